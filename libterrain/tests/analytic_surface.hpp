@@ -86,7 +86,7 @@ class AnalyticSurface final : public TileSurface {
     }
   }
 
-  /// A number of all samples: nothing tells what lies between them.
+  /// Hashes all samples; the surface between them is unknown.
   std::uint64_t digest(const GeographicBox& /*box*/) override {
     Digest digest;
     for (const double height : samples_) digest.add(height);
@@ -95,7 +95,7 @@ class AnalyticSurface final : public TileSurface {
     return digest.value();
   }
 
-  bool in_rows = true;  ///< whether it says so
+  bool in_rows = true;  ///< whether part() returns rows
 
  private:
   [[nodiscard]] double longitude(int column) const { return west_ + step_ * column; }

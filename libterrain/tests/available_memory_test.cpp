@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Folders like those of /proc and of cgroups.
+/// Folders like those in /proc and of cgroups.
 class CgroupMemory : public testing::Test {
  protected:
   CgroupMemory() {
@@ -29,7 +29,7 @@ class CgroupMemory : public testing::Test {
     fs::create_directories((root_ / path).parent_path());
     std::ofstream(root_ / path) << text << '\n';
   }
-  /// A line of mountinfo for the folder "cg".
+  /// Returns a line of mountinfo for the folder "cg".
   [[nodiscard]] std::string mount(const std::string& shown, const std::string& type) const {
     return "30 23 0:26 / / rw - ext4 /dev/sda rw\n31 23 0:26 " + shown + " " +
            (root_ / "cg").string() + " rw,nosuid shared:4 - " + type;
@@ -43,7 +43,7 @@ class CgroupMemory : public testing::Test {
 
 TEST_F(CgroupMemory, IsUnlimitedWithoutCgroups) { EXPECT_EQ(limit(), std::nullopt); }
 
-TEST_F(CgroupMemory, OfVersion2IsTheSmallestOnTheWayUp) {
+TEST_F(CgroupMemory, ReadsSmallestLimitOfVersion2Ancestors) {
   write("proc/cgroup", "0::/slice/job/step");
   write("proc/mountinfo", mount("/", "cgroup2 cgroup2 rw,nsdelegate"));
   write("cg/slice/job/step/memory.max", "max");
@@ -58,7 +58,7 @@ TEST_F(CgroupMemory, OfVersion2IsTheSmallestOnTheWayUp) {
   EXPECT_EQ(limit(), 1500000000u);
 }
 
-TEST_F(CgroupMemory, OfVersion1IsTheMemoryControllers) {
+TEST_F(CgroupMemory, ReadsMemoryControllerOfVersion1) {
   write("proc/cgroup", "5:cpu,cpuacct:/other\n4:memory:/job/step\n0::/");
   write("proc/mountinfo", mount("/", "cgroup cgroup rw,memory"));
   write("cg/job/step/memory.limit_in_bytes", "9223372036854771712");
@@ -67,8 +67,8 @@ TEST_F(CgroupMemory, OfVersion1IsTheMemoryControllers) {
   EXPECT_EQ(limit(), 1000000000u);
 }
 
-/// The mount shows the container's own cgroup, and /proc names it from the host's root.
-TEST_F(CgroupMemory, OfAContainerIsFoundWhereTheMountShowsIt) {
+/// The mount shows the container's own cgroup, while /proc names it from the host's root.
+TEST_F(CgroupMemory, ReadsLimitInsideContainerMount) {
   write("proc/cgroup", "4:memory:/docker/abc/step");
   write("proc/mountinfo", mount("/docker/abc", "cgroup cgroup rw,memory"));
   write("cg/memory.limit_in_bytes", "700000000");
@@ -78,7 +78,7 @@ TEST_F(CgroupMemory, OfAContainerIsFoundWhereTheMountShowsIt) {
   EXPECT_EQ(limit(), 600000000u);
 }
 
-TEST(AvailableMemory, KeepsWithinTheLimitsOfTheProcess) {
+TEST(AvailableMemory, RespectsProcessLimits) {
 #ifdef __has_feature
 #if __has_feature(thread_sanitizer) || __has_feature(address_sanitizer)
   GTEST_SKIP() << "the sanitizer's own memory exceeds the limits that are set here";

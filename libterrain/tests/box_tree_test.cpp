@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Boxes found in a tree against looking at each of them.
+// Compares boxes found in a tree with a linear search.
 #include "surface/box_tree.hpp"
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 namespace {
 
-TEST(BoxTree, VisitsWhatMeetsABox) {
+TEST(BoxTree, VisitsBoxesThatMeetAQuery) {
   BoxTree tree;
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -26,7 +26,7 @@ TEST(BoxTree, VisitsWhatMeetsABox) {
       }
       return box;
     };
-    // None, one, some; the numbers are any.
+    // None, one, several; with arbitrary numbers.
     std::vector<BoxTree::Item>& items = tree.start();
     for (std::uint64_t i = 0; i < seed * (seed - 1) / 2; ++i) {
       items.push_back({random_box(8), static_cast<std::uint32_t>(7 * i)});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contour lines of random lattices with plateaus and holes: each crossing of an edge by a level is
-// on one line, ends lie at borders only, and bands do not matter.
+// on one line, ends are only at borders, and bands do not matter.
 #include "contour/contour_lines.hpp"
 
 #include <algorithm>
@@ -56,7 +56,7 @@ Drawn draw(const std::vector<double>& lattice, double interval, std::int64_t ban
 
 using Edge = std::pair<std::int64_t, std::int64_t>;
 
-/// How many triangles there are at each edge, by the rule of lattice_surface.hpp.
+/// Returns the number of triangles at each edge, by the rule of lattice_surface.hpp.
 std::map<Edge, int> edges_of(const std::vector<double>& lattice) {
   std::map<Edge, int> edges;
   const auto add = [&](std::int64_t a, std::int64_t b, std::int64_t c) {
@@ -81,7 +81,7 @@ std::map<Edge, int> edges_of(const std::vector<double>& lattice) {
   return edges;
 }
 
-TEST(ContourLines, ComeInTheSameOrderByBandsOfAnySize) {
+TEST(ContourLines, KeepOrderForAnyBandSize) {
   const std::vector<double> lattice = random_lattice(7, 40, 9);
   const Drawn large = draw(lattice, 5, 256), small = draw(lattice, 5, 2);
   ASSERT_EQ(large.lines.size(), small.lines.size());
@@ -90,7 +90,7 @@ TEST(ContourLines, ComeInTheSameOrderByBandsOfAnySize) {
   }
 }
 
-TEST(ContourLines, AreTheSameOnAnyNumberOfThreads) {
+TEST(ContourLines, DoNotDependOnThreads) {
   const std::vector<double> lattice = random_lattice(7, 40, 9);
   const Drawn one = draw(lattice, 5, 10), several = draw(lattice, 5, 10, 4);
   ASSERT_GT(one.lines.size(), 10u);
@@ -102,13 +102,13 @@ TEST(ContourLines, AreTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(one.segments, several.segments);
 }
 
-TEST(ContourLines, CrossEveryEdgeWhoseEndsStraddleALevelAndEndAtBordersOnly) {
+TEST(ContourLines, CrossEveryStraddlingEdgeAndEndOnlyAtBorders) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     SCOPED_TRACE(seed);
     auto lattice = random_lattice(seed, seed % 3 == 0 ? 3 : 40, static_cast<int>(seed % 4) * 5);
     const double interval = seed % 2 == 0 ? 1 : 3.5;
     if (seed % 2 == 1) {
-      // No sample lies at a level.
+      // No sample is at a level.
       for (double& height : lattice) height += 0.25;
     }
     const Drawn drawn = draw(lattice, interval, kRows);
@@ -132,7 +132,7 @@ TEST(ContourLines, CrossEveryEdgeWhoseEndsStraddleALevelAndEndAtBordersOnly) {
         ++open;
       }
     }
-    // Where samples lie at levels, lines may shrink to points, which are not written.
+    // Where samples are at levels, lines may shrink to points, which are not written.
     EXPECT_LE(2 * open, ends);
     if (seed % 2 == 1) {
       EXPECT_EQ(2 * open, ends);
@@ -160,8 +160,8 @@ TEST(ContourLines, DoNotDependOnBands) {
   }
 }
 
-TEST(ContourLines, APlateauHasItsLineOnTheUpperSideAndACraterOneRing) {
-  // A plateau at a level: counted as below it, so the line runs where the ground rises from it.
+TEST(ContourLines, DrawPlateauOnUpperSideAndCraterAsOneRing) {
+  // A plateau at a level counts as below it, so the line is where the ground rises from it.
   std::vector<double> lattice(kColumns * kRows, 10);
   for (std::int64_t row = 0; row < kRows; ++row) {
     for (std::int64_t column = 12; column < kColumns; ++column) {

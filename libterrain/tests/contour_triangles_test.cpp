@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Contour lines of Delaunay triangulations, in parts and whole, against the segments of every
-// triangle by itself.
+// Compares contour lines of Delaunay triangulations, in parts and whole, with the segments of every
+// single triangle.
 #include "contour/contour_triangles.hpp"
 
 #include <algorithm>
@@ -29,12 +29,12 @@ using PlaneEdge = std::pair<Point2, Point2>;
 struct Surface {
   std::vector<Triangle> triangles;
   std::vector<Point2> points;
-  tri::Delaunay2<double> whole;  ///< of which these are the triangles, in order
-  std::vector<double> heights;   ///< by slot
+  tri::Delaunay2<double> whole;  ///< the triangulation of these triangles, in order
+  std::vector<double> heights;   ///< by vertex slot
 };
 
-/// Points in a square of side 100 at an offset. kind 0: anywhere; 1: whole numbers, few heights; 2:
-/// crowds; 3: on one line but for one.
+/// Makes points in a square of side 100 at an offset. kind 0: anywhere; 1: integers, few heights;
+/// 2: clustered; 3: all but one on a line.
 Surface random_surface(std::uint64_t seed, int kind, std::size_t count, double interval) {
   std::mt19937_64 random(seed);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -68,9 +68,10 @@ Surface random_surface(std::uint64_t seed, int kind, std::size_t count, double i
   return surface;
 }
 
-/// Each triangle by itself; direction by the gradient. Equal ends are left out.
+/// Returns the segments of every single triangle, directed by the gradient, without those of zero
+/// length.
 std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, double interval) {
-  // The intervals have at most one decimal, and so have the heights of their multiples.
+  // The intervals, and so the heights of their multiples, have at most one decimal.
   const auto height = [&](std::int64_t level) {
     return std::round(10 * interval * static_cast<double>(level)) / 10;
   };
@@ -109,7 +110,7 @@ struct DrawnParts {
   std::uint64_t most_open = 0, left_open = 0;
 };
 
-/// The plane around the points in squares of one size, those in a row one after the other.
+/// Divides the plane around the points into equal squares, numbered row by row.
 struct Parts {
   Point2 low{};
   double size = 1;
@@ -161,7 +162,7 @@ std::multiset<Segment> segments_of(const std::vector<ContourLine>& lines) {
   return segments;
 }
 
-TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
+TEST(ContourTriangles, MatchSegmentsOfTrianglesAndEndOnlyAtHull) {
   for (std::uint64_t seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     const int kind = static_cast<int>(seed % 4);
@@ -169,7 +170,7 @@ TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
     const Surface surface = random_surface(seed, kind, 60 + 40 * seed, interval);
     const auto expected = segments_of(surface.triangles, interval);
     ASSERT_FALSE(expected.empty());
-    // The hull's crossings are where lines end.
+    // Lines end at crossings of the hull.
     std::map<PlaneEdge, int> edges;
     for (const Triangle& t : surface.triangles) {
       for (std::size_t i = 0; i < 3; ++i) {
@@ -201,7 +202,7 @@ TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
           ++open;
         }
       }
-      // With whole heights, lines may shrink to points, which are not written.
+      // With integer heights, lines may shrink to points, which are not written.
       EXPECT_LE(2 * open, ends);
       if (kind != 1) {
         EXPECT_EQ(2 * open, ends);
@@ -210,7 +211,7 @@ TEST(ContourTriangles, AreTheSegmentsOfAllTrianglesAndEndAtTheHullOnly) {
   }
 }
 
-/// As draw() does, each part by a tracer.
+/// As draw(), with a tracer for each part.
 std::vector<ContourLine> trace(const Surface& surface, const Parts& parts, double interval,
                                const std::function<bool(tri::TriangleId)>& wanted) {
   const tri::Delaunay2<double>& whole = surface.whole;
@@ -240,8 +241,8 @@ std::vector<ContourLine> trace(const Surface& surface, const Parts& parts, doubl
   return lines;
 }
 
-TEST(PartTracer, FindsTheLinesThatSegmentsMakeInTheirOrder) {
-  // Each kind, however few.
+TEST(PartTracer, FindsLinesInSegmentOrder) {
+  // Every kind, even if only a few are tested.
   constexpr std::uint64_t kStep = TERRACE_TEST_SHARE == 1 ? 1 : 5;
   for (std::uint64_t seed = 51; seed <= 74; seed += kStep) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -274,7 +275,7 @@ TEST(PartTracer, FindsTheLinesThatSegmentsMakeInTheirOrder) {
   }
 }
 
-TEST(ContourTriangles, EndWhereTrianglesAreLeftOut) {
+TEST(ContourTriangles, EndAtOmittedTriangles) {
   for (std::uint64_t seed = 41; seed <= 48; ++seed) {
     SCOPED_TRACE(seed);
     Surface surface = random_surface(seed, 0, 900, 2);
@@ -286,7 +287,7 @@ TEST(ContourTriangles, EndWhereTrianglesAreLeftOut) {
   }
 }
 
-TEST(ContourTriangles, LinesLeaveAsSoonAsTheyAreWhole) {
+TEST(ContourTriangles, EmitLinesAsSoonAsComplete) {
   const Surface surface = random_surface(7, 0, 4000, 1);
   const DrawnParts drawn = draw(surface.triangles, Parts(surface.points, 8), 1);
   std::uint64_t points = 0;
@@ -294,7 +295,7 @@ TEST(ContourTriangles, LinesLeaveAsSoonAsTheyAreWhole) {
   EXPECT_LT(drawn.most_open, points / 2);
 }
 
-TEST(ContourTriangles, TheOrderIsThatOfThePlaces) {
+TEST(ContourTriangles, OrderDependsOnlyOnPlaces) {
   const Surface surface = random_surface(9, 1, 600, 4);
   std::vector<Triangle> shuffled = surface.triangles;
   std::mt19937_64 random(3);
@@ -312,7 +313,7 @@ TEST(ContourTriangles, TheOrderIsThatOfThePlaces) {
   }
 }
 
-TEST(ContourTriangles, TheLimitOfOpenLinesIsKept) {
+TEST(ContourTriangles, RespectLimitOfOpenLines) {
   const Surface surface = random_surface(5, 0, 2000, 0.5);
   ContourTriangles contours(0.5, [](const ContourLine&) {}, {.points = 100, .exceeded = [] {
                                                                throw std::length_error("too many");
@@ -320,12 +321,12 @@ TEST(ContourTriangles, TheLimitOfOpenLinesIsKept) {
   EXPECT_THROW(contours.add(surface.triangles), std::length_error);
 }
 
-TEST(ContourTriangles, APitAtALevelHasNoLineAndAPlateauOneOnItsUpperSide) {
+TEST(ContourTriangles, DrawNoLineAroundPitAndOneAbovePlateau) {
   const ContourLevels levels(0.1);
   const auto corner = [&](double x, double y, double height) {
     return ContourTriangles::Corner{{x, y}, height, levels.at_or_above(height), 0};
   };
-  // A fan of triangles around a vertex at 0.3, three times 0.1 as it is written.
+  // A fan of triangles around a vertex at 0.3, the decimal product of three and 0.1.
   const double pit = levels.height(3);
   std::vector<Triangle> fan;
   for (int i = 0; i < 6; ++i) {

@@ -22,7 +22,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// What a file says that has nothing but WKT, or nothing but a code.
+/// The CRS of a file that contains only WKT, or only a code.
 stream::Crs crs_of_wkt(const std::string& wkt) {
   stream::Crs crs;
   crs.wkt = wkt;
@@ -34,7 +34,7 @@ stream::Crs crs_of_code(int code) {
   return crs;
 }
 
-TEST(CoordinateSystem, KnowsWhatTheCodesMeasureIn) {
+TEST(CoordinateSystem, KnowsUnitsOfCodes) {
   for (const char* code : {"EPSG:4326", "epsg:4258", "EPSG:4269", "EPSG:4979"}) {
     EXPECT_TRUE(CoordinateSystem::parse(code).is_geographic()) << code;
     EXPECT_EQ(CoordinateSystem::parse(code).crs().horizontal_unit, "degree");
@@ -49,7 +49,7 @@ TEST(CoordinateSystem, KnowsWhatTheCodesMeasureIn) {
   EXPECT_EQ(CoordinateSystem::parse("EPSG:900913").crs().epsg, 3857);
 }
 
-TEST(CoordinateSystem, RefusesOtherText) {
+TEST(CoordinateSystem, RejectsInvalidText) {
   for (const char* text : {"", "32632", "EPSG:", "EPSG:x", "EPSG:12", "EPSG:99999", "EPSG:4326 ",
                            "EPSG:4326+", "EPSG:4326+4326", "EPSG:5703", "no/such/file.prj",
                            "PROJCS[\"x\"", "GEOGCS[\"x\"]", "LOCAL_CS[\"x\",UNIT[\"metre\",1]]",
@@ -58,7 +58,7 @@ TEST(CoordinateSystem, RefusesOtherText) {
   }
 }
 
-TEST(CoordinateSystem, FilesOfArcInfosOldFormAreRead) {
+TEST(CoordinateSystem, ReadsOldArcInfoFiles) {
   const tests::TemporaryFolder folder;
   const std::string path = (folder.path() / "dem.prj").string();
   const auto code_of = [&](const std::string& text) {
@@ -84,7 +84,7 @@ TEST(CoordinateSystem, FilesOfArcInfosOldFormAreRead) {
   }
 }
 
-TEST(CoordinateSystem, ReadsWhatPeopleWrite) {
+TEST(CoordinateSystem, ReadsCommonSpellings) {
   const CoordinateSystem known = CoordinateSystem::parse("EPSG:32632");
   const std::string json =
       R"({"type":"ProjectedCRS","name":"zone 32","base_crs":{"name":"WGS 84","datum":{"type":)"
@@ -114,9 +114,9 @@ TEST(CoordinateSystem, ReadsWhatPeopleWrite) {
   EXPECT_TRUE(CoordinateSystem::of(esri.crs(), "store")->same_places(esri));
 }
 
-/// What LAS, LAZ, COPC and GeoTIFF are given is read as the same system, whichever way the axes
-/// point.
-TEST(CoordinateSystem, WhatFilesAreGivenReadsBack) {
+/// The records in LAS, LAZ, COPC and GeoTIFF are read as the same system, whatever the directions
+/// of its axes.
+TEST(CoordinateSystem, ReadsBackRecordsOfFiles) {
   for (const char* const code :
        {"EPSG:5513", "EPSG:2065", "EPSG:8352", "EPSG:8044", "EPSG:8045", "EPSG:5514", "EPSG:2053",
         "EPSG:32632", "EPSG:25832+7837", "EPSG:4326", "EPSG:4979", "EPSG:31468", "ESRI:102067"}) {
@@ -131,12 +131,12 @@ TEST(CoordinateSystem, WhatFilesAreGivenReadsBack) {
     ASSERT_TRUE(keyed);
     EXPECT_TRUE(keyed->same_places(known));
   }
-  // WKT 1 wherever it says all.
+  // WKT 1 if it can express the system.
   EXPECT_TRUE(CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt.starts_with("PROJCS["));
 }
 
-/// One system as files spell it.
-TEST(CoordinateSystem, DescriptionsOfOneSystemAreTheSame) {
+/// One system in the spellings of different files.
+TEST(CoordinateSystem, RecognisesEqualDescriptions) {
   const CoordinateSystem utm = CoordinateSystem::parse("EPSG:25832");
   const auto keys = [](std::vector<std::pair<std::uint16_t, double>> values) {
     stream::Crs crs;
@@ -172,7 +172,7 @@ TEST(CoordinateSystem, DescriptionsOfOneSystemAreTheSame) {
   }
 }
 
-TEST(CoordinateSystem, AGeocentricSystemIsNamedButHasNoTerrain) {
+TEST(CoordinateSystem, NamesGeocentricSystems) {
   const stream::Crs crs = crs_named("EPSG:4978");
   EXPECT_EQ(crs.epsg, 0);
   EXPECT_EQ(crs.horizontal_unit, "metre");
@@ -183,13 +183,13 @@ TEST(CoordinateSystem, AGeocentricSystemIsNamedButHasNoTerrain) {
   EXPECT_THROW(CoordinateSystem::parse("EPSG:4978"), UsageError);
 }
 
-TEST(CoordinateSystem, HeightsOfTheCodes) {
+TEST(CoordinateSystem, ReadsHeightReferenceOfCodes) {
   const auto heights = [](const char* text) { return CoordinateSystem::parse(text).heights(); };
   EXPECT_EQ(heights("EPSG:32632"), Heights::unknown);
   EXPECT_EQ(heights("EPSG:4979"), Heights::ellipsoidal);
   EXPECT_EQ(heights("EPSG:32632+5773"), Heights::orthometric);
   EXPECT_EQ(heights("EPSG:4326+5030"), Heights::ellipsoidal);
-  EXPECT_EQ(heights("EPSG:4326+4979"), Heights::ellipsoidal);  // as GeoTIFF 1.1 has EPSG:4979
+  EXPECT_EQ(heights("EPSG:4326+4979"), Heights::ellipsoidal);  // as GeoTIFF 1.1 uses EPSG:4979
   EXPECT_EQ(heights("EPSG:5555"), Heights::orthometric);       // compound: UTM 32 and DHHN92
   EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().epsg, 25832);
   EXPECT_EQ(CoordinateSystem::parse("EPSG:5555").crs().vertical_epsg, 5783);
@@ -201,7 +201,7 @@ TEST(CoordinateSystem, HeightsOfTheCodes) {
 }
 
 // Guidance Note 7-2 (2019), the examples of sections 3.1 to 3.5 that have an EPSG code.
-TEST(CoordinateSystem, ExamplesOfTheGuidanceNote) {
+TEST(CoordinateSystem, MatchesExamplesOfGuidanceNote) {
   struct Example {
     const char* crs;
     Point2 degrees, plane;
@@ -226,14 +226,14 @@ TEST(CoordinateSystem, ExamplesOfTheGuidanceNote) {
     EXPECT_NEAR(place[0], example.plane[0], example.tolerance);
     EXPECT_NEAR(place[1], example.plane[1], example.tolerance);
     system.to_own_geographic({&place, 1});
-    // A tenth of a micrometre by GeographicLib, a millimetre by PROJ's series for equal areas.
+    // A tenth of a micrometre for GeographicLib, a millimetre for PROJ's series for equal areas.
     const double exact = system.definition().method ? 1e-12 : 1e-8;
     EXPECT_NEAR(place[0], example.degrees[0], exact);
     EXPECT_NEAR(place[1], example.degrees[1], exact);
   }
 }
 
-TEST(CoordinateSystem, WktOfOtherDialects) {
+TEST(CoordinateSystem, ReadsOtherWktDialects) {
   const auto same = [](const std::string& wkt, const char* code) {
     const CoordinateSystem read = CoordinateSystem::parse(wkt),
                            known = CoordinateSystem::parse(code);
@@ -247,7 +247,7 @@ TEST(CoordinateSystem, WktOfOtherDialects) {
       R"(GEOGCS["GCS_North_American_1983",DATUM["D_North_American_1983",SPHEROID["GRS_1980",)"
       R"(6378137.0,298.257222101]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]])";
   same(wgs84, "EPSG:4326");
-  // ESRI's.
+  // ESRI's form.
   same("PROJCS[\"WGS_1984_UTM_Zone_32N\"," + wgs84 +
            R"(,PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],)"
            R"(PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",9.0],)"
@@ -273,7 +273,7 @@ TEST(CoordinateSystem, WktOfOtherDialects) {
            R"(PARAMETER["False_Northing",0.0],PARAMETER["Central_Meridian",0.0],)"
            R"(PARAMETER["Standard_Parallel_1",-71.0],UNIT["Meter",1.0]])",
        "EPSG:3031");
-  // GDAL's.
+  // GDAL's form.
   same("PROJCS[\"WGS 84 / Pseudo-Mercator\"," + wgs84 +
            R"(,PROJECTION["Mercator_1SP"],PARAMETER["central_meridian",0],)"
            R"(PARAMETER["scale_factor",1],PARAMETER["false_easting",0],)"
@@ -289,7 +289,7 @@ TEST(CoordinateSystem, WktOfOtherDialects) {
        "EPSG:3413");
 }
 
-TEST(CoordinateSystem, WktThatContradictsItselfIsRefused) {
+TEST(CoordinateSystem, RejectsContradictoryWkt) {
   const std::string good = CoordinateSystem::parse("EPSG:32632").crs().wkt;
   EXPECT_NO_THROW(definition_of_contents(good));
   const auto broken = [&good](const std::string& from, const std::string& to) {
@@ -304,7 +304,7 @@ TEST(CoordinateSystem, WktThatContradictsItselfIsRefused) {
   EXPECT_THROW(definition_of_contents(broken("0.9996", "nan")), CrsError);
 }
 
-TEST(CoordinateSystem, AFileMaySpellACrsAsItLikes) {
+TEST(CoordinateSystem, ReadsAnySpellingInFiles) {
   const auto title = [](const std::string& text) {
     try {
       return definition_of_contents(text).title();
@@ -330,7 +330,7 @@ TEST(CoordinateSystem, AFileMaySpellACrsAsItLikes) {
   }
   EXPECT_EQ(definition_of_contents("EPSG:25832+7837").vertical_epsg, 7837);
   EXPECT_EQ(title(" \n"), "refused: the definition is empty");
-  // It does not lead to another file.
+  // It must not lead to another file.
   const tests::TemporaryFolder folder;
   const std::string file = (folder.path() / "a.prj").string();
   std::ofstream(file) << "EPSG:32632";
@@ -339,7 +339,7 @@ TEST(CoordinateSystem, AFileMaySpellACrsAsItLikes) {
   EXPECT_EQ(local_crs_of(crs_of_wkt(file)), std::nullopt);
 }
 
-TEST(CoordinateSystem, WktMayHaveParentheses) {
+TEST(CoordinateSystem, ReadsWktWithParentheses) {
   for (const std::string& brackets : {CoordinateSystem::parse("EPSG:32632").crs().wkt,
                                       CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt}) {
     std::string text = brackets;
@@ -354,7 +354,7 @@ TEST(CoordinateSystem, WktMayHaveParentheses) {
   }
 }
 
-TEST(CoordinateSystem, TextThatTakesLongToReadIsRefused) {
+TEST(CoordinateSystem, RejectsExpensiveText) {
   const auto repeated = [](const std::string& text, int times) {
     std::string all;
     for (int i = 0; i < times; ++i) all += text;
@@ -378,7 +378,7 @@ TEST(CoordinateSystem, TextThatTakesLongToReadIsRefused) {
   const std::string members = "{\"type\":\"GeographicCRS\",\"datum_ensemble\":{\"members\":[" +
                               repeated("{\"name\":\"a\"},", 3000) + "1]}}";
   EXPECT_NE(refusal(members).find("too many parts"), std::string::npos);
-  // Wherever text comes from: a file's WKT, ESRI's citation in GeoTIFF, the caller.
+  // From every source of text: a file's WKT, ESRI's citation in GeoTIFF, the caller.
   stream::Crs crs;
   crs.wkt = members;
   EXPECT_THROW(definition_of(crs), CrsError);
@@ -397,7 +397,7 @@ constexpr char kOwnDatum[] =
     R"(PARAMETER["scale_factor",1],PARAMETER["false_easting",400000],)"
     R"(PARAMETER["false_northing",-100000],UNIT["metre",1]])";
 
-TEST(CoordinateSystem, ADatumThatNobodyKnowsNeedsAShift) {
+TEST(CoordinateSystem, UnknownDatumNeedsShift) {
   const CoordinateSystem bare = CoordinateSystem::parse(kOwnDatum);
   EXPECT_FALSE(bare.reaches_wgs84());
   try {
@@ -418,32 +418,32 @@ TEST(CoordinateSystem, ADatumThatNobodyKnowsNeedsAShift) {
 // Ordnance Survey's seven parameters.
 constexpr DatumShift kBritish{446.448, -125.157, 542.060, 0.1502, 0.2470, 0.8421, -20.4894};
 
-TEST(CoordinateSystem, AShiftGoesBeforeTheDatabase) {
+TEST(CoordinateSystem, ShiftOverridesDatabase) {
   const CoordinateSystem bare = CoordinateSystem::parse("EPSG:27700");
   const CoordinateSystem shifted = CoordinateSystem::parse("EPSG:27700", kBritish);
   EXPECT_FALSE(bare.same_places(shifted));
-  // cs2cs of PROJ 9.1.1, with +towgs84.
+  // The result of cs2cs of PROJ 9.1.1, with +towgs84.
   const Point2 place = shifted.to_geographic(Point2{530000, 180000});
   EXPECT_NEAR(place[0], -0.1285, 1e-3);
   EXPECT_NEAR(place[1], 51.5037, 1e-3);
   const Point2 back = shifted.from_geographic(place);
-  EXPECT_NEAR(back[0], 530000, 0.01);  // heights between the ellipsoids are left out
+  EXPECT_NEAR(back[0], 530000, 0.01);  // heights between the ellipsoids are ignored
   EXPECT_NEAR(back[1], 180000, 0.01);
-  // As a store keeps it.
+  // As a store records it.
   const auto again = CoordinateSystem::of(shifted.crs(), "store");
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->same_places(shifted));
   EXPECT_EQ(again->to_geographic(Point2{530000, 180000}), place);
-  // Between systems of one datum no operation is needed.
+  // No operation is needed between systems of one datum.
   Point2 own{400000, 100000};
   Transformation(bare, CoordinateSystem::parse("EPSG:4277")).forward({&own, 1});
   EXPECT_NEAR(own[0], -2, 1e-12);
-  // A shift for what counts as WGS 84 is not one.
+  // A shift is ignored for a system that counts as WGS 84.
   EXPECT_TRUE(CoordinateSystem::parse("EPSG:25832", kBritish)
                   .same_places(CoordinateSystem::parse("EPSG:25832")));
 }
 
-TEST(CoordinateSystem, NamesTheOperationAndABetterOne) {
+TEST(CoordinateSystem, NamesOperationAndBetterAlternative) {
   const auto over = [](const char* text, double x, double y) {
     return CoordinateSystem::parse(text).over({{x, y, 0}, {x + 1000, y + 1000, 0}});
   };
@@ -451,7 +451,7 @@ TEST(CoordinateSystem, NamesTheOperationAndABetterOne) {
   EXPECT_TRUE(etrs.counts_as_wgs84());
   EXPECT_EQ(etrs.to_wgs84().accuracy(), 1);
   EXPECT_EQ(CoordinateSystem().to_wgs84().accuracy(), 0);
-  // The one for all of Czechoslovakia is off by 6 m; that for the place by 1 m.
+  // The operation for all of Czechoslovakia is off by 6 m, the one for this place by 1 m.
   const CoordinateSystem krovak = over("EPSG:5514", -742000, -1043000);
   EXPECT_EQ(krovak.to_wgs84().accuracy(), 1) << krovak.wgs84_note();
   const CoordinateSystem british = over("EPSG:27700", 530000, 180000);
@@ -460,7 +460,7 @@ TEST(CoordinateSystem, NamesTheOperationAndABetterOne) {
   if (!british.to_wgs84().better().empty()) {
     EXPECT_NE(british.to_wgs84().better().find("OSTN15"), std::string::npos);
   }
-  // Without the grid between the two Swiss datums the way leads by WGS 84, and says so.
+  // Without the grid between the two Swiss datums the conversion goes through WGS 84, and says so.
   const Transformation swiss(over("EPSG:21781", 600000, 200000),
                              CoordinateSystem::parse("EPSG:2056"));
   EXPECT_NE(swiss.note().find("CH1903"), std::string::npos) << swiss.note();
@@ -470,8 +470,8 @@ TEST(CoordinateSystem, NamesTheOperationAndABetterOne) {
   EXPECT_NEAR(place[1], 1200000, 2);
 }
 
-/// As cs2cs of PROJ 9.1.1 with Debian's proj-data has them.
-TEST(CoordinateSystem, NationalGrids) {
+/// The results of cs2cs of PROJ 9.1.1 with Debian's proj-data.
+TEST(CoordinateSystem, MatchesNationalGrids) {
   struct Grid {
     const char* crs;
     Point2 plane, own, wgs84;
@@ -504,7 +504,7 @@ TEST(CoordinateSystem, NationalGrids) {
   }
 }
 
-TEST(CoordinateSystem, ManyThreadsShareOne) {
+TEST(CoordinateSystem, IsThreadSafe) {
   const CoordinateSystem shared =
       CoordinateSystem::parse("EPSG:5514").over({{-743000, -1044000, 0}, {-741000, -1042000, 0}});
   const CoordinateSystem alone =
@@ -530,7 +530,7 @@ TEST(CoordinateSystem, ManyThreadsShareOne) {
   EXPECT_EQ(wrong, (std::array<int, 4>{}));
 }
 
-TEST(CoordinateSystem, PolesAndPlacesThatAreNone) {
+TEST(CoordinateSystem, HandlesPolesAndInvalidPlaces) {
   const auto forward = [](const char* crs, Point2 place) {
     return CoordinateSystem::parse(crs).from_geographic(place);
   };
@@ -542,7 +542,7 @@ TEST(CoordinateSystem, PolesAndPlacesThatAreNone) {
   EXPECT_NEAR(forward("EPSG:3413", {123, 90})[0], 0, 1e-6);
   EXPECT_NEAR(forward("EPSG:32661", {0, 90})[1], 2000000, 1e-6);
   EXPECT_TRUE(std::isnan(forward("EPSG:3413", {0, -90})[0]));
-  // Across the antimeridian longitudes are the same place by any count.
+  // Longitudes beyond the antimeridian are the same place.
   const Point2 east = forward("EPSG:32660", {181, 10}), west = forward("EPSG:32660", {-179, 10});
   EXPECT_NEAR(east[0], west[0], 1e-8);
   EXPECT_LT(CoordinateSystem::parse("EPSG:32660").to_geographic(east)[0], -178.99);
@@ -566,8 +566,8 @@ std::vector<std::vector<double>> rows_of(const std::string& name) {
   return rows;
 }
 
-// GeographicLib's exact projection (elliptic functions): metres without false origin.
-TEST(CoordinateSystem, ExactTransverseMercator) {
+// GeographicLib's exact projection (elliptic functions), in metres without a false origin.
+TEST(CoordinateSystem, MatchesExactTransverseMercator) {
   const auto rows = rows_of("utm_tm_exact_2000.tsv");
   if (rows.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
   ASSERT_EQ(rows.size(), 2000u);
@@ -595,7 +595,7 @@ stream::Crs keys(std::vector<stream::GeoKey> list) {
   return crs;
 }
 
-TEST(GeoKeys, UserDefinedProjections) {
+TEST(GeoKeys, ReadUserDefinedProjections) {
   const auto same = [](std::vector<stream::GeoKey> list, const char* code) {
     const auto system = CoordinateSystem::of(keys(std::move(list)), "file");
     ASSERT_TRUE(system);
@@ -650,7 +650,7 @@ TEST(GeoKeys, UserDefinedProjections) {
         {3074, {16032}, ""},
         {3076, {9001}, ""}},
        "EPSG:32632");
-  // The false easting is in feet as the unit is.
+  // The false easting is in feet, like the unit.
   same({{1024, {1}, ""},
         {2048, {4269}, ""},
         {3072, {32767}, ""},
@@ -665,7 +665,7 @@ TEST(GeoKeys, UserDefinedProjections) {
        "EPSG:2263");
 }
 
-TEST(GeoKeys, ACodeOfTheDatumCountsBesideTheNumbersOfItsEllipsoid) {
+TEST(GeoKeys, UseDatumCodeThatMatchesEllipsoid) {
   const auto with = [](double inverse_flattening) {
     return keys({{1024, {1}, ""},
                  {2048, {32767}, ""},
@@ -694,7 +694,7 @@ TEST(GeoKeys, ACodeOfTheDatumCountsBesideTheNumbersOfItsEllipsoid) {
   EXPECT_FALSE(CoordinateSystem::of(with(294.978698214), "file")->reaches_wgs84());
 }
 
-TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
+TEST(GeoKeys, RejectAndNameContradictions) {
   const std::vector<std::vector<stream::GeoKey>> lists{
       {{1024, {1}, ""}, {3072, {32632}, ""}, {3076, {9002}, ""}},
       {{1024, {1}, ""}, {2048, {4269}, ""}, {3072, {32632}, ""}},
@@ -721,7 +721,7 @@ TEST(GeoKeys, ContradictionsAreRefusedAndNamed) {
                                    "dem.tif"));
 }
 
-TEST(GeoKeys, ThePlaneOfAMapStandsOnAGeographicSystem) {
+TEST(GeoKeys, RequireGeographicBase) {
   for (const double base : {4978.0, 4389.0, 32632.0, 5703.0}) {  // geocentric, projected, heights
     const stream::Crs crs = keys({{1024, {1}, ""},
                                   {2048, {base}, ""},
@@ -739,8 +739,8 @@ TEST(GeoKeys, ThePlaneOfAMapStandsOnAGeographicSystem) {
   }
 }
 
-/// GDAL writes both without a model of GeoTIFF's.
-TEST(GeoKeys, ADefinitionOfEsriIsReadAndALocalSystemIsNone) {
+/// GDAL writes both without a GeoTIFF model.
+TEST(GeoKeys, ReadEsriDefinitionsAndIgnoreLocalSystems) {
   stream::Crs crs;
   crs.geo_keys = {{1024, {32767}, ""}, {2048, {4326}, ""}, {3076, {9001}, ""}};
   crs.name =
@@ -759,7 +759,7 @@ TEST(GeoKeys, ADefinitionOfEsriIsReadAndALocalSystemIsNone) {
   EXPECT_FALSE(CoordinateSystem::of(crs, "dem.tif"));
 }
 
-TEST(GeoKeys, MethodsThatEpsgDoesNotNumberAreThoseOfProj) {
+TEST(GeoKeys, UseProjForMethodsWithoutEpsgCode) {
   const std::vector<std::pair<int, std::string>> methods{
       {12, "aeqd +lat_0=46"},  {13, "eqdc +lat_0=46 +lat_1=40 +lat_2=50"},
       {14, "stere +lat_0=46"}, {17, "eqc +lat_ts=40"},
@@ -806,7 +806,7 @@ TEST(GeoKeys, MethodsThatEpsgDoesNotNumberAreThoseOfProj) {
   }
 }
 
-TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
+TEST(GeoKeys, RejectCodesBeyond16Bits) {
   for (const double code : {4326.5, -4326.0, 1e300}) {
     stream::Crs crs;
     crs.geo_keys = {{1024, {2}, ""}, {2048, {code}, ""}};
@@ -819,7 +819,7 @@ TEST(GeoKeys, ACodeIsAWholeNumberOf16Bits) {
   }
 }
 
-TEST(GeoKeys, ImpossibleNumbersAreRefused) {
+TEST(GeoKeys, RejectImpossibleNumbers) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<std::vector<stream::GeoKey>> lists{
       {{1024, {2}, ""}, {2048, {32767}, ""}, {2057, {-1}, ""}, {2059, {300}, ""}},
@@ -838,9 +838,9 @@ TEST(GeoKeys, ImpossibleNumbersAreRefused) {
   }
 }
 
-/// What a store keeps of such a system used to be refused when it was read: it contradicted the
-/// code that the name had given it.
-TEST(Wkt, ANameDoesNotMakeADatumOfAnotherEllipsoid) {
+/// The stored record of such a system was once refused on reading, because it contradicted the code
+/// derived from its name.
+TEST(Wkt, DatumNameNeedsMatchingEllipsoid) {
   stream::Crs crs;
   crs.wkt =
       "GEOGCS[\"WGS 84\",DATUM[\"WGS_1984\",SPHEROID[\"Bessel\",6377397.155,299.1528128]],"
@@ -854,7 +854,7 @@ TEST(Wkt, ANameDoesNotMakeADatumOfAnotherEllipsoid) {
   EXPECT_EQ(kept->definition().ellipsoid, system->definition().ellipsoid);
 }
 
-TEST(Wkt, UnitsWithoutASizeAreRefused) {
+TEST(Wkt, RejectsUnitsWithoutSize) {
   for (const char* const unit : {"0", "-1"}) {
     stream::Crs crs;
     crs.wkt = std::string("GEOGCS[\"x\",DATUM[\"y\",SPHEROID[\"z\",6378137,298]],UNIT[\"u\",") +
@@ -863,7 +863,7 @@ TEST(Wkt, UnitsWithoutASizeAreRefused) {
   }
 }
 
-TEST(GeoKeys, WhatIsMissingIsNamed) {
+TEST(GeoKeys, NameMissingKeys) {
   const std::vector<std::vector<stream::GeoKey>> lists{
       {{1024, {1}, ""}, {3072, {32767}, ""}, {3075, {1}, ""}, {3076, {9001}, ""}},  // no datum
       {{1024, {1}, ""}, {2048, {4326}, ""}, {3072, {32767}, ""}, {3075, {1}, ""}},  // no unit
@@ -884,7 +884,7 @@ TEST(GeoKeys, WhatIsMissingIsNamed) {
   EXPECT_FALSE(CoordinateSystem::of(stream::Crs{}, "f"));
 }
 
-TEST(DatumShift, ThreeOrSevenNumbers) {
+TEST(DatumShift, NeedsThreeOrSevenNumbers) {
   EXPECT_EQ(parse_datum_shift("1,2,3"), (DatumShift{1, 2, 3}));
   EXPECT_EQ(parse_datum_shift("1,2,3,4,5,6,7"), (DatumShift{1, 2, 3, 4, 5, 6, 7}));
   EXPECT_EQ(parse_datum_shift(""), std::nullopt);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Files of the points that a detail wants, and of those near a place: against the points visited
+// Compares files of the points that a detail wants, and of those near a place, with points visited
 // one by one.
 #include "terrace/terrain/detail_points.hpp"
 
@@ -24,7 +24,7 @@ namespace {
 
 using tests::TemporaryFolder;
 
-/// 20,000 points in a square of 100 m, numbered, as a store.
+/// Builds a store of 20,000 numbered points in a square of 100 m.
 stream::Store numbered_points(const TemporaryFolder& folder) {
   const std::filesystem::path text = folder.path() / "points.csv";
   std::mt19937_64 random(3);
@@ -63,7 +63,7 @@ Written read_back(const std::filesystem::path& path) {
   return points;
 }
 
-TEST(DetailPoints, AFileHasTheWantedPointsInTheirOrder) {
+TEST(DetailPoints, WritesWantedPointsInOrder) {
   const TemporaryFolder folder;
   const stream::Store store = numbered_points(folder);
   const std::size_t payload = store.schema().payload_size();
@@ -93,7 +93,7 @@ TEST(DetailPoints, AFileHasTheWantedPointsInTheirOrder) {
   }
 }
 
-TEST(DetailPoints, AFileOfNearPointsHasTheirDistances) {
+TEST(DetailPoints, WritesDistancesOfNearPoints) {
   const TemporaryFolder folder;
   const stream::Store store = numbered_points(folder);
   const std::size_t payload = store.schema().payload_size();

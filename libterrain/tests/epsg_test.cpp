@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every projected system of the EPSG dataset in PROJ's database: it is understood, its WKT reads
-// back, places come back from it, and GeographicLib and PROJ compute the same where both can.
+// Every projected system of the EPSG dataset in PROJ's database: it can be read, its WKT reads
+// back, conversion to it can be reversed, and GeographicLib and PROJ agree where both support it.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -40,7 +40,7 @@ std::vector<Code> projected_codes() {
   std::vector<Code> codes;
   for (int i = 0; i < count; ++i) {
     const PROJ_CRS_INFO& row = *list[i];
-    if (std::string(row.code) == "900913") continue;  // stands for 3857
+    if (std::string(row.code) == "900913") continue;  // an alias of 3857
     codes.push_back({.code = std::stoi(row.code),
                      .area = {row.west_lon_degree, row.south_lat_degree, row.east_lon_degree,
                               row.north_lat_degree},
@@ -52,7 +52,7 @@ std::vector<Code> projected_codes() {
   return codes;
 }
 
-/// In the area of use, a little inward; longitudes from `meridian`.
+/// Returns places slightly inside the area of use, with longitudes from `meridian`.
 std::array<Point2, 5> places_in(GeographicArea area, double meridian) {
   if (area.east < area.west) area.east += 360;
   constexpr std::array<Point2, 5> kShares{
@@ -66,7 +66,7 @@ std::array<Point2, 5> places_in(GeographicArea area, double meridian) {
   return places;
 }
 
-/// What PROJ 9.1 has no method for; later versions may.
+/// Systems with a method that PROJ 9.1 does not support; later versions may.
 constexpr std::array<int, 33> kBeyondProj{
     // Lambert conformal conic, west orientated
     2218, 2221, 2296, 2297, 2298, 2299, 2300, 2301, 2302, 2303, 2304, 2305, 2306, 2307, 3052, 3053,
@@ -79,11 +79,11 @@ constexpr std::array<int, 33> kBeyondProj{
     5224, 5225, 5515, 5516,
     // Tunisia mining grid, Lambert near-conformal
     22300, 22700,
-    // grids of zones, which are no places in a plane
+    // grids of zones, which are not on a single plane
     32600, 32700,
-    // Mercator with a scale of another latitude than the equator (deprecated, for 3994)
+    // Mercator with a scale at a latitude other than the equator (deprecated, replaced by 3994)
     3752};
-/// Laborde's: PROJ's inverse is some centimetres off at the ends of Madagascar.
+/// Laborde's projection: PROJ's inverse is off by some centimetres at the ends of Madagascar.
 constexpr std::array<int, 2> kInexactInverse{8441, 29701};
 
 bool is_one_of(std::span<const int> codes, int code) {
@@ -93,7 +93,7 @@ bool is_one_of(std::span<const int> codes, int code) {
 struct Findings {
   std::vector<std::string> faults;
   std::size_t refused = 0, places = 0, compared = 0;
-  double worst = 0;  ///< metres between GeographicLib and PROJ
+  double worst = 0;  ///< in metres, between GeographicLib and PROJ
 
   void fault(int code, const std::string& what) {
     faults.push_back("EPSG:" + std::to_string(code) + ": " + what);
@@ -119,7 +119,7 @@ void check(const Code& row, Findings& found) {
     if (!is_one_of(kBeyondProj, row.code)) found.fault(row.code, error.what());
     return;
   }
-  // A few deprecated ones.
+  // A few deprecated systems.
   if (!row.has_area) return;
   const std::array<Point2, 5> degrees = places_in(row.area, definition.prime_meridian);
   std::array<Point2, 5> plane = degrees;
@@ -128,14 +128,14 @@ void check(const Code& row, Findings& found) {
   projection->reverse(back);
   for (std::size_t i = 0; i < degrees.size(); ++i) {
     if (std::isnan(plane[i][0])) {
-      // Corners of a rectangle around an area may lie outside of what the projection shows.
+      // Corners of a rectangle around an area may be outside the projection's range.
       if (i == 0) found.fault(row.code, "its middle has no place");
       continue;
     }
     ++found.places;
     const double turn = std::remainder(back[i][0] - degrees[i][0], 360.0);
     const double across = turn * std::cos(degrees[i][1] * 3.14159265358979 / 180);
-    // Micrometres by GeographicLib, two millimetres by PROJ's series.
+    // Micrometres for GeographicLib, two millimetres for PROJ's series.
     const double exact = is_one_of(kInexactInverse, row.code) ? 1e-6
                          : definition.method                  ? 1e-10
                                                               : 2e-8;
@@ -161,7 +161,7 @@ void check(const Code& row, Findings& found) {
   }
 }
 
-TEST(Epsg, EveryProjectedSystemWorksAndGeographicLibAgreesWithProj) {
+TEST(Epsg, AllProjectedSystemsWorkAndLibrariesAgree) {
   const std::vector<Code> codes = projected_codes();
   ASSERT_GT(codes.size(), 5000u);
   std::atomic<std::size_t> next = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Published numbers that others agree on: geodesics, geocentric places, the grids of UTM and UPS.
+// Published reference values: geodesics, geocentric places, the grids of UTM and UPS.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -29,7 +29,7 @@ std::string data_file(const std::string& name) {
 }
 
 // C. F. F. Karney, "Test set for geodesics", doi:10.5281/zenodo.32156, its short version.
-TEST(GeodesyData, DistancesOfTenThousandGeodesics) {
+TEST(GeodesyData, MatchesTenThousandGeodesics) {
   const std::string file = data_file("GeodTest-short.dat.gz");
   if (file.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(
@@ -45,7 +45,7 @@ TEST(GeodesyData, DistancesOfTenThousandGeodesics) {
                           &lon2, &azi2, &metres),
               7);
     worst = std::max(worst, std::abs(distance.between({lon1, lat1}, {lon2, lat2}) - metres));
-    // In pieces along the geodesic, too: a polyline of sixteen.
+    // Also in pieces along the geodesic: a polyline of sixteen.
     if (rows++ % 10 != 0) continue;
     const GeographicLib::GeodesicLine path(GeographicLib::Geodesic::WGS84(), lat1, lon1, azi1);
     double sum = 0;
@@ -59,15 +59,15 @@ TEST(GeodesyData, DistancesOfTenThousandGeodesics) {
     worst_sum = std::max(worst_sum, std::abs(sum - metres));
   }
   EXPECT_EQ(rows, 10000u);
-  EXPECT_LT(worst, 1e-7);  // half of the last digit, and 15 nm of the method's
+  EXPECT_LT(worst, 1e-7);  // half of the last digit, plus the method's 15 nm
   EXPECT_LT(worst_sum, 1e-6);
   std::cout << rows << " geodesics: off by " << worst << " m, in 16 pieces by " << worst_sum
             << " m\n";
 }
 
-// GEOTRANS: places and their military grid references, to a metre. The squares' letters are read by
-// GeographicLib; zones, eastings and northings are compared.
-TEST(GeodesyData, UtmAndUpsOfGeotrans) {
+// GEOTRANS: places and their military grid references, to a metre. GeographicLib reads the letters
+// of the squares; zones, eastings and northings are compared.
+TEST(GeodesyData, MatchesGeotransUtmAndUps) {
   const std::string name = data_file("geotrans_clean.txt");
   if (name.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
   std::ifstream file(name);
@@ -101,7 +101,7 @@ TEST(GeodesyData, UtmAndUpsOfGeotrans) {
             << " of them polar: within " << worst << " m of the middle of the square\n";
 }
 
-TEST(GeodesyData, TenThousandGeocentricPlaces) {
+TEST(GeodesyData, MatchesTenThousandGeocentricPlaces) {
   const std::string name = data_file("xyz_to_llh_10_000.txt");
   if (name.empty()) GTEST_SKIP() << "TERRACE_DATA is not set";
   std::ifstream file(name);

@@ -28,7 +28,7 @@ constexpr PlacedBox kBoxes[] = {
     {"EPSG:4277", {-8, 49}, {2, 61}},  // degrees of another datum
 };
 
-TEST(BoxGeography, StaysWithinItsToleranceInsideAndOutside) {
+TEST(BoxGeography, StaysWithinToleranceInsideAndOutside) {
   std::mt19937_64 random(20261124);
   const auto unit = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   for (const PlacedBox& test : kBoxes) {
@@ -39,7 +39,7 @@ TEST(BoxGeography, StaysWithinItsToleranceInsideAndOutside) {
     std::vector<Point2> places(3000);
     for (Point2& p : places) {
       for (std::size_t k = 0; k < 2; ++k) {
-        // A tenth beyond the box, and some on its very corners.
+        // Up to a tenth beyond the box, and some exactly on its corners.
         const double t = std::clamp(1.3 * unit() - 0.15, -0.1, 1.1);
         const double on_box = t < 0 && unit() < 0.5 ? 0 : t > 1 && unit() < 0.5 ? 1 : t;
         p[k] = test.low[k] + on_box * (test.high[k] - test.low[k]);
@@ -58,7 +58,7 @@ TEST(BoxGeography, StaysWithinItsToleranceInsideAndOutside) {
       const double turn = std::abs(std::remainder(found[i][0] - truth[i][0], 360.0));
       const double off = std::max(turn, std::abs(found[i][1] - truth[i][1]));
       wrong += off <= BoxGeography::kTolerance ? 0 : 1;
-      // The others make no difference.
+      // The result does not depend on the other places.
       Point2 alone = places[i];
       geography(std::span(&alone, 1));
       EXPECT_EQ(alone, found[i]);

@@ -22,8 +22,8 @@ constexpr std::uint64_t kMemory = std::uint64_t{1} << 30;
 
 class GeoidTest : public testing::Test {
  protected:
-  /// A grid of GeographicLib's format, 5 degrees apart, of height 20 sin(latitude) + 50: smooth, so
-  /// that the interpolation's error is small.
+  /// Writes a grid in GeographicLib's format, with a spacing of 5 degrees and heights of 20
+  /// sin(latitude) + 50, which is smooth, so the interpolation's error is small.
   std::string write_grid(const std::string& name) const {
     constexpr int kWidth = 72, kHeight = 37;
     const std::string file = (folder_ / name).string();
@@ -61,7 +61,7 @@ TEST_F(GeoidTest, InterpolatesTheGrid) {
   EXPECT_TRUE(std::isnan(geoid.undulation({NAN, 10})));
 }
 
-TEST_F(GeoidTest, RefusesWhatIsNoGrid) {
+TEST_F(GeoidTest, RejectsInvalidGrids) {
   const std::string file = write_grid("good.pgm");
   EXPECT_THROW(GeoidGrid((folder_ / "none.pgm").string(), kMemory), stream::Error);
   EXPECT_THROW(GeoidGrid((folder_ / "good.tif").string(), kMemory), stream::Error);
@@ -84,7 +84,7 @@ double converted(const EllipsoidalHeights& heights, const Point2& place, double 
   return height;
 }
 
-TEST_F(GeoidTest, HeightsBecomeEllipsoidalMetres) {
+TEST_F(GeoidTest, ConvertsToEllipsoidalMetres) {
   const std::string file = write_grid("test.pgm");
   const EllipsoidalHeights plain(schema_with("ellipsoidal", "metre"), HeightReference::recorded, "",
                                  kMemory);
@@ -106,7 +106,7 @@ TEST_F(GeoidTest, HeightsBecomeEllipsoidalMetres) {
   EXPECT_NE(unknown.note().find("orthometric"), std::string::npos);
 }
 
-TEST_F(GeoidTest, DigestsTellWhichOperationIsMeant) {
+TEST_F(GeoidTest, DigestDependsOnOperation) {
   const auto digest_of = [](HeightReference vertical, const std::string& geoid) {
     Digest digest;
     EllipsoidalHeights(schema_with("orthometric", "metre"), vertical, geoid, kMemory)
@@ -119,7 +119,7 @@ TEST_F(GeoidTest, DigestsTellWhichOperationIsMeant) {
   EXPECT_NE(egm96, digest_of(HeightReference::ignore, ""));
 }
 
-TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
+TEST_F(GeoidTest, RejectsMissingAndContradictoryOptions) {
   const std::string file = write_grid("test.pgm");
   const auto refused = [](const stream::StoreSchema& schema, HeightReference vertical,
                           const std::string& geoid) {
@@ -131,8 +131,8 @@ TEST_F(GeoidTest, WhatWasNotSaidOrContradictsIsRefused) {
   refused(schema_with("orthometric", "metre"), HeightReference::ignore, file);
 }
 
-// The heights of EGM96 in its 15' grid, as cs2cs of PROJ 9.1.1 gives them.
-TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
+// The heights of EGM96 in its 15' grid, as computed by cs2cs of PROJ 9.1.1.
+TEST(EllipsoidalHeightsTest, DefaultsToProjGridOfEgm96) {
   const EllipsoidalHeights sea(schema_with("", "metre"), HeightReference::orthometric, "", kMemory);
   EXPECT_TRUE(sea.has_geoid());
   EXPECT_NEAR(converted(sea, {8, 46}, 1000), 1051.852947, 1e-5);
@@ -145,7 +145,7 @@ TEST(EllipsoidalHeightsTest, PROJsGridOfEgm96IsTheDefault) {
                UsageError);
 }
 
-TEST(EllipsoidalHeightsTest, ManyTogetherGetWhatEachGetsAlone) {
+TEST(EllipsoidalHeightsTest, BatchesMatchSinglePlaces) {
   const EllipsoidalHeights sea(schema_with("", "metre"), HeightReference::orthometric, "", kMemory);
   constexpr int kSide = 120;
   for (const double step : {1.0 / 1200, 0.02, 1.5}) {
@@ -162,13 +162,13 @@ TEST(EllipsoidalHeightsTest, ManyTogetherGetWhatEachGetsAlone) {
   }
 }
 
-TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
+TEST(EllipsoidalHeightsTest, StoresVerticalCrsOverridesDefault) {
   stream::StoreSchema schema = schema_with("orthometric", "metre");
   schema.crs.vertical_epsg = 5773;
   EXPECT_NEAR(
       converted(EllipsoidalHeights(schema, HeightReference::orthometric, "", kMemory), {8, 46}, 0),
       51.852947, 1e-5);
-  // Debian has no grid of EGM2008; somebody else may.
+  // Debian has no grid of EGM2008; other systems may.
   schema.crs.vertical_epsg = 3855;
   try {
     const EllipsoidalHeights egm2008(schema, HeightReference::orthometric, "", kMemory);
@@ -180,7 +180,7 @@ TEST(EllipsoidalHeightsTest, TheStoresOwnVerticalSystemGoesBeforeTheDefault) {
   }
 }
 
-TEST(EllipsoidalHeightsTest, AnUnknownUnitIsThatOfTheGroundAsInOtherVerbs) {
+TEST(EllipsoidalHeightsTest, UsesGroundsAssumptionForUnknownUnit) {
   stream::StoreSchema schema;
   schema.vertical = "ellipsoidal";
   schema.crs.horizontal_unit = "foot";

@@ -19,8 +19,8 @@ struct PlacedGrid {
   stream::WorldTransform world;
 };
 
-/// The largest difference from exact places, degrees; longitudes weighed with the cosine of the
-/// latitude near poles only in that turns of 360 do not count.
+/// Returns the largest difference from exact places in degrees, ignoring turns of 360. Near poles,
+/// longitudes are weighted with the cosine of the latitude.
 double worst_of(const PlacedGrid& test, std::int64_t column, std::int64_t row, std::size_t columns,
                 std::size_t rows) {
   const CoordinateSystem system = CoordinateSystem::parse(test.crs);
@@ -45,7 +45,7 @@ double worst_of(const PlacedGrid& test, std::int64_t column, std::int64_t row, s
   return worst;
 }
 
-TEST(GridGeography, StaysWithinItsTolerance) {
+TEST(GridGeography, StaysWithinTolerance) {
   const PlacedGrid cases[] = {
       {"EPSG:32632", {{30, 0, 400000, 0, -30, 5200000}}},
       {"EPSG:32632", {{24, -18, 400000, -18, -24, 5200000}}},   // rotated
@@ -70,7 +70,7 @@ TEST(GridGeography, StaysWithinItsTolerance) {
   }
 }
 
-TEST(GridGeography, RandomGridsStayWithinTheTolerance) {
+TEST(GridGeography, StaysWithinToleranceOnRandomGrids) {
   const char* const systems[] = {"EPSG:32633", "EPSG:25831", "EPSG:3035", "EPSG:3034",
                                  "EPSG:2154",  "EPSG:3857",  "EPSG:3995", "EPSG:3338"};
   std::mt19937_64 random(20250117);
@@ -87,14 +87,14 @@ TEST(GridGeography, RandomGridsStayWithinTheTolerance) {
   }
 }
 
-TEST(GridGeography, NeedsAWayToWgs84) {
+TEST(GridGeography, NeedsOperationToWgs84) {
   const char* const unknown =
       R"(GEOGCS["own",DATUM["own datum",SPHEROID["own",6377000,300]],PRIMEM["Greenwich",0],)"
       R"(UNIT["degree",0.0174532925199433]])";
   EXPECT_THROW(GridGeography(CoordinateSystem::parse(unknown), {}), stream::Error);
 }
 
-TEST(GridGeography, EmptyWindow) {
+TEST(GridGeography, AcceptsEmptyWindow) {
   const GridGeography grid(CoordinateSystem::parse("EPSG:32632"), {});
   grid.window(0, 0, 0, 0, {}, {});
   grid.window(0, 0, 0, 5, {}, {});

@@ -27,16 +27,17 @@ stream::Box3 around(double column, double row) {
   return {.min = {column - 50, row - 50, 0}, .max = {column + 50, row + 50, 1000}};
 }
 
-// Oracle: geodesics a few metres long, solved by GeographicLib.
+// Oracle: geodesics a few metres long, computed by GeographicLib.
 TEST(MetresPerDegree, AgreesWithGeodesics) {
   const auto& wgs84 = GeographicLib::Geodesic::WGS84();
   for (double latitude = -89.9; latitude <= 89.9; latitude += 0.73) {
     const MetresPerDegree metres = metres_per_degree(latitude);
-    // Long enough that the rounding of the latitudes does not matter, short enough to be local.
+    // Long enough to make the rounding of latitudes negligible, short enough to be local.
     constexpr double kStep = 1e-4;
     double along_meridian = 0, along_parallel = 0;
     wgs84.Inverse(latitude - kStep, 10, latitude + kStep, 10, along_meridian);
-    // The shorter the chord against the parallel's radius, the closer geodesic and parallel.
+    // The shorter the chord relative to the parallel's radius, the closer geodesic and parallel
+    // are.
     const double east = kStep * std::cos(latitude * base::kRadiansPerDegree);
     wgs84.Inverse(latitude, 10 - east, latitude, 10 + east, along_parallel);
     EXPECT_NEAR(metres.latitude / (along_meridian / (2 * kStep)), 1.0, 1e-6) << latitude;
@@ -44,7 +45,7 @@ TEST(MetresPerDegree, AgreesWithGeodesics) {
   }
 }
 
-TEST(MetresPerDegree, IsZeroEastwardAtThePolesOnly) {
+TEST(MetresPerDegree, IsZeroEastwardOnlyAtPoles) {
   EXPECT_EQ(metres_per_degree(90).longitude, 0.0);
   EXPECT_EQ(metres_per_degree(-120).longitude, 0.0);  // clamped
   EXPECT_NEAR(metres_per_degree(0).longitude, 111319.490793, 1e-6);
@@ -52,7 +53,7 @@ TEST(MetresPerDegree, IsZeroEastwardAtThePolesOnly) {
               1e-5);  // a^2 / b
 }
 
-TEST(Ground, MapsDegreesAtTheLatitudeOfTheBlock) {
+TEST(Ground, MapsDegreesAtLatitudeOfBlock) {
   const Ground ground(geographic(1.0 / 1200));
   EXPECT_TRUE(ground.assumption().empty());
   for (const double row : {0.0, 600.0, 40000.0}) {
@@ -80,17 +81,17 @@ TEST(Ground, TakesUnitsFromTheSource) {
   EXPECT_DOUBLE_EQ(assumed.map(around(0, 0))[8], 0.1 * 1200.0 / 3937.0);
   EXPECT_NE(assumed.assumption(), "");
 
-  placement.coordinates[2].unit = "metre";  // the column's own word counts most
+  placement.coordinates[2].unit = "metre";  // the column's own unit takes precedence
   EXPECT_DOUBLE_EQ(Ground(placement).map(around(0, 0))[8], 0.1);
 }
 
-TEST(Ground, SaysThatUnknownUnitsAreMetres) {
+TEST(Ground, ReportsUnknownUnitsAsMetres) {
   const Ground ground{stream::Placement{}};
   EXPECT_NE(ground.assumption().find("metres"), std::string::npos);
   EXPECT_EQ(ground.map(around(0, 0)), (GroundMap{1, 0, 0, 0, 1, 0, 0, 0, 1}));
 }
 
-TEST(Ground, KnowsTheUsualWordsForUnits) {
+TEST(Ground, KnowsCommonUnitNames) {
   constexpr double kSurveyFoot = 1200.0 / 3937.0;
   const std::pair<double, std::vector<const char*>> words[] = {
       {1.0, {"m", "metre", "Meters", " METRES ", "[m]", "mtr"}},
@@ -115,7 +116,7 @@ TEST(Ground, KnowsTheUsualWordsForUnits) {
   }
 }
 
-TEST(Ground, SaysWhichUnitOfHeightsIsNotKnown) {
+TEST(Ground, NamesUnknownHeightUnit) {
   stream::Placement placement = geographic(0.01);
   placement.coordinates[2].unit = "cubits";
   const Ground ground(placement);
@@ -127,7 +128,7 @@ TEST(Ground, SaysWhichUnitOfHeightsIsNotKnown) {
   EXPECT_EQ(Ground(placement).metres_vertical(), 0.01);
 }
 
-TEST(Ground, UndoesTheGrowthOfWebMercator) {
+TEST(Ground, CorrectsScaleOfWebMercator) {
   stream::Placement placement;
   placement.crs.epsg = 3857;
   placement.crs.horizontal_unit = "metre";
@@ -150,7 +151,7 @@ TEST(Ground, UndoesTheGrowthOfWebMercator) {
 }
 
 // Oracle: geodesics across a cell in the map's directions.
-TEST(Ground, KnowsTheLocalScaleOfProjections) {
+TEST(Ground, KnowsLocalScaleOfProjections) {
   const auto& wgs84 = GeographicLib::Geodesic::WGS84();
   struct Case {
     int code;
@@ -179,7 +180,7 @@ TEST(Ground, KnowsTheLocalScaleOfProjections) {
   }
 }
 
-TEST(World, BoxOfARotatedRasterHoldsAllCorners) {
+TEST(World, BoxOfRotatedRasterContainsAllCorners) {
   stream::Placement placement;
   placement.world.xy = {0.8, -0.6, 100, 0.6, 0.8, 200};
   placement.coordinates[2] = {.name = "z", .scale = -2, .offset = 5, .unit = ""};

@@ -25,25 +25,25 @@ TEST(HeightGrid, AveragesSquares) {
   const TriangleMesh mesh = grid.mesh();
   ASSERT_EQ(mesh.positions.size(), 6u);
   EXPECT_EQ(mesh.positions[0], (stream::Point3{0.5, 0.5, (0 + 1 + 5 + 6) / 4.0}));
-  EXPECT_EQ(mesh.positions[2][2], (4 + 9) / 2.0);  // the last column stands alone
+  EXPECT_EQ(mesh.positions[2][2], (4 + 9) / 2.0);  // the last column has no partner
 }
 
-TEST(HeightGrid, LeavesHolesWhereThereIsNoData) {
+TEST(HeightGrid, LeavesHolesWithoutData) {
   HeightGrid grid(3, 3, 100);
   for (int i = 0; i < 9; ++i) {
     if (i != 4 && i != 0) grid.add({i % 3 + 0.0, i / 3 + 0.0, 0});
   }
   const TriangleMesh mesh = grid.mesh();
   EXPECT_EQ(mesh.positions.size(), 7u);
-  // Every square touches the missing middle: three keep one triangle, the one without a corner
-  // none.
+  // Every square touches the missing middle: three keep one triangle, the one that lacks another
+  // corner keeps none.
   EXPECT_EQ(mesh.triangles.size(), 3u);
   for (const auto& t : mesh.triangles) {
     EXPECT_EQ((std::set<std::uint32_t>(t.begin(), t.end()).size()), 3u);
   }
 }
 
-TEST(HeightGrid, IgnoresWhatLiesOutside) {
+TEST(HeightGrid, IgnoresCellsOutside) {
   HeightGrid grid(2, 2, 100);
   grid.add({-1, 0, 5});
   grid.add({0, 2, 5});

@@ -15,7 +15,7 @@ namespace {
 
 class JsonOfFile : public ::testing::Test {
  protected:
-  /// Returns the error of a file with this text, of at most 64 KiB.
+  /// Returns the error for a file with this text, of at most 64 KiB.
   std::string fault_of(const std::string& text) const {
     std::ofstream(path_, std::ios::binary) << text;
     try {
@@ -37,12 +37,12 @@ TEST_F(JsonOfFile, ReadsJson) {
   EXPECT_FALSE(json_of_file(path_ + ".none", 1, "").has_value());
 }
 
-TEST_F(JsonOfFile, NamesThePlaceOfAFault) {
+TEST_F(JsonOfFile, NamesPlaceOfFault) {
   EXPECT_EQ(fault_of("{\"a\": 1,\n  \"b\": }"), "line 2, column 8: is not JSON");
   EXPECT_EQ(fault_of("{\"a\": [1, 2"), "line 1, column 12: the JSON is cut off");
 }
 
-TEST_F(JsonOfFile, EndsAtAStop) {
+TEST_F(JsonOfFile, StopsWhenRequested) {
   std::ofstream(path_, std::ios::binary) << "[" << std::string(1000000, ' ') << "]";
   std::stop_source stop;
   stop.request_stop();
@@ -50,7 +50,7 @@ TEST_F(JsonOfFile, EndsAtAStop) {
                stream::Stopped);
 }
 
-TEST_F(JsonOfFile, OtherFormatsAreNotReadToTheirEnd) {
+TEST_F(JsonOfFile, RejectsOtherFormatsEarly) {
   EXPECT_EQ(fault_of("SQLite format 3\0" + std::string(1000000, 'x')), "is not JSON");
   EXPECT_EQ(fault_of("[" + std::string(100000, ' ') + "]"),
             "is larger than the 64 KiB that such a file may have");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines joined from segments in any order, against the lines that the segments were cut from.
+// Compares lines joined from segments in any order with the lines that the segments were cut from.
 #include "contour/line_joiner.hpp"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ struct Crossing {
   std::uint64_t edge = 0;
   friend bool operator==(const Crossing&, const Crossing&) = default;
 };
-/// Few different values, so that most crossings stand in each other's way.
+/// A hash with few values, so that most crossings collide.
 struct FewValues {
   std::size_t operator()(const Crossing& c) const { return c.edge % 7 * 0x10001U; }
 };
@@ -33,7 +33,7 @@ struct JoinerSegment {
   Crossing from, to;
 };
 
-/// Lines of some edges each, closed or not, and their segments, shuffled.
+/// Makes lines of some edges each, closed or open, and returns their segments, shuffled.
 std::vector<JoinerSegment> shuffled_segments(std::mt19937_64& random,
                                              std::vector<ContourLine>& lines) {
   std::vector<JoinerSegment> segments;
@@ -54,7 +54,7 @@ std::vector<JoinerSegment> shuffled_segments(std::mt19937_64& random,
   return segments;
 }
 
-/// Closed lines from their least point on.
+/// Rotates a closed line to start at its least point.
 ContourLine turned(ContourLine line) {
   if (!line.closed) return line;
   line.points.pop_back();
@@ -83,7 +83,7 @@ TEST(LineJoiner, JoinsSegmentsInAnyOrder) {
       points += line.points.size();
       expected.erase(found);
     });
-    // Some lines are emitted on the way: those that have no end in the later half.
+    // Emit some lines early: those without an end in the later half.
     std::map<std::uint64_t, int> later;
     const std::size_t half = segments.size() / 2;
     for (std::size_t i = half; i < segments.size(); ++i) {
@@ -105,21 +105,21 @@ TEST(LineJoiner, JoinsSegmentsInAnyOrder) {
   }
 }
 
-TEST(LineJoiner, EmitsOpenLinesInTheOrderOfTheirFirstSegments) {
+TEST(LineJoiner, EmitsOpenLinesInOrderOfFirstSegments) {
   std::vector<double> first;
   LineJoiner<Crossing, FewValues> joiner(
       [&](ContourLine&& line) { first.push_back(line.points.front()[0]); });
   const auto add = [&](std::uint64_t from, std::uint64_t to) {
     joiner.add({0, from}, place_of(from), {0, to}, place_of(to));
   };
-  // A closed line between makes a place free for the third.
+  // A closed line in between frees a slot for the third line.
   add(10, 11);
   add(20, 21);
   add(21, 20);
   add(30, 31);
   add(1, 2);
   add(2, 3);
-  add(3, 10);  // joins the last to the first, whose number stays
+  add(3, 10);  // joins the last to the first, which keeps its number
   joiner.emit_whole([](const Crossing&) { return false; });
   EXPECT_EQ(first, (std::vector<double>{20, 1, 30}));
 }
@@ -184,7 +184,7 @@ void add_as_stretches(Joiner& joiner, std::span<const JoinerSegment> segments) {
   joiner.end_of_stretches(open);
 }
 
-TEST(LineJoiner, StretchesMakeTheLinesOfTheirSegments) {
+TEST(LineJoiner, StretchesMatchTheirSegments) {
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
@@ -202,7 +202,7 @@ TEST(LineJoiner, StretchesMakeTheLinesOfTheirSegments) {
                    place_of(segments[i].to.edge));
       }
       add_as_stretches(together, std::span(segments).subspan(begin, end - begin));
-      // What has no end in the segments to come is whole.
+      // Lines without an end in later segments are complete.
       std::map<std::uint64_t, int> later;
       for (std::size_t i = end; i < segments.size(); ++i) {
         ++later[segments[i].from.edge];
@@ -224,7 +224,7 @@ TEST(LineJoiner, StretchesMakeTheLinesOfTheirSegments) {
   }
 }
 
-TEST(LineJoiner, TellsOfTooManyPoints) {
+TEST(LineJoiner, ReportsTooManyPoints) {
   LineJoiner<Crossing, FewValues> joiner(
       [](ContourLine&&) {},
       {.points = 100, .exceeded = [] { throw std::length_error("too many"); }});

@@ -10,7 +10,8 @@
 
 namespace terrace::tests {
 
-/// Writes a GeoTIFF of 16-bit samples, height(column, row). options: size, place, CRS, nodata.
+/// Writes a GeoTIFF of 16-bit samples, height(column, row). options: size, georeference, CRS,
+/// nodata.
 template <class Height>
 void write_made_raster(const std::filesystem::path& path, stream::GeoTiffOptions options,
                        const Height& height) {

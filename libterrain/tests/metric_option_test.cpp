@@ -23,7 +23,7 @@ MetricChoice from_file(const std::string& json) {
   return MetricChoice::parse("elliptical:" + path);
 }
 
-TEST(MetricOption, NamesTheMetrics) {
+TEST(MetricOption, NamesMetrics) {
   using cluster::name_of;
   EXPECT_EQ(name_of(MetricChoice::parse("euclidean").on_ground(kOrigin, kOne)), "euclidean");
   EXPECT_EQ(name_of(MetricChoice::parse("squared").on_ground(kOrigin, kOne)), "squared");
@@ -37,7 +37,7 @@ TEST(MetricOption, NamesTheMetrics) {
   }
 }
 
-TEST(MetricOption, ARegionWithoutABoxIsEverywhere) {
+TEST(MetricOption, RegionWithoutBoxIsEverywhere) {
   const cluster::Metric metric =
       from_file(R"({"regions": [{"semi_axes": [4, 2], "angle": 90}]})").on_ground(kOrigin, kOne);
   EXPECT_EQ(cluster::name_of(metric), "elliptical");
@@ -45,19 +45,19 @@ TEST(MetricOption, ARegionWithoutABoxIsEverywhere) {
   EXPECT_EQ(cluster::distance(metric, {0, 0, 0}, {2, 0, 0}), 1.0);
 }
 
-TEST(MetricOption, BoxesAreInTheCrsAndSemiAxesOnTheGround) {
-  // Two metres to a unit of x, about (100, 0, 0).
+TEST(MetricOption, BoxesUseCrsAndSemiAxesUseGround) {
+  // Two metres per unit of x, around (100, 0, 0).
   const cluster::Metric metric =
       from_file(R"({"regions": [{"box": [110, -5, 120, 5], "semi_axes": [10, 1]}]})")
           .on_ground({100, 0, 0}, {2, 0, 0, 0, 1, 0, 0, 0, 1});
-  // x = 115 lies at 30 on the ground.
+  // x = 115 is 30 on the ground.
   EXPECT_EQ(cluster::distance(metric, {30, 0, 0}, {40, 0, 0}), 1.0);
   EXPECT_EQ(cluster::distance(metric, {30, 0, 7}, {30, 1, 7}), 1.0);
   EXPECT_EQ(cluster::distance(metric, {50, 0, 0}, {40, 0, 0}), 10.0);
 }
 
-TEST(MetricOption, BoxesHoldWhatIsInThemInTheCrsUnderAnyMapToTheGround) {
-  // A projection far from its centre, and a turned one, about a far origin.
+TEST(MetricOption, BoxesContainTheirPointsUnderAnyGroundMap) {
+  // A projection far from its centre, and a rotated one, around a distant origin.
   const MetricChoice choice = from_file(
       R"({"regions": [{"box": [5000100, 2000200, 5000300, 2000600], "semi_axes": [10, 10, 10]}]})");
   const stream::Point3 origin{5000000, 2000000, 0};
@@ -68,7 +68,7 @@ TEST(MetricOption, BoxesHoldWhatIsInThemInTheCrsUnderAnyMapToTheGround) {
     std::size_t inside = 0;
     for (int i = 0; i <= 40; ++i) {
       for (int k = 0; k <= 80; ++k) {
-        // Some lie on the sides and corners of the box, which is closed.
+        // Some are on the sides and corners of the box, which is closed.
         const double x = 10.0 * i, y = 10.0 * k;
         const cluster::Point3 place{map[0] * x + map[1] * y, map[3] * x + map[4] * y, 0};
         const bool in = x >= 100 && x <= 300 && y >= 200 && y <= 600;
@@ -82,7 +82,7 @@ TEST(MetricOption, BoxesHoldWhatIsInThemInTheCrsUnderAnyMapToTheGround) {
   }
 }
 
-TEST(MetricOption, TheFirstRegionCountsAndRotationsTurn) {
+TEST(MetricOption, UsesFirstRegionAndItsRotation) {
   const cluster::Metric metric = from_file(R"({"regions": [
       {"box": [0, 0, 0, 1, 1, 1], "semi_axes": [1, 1, 0.5],
        "rotation": [[0, 1, 0], [0, 0, 1], [1, 0, 0]]},
@@ -92,7 +92,7 @@ TEST(MetricOption, TheFirstRegionCountsAndRotationsTurn) {
   EXPECT_EQ(cluster::distance(metric, {5, 0, 0}, {7, 0, 0}), 1.0);
 }
 
-TEST(MetricOption, BadFilesAreNamedWithTheRegion) {
+TEST(MetricOption, NamesRegionOfInvalidFile) {
   EXPECT_THROW(MetricChoice::parse("elliptical:no-such-file.json"), stream::Error);
   for (const char* json :
        {"", "[]", "{}", R"({"regions": []})", R"({"regions": 3})", R"({"regions": [3]})",

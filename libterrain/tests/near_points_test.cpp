@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Points near a place: against all points of the store, and their distances against geodesics.
+// Compares points near a place with all points of the store, and their distances with geodesics.
 #include "terrace/terrain/near_points.hpp"
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace {
 
 using tests::TemporaryFolder;
 
-/// 3,000 points within 500 m or so of (x, y), heights up to 100, as a store.
+/// Builds a store of 3,000 points within about 500 m of (x, y), with heights up to 100.
 stream::Store cloud(const TemporaryFolder& folder, const std::string& crs, double x, double y,
                     double unit_x, double unit_y) {
   const std::filesystem::path text = folder.path() / "points.xyz";
@@ -60,7 +60,7 @@ std::vector<stream::Point3> all_points(const stream::Store& store, unsigned from
   return all;
 }
 
-/// Distances of all points by `exact`, sorted, against those that are found.
+/// Compares the sorted distances of all points by `exact` with those that are found.
 template <class Exact>
 void expect_nearest(const stream::Store& store, const NearPlace& place, double tolerance,
                     const Exact& exact) {
@@ -84,7 +84,7 @@ void expect_nearest(const stream::Store& store, const NearPlace& place, double t
   }
 }
 
-TEST(NearPoints, DistancesInDegreesAreThoseOfGeodesics) {
+TEST(NearPoints, DistancesInDegreesMatchGeodesics) {
   for (const double latitude : {0.0, 46.5, -70.0}) {
     SCOPED_TRACE(latitude);
     const TemporaryFolder folder;
@@ -102,9 +102,9 @@ TEST(NearPoints, DistancesInDegreesAreThoseOfGeodesics) {
   }
 }
 
-TEST(NearPoints, DistancesOfAProjectionAreOnTheGround) {
+TEST(NearPoints, DistancesOfProjectionAreOnTheGround) {
   const TemporaryFolder folder;
-  // Far from the central meridian: the grid's metre is 1.0011 metres.
+  // Far from the central meridian, a metre of the grid is 1.0011 metres.
   const stream::Store store = cloud(folder, "32632", 800000, 5200000, 900, 900);
   const auto scaled = [&](const stream::Point3& p) {
     return std::hypot(p[0] - 800100, p[1] - 5200050) / 1.000712;
@@ -112,7 +112,7 @@ TEST(NearPoints, DistancesOfAProjectionAreOnTheGround) {
   expect_nearest(store, {.xy = {800100, 5200050}}, 2e-5, scaled);
 }
 
-TEST(NearPoints, RefusesWhatMakesNoSense) {
+TEST(NearPoints, RejectsInvalidArguments) {
   const TemporaryFolder folder;
   const stream::Store store = cloud(folder, "32632", 500000, 5200000, 900, 900);
   stream::StoreQuery query(store);

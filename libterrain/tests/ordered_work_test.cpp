@@ -36,7 +36,7 @@ TEST(OrderedWork, CommitsEachResultOnceInOrder) {
   }
 }
 
-TEST(OrderedWork, ItemsAreGivenOneAtATimeAndCommittedInTheirOrder) {
+TEST(OrderedWork, TakesItemsOneByOneAndCommitsInOrder) {
   for (const unsigned threads : {1U, 2U, 7U}) {
     for (const std::size_t count : {0U, 1U, 2U, 500U}) {
       SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
@@ -64,7 +64,7 @@ TEST(OrderedWork, ItemsAreGivenOneAtATimeAndCommittedInTheirOrder) {
   }
 }
 
-TEST(OrderedWork, WhatCameBeforeAnItemThatCannotBeGivenIsCommitted) {
+TEST(OrderedWork, CommitsItemsBeforeFailingNext) {
   for (const unsigned threads : {1U, 4U}) {
     std::size_t given = 0, committed = 0;
     EXPECT_THROW(each_in_order(
@@ -80,7 +80,7 @@ TEST(OrderedWork, WhatCameBeforeAnItemThatCannotBeGivenIsCommitted) {
   }
 }
 
-TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
+TEST(OrderedWork, CommitsOneAtATimeOnRequestedThreads) {
   std::atomic<int> committing = 0, working = 0, most = 0;
   std::vector<std::atomic<unsigned>> made(3);
   std::latch all_at_work(3);
@@ -110,7 +110,7 @@ TEST(OrderedWork, OneCommitAtATimeAndNoMoreThreadsThanAsked) {
   for (const std::atomic<unsigned>& own : made) EXPECT_GT(own, 0U);
 }
 
-TEST(OrderedWork, TheFirstErrorComesOut) {
+TEST(OrderedWork, RethrowsFirstError) {
   for (const unsigned threads : {1U, 4U}) {
     std::size_t last = 0;
     const auto run = [&] {
@@ -132,7 +132,7 @@ TEST(OrderedWork, TheFirstErrorComesOut) {
   }
 }
 
-TEST(OrderedWork, AnErrorOfACommitEndsTheWork) {
+TEST(OrderedWork, StopsAfterCommitError) {
   std::atomic<unsigned> made = 0;
   EXPECT_THROW(in_order(
                    1000, 4,

@@ -21,7 +21,7 @@ void expect_refused(const OutputKind& kind, const std::string& path, const std::
   }
 }
 
-TEST(OutputKinds, TheEndingChoosesTheFormat) {
+TEST(OutputKinds, EndingSelectsFormat) {
   EXPECT_EQ(format_of_output(outputs::kPointFile, "a.b/x.TXT"), "xyz");
   EXPECT_EQ(format_of_output(outputs::kPointFile, "x.csv"), "csv");
   EXPECT_EQ(format_of_output(outputs::kPointOrLineFile, "x.geojson"), "geojson");
@@ -30,7 +30,7 @@ TEST(OutputKinds, TheEndingChoosesTheFormat) {
   EXPECT_EQ(format_of_output(outputs::kContourFile, "-"), "geojson");
 }
 
-TEST(OutputKinds, ANameOfAnotherFormatIsRefusedWithThePossibleOnes) {
+TEST(OutputKinds, RejectsOtherFormatsAndListsChoices) {
   expect_refused(outputs::kRasterFile, "x.png", {}, "ends in .tif or .tiff");
   expect_refused(outputs::kPictureFile, "x.jpg", {}, "ends in .png");
   expect_refused(outputs::kContourFile, "c.gpkg", {}, "ends in .geojson or .json");
@@ -43,21 +43,21 @@ TEST(OutputKinds, ANameOfAnotherFormatIsRefusedWithThePossibleOnes) {
   expect_refused(outputs::kRasterFile, "-", {}, "standard output");
 }
 
-TEST(OutputKinds, FreeNamesMayHaveAnyUnknownEnding) {
+TEST(OutputKinds, FreeNamesAllowUnknownEndings) {
   for (const char* name : {"s", "s.terrace", "s.v2", "s.2024-11", ".s"}) {
     EXPECT_NO_THROW(format_of_output(outputs::kStore, name)) << name;
     EXPECT_NO_THROW(format_of_output(outputs::kOverlayFile, name)) << name;
   }
 }
 
-TEST(OutputKinds, InputsWithNamesOfOtherFormatsAreRefused) {
+TEST(OutputKinds, RejectsInputsOfOtherFormats) {
   for (const char* name : {"-", "places", "places.dat", "p.CSV", "/dev/stdin"}) {
     EXPECT_NO_THROW(check_input_name(outputs::kPlaceTable, name)) << name;
   }
   EXPECT_THROW(check_input_name(outputs::kPlaceTable, "p.geojson"), UsageError);
 }
 
-TEST(OutputKinds, AFormatThatIsNamedMustNotContradictTheEnding) {
+TEST(OutputKinds, FormatMustMatchEnding) {
   EXPECT_EQ(format_of_output(outputs::kPointFile, "x.dat", "csv"), "csv");
   EXPECT_EQ(format_of_output(outputs::kPointFile, "x.txt", "csv"), "csv");
   EXPECT_EQ(format_of_output(outputs::kMeshFile, "x.ply", "ply-ascii"), "ply-ascii");

@@ -8,17 +8,17 @@
 namespace terrace::terrain {
 namespace {
 
-TEST(PlaceFile, QuotesAroundQuotesTakeNoStack) {
+TEST(PlaceFile, NestedQuotesUseNoStack) {
   const std::string quotes(std::size_t{1} << 20, '"');
   PlaceLayout layout;
   layout.separator = ';';
   const Point2 place = place_of(quotes + ";1", layout, "places.csv", 1);
-  EXPECT_TRUE(place[0] != place[0]);  // nothing is in the quotes
+  EXPECT_TRUE(place[0] != place[0]);  // the quotes are empty
   EXPECT_EQ(place[1], 1.0);
   EXPECT_TRUE(PlaceLayout::of(quotes + "x" + quotes + ",y", "places.csv").header);
 }
 
-TEST(PlaceFile, FindsPlacesBehindOtherColumnsByName) {
+TEST(PlaceFile, FindsPlaceColumnsByName) {
   for (const std::string_view header :
        {"id,POINT_X,POINT_Y", "id,x_coord,y_coord", "PointID;Easting(m);Northing(m)", "n_id,E,N",
         "id,x,y,lon,lat", "name,lon,lat,easting,northing"}) {

@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 namespace {
 
-TEST(PointMeshCuts, HaveFewSamplesPerCellAndHardlyFewerThanMayBe) {
+TEST(PointMeshCuts, FillCellsNearlyToTheLimit) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937_64 engine(seed);
@@ -40,17 +40,17 @@ TEST(PointMeshCuts, HaveFewSamplesPerCellAndHardlyFewerThanMayBe) {
     }
     EXPECT_LE(static_cast<double>(cuts.cells.size()),
               1.0 + 1.7 * static_cast<double>(all.size()) / static_cast<double>(most));
-    // No sample on a line.
+    // No sample is on a line.
     for (const PointMeshCuts::Node& node : cuts.nodes) {
       for (const Point2& p : all) EXPECT_NE(p[node.axis], node.line);
     }
   }
 }
 
-TEST(PointMeshCuts, CannotDivideOnePlace) {
+TEST(PointMeshCuts, CannotDivideSinglePlace) {
   std::vector<Point2> all(1000, Point2{3, 4});
   EXPECT_EQ(cut_for_point_mesh(all, 1, 100).cells.size(), 1U);
-  // The others go apart from it.
+  // The other places can be separated from it.
   for (int i = 0; i < 50; ++i) all.push_back({static_cast<double>(i), 10});
   const PointMeshCuts cuts = cut_for_point_mesh(all, 1, 100);
   EXPECT_GT(cuts.cells.size(), 1U);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The triangles round a point, against those of the triangulation of all points.
+// Compares the triangles around a point with those of the triangulation of all points.
 #include "surface/point_star.hpp"
 
 #include <algorithm>
@@ -15,7 +15,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// The neighbours, counter-clockwise from the least; of an open star from the hull's first.
+/// Returns the neighbours, counter-clockwise from the least; of an open star, from the hull's
+/// first.
 std::vector<Point2> neighbours_of(const PointStar& star) {
   std::vector<Point2> result;
   for (std::size_t i = 0; i < star.size(); ++i) result.push_back(star.neighbour(i));
@@ -25,7 +26,7 @@ std::vector<Point2> neighbours_of(const PointStar& star) {
   return result;
 }
 
-/// The same from the triangles of the whole; closed tells whether they lie all round.
+/// The same from the whole triangulation; closed: whether triangles surround the centre.
 std::vector<Point2> neighbours_in(const tri::Delaunay2<double>& whole, const Point2& centre,
                                   bool& closed) {
   std::vector<std::array<Point2, 2>> edges;  // of the triangles, opposite to the centre
@@ -69,7 +70,7 @@ std::vector<Point2> cloud(const std::string& kind, std::mt19937_64& engine) {
       const double t = 0.1 * static_cast<double>(i);
       points.push_back({1000 * std::cos(t), 1000 * std::sin(t)});
     }
-    // Integer points of one circle, and some inside.
+    // Integer points on one circle, and some inside.
     if (kind == "cocircular") {
       const int a = i % 4 < 2 ? 1 : -1, b = i % 2 == 0 ? 1 : -1;
       const std::array<std::array<int, 2>, 5> at{{{0, 65}, {16, 63}, {25, 60}, {33, 56}, {39, 52}}};
@@ -84,7 +85,7 @@ std::vector<Point2> cloud(const std::string& kind, std::mt19937_64& engine) {
 
 class Stars : public testing::TestWithParam<std::string> {};
 
-TEST_P(Stars, AreThoseOfTheTriangulation) {
+TEST_P(Stars, MatchTriangulation) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 engine(seed);
@@ -117,7 +118,7 @@ INSTANTIATE_TEST_SUITE_P(PointStar, Stars,
                            return name;
                          });
 
-TEST(PointStar, HasNoTriangleOnALine) {
+TEST(PointStar, HasNoTriangleForCollinearPoints) {
   PointStar star;
   star.start({0, 0});
   EXPECT_EQ(star.triangles(), 0U);

@@ -50,7 +50,7 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
     return base::unit_interval(seed_);
   }
 
-  /// A raster that is tiled, and a surface of it.
+  /// A tiled raster and a surface of it.
   struct Tiled {
     stream::Store store;
     TiledRaster raster;
@@ -91,7 +91,8 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
     }
   }
 
-  /// A box of any size in and around the raster, now and then far from it or all around the globe.
+  /// Returns a box of any size in and around the raster, sometimes far from it or all around the
+  /// globe.
   GeographicBox box(const GeographicBox& bounds) {
     const double wide = bounds.east - bounds.west > 300.0 ? 4.0 : bounds.east - bounds.west;
     const double high = std::min(bounds.north - bounds.south, 4.0);
@@ -107,7 +108,7 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
     return box;
   }
 
-  /// Whether both answer alike in the box, as far as it is looked at.
+  /// Whether both give the same answers in the box, as far as they are compared.
   bool alike(Tiled& a, Tiled& b, const GeographicBox& box) {
     SurfaceSamples left, right;
     a.surface.samples(box, left);
@@ -154,7 +155,7 @@ class RasterDigest : public ::testing::TestWithParam<Frame> {
   const fs::path& folder_ = scratch_.path();
 };
 
-TEST_P(RasterDigest, EqualOnesGiveEqualAnswers) {
+TEST_P(RasterDigest, EqualDigestsGiveEqualAnswers) {
   const auto before = tiled("before");
   fill(40, 30, 1, 700.0F);
   fill(100, 110, 9, 500.0F);
@@ -174,11 +175,11 @@ TEST_P(RasterDigest, EqualOnesGiveEqualAnswers) {
   }
   EXPECT_GT(equal, 60);
   EXPECT_GT(changed, 20);
-  // The outline counts some way beyond the data.
+  // The outline matters some way beyond the data.
   EXPECT_GT(equal, needless / 4);
 }
 
-TEST_P(RasterDigest, ClustersDoNotMatterButForTheFill) {
+TEST_P(RasterDigest, DependsOnClustersOnlyThroughFill) {
   const auto one = tiled("one"), other = tiled("other", 700);
   one->raster.flat_fill = other->raster.flat_fill = 12.0;
   for (int round = 0; round < 100; ++round) {
@@ -187,7 +188,7 @@ TEST_P(RasterDigest, ClustersDoNotMatterButForTheFill) {
   }
 }
 
-TEST_P(RasterDigest, OptionsOfTheSurfaceCount) {
+TEST_P(RasterDigest, DependsOnSurfaceOptions) {
   const auto one = tiled("one");
   const GeographicBox all = one->raster.places.bounds();
   const std::uint64_t plain = one->surface.digest(all);
@@ -201,9 +202,9 @@ TEST_P(RasterDigest, OptionsOfTheSurfaceCount) {
   EXPECT_NE(higher, one->surface.digest(all));
 }
 
-// Masks are placed part by part: they may differ from single places where a place lies between two
+// Masks are computed part by part, so they may differ from single places if a place is between two
 // samples.
-TEST_P(RasterDigest, MasksAreThoseOfTheirPlaces) {
+TEST_P(RasterDigest, MasksMatchSinglePlaces) {
   const auto one = tiled("one");
   for (const std::optional<double>& height :
        {std::optional<double>{}, std::optional<double>{77.0}}) {
@@ -221,7 +222,7 @@ TEST_P(RasterDigest, MasksAreThoseOfTheirPlaces) {
       }
       std::vector<std::uint8_t> mask(longitude.size()), single(mask);
       one->surface.water(longitude, latitude, mask);
-      // Not in rows and columns any more.
+      // No longer in rows and columns.
       std::reverse(longitude.begin() + 1, longitude.end());
       std::reverse(latitude.begin() + 1, latitude.end());
       one->surface.water(longitude, latitude, single);

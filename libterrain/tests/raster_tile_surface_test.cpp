@@ -103,7 +103,7 @@ Heights in_rows(const SurfaceRows& rows) {
   return heights;
 }
 
-TEST_F(RasterOfDegrees, RowsAreTheSamples) {
+TEST_F(RasterOfDegrees, RowsMatchSamples) {
   const std::array<std::array<double, 6>, 5> worlds{{{0.01, 0, 10, 0, -0.01, 47},
                                                      {0.01, 0, 10, 0, 0.01, 44},
                                                      {-0.01, 0, 17, 0, -0.01, 47},
@@ -140,14 +140,14 @@ TEST_F(RasterOfDegrees, RowsAreTheSamples) {
   }
 }
 
-/// A surface that does not know its range.
+/// A surface with an unknown range.
 class WithoutRange final : public RasterTileSurface {
  public:
   using RasterTileSurface::RasterTileSurface;
   std::optional<HeightRange> surface_range(const GeographicBox& /*box*/) override { return {}; }
 };
 
-TEST_F(RasterOfDegrees, TheSurfaceIsWithinItsRange) {
+TEST_F(RasterOfDegrees, SurfaceIsWithinItsRange) {
   for (const auto& [world, epsg] :
        {std::pair{std::array<double, 6>{0.01, 0, 10, 0, -0.01, 47}, 4326},
         std::pair{std::array<double, 6>{0.01, 0, 176, 0, -0.01, -20}, 4326},
@@ -185,7 +185,7 @@ TEST_F(RasterOfDegrees, TheSurfaceIsWithinItsRange) {
             EXPECT_LE(height, range.high + 1e-9);
           }
         }
-        // Across 180 degrees bounds go around the globe.
+        // Across 180 degrees, bounds go around the globe.
         if (gaps == 0.0 && all.east - all.west < 180.0) {
           EXPECT_GT(narrower, 20U);
         }
@@ -194,7 +194,7 @@ TEST_F(RasterOfDegrees, TheSurfaceIsWithinItsRange) {
   }
 }
 
-TEST_F(RasterOfDegrees, TilesDoNotDependOnWhetherTheRangeIsKnown) {
+TEST_F(RasterOfDegrees, TilesDoNotDependOnKnownRange) {
   for (const auto& [world, epsg] :
        {std::pair{std::array<double, 6>{0.01, 0, 10, 0, -0.01, 47}, 4326},
         std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632}}) {
@@ -220,7 +220,7 @@ TEST_F(RasterOfDegrees, TilesDoNotDependOnWhetherTheRangeIsKnown) {
   }
 }
 
-TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
+TEST_F(RasterOfDegrees, ProjectedOrRotatedRastersHaveNoRows) {
   for (const auto& [world, epsg] :
        {std::pair{std::array<double, 6>{30, 0, 400000, 0, -30, 5200000}, 32632},
         std::pair{std::array<double, 6>{0.01, 0.001, 10, -0.001, 0.01, 44}, 4326}}) {
@@ -232,7 +232,7 @@ TEST_F(RasterOfDegrees, ProjectedOrTurnedRastersHaveNoRows) {
   }
 }
 
-TEST_F(RasterOfDegrees, BoxesOfProjectedRastersHaveAllTheirSamples) {
+TEST_F(RasterOfDegrees, BoxesOfProjectedRastersHaveAllSamples) {
   const double around = 2 * 20037508.342789244 / kColumns;
   for (const auto& [world, epsg] :
        {std::pair{std::array<double, 6>{30000, 0, -1e7, 0, -30000, 8e6}, 32632},
@@ -264,7 +264,7 @@ TEST_F(RasterOfDegrees, BoxesOfProjectedRastersHaveAllTheirSamples) {
   }
 }
 
-TEST_F(RasterOfDegrees, SurfacesShareWhatOneHasRead) {
+TEST_F(RasterOfDegrees, SurfacesShareCachedHeights) {
   std::stop_source stop;
   const stream::Store store =
       make<float>(stream::ScalarType::f32, {0.01, 0, 10, 0, -0.01, 47}, 4326)
@@ -275,13 +275,13 @@ TEST_F(RasterOfDegrees, SurfacesShareWhatOneHasRead) {
   const GeographicBox box{12.8, 45.0, 14.0, 46.0}, other{10.5, 44.5, 11.0, 45.5};
   const Heights heights = sampled(first, box);
   EXPECT_GT(heights.size(), 1000u);
-  // From now on nothing can be read.
+  // From now on, reading fails.
   stop.request_stop();
   EXPECT_EQ(sampled(second, box), heights);
   EXPECT_THROW(sampled(second, other), stream::Stopped);
 }
 
-TEST_F(RasterOfDegrees, ThreadsOfOneCacheGetTheHeightsOfTheStore) {
+TEST_F(RasterOfDegrees, ConcurrentCacheReadsMatchStore) {
   const stream::Store store =
       make<float>(stream::ScalarType::f32, {0.01, 0, 10, 0, -0.01, 47}, 4326);
   std::vector<double> expected(kColumns * kRows);
@@ -307,7 +307,7 @@ TEST_F(RasterOfDegrees, ThreadsOfOneCacheGetTheHeightsOfTheStore) {
   }
 }
 
-TEST_F(RasterOfDegrees, CachedHeightsAreThoseOfTheStore) {
+TEST_F(RasterOfDegrees, CachedHeightsMatchStore) {
   const auto check = [&](const stream::Store& store) {
     // None, a few of the nine squares, all.
     for (const std::uint64_t bytes :

@@ -14,8 +14,8 @@ namespace {
 
 const stream::Box3 kEverywhere{{-1e8, -1e8, -1e8}, {1e8, 1e8, 1e8}};
 
-// Oracle: the point itself, converted back into the region's system.
-TEST(RegionCrs, HoldsWhatTheBoxHolds) {
+// Oracle: the point itself, converted back to the region's system.
+TEST(RegionCrs, ContainsSamePointsAsBox) {
   struct Case {
     const char *from, *to;
     const char* box;
@@ -41,7 +41,7 @@ TEST(RegionCrs, HoldsWhatTheBoxHolds) {
     std::mt19937_64 random(7);
     const auto unit = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     for (int i = 0; i < 2000; ++i) {
-      // Half again as large as the box, in its own system; nothing closer than a thousandth of its
+      // Half again as large as the box, in its own system, except closer than a thousandth of its
       // size to the border, where the polygon may differ.
       const double width = box.box().max[0] - box.box().min[0];
       const double height = box.box().max[1] - box.box().min[1];
@@ -68,7 +68,7 @@ TEST(RegionCrs, KeepsHeights) {
   EXPECT_EQ(region.box().max[2], 200);
 }
 
-TEST(RegionCrs, RefusesWhatTheSystemDoesNotShow) {
+TEST(RegionCrs, RejectsOutlinesBeyondTheCrs) {
   const CoordinateSystem degrees, mercator = CoordinateSystem::parse("EPSG:3857");
   EXPECT_THROW(
       region_in(Region::parse("0,0,10,90"), Transformation(mercator, degrees), kEverywhere),
@@ -76,7 +76,7 @@ TEST(RegionCrs, RefusesWhatTheSystemDoesNotShow) {
   EXPECT_THROW(
       region_in(Region::parse("0,0,10,95"), Transformation(mercator, degrees), kEverywhere),
       stream::Error);
-  // Cut in two by the projection: one side of the antimeridian lies at the left, one at the right.
+  // The projection cuts it in two: one side of the antimeridian is on the left, one on the right.
   EXPECT_THROW(
       region_in(Region::parse("170,0,190,10"),
                 Transformation(CoordinateSystem::parse("EPSG:8857"), degrees), kEverywhere),
@@ -87,7 +87,7 @@ TEST(RegionCrs, RefusesWhatTheSystemDoesNotShow) {
       stream::Error);
 }
 
-TEST(RegionCrs, AMercatorMapGoesOnAtItsEdges) {
+TEST(RegionCrs, MercatorContinuesAtItsEdges) {
   const CoordinateSystem degrees, mercator = CoordinateSystem::parse("EPSG:3857");
   const Region region =
       region_in(Region::parse("170,0,190,10"), Transformation(mercator, degrees), kEverywhere);
@@ -101,7 +101,7 @@ TEST(RegionCrs, AMercatorMapGoesOnAtItsEdges) {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const stream::Box3 kAlps{{8, 46, 0}, {9, 47, 0}};
 
-TEST(RegionCrs, ABoxTurnedToTheDataIsABox) {
+TEST(RegionCrs, ShiftedBoxIsABox) {
   for (const char* const text : {"8.3,46,8.5,47", "-351.7,46,-351.5,47", "368.3,46,368.5,47"}) {
     const Region region = with_turns(Region::parse(text), 360, kAlps, {1e-9, 1e-9});
     EXPECT_TRUE(region.polygons().empty()) << text;
@@ -109,12 +109,12 @@ TEST(RegionCrs, ABoxTurnedToTheDataIsABox) {
     for (const double x : {8.2999, 8.5001}) EXPECT_FALSE(region.covers({x, 46})) << text;
     EXPECT_NEAR(region.extent().min[0], 8.3, 1e-12) << text;
   }
-  // Without rounding there is nothing to add, with it the box is wider than its extent.
+  // Without rounding there is nothing to add; with it, the box is wider than its extent.
   EXPECT_EQ(with_turns(Region::parse("8.3,46,8.5,47"), 360, kAlps).box().min[0], 8.3);
   EXPECT_LT(with_turns(Region::parse("8.3,46,8.5,47"), 360, kAlps, {1e-9, 0}).box().min[0], 8.3);
 }
 
-TEST(RegionCrs, ABoxHasAPartAtEachEndOfTheDataThatItReaches) {
+TEST(RegionCrs, BoxHasPartAtEachEndOfData) {
   const stream::Box3 world{{0, -90, 0}, {359, 90, 0}};
   const Region region = with_turns(Region::of_box({{-10, -kInfinity, 0}, {10, kInfinity, 0}}), 360,
                                    world, {1e-6, 1e-6});
@@ -125,7 +125,7 @@ TEST(RegionCrs, ABoxHasAPartAtEachEndOfTheDataThatItReaches) {
   EXPECT_TRUE(with_turns(Region::parse("-180,-90,180,90"), 360, world).covers({270, 0}));
 }
 
-TEST(RegionCrs, PolygonsOnBothSidesOfTheAntimeridianComeTogether) {
+TEST(RegionCrs, JoinsPolygonsAcrossAntimeridian) {
   const stream::Box3 fiji{{179, -18, 0}, {181, -16, 0}};
   const auto square = [](double west) {
     return Polygon{{{west, -17}, {west + 0.5, -17}, {west + 0.5, -16}, {west, -16}}};
@@ -139,7 +139,7 @@ TEST(RegionCrs, PolygonsOnBothSidesOfTheAntimeridianComeTogether) {
   }
 }
 
-TEST(RegionCrs, AnInfiniteBoxIsMeantAsItIsWritten) {
+TEST(RegionCrs, InfiniteBoxIsUnchanged) {
   const Region west = Region::of_box({{-kInfinity, -kInfinity, 0}, {8.5, kInfinity, 0}});
   EXPECT_TRUE(with_turns(west, 360, kAlps).covers({8.5, 46}));
   EXPECT_FALSE(with_turns(west, 360, kAlps).covers({8.6, 46}));

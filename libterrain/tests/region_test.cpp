@@ -26,7 +26,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// A file that goes with the object.
+/// A file that is removed with the object.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& text) { std::ofstream(path_) << text; }
@@ -51,14 +51,14 @@ TEST(Region, BoxesAreClosedAndMayBeNegative) {
   EXPECT_FALSE(solid.contains({5, 5, 1.1}));
 }
 
-TEST(Region, RefusesWhatIsNoBox) {
+TEST(Region, RejectsInvalidBoxes) {
   for (const char* text : {"1,2,3", "1,2,3,4,5", "5,0,1,1", "0,0,0,1,1,-1", "1,2,,4"}) {
     EXPECT_THROW(Region::parse(text), UsageError) << text;
   }
   EXPECT_THROW(Region::parse("no-such-file.geojson"), stream::Error);
 }
 
-TEST(Region, TakesAllKindsOfGeoJson) {
+TEST(Region, ReadsAllKindsOfGeoJson) {
   const std::string square = "[[[0,0],[4,0],[4,4],[0,4],[0,0]],[[1,1],[3,1],[3,3],[1,3],[1,1]]]";
   const std::string polygon = R"({"type":"Polygon","coordinates":)" + square + "}";
   const std::string feature = R"({"type":"Feature","properties":{},"geometry":)" + polygon + "}";
@@ -78,7 +78,7 @@ TEST(Region, TakesAllKindsOfGeoJson) {
   }
 }
 
-TEST(Region, FeaturesWithoutAGeometryAreLeftOut) {
+TEST(Region, SkipsFeaturesWithoutGeometry) {
   const std::string nowhere = R"({"type":"Feature","properties":{},"geometry":null})";
   const std::string square =
       R"({"type":"Feature","properties":null,"geometry":)"
@@ -90,7 +90,7 @@ TEST(Region, FeaturesWithoutAGeometryAreLeftOut) {
   EXPECT_THROW(region_of(nowhere), stream::Error);
 }
 
-TEST(Region, RestrictsWhatASourceDelivers) {
+TEST(Region, RestrictsSource) {
   stream::Selection selection;
   region_of(R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[0,4]],[[1,1],[2,1],[1,2]]]})")
       .restrict(selection);
@@ -106,7 +106,7 @@ TEST(Region, RestrictsWhatASourceDelivers) {
   EXPECT_FALSE(selection.covers);
 }
 
-TEST(Region, RefusesHostileGeoJson) {
+TEST(Region, RejectsHostileGeoJson) {
   std::string deep;
   for (int i = 0; i < 100; ++i) deep += R"({"type":"Feature","geometry":)";
   for (const std::string& json :
@@ -122,11 +122,11 @@ TEST(Region, RefusesHostileGeoJson) {
   }
 }
 
-// The typedef form: GCC's __extension__ silences -Wpedantic only before a declaration like this.
+// The typedef form, because GCC's __extension__ silences -Wpedantic only before such a declaration.
 __extension__ typedef __int128 Wide;
 
-// Law: the orientation of nearly collinear points is that of their exact integers.
-TEST(Orientation, IsExactNearALine) {
+// Law: the orientation of nearly collinear points equals that of their exact integers.
+TEST(Orientation, IsExactForNearlyCollinearPoints) {
   std::mt19937_64 random(7);
   for (int trial = 0; trial < 20000; ++trial) {
     const auto coordinate = [&] {
@@ -145,10 +145,9 @@ TEST(Orientation, IsExactNearALine) {
   }
 }
 
-// ---- Polygons against their definition, in integers
-// ----------------------------------------------
+// Polygons compared with their definition in integer arithmetic.
 
-/// On a lattice of steps of a half.
+/// Coordinates on a lattice with steps of one half.
 struct Step {
   std::int64_t x = 0, y = 0;
   friend bool operator==(const Step&, const Step&) = default;
@@ -172,7 +171,7 @@ bool segments_meet(const Step& a, const Step& b, const Step& c, const Step& d) {
 
 const Step& next(const Ring& ring, std::size_t i) { return ring[(i + 1) % ring.size()]; }
 
-/// Without a corner that is given twice in a row.
+/// Whether the ring is simple, ignoring repeated consecutive corners.
 bool is_simple(const Ring& given) {
   Ring ring;
   for (std::size_t i = 0; i < given.size(); ++i) {
@@ -201,7 +200,7 @@ bool on_ring(const std::vector<Ring>& rings, const Step& p) {
   return false;
 }
 
-/// On a ring, or inside by the even-odd rule.
+/// Whether p is on a ring, or inside by the even-odd rule.
 bool holds(const std::vector<Ring>& rings, const Step& p) {
   bool inside = on_ring(rings, p);
   if (inside) return true;
@@ -214,7 +213,7 @@ bool holds(const std::vector<Ring>& rings, const Step& p) {
   return inside;
 }
 
-/// How a convex figure, given by its corners, lies to the polygon.
+/// Returns how a convex figure, given by its corners, overlaps the polygon.
 Overlap overlap_of(const std::vector<Ring>& rings, const Ring& figure) {
   bool meets = holds(rings, figure[0]), borders = false;
   for (const Ring& ring : rings) {
@@ -223,7 +222,7 @@ Overlap overlap_of(const std::vector<Ring>& rings, const Ring& figure) {
         borders = borders || segments_meet(ring[i], next(ring, i), figure[k], next(figure, k));
       }
     }
-    bool within = true;  // the ring is in the figure or, by the above, wholly outside
+    bool within = true;  // the ring is in the figure or, by the above, entirely outside
     for (std::size_t k = 0; k < figure.size(); ++k) {
       within = within && side(figure[k], next(figure, k), ring[0]) > 0;
     }
@@ -233,7 +232,7 @@ Overlap overlap_of(const std::vector<Ring>& rings, const Ring& figure) {
   return !meets ? Overlap::none : borders ? Overlap::part : Overlap::whole;
 }
 
-/// Where the lattice lies among the doubles: at the last, steps are as small as doubles have them.
+/// The position of the lattice among the doubles; in the last, steps are as small as doubles allow.
 struct StepsAt {
   double origin, step;
   [[nodiscard]] Point2 operator()(const Step& p) const {
@@ -251,7 +250,7 @@ class RandomPlaces {
   std::int64_t below(std::int64_t end) {
     return static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(end));
   }
-  /// Corners are met often.
+  /// Places that often coincide with corners.
   Step place() { return {2 * below(10), 2 * below(10)}; }
   Ring ring(std::int64_t most) {
     Ring ring(static_cast<std::size_t>(3 + below(most - 2)));
@@ -295,7 +294,7 @@ void expect_boxes_and_triangles(const Region& region, const std::vector<Ring>& r
     const Overlap box = overlap_of(rings, {a, {b.x, a.y}, b, {a.x, b.y}});
     ASSERT_EQ(region.overlap({{low[0], low[1], 0}, {high[0], high[1], 1}}), box);
     ++seen[static_cast<std::size_t>(box)];
-    // A box without size: a place on a ring is not wholly inside, one beside is.
+    // A box without size: a place on a ring is not wholly inside, one next to it is.
     const Overlap place = !holds(rings, a)    ? Overlap::none
                           : on_ring(rings, a) ? Overlap::part
                                               : Overlap::whole;
@@ -308,8 +307,8 @@ void expect_boxes_and_triangles(const Region& region, const std::vector<Ring>& r
   }
 }
 
-// Law: a ring is taken if it is simple, and then everything is told as the integers tell it.
-TEST(Region, OneRingIsWhatTheIntegersSay) {
+// Law: a ring is accepted if it is simple; then all answers equal those in integer arithmetic.
+TEST(Region, SingleRingMatchesIntegerArithmetic) {
   int taken = 0, refused = 0;
   std::array<int, 3> seen{};
   for (std::uint64_t seed = 1; seed <= 600 / kShare; ++seed) {
@@ -334,8 +333,8 @@ TEST(Region, OneRingIsWhatTheIntegersSay) {
   for (const int count : seen) EXPECT_GT(count, 30 / kShare);
 }
 
-// Polygons with holes, and several that overlap; which are valid is left to GEOS here.
-TEST(Region, HolesAndOverlapsAreWhatTheIntegersSay) {
+// Polygons with holes, and several that overlap; GEOS decides which are valid.
+TEST(Region, HolesAndOverlapsMatchIntegerArithmetic) {
   int holes = 0, pairs = 0;
   std::array<int, 3> seen{};
   for (std::uint64_t seed = 1; seed <= 500 / kShare; ++seed) {
@@ -365,7 +364,8 @@ TEST(Region, HolesAndOverlapsAreWhatTheIntegersSay) {
   for (const int count : seen) EXPECT_GT(count, 30 / kShare);
 }
 
-/// A closed outline that turns once and goes in and out; every corner at another angle.
+/// Makes a closed outline with corners alternating between inside and outside, each at another
+/// angle.
 std::vector<Point2> jagged_ring(std::size_t corners, const Point2& middle, double radius) {
   std::mt19937_64 random(corners);
   std::vector<Point2> ring;
@@ -392,9 +392,9 @@ bool even_odd(const std::vector<Point2>& ring, const Point2& p) {
   return inside;
 }
 
-// Among so many corners most answers are the grid's. Oracle: even-odd, exactly. From several
-// threads at once: of one object, by more threads than it prepares for.
-TEST(Region, ManyThreadsAskOneOfManyCorners) {
+// With this many corners the grid gives most answers. Oracle: exact even-odd rule. Several threads
+// query one object at once, more than it prepares for.
+TEST(Region, LargeRegionIsThreadSafe) {
   constexpr std::size_t kThreads = 8, kQuestions = 3000;
   const std::vector<Point2> ring = jagged_ring(5000, {4e6, 7e6}, 1e5);
   const Region region = Region::of_polygons({{ring}}, -kAnyHeight, kAnyHeight);
@@ -405,7 +405,7 @@ TEST(Region, ManyThreadsAskOneOfManyCorners) {
       std::mt19937_64 random(t);
       const auto near = [&] { return 2.2e5 * (base::unit_interval(random()) - 0.5); };
       for (std::size_t i = 0; i < kQuestions; ++i) {
-        // Every other one is the middle of two corners, rounded: as near to a ring as can be.
+        // Every other one is the rounded middle of two corners, as near to a ring as possible.
         const Point2 &a = ring[random() % ring.size()], &b = ring[random() % ring.size()];
         const Point2 p = i % 2 == 0 ? Point2{4e6 + near(), 7e6 + near()}
                                     : Point2{(a[0] + b[0]) / 2, (a[1] + b[1]) / 2};
@@ -431,7 +431,7 @@ TEST(Region, ManyThreadsAskOneOfManyCorners) {
   }
 }
 
-TEST(Region, OverlapsByHeightsToo) {
+TEST(Region, OverlapsInHeight) {
   const Region region = Region::of_polygons({{{{0, 0}, {10, 0}, {10, 10}, {0, 10}}}}, 5, 8);
   EXPECT_EQ(region.overlap({{2, 2, 6}, {3, 3, 7}}), Overlap::whole);
   EXPECT_EQ(region.overlap({{2, 2, 4}, {3, 3, 7}}), Overlap::part);
@@ -448,7 +448,7 @@ TEST(Region, OverlapsByHeightsToo) {
 }
 
 // Oracle: the same box as a polygon.
-TEST(Region, BoxesTouchTheTrianglesThatTheirPolygonsDo) {
+TEST(Region, BoxesTouchSameTrianglesAsPolygons) {
   RandomPlaces random(5);
   const StepsAt& frame = kFrames[0];
   int touching = 0;
@@ -468,7 +468,7 @@ TEST(Region, BoxesTouchTheTrianglesThatTheirPolygonsDo) {
   EXPECT_LT(touching, 4000 / kShare);
 }
 
-TEST(Region, TakesRingsHoweverTheyAreWritten) {
+TEST(Region, AcceptsRingsInAnyForm) {
   for (const std::vector<Point2>& ring :
        std::vector<std::vector<Point2>>{{{0, 0}, {4, 0}, {4, 4}, {0, 4}},
                                         {{0, 4}, {4, 4}, {4, 0}, {0, 0}},
@@ -481,7 +481,7 @@ TEST(Region, TakesRingsHoweverTheyAreWritten) {
   }
 }
 
-TEST(Region, SaysWhatIsWrongWithRings) {
+TEST(Region, DescribesFaultsOfRings) {
   struct Case {
     std::vector<Polygon> polygons;
     const char *where, *cause;
@@ -509,7 +509,7 @@ TEST(Region, SaysWhatIsWrongWithRings) {
     SCOPED_TRACE(test.cause);
     try {
       Region::of_polygons(test.polygons, 0, 1);
-      ADD_FAILURE() << "taken";
+      ADD_FAILURE() << "accepted";
     } catch (const stream::Error& error) {
       EXPECT_EQ(error.parts().where, test.where);
       EXPECT_NE(error.parts().cause.find(test.cause), std::string::npos) << error.parts().cause;
@@ -519,15 +519,15 @@ TEST(Region, SaysWhatIsWrongWithRings) {
   const TemporaryFile file(R"({"type":"Polygon","coordinates":[[[0,0],[4,4],[4,0],[0,4],[0,0]]]})");
   try {
     Region::parse(file.path());
-    ADD_FAILURE() << "taken";
+    ADD_FAILURE() << "accepted";
   } catch (const stream::Error& error) {
     EXPECT_EQ(error.parts().file, file.path());
   }
 }
 
-TEST(Region, TakesRingsThatTouchInPlacesOnly) {
+TEST(Region, AcceptsRingsThatTouchOnlyAtPoints) {
   const std::vector<Point2> square{{0, 0}, {8, 0}, {8, 8}, {0, 8}};
-  // Holes that touch the shell, in a corner and along a side, and each other.
+  // The holes touch each other, and the shell at a corner and on a side.
   const std::vector<Point2> left{{0, 4}, {2, 3}, {4, 4}, {2, 5}}, right{{4, 4}, {6, 3}, {6, 5}};
   const std::vector<Point2> corner{{0, 0}, {2, 1}, {1, 2}};
   EXPECT_NO_THROW(Region::of_polygons({{square, left, right, corner}}, 0, 1));
@@ -537,9 +537,9 @@ TEST(Region, TakesRingsThatTouchInPlacesOnly) {
     } catch (const stream::Error& error) {
       return error.parts().cause;
     }
-    return "taken";
+    return "accepted";
   };
-  // A hole from side to side, and a circle of holes, cut the inside in two.
+  // A hole from side to side, and a closed chain of holes, cut the interior in two.
   EXPECT_NE(refused({square, {{0, 4}, {4, 3}, {8, 4}, {4, 5}}}).find("disconnected at 8, 4"),
             std::string::npos);
   EXPECT_NE(refused({square, left, {{4, 4}, {8, 4}, {6, 5}}}).find("disconnected"),
@@ -549,7 +549,7 @@ TEST(Region, TakesRingsThatTouchInPlacesOnly) {
             std::string::npos);
   EXPECT_NE(refused({square, left, {{1, 4}, {2, 3.75}, {3, 4}}}).find("Nested holes at 1, 4"),
             std::string::npos);
-  // Two rings with one side in common, and a hole that is the shell again.
+  // Two rings that share a side, and a hole that repeats the shell.
   EXPECT_NE(refused({square, {{0, 2}, {2, 3}, {0, 4}}}).find("Self-intersection"),
             std::string::npos);
   EXPECT_NE(refused({square, square}).find("Self-intersection"), std::string::npos);
@@ -559,8 +559,8 @@ TEST(Region, TakesRingsThatTouchInPlacesOnly) {
             std::string::npos);
 }
 
-/// Shapes of which all pairs of edges would be compared where boxes alone exclude pairs.
-TEST(Region, ChecksStarsCombsAndSpiralsInNearlyLinearTime) {
+/// Bounding boxes alone would exclude almost no pair of edges of these shapes.
+TEST(Region, ChecksStarsAndSpiralsInNearlyLinearTime) {
   constexpr int kCorners = 200'000 / kShare;
   constexpr double kTurn = 6.283185307179586;
   std::vector<Point2> star, spiral;
@@ -580,7 +580,7 @@ TEST(Region, ChecksStarsCombsAndSpiralsInNearlyLinearTime) {
     const Region region = Region::of_polygons({{ring}}, 0, 1);
     EXPECT_FALSE(region.covers({1e5, 0}));
   }
-  // One edge too far.
+  // One edge crosses another.
   std::vector<Point2> crossed = star;
   crossed[static_cast<std::size_t>(kCorners / 2)] = {0.5, -1.0};
   EXPECT_THROW(Region::of_polygons({{crossed}}, 0, 1), stream::Error);
@@ -589,8 +589,8 @@ TEST(Region, ChecksStarsCombsAndSpiralsInNearlyLinearTime) {
   EXPECT_THROW(Region::of_polygons({{star}}, 0, 1, {}, stop.get_token()), stream::Stopped);
 }
 
-/// Spikes from side to side, of which each row or each column crosses all.
-TEST(Region, SpikesAreAnsweredAlongBothAxes) {
+/// Spikes across the whole box, all of them crossed by each row or by each column.
+TEST(Region, AnswersSpikesAlongBothAxes) {
   constexpr std::size_t kSpikes = 20000;
   constexpr double kWidth = 1000.0 / kSpikes;
   std::vector<Point2> comb;

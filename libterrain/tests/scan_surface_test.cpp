@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The surface of a scan, against the sphere that its points lie on.
+// Compares the surface of a scan with the sphere that its points are on.
 #include "terrace/terrain/scan_surface.hpp"
 
 #include <array>
@@ -29,7 +29,7 @@ constexpr stream::Point3 kCentre{400000.0, 5200000.0, 700.0};
 
 class ScanSurfaceTest : public ::testing::Test {
  protected:
-  /// 3,000 random points on a sphere, in metres.
+  /// Makes 3,000 random points on a sphere, in metres.
   ScanSurfaceTest() {
     const std::filesystem::path text = folder_.path() / "points.xyz";
     std::mt19937_64 random(5);
@@ -65,7 +65,7 @@ class ScanSurfaceTest : public ::testing::Test {
   tests::TemporaryFolder folder_;
 };
 
-TEST_F(ScanSurfaceTest, OfASphereIsClosedAndHasItsAreaAndVolume) {
+TEST_F(ScanSurfaceTest, SphereIsClosedWithCorrectAreaAndVolume) {
   const ScanSurface surface = scan_surface(store(), {});
   EXPECT_EQ(surface.mesh.positions.size(), 3000U);
   EXPECT_EQ(surface.mesh.levels.size(), 3000U);
@@ -77,7 +77,7 @@ TEST_F(ScanSurfaceTest, OfASphereIsClosedAndHasItsAreaAndVolume) {
   for (const stream::Point3& p : surface.mesh.positions) EXPECT_NEAR(radius_of(p), kRadius, 1e-5);
 }
 
-TEST_F(ScanSurfaceTest, TetrahedraFillIt) {
+TEST_F(ScanSurfaceTest, TetrahedraFillSurface) {
   ScanSurfaceOptions options;
   options.tetrahedra = true;
   const ScanSurface inside = scan_surface(store(), {}, options);
@@ -95,7 +95,7 @@ TEST_F(ScanSurfaceTest, TetrahedraFillIt) {
   EXPECT_NEAR(volume, inside.measures.volume, 1e-6 * volume);
 }
 
-TEST_F(ScanSurfaceTest, CornersOfAMethodAreNewPointsUnlessItNamesThem) {
+TEST_F(ScanSurfaceTest, MethodReturnsNewPointsUnlessItNamesInputs) {
   ScanSurfaceOptions options;
   std::size_t given = 0;
   options.method =
@@ -131,7 +131,7 @@ TEST_F(ScanSurfaceTest, CornersOfAMethodAreNewPointsUnlessItNamesThem) {
   EXPECT_THROW(static_cast<void>(scan_surface(store(), {}, options)), UsageError);
 }
 
-TEST_F(ScanSurfaceTest, RefusesWhatDoesNotFitAndStops) {
+TEST_F(ScanSurfaceTest, RejectsTooManyPointsAndStops) {
   try {
     static_cast<void>(scan_surface(store(), {}, {}, {.memory_bytes = std::uint64_t{1} << 20}));
     FAIL() << "3,000 points do not fit into 1 MiB";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Stores of scans under a camera: made ones, and those in the data folder named by TERRACE_DATA.
+// Stores of scans seen by a camera: generated scans, and those in the data folder TERRACE_DATA.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,7 +27,7 @@ namespace {
 using ScanSurface3 = tri::DynamicSurface<std::int32_t>;
 using ScanView = StoreView<ScanSurface3>;
 
-/// What a renderer keeps: the corners of triangles as they were when it was told of them.
+/// What a renderer keeps: the corners of triangles as they were when they were added.
 class DrawnSurface {
  public:
   using Corners = std::array<ScanSurface3::Point, 3>;
@@ -65,7 +65,7 @@ class ScanViews : public testing::Test {
     build_store(request);
     return stream::Store::open(request.store);
   }
-  /// The name of a file of points: of the vertices of an OBJ, or the file itself.
+  /// Returns the name of a file of points: of the vertices of an OBJ, or the file itself.
   std::string points_of(const std::filesystem::path& file) {
     if (file.extension() != ".obj") return file.string();
     const std::filesystem::path text = folder_.path() / "vertices.xyz";
@@ -76,7 +76,7 @@ class ScanViews : public testing::Test {
     }
     return text.string();
   }
-  /// A bumpy body of about 100 m, scanned in this many points.
+  /// Builds a store of a bumpy body of about 100 m, scanned in this many points.
   stream::Store bumpy(int count, std::uint64_t seed) {
     const std::filesystem::path text = folder_.path() / "points.xyz";
     std::mt19937_64 random(seed);
@@ -103,7 +103,7 @@ class ScanViews : public testing::Test {
   tests::TemporaryFolder folder_;
 };
 
-/// Round the body, close over it and looking ahead.
+/// A flight around the body, close to it and looking ahead.
 class Round {
  public:
   explicit Round(const stream::Store& store) {
@@ -133,12 +133,12 @@ class Round {
 
 struct Flown {
   std::size_t triangles = 0, expanded = 0, collapsed = 0;
-  std::size_t differed_first = 0, differed = 0;  ///< triangles that restore() took away
+  std::size_t differed_first = 0, differed = 0;  ///< triangles that restore() removed
 };
 
-/// Settles before the first frame, flies once round in `frames`, and settles. Both times the
-/// tetrahedra must be those of the points, the deltas add up to the surface, and the surface from
-/// scratch be that of the points.
+/// Settles before the first frame, flies around once in `frames` frames, and settles again. Both
+/// times the tetrahedra must be those of the points, the deltas must add up to the surface, and the
+/// surface from scratch must be that of the points.
 void fly(ScanView& view, const Round& round, int frames, double pixel_error, double seconds,
          Flown& flown) {
   const ScanSurface3& surface = view.model().triangulation();
@@ -176,7 +176,7 @@ void fly(ScanView& view, const Round& round, int frames, double pixel_error, dou
   flown.triangles = surface.triangle_count();
 }
 
-TEST_F(ScanViews, OfAMadeBodyFollowTheCameraAndEndAtTheSameWhoeverReads) {
+TEST_F(ScanViews, FollowCameraToSameResultWithAnyReader) {
   const stream::Store store = bumpy(20'000, 3);
   const Round round(store);
   std::array<std::uint64_t, 2> hashes{};
@@ -187,7 +187,7 @@ TEST_F(ScanViews, OfAMadeBodyFollowTheCameraAndEndAtTheSameWhoeverReads) {
     EXPECT_GT(flown.expanded, 50u);
     EXPECT_GT(flown.collapsed, 20u);
     EXPECT_LE(flown.differed_first + flown.differed, flown.triangles / 500);
-    // All of it.
+    // At full detail.
     tri::View all;
     all.ground_error = 0.0;
     for (int frame = 0; frame < 20000 && (frame == 0 || !view.settled()); ++frame) {
@@ -201,7 +201,7 @@ TEST_F(ScanViews, OfAMadeBodyFollowTheCameraAndEndAtTheSameWhoeverReads) {
   EXPECT_EQ(hashes[0], hashes[1]);
 }
 
-TEST_F(ScanViews, VerticesLieWhereTheStoreSays) {
+TEST_F(ScanViews, PlaceVerticesAtStoredPoints) {
   const stream::Store store = bumpy(3000, 4);
   ScanView view(store, {}, ScanView::Reader::in_frame);
   tri::View all;
@@ -224,7 +224,7 @@ TEST_F(ScanViews, VerticesLieWhereTheStoreSays) {
     for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(there[k], again[k], 1e-8);
     EXPECT_LT(std::hypot(there[0], there[1]), 70.0);  // the middle is the origin
   }
-  // Coordinates differ by more than the lattice's step, so the order is the same.
+  // Coordinates differ by more than the lattice's spacing, so the order is the same.
   std::sort(expected.begin(), expected.end());
   std::sort(found.begin(), found.end());
   ASSERT_EQ(found.size(), expected.size());
@@ -232,7 +232,7 @@ TEST_F(ScanViews, VerticesLieWhereTheStoreSays) {
     for (std::size_t k = 0; k < 3; ++k) ASSERT_NEAR(found[i][k], expected[i][k], 1e-6);
 }
 
-TEST_F(ScanViews, ExpandRegionsAndCollapseThemAgain) {
+TEST_F(ScanViews, ExpandAndCollapseRegions) {
   const stream::Store store = bumpy(10'000, 5);
   ScanView view(store, {}, ScanView::Reader::in_frame);
   const std::size_t coarse = view.model().point_count();
@@ -262,17 +262,17 @@ TEST_F(ScanViews, ExpandRegionsAndCollapseThemAgain) {
   EXPECT_EQ(view.model().point_count(), coarse);
 }
 
-/// The surface of the steps may differ from that from scratch in weakly determined pockets. Of the
-/// bunny and the armadillo less than a thousandth of the triangles does. Lucy has large pockets
-/// whose side a distant angle decides (between the robe's folds, between arm and face), and her
-/// coarse points decide differently: refined at once from the coarsest level, up to a tenth of the
-/// triangles differ until restore(); after that, a flight makes less than a hundredth differ.
-TEST_F(ScanViews, OfRealScansFollowTheCamera) {
+/// The surface of the steps may differ from that from scratch in weakly determined pockets. For the
+/// bunny and the armadillo, less than a thousandth of the triangles differ. Lucy has large pockets
+/// that depend on a distant angle (between the robe's folds, between arm and face), and her coarse
+/// points decide differently. After refining directly from the coarsest level, up to a tenth of the
+/// triangles differ until restore(); after that, a flight changes less than a hundredth.
+TEST_F(ScanViews, FollowCameraOnRealScans) {
   const char* const data = std::getenv("TERRACE_DATA");
   if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
   struct Scan {
     const char* file;
-    std::size_t first, later;  ///< of a thousand triangles so many may differ
+    std::size_t first, later;  ///< limits of differing triangles per thousand
   };
   const Scan scans[] = {
       {"bun_zipper.ply", 1, 1}, {"armadillo_libigl.obj", 1, 1}, {"lucy_100k.ply", 150, 10}};
@@ -295,11 +295,11 @@ TEST_F(ScanViews, OfRealScansFollowTheCamera) {
   }
 }
 
-TEST_F(ScanViews, AreOfBodiesAndNeitherOfGroundNorOfClassifiedPoints) {
+TEST_F(ScanViews, RecogniseBodiesButNotGroundOrClassifiedPoints) {
   constexpr stream::LinearMap kMetres{1, 0, 0, 0, 1, 0, 0, 0, 1};
   const stream::Store body = bumpy(5000, 7);
   EXPECT_TRUE(is_scan(body, kMetres));
-  // Seen so that it is a hundred times as wide as it is high, it is ground.
+  // Stretched to a hundred times its width, it is ground.
   EXPECT_FALSE(is_scan(body, {100, 0, 0, 0, 100, 0, 0, 0, 1}));
   const std::filesystem::path text = folder_.path() / "points.csv";
   std::mt19937_64 random(8);

@@ -15,18 +15,18 @@ TriangleMesh tetrahedron() {
   return mesh;
 }
 
-TEST(HeightField, IsSeenFromAboveWithoutOverlap) {
+TEST(HeightField, HasNoOverlapSeenFromAbove) {
   TriangleMesh flat;
   flat.positions = {{0, 0, 3}, {1, 0, 1}, {0, 1, 7}, {1, 1, -2}};
   flat.triangles = {{0, 1, 2}, {1, 3, 2}};
   EXPECT_TRUE(is_height_field(flat));
-  flat.triangles[1] = {1, 2, 3};  // turned over
+  flat.triangles[1] = {1, 2, 3};  // inverted
   EXPECT_FALSE(is_height_field(flat));
   EXPECT_FALSE(is_height_field(tetrahedron()));
   EXPECT_FALSE(is_height_field(TriangleMesh{}));
 }
 
-TEST(VertexNormals, AreUnitAndOutward) {
+TEST(VertexNormals, AreUnitVectorsPointingOutward) {
   const TriangleMesh mesh = tetrahedron();
   const auto normals = vertex_normals(mesh);
   ASSERT_EQ(normals.size(), 4u);
@@ -41,7 +41,7 @@ TEST(VertexNormals, AreUnitAndOutward) {
   }
 }
 
-TEST(VertexNormals, OfTerrainPointUpWhateverTheOrientation) {
+TEST(VertexNormals, PointUpOnTerrainInAnyOrientation) {
   TriangleMesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {9, 9, 9}};
   for (const std::array<std::uint32_t, 3> t : {std::array<std::uint32_t, 3>{0, 1, 2}, {0, 2, 1}}) {

@@ -31,7 +31,7 @@ class SmoothOffsets : public ::testing::Test {
     }
     return places;
   }
-  /// Compares with the function itself. Returns how often that was asked for.
+  /// Compares with the function itself. Returns the number of its evaluations.
   std::size_t check(const std::vector<Point2>& places,
                     const std::function<double(const Point2&)>& offset) {
     std::vector<double> heights;
@@ -60,8 +60,8 @@ class SmoothOffsets : public ::testing::Test {
   std::uint64_t seed_ = 71;
 };
 
-/// Bilinear between random values on a grid, as vertical grids are, with steps of some centimetres
-/// per kilometre.
+/// Bilinear between random values on a grid, like vertical grids, with differences of some
+/// centimetres per kilometre.
 double on_grid(const Point2& p, double cells_per_degree) {
   const auto value = [](double x, double y) {
     const auto number = static_cast<std::uint64_t>(std::int64_t{1} << 40) +
@@ -76,14 +76,14 @@ double on_grid(const Point2& p, double cells_per_degree) {
   return (1 - fy) * row(std::floor(y)) + fy * row(std::floor(y) + 1);
 }
 
-TEST_F(SmoothOffsets, OfGridsAreThoseAskedForOneByOne) {
+TEST_F(SmoothOffsets, MatchSingleQueriesOnGrids) {
   for (const double cells : {4.0, 24.0, 60.0, 7.3}) {
     for (const double size : {0.001, 0.05, 0.6}) {
       SCOPED_TRACE(testing::Message() << cells << " cells per degree, places in " << size);
       const Point2 low{-10 + 20 * random(), 40 + 10 * random()};
       const auto offset = [&](const Point2& p) { return on_grid(p, cells); };
       const std::size_t asked = check(places(20000, low, {size, 0.7 * size}), offset);
-      // Only where the box has a handful of usual cells most are answered by polynomials.
+      // Polynomials answer most queries only if the box has few cells.
       if (cells != 7.3 && size * cells < 4) {
         EXPECT_LT(asked, 4000u);
       }
@@ -91,11 +91,11 @@ TEST_F(SmoothOffsets, OfGridsAreThoseAskedForOneByOne) {
   }
 }
 
-TEST_F(SmoothOffsets, OfSmoothFunctionsAreThoseAskedForOneByOne) {
+TEST_F(SmoothOffsets, MatchSingleQueriesOnSmoothFunctions) {
   const auto wave = [](const Point2& p) { return 50 * std::sin(p[0] / 9) * std::cos(p[1] / 7); };
   EXPECT_LT(check(places(20000, {170, -30}, {0.5, 0.5}), wave), 100u);
   check(places(20000, {-180, -90}, {360, 180}), wave);
-  // Along a line, at one place, and of few places.
+  // Along a line, at a single place, and for few places.
   EXPECT_LT(check(places(5000, {12, 40}, {0, 0.5}), wave), 100u);
   EXPECT_LT(check(places(5000, {12, 40}, {0.5, 0}), wave), 100u);
   EXPECT_LT(check(places(5000, {12, 40}, {0, 0}), wave), 100u);
@@ -103,7 +103,7 @@ TEST_F(SmoothOffsets, OfSmoothFunctionsAreThoseAskedForOneByOne) {
   check({}, wave);
 }
 
-TEST_F(SmoothOffsets, EndWhereTheGridEnds) {
+TEST_F(SmoothOffsets, EndAtGridBorder) {
   const auto ends = [](const Point2& p) {
     return p[0] > 12.3 && p[1] > 40.1 ? 44 + 0.1 * p[0] : std::numeric_limits<double>::quiet_NaN();
   };
@@ -116,7 +116,7 @@ TEST_F(SmoothOffsets, EndWhereTheGridEnds) {
   check(some, [](const Point2& p) { return p[0] + p[1]; });
 }
 
-TEST(QuinticSurface, IsThePolynomialThatItGoesThrough) {
+TEST(QuinticSurface, ReproducesPolynomials) {
   const auto f = [](double s, double t) {
     return 3 + s * (1 - t * t * t) + 2 * s * s * s * s * s * t - t * t;
   };

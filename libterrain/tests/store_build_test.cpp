@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The bytes of a store are a function of input and options: not of the compiler or its
+// The bytes of a store are a function of input and options, not of the compiler or its
 // optimisation.
 #include <algorithm>
 #include <cmath>
@@ -33,18 +33,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The checksum was computed by GCC at -O3; the sanitizers' build, Clang at -O1, must find it too.
-/// It changes only with the format or with the clustering, which is a decision and never an
-/// accident.
-TEST(StoreBuild, ChecksumIsTheSameWithEveryCompiler) {
+/// The checksum was computed with GCC at -O3; the sanitizers' build, with Clang at -O1, must give
+/// the same. It changes only with the format or the clustering, which must be a deliberate
+/// decision.
+TEST(StoreBuild, ChecksumDoesNotDependOnCompiler) {
   std::string name = (fs::temp_directory_path() / "terrace-build-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
   const fs::path folder = name;
   const fs::path points = folder / "points.xyz";
   {
     std::ofstream file(points);
-    // Whole centimetres by integer arithmetic: three fields with bumps and a few places given
-    // twice.
+    // Whole centimetres in integer arithmetic: three fields with bumps, and a few repeated places.
     for (int i = 0; i < 4000; ++i) {
       const int x = i * 7919 % 100003, y = i * 104729 % 60013;
       const int z = 10000 + x / 13 % 700 + y / 7 % 900 + x * (y % 97) / 100000 + i * 31 % 11;
@@ -68,7 +67,7 @@ TEST(StoreBuild, ChecksumIsTheSameWithEveryCompiler) {
   fs::remove_all(folder);
 }
 
-/// Builds a store of points whose lines of CSV are `line(i)`.
+/// Builds a store of points with `line(i)` as their lines of CSV.
 stream::Store store_of_lines(const fs::path& folder, const std::string& columns, int points,
                              std::size_t block_points,
                              const std::function<void(std::ostream& file, int i)>& line) {
@@ -90,7 +89,7 @@ stream::Store store_of_lines(const fs::path& folder, const std::string& columns,
 }
 
 // A store with another word could not be opened.
-TEST(StoreBuild, HeightsReferToOneOfTwo) {
+TEST(StoreBuild, RejectsUnknownHeightReference) {
   const tests::TemporaryFolder folder;
   std::ofstream(folder.path() / "points.csv") << "x,y,z\n1,2,3\n";
   BuildRequest request;
@@ -104,10 +103,11 @@ TEST(StoreBuild, HeightsReferToOneOfTwo) {
   EXPECT_EQ(stream::Store::open(request.store).schema().vertical, "ellipsoidal");
 }
 
-// By the ranges of their attributes; what comes is what the condition takes of all points.
-TEST(StoreBuild, ClustersThatCannotMeetAConditionAreNotRead) {
+// Clusters are skipped by the ranges of their attributes; the points must equal those that the
+// condition selects from all.
+TEST(StoreBuild, SkipsClustersThatCannotMeetCondition) {
   const tests::TemporaryFolder folder;
-  // Strips of a class each.
+  // Strips of one class each.
   stream::Store store =
       store_of_lines(folder.path(), "x,y,z,class", 20000, 2000, [](std::ostream& file, int i) {
         const int x = i * 7919 % 10007, y = i * 104729 % 10009;
@@ -162,7 +162,7 @@ class Listed final : public WantedPart {
   bool ended_ = false;
 };
 
-TEST(StoreBuild, PartsOfWhatIsWantedComeInOrderWhateverTheThreads) {
+TEST(StoreBuild, WantedPartsComeInOrderOnAnyThreads) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       store_of_lines(folder.path(), "x,y,z", 100000, 500, [](std::ostream& file, int i) {
@@ -197,7 +197,7 @@ TEST(StoreBuild, PartsOfWhatIsWantedComeInOrderWhateverTheThreads) {
 }
 
 // Every point of a level and above belongs to one cluster of each level that is not finer.
-TEST(StoreBuild, TheClustersOfALevelPartThePointsOfEveryFinerOne) {
+TEST(StoreBuild, ClustersOfALevelPartitionFinerPoints) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       store_of_lines(folder.path(), "x,y,z,number", 20000, 50, [](std::ostream& file, int i) {
@@ -232,7 +232,7 @@ TEST(StoreBuild, TheClustersOfALevelPartThePointsOfEveryFinerOne) {
                                  records += record.points;
                                });
       }
-      // All but the representatives, which are members of coarser clusters.
+      // All except the representatives, which are members of coarser clusters.
       EXPECT_EQ(records + (level < store.top() ? store.levels()[level].clusters : 0), met.size());
       std::sort(expected.begin(), expected.end());
       std::sort(met.begin(), met.end());
@@ -245,8 +245,8 @@ TEST(StoreBuild, TheClustersOfALevelPartThePointsOfEveryFinerOne) {
 }
 
 }  // namespace
-// An array in memory; heights, gradients and a profile of the plane that its points lie on.
-TEST(StoreBuild, TakesASourceOfTheCaller) {
+// An array in memory; heights, gradients and a profile of the plane through its points.
+TEST(StoreBuild, AcceptsCallersSource) {
   const tests::TemporaryFolder folder;
   const auto plane = [](double x, double y) { return 2 + 0.25 * x - 0.5 * y; };
   std::vector<stream::Point3> points;
@@ -309,8 +309,8 @@ TEST(StoreBuild, TakesASourceOfTheCaller) {
   }
 }
 
-// Most of the work may be left when the last point is read: blocks wait for every thread.
-TEST(StoreBuild, StopsAfterTheLastPointWasRead) {
+// Most of the work may remain when the last point is read, because blocks wait for every thread.
+TEST(StoreBuild, StopsAfterLastPointWasRead) {
   const tests::TemporaryFolder folder;
   std::vector<stream::Point3> points;
   for (int i = 0; i < 3100; ++i) {
@@ -325,7 +325,7 @@ TEST(StoreBuild, StopsAfterTheLastPointWasRead) {
                                  std::ptrdiff_t{sizeof(stream::Point3)}};
   }
   BuildRequest request;
-  // No stop ends the reading.
+  // The source itself does not react to a stop.
   request.open = [&columns](const stream::SourceOptions&) {
     return stream::open_memory(columns, {});
   };

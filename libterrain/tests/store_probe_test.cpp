@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The answers of StoreProbe against the samplers of the library, with all bytes and with none at
-// first.
+// Compares the answers of StoreProbe with the library's samplers, with all bytes available and with
+// none at first.
 #include "sample/store_probe.hpp"
 
 #include <algorithm>
@@ -32,7 +32,7 @@ using stream::Point3;
 
 constexpr std::uint32_t kColumns = 300, kRows = 260;
 
-/// A raster of hills in metres, with a lake and some single samples without data.
+/// Builds a raster of hills in metres, with a lake and some single samples without data.
 std::filesystem::path built_raster(const tests::TemporaryFolder& folder) {
   stream::GeoTiffOptions options;
   options.nodata = -9999;
@@ -52,7 +52,7 @@ std::filesystem::path built_raster(const tests::TemporaryFolder& folder) {
   return request.store;
 }
 
-/// A store without any bytes at first, which brings those that a question lacks.
+/// A store without any bytes at first, which supplies those that a query lacks.
 class Remote {
  public:
   explicit Remote(const std::filesystem::path& folder) {
@@ -99,7 +99,7 @@ void expect_same(double a, double b, const std::string& where) {
 
 constexpr stream::LinearMap kGround{30, 0, 0, 0, -30, 0, 0, 0, 1};
 
-TEST(StoreProbes, HeightsOfRastersAreThoseOfTheSampler) {
+TEST(StoreProbes, RasterHeightsMatchSampler) {
   const tests::TemporaryFolder folder;
   const std::filesystem::path path = built_raster(folder);
   const stream::Store store = stream::Store::open(path);
@@ -134,7 +134,7 @@ TEST(StoreProbes, HeightsOfRastersAreThoseOfTheSampler) {
   EXPECT_LE(rounds, 2 * static_cast<int>(store.levels().size()) + 1);
 }
 
-TEST(StoreProbes, ProfilesOfRastersAreThoseOfTheLibrary) {
+TEST(StoreProbes, RasterProfilesMatchLibrary) {
   const tests::TemporaryFolder folder;
   const std::filesystem::path path = built_raster(folder);
   const stream::Store store = stream::Store::open(path);
@@ -168,14 +168,14 @@ TEST(StoreProbes, ProfilesOfRastersAreThoseOfTheLibrary) {
       expect_same(found->points[i][1], expected[i].height, std::to_string(i));
     }
   }
-  // Little is read for a short way.
+  // A short line reads little.
   Remote other(path);
   StoreProbe brief(other.store(), kGround);
   ASSERT_TRUE(other.ask([&] { return brief.profile({20, 200, 0}, {22, 201, 0}, 2); }));
   EXPECT_LT(other.bytes(), store.bytes() / 3);
 }
 
-TEST(StoreProbes, PointsAreFoundAmongAll) {
+TEST(StoreProbes, FindNearestOfAllPoints) {
   const tests::TemporaryFolder folder;
   std::mt19937 random(5);
   std::uniform_real_distribution<double> any(0, 100);

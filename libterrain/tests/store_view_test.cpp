@@ -79,7 +79,7 @@ bool settle(StoreView<Coord>& view, const tri::View& wish) {
   return false;
 }
 
-/// The points of the expanded clusters and of the root, each once.
+/// Counts the points of the expanded clusters and of the root, each once.
 template <class Coord>
 std::uint64_t points_expected(const StoreView<Coord>& view, const stream::Store& store) {
   std::uint64_t points = store.levels()[store.top()].members;
@@ -89,7 +89,7 @@ std::uint64_t points_expected(const StoreView<Coord>& view, const stream::Store&
   return points;
 }
 
-TEST_F(StoreViews, EndWithWhatTheViewAsksForWhoeverReads) {
+TEST_F(StoreViews, ReachRequestedDetailWithAnyReader) {
   const stream::Store store = in_metres();
   using View = StoreView<std::int32_t>;
   std::set<std::uint64_t> hashes;
@@ -105,7 +105,7 @@ TEST_F(StoreViews, EndWithWhatTheViewAsksForWhoeverReads) {
     EXPECT_GE(view.traffic().points, view.model().point_count());
     EXPECT_GT(view.traffic().bytes, 0u);
     hashes.insert(view.model().triangulation().hash());
-    // Far away nothing is left but the root.
+    // From far away only the root remains.
     tri::View away;
     away.ground_error = 1e9;
     ASSERT_TRUE(settle(view, away));
@@ -114,7 +114,7 @@ TEST_F(StoreViews, EndWithWhatTheViewAsksForWhoeverReads) {
   EXPECT_EQ(hashes.size(), 1u);
 }
 
-TEST_F(StoreViews, TheTrianglesOfAllStepsAreThoseOfTheMesh) {
+TEST_F(StoreViews, DeltasAddUpToTheMesh) {
   const stream::Store store = in_metres();
   StoreView<double> view(store);
   std::set<tri::TriangleId> drawn;
@@ -130,8 +130,8 @@ TEST_F(StoreViews, TheTrianglesOfAllStepsAreThoseOfTheMesh) {
   EXPECT_EQ(drawn, there);
 }
 
-TEST_F(StoreViews, AFrameOfMetresWhateverTheCrs) {
-  // At 46 degrees north 30 m are 0.00026999 degrees of latitude and 0.00038775 of longitude.
+TEST_F(StoreViews, UseMetresForAnyCrs) {
+  // At 46 degrees north, 30 m are 0.00026999 degrees of latitude and 0.00038775 of longitude.
   const stream::Store metres = in_metres();
   const stream::Store degrees =
       build("degrees", {0.00038775, 0, 8.0, 0, -0.00026999, 46.035}, 4326);
@@ -152,7 +152,7 @@ TEST_F(StoreViews, AFrameOfMetresWhateverTheCrs) {
               0.1 * static_cast<double>(flat.model().point_count()));
 }
 
-/// Whether a triangle spans a gap, from the definition, by all clusters' records.
+/// Whether a triangle spans a gap by definition, using all clusters' records.
 bool spans_gap_by_records(const StoreView<std::int32_t>& view, const stream::Store& store,
                           tri::TriangleId triangle) {
   const auto& model = view.model();
@@ -185,9 +185,9 @@ bool spans_gap_by_records(const StoreView<std::int32_t>& view, const stream::Sto
   return true;
 }
 
-// Coast, lakes down to single cells, and an island: what is drawn without the triangles that span a
-// gap is the land.
-TEST_F(StoreViews, TrianglesThatSpanGapsAreKnown) {
+// Coast, lakes down to single cells, and an island: without the triangles that span a gap, exactly
+// the land is drawn.
+TEST_F(StoreViews, RecogniseTrianglesOverGaps) {
   const auto has_data = [](std::uint32_t column, std::uint32_t row) {
     const double x = column, y = row;
     const bool land = x + 20 * std::sin(y / 15) < 200 && std::hypot(x - 80, y - 100) > 30;
@@ -212,7 +212,7 @@ TEST_F(StoreViews, TrianglesThatSpanGapsAreKnown) {
         const bool spans = view.spans_gap(triangle);
         gaps += spans;
         if (spans == spans_gap_by_records(view, *of, triangle)) continue;
-        // Bounds of records that are not read yet, and boxes of a rotated raster, hold more.
+        // Bounds of unread records, and boxes of a rotated raster, are larger.
         ASSERT_FALSE(spans);
         ++differ;
       }
@@ -223,7 +223,7 @@ TEST_F(StoreViews, TrianglesThatSpanGapsAreKnown) {
     }
     EXPECT_GT(gaps, 2000u);
     EXPECT_LT(differ, gaps / 4);
-    // At full detail exactly the triangles between neighbours are left.
+    // At full detail, exactly the triangles between neighbours remain.
     EXPECT_EQ(view.model().point_count(), of->points());
     std::size_t drawn = 0, between_neighbours = 0;
     for (const tri::TriangleId triangle : view.model().triangulation().all_triangles()) {
@@ -241,7 +241,7 @@ TEST_F(StoreViews, TrianglesThatSpanGapsAreKnown) {
   }
 }
 
-// The coarsest mesh leaves the sea open; nothing is left out of a raster without gaps.
+// The coarsest mesh leaves the sea open; a raster without gaps loses no triangle.
 TEST_F(StoreViews, MeshesOfALevelHaveNoTrianglesOverGaps) {
   const auto has_data = [](std::uint32_t column, std::uint32_t row) {
     return column < 100 || (column > 200 && row > 100);
@@ -268,7 +268,7 @@ TEST_F(StoreViews, MeshesOfALevelHaveNoTrianglesOverGaps) {
 
 using Places = std::vector<Point2>;
 
-/// The part of a convex polygon to the left of a line.
+/// Returns the part of a convex polygon to the left of a line.
 Places left_of(const Point2& from, const Point2& to, const Places& polygon) {
   const auto side = [&](const Point2& p) {
     return (to[0] - from[0]) * (p[1] - from[1]) - (to[1] - from[1]) * (p[0] - from[0]);
@@ -295,8 +295,8 @@ double area_of(const Places& polygon) {
   return twice / 2;
 }
 
-/// How much of a triangle is over squares of four samples with data, or over the half of a square
-/// that has three.
+/// Returns the area of a triangle over squares of four samples with data, or over the half of a
+/// square that has three.
 template <class HasData>
 double area_with_data(const Places& triangle, const HasData& has_data) {
   std::array<double, 2> low{HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL};
@@ -324,9 +324,9 @@ double area_with_data(const Places& triangle, const HasData& has_data) {
   return area;
 }
 
-// By the definition of the surface, whatever the ellipses are and wherever data is missing: no
-// triangle reaches over cells without data, and all of the land is covered once.
-TEST_F(StoreViews, MeshesByAMetricCoverWhatMeshesWithoutCover) {
+// By the definition of the surface, for any ellipses and any missing data: no triangle covers cells
+// without data, and all of the land is covered once.
+TEST_F(StoreViews, MeshesCoverSameAreaWithAMetric) {
   std::mt19937 random(5);
   const auto number = [&](double from, double to) {
     return std::uniform_real_distribution<double>(from, to)(random);
@@ -399,9 +399,9 @@ TEST_F(StoreViews, MeshesByAMetricCoverWhatMeshesWithoutCover) {
   }
 }
 
-// As in a browser: bytes come when they will, a few of those that are missing after each frame. The
-// end is that of a view of the folder, of triangles and of points alone.
-TEST_F(StoreViews, BytesThatComeInAnyOrderEndAtTheSame) {
+// As in a browser: bytes arrive in any order, a few of the missing ones after each frame. The
+// result must equal that of a view of the folder, for triangles and for points alone.
+TEST_F(StoreViews, ReachSameResultForAnyOrderOfBytes) {
   const stream::Store whole = in_metres();
   const auto fly = [&](auto shown) {
     using View = StoreView<decltype(shown)>;
@@ -456,7 +456,7 @@ TEST_F(StoreViews, BytesThatComeInAnyOrderEndAtTheSame) {
   fly(tri::PointCloud{});
 }
 
-TEST_F(StoreViews, FaultsOfReadingComeOutOfAFrame) {
+TEST_F(StoreViews, FramesRethrowReadErrors) {
   const stream::Store store = in_metres();
   std::stop_source stop;
   for (const auto reader :

@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Places of few different coordinates, so that many are on one line or equal, or of many.
+/// Makes places with few different coordinates, so that many are collinear or equal, or with many.
 std::vector<Point2> places(std::uint64_t seed, std::size_t count) {
   std::mt19937_64 engine(seed);
   const bool few = seed % 2 == 0;
@@ -31,13 +31,13 @@ std::vector<Point2> places(std::uint64_t seed, std::size_t count) {
   return out;
 }
 
-/// Whether a to b has all places on its left or on it.
+/// Whether all places are to the left of a to b, or on it.
 bool supports(const Point2& a, const Point2& b, const std::vector<Point2>& all) {
   return std::all_of(all.begin(), all.end(),
                      [&](const Point2& p) { return tri::orientation(a, b, p) >= 0; });
 }
 
-TEST(ConvexHull, IsTheCornersInOrder) {
+TEST(ConvexHull, ReturnsCornersInOrder) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     SCOPED_TRACE(seed);
     const std::vector<Point2> all = places(seed, 1 + seed % 40);
@@ -55,7 +55,7 @@ TEST(ConvexHull, IsTheCornersInOrder) {
       EXPECT_TRUE(supports(a, b, all));
       EXPECT_EQ(tri::orientation(a, b, c), 1);
     }
-    // With what lies on the sides: every place of the border, each once.
+    // With the points on the sides: every place of the border, each once.
     const std::vector<Point2> border = convex_hull(all, true);
     for (std::size_t i = 0; i < border.size(); ++i) {
       EXPECT_TRUE(supports(border[i], border[(i + 1) % border.size()], all));
@@ -71,12 +71,12 @@ TEST(ConvexHull, IsTheCornersInOrder) {
   }
 }
 
-TEST(ConvexHull, OfAStreamIsThatOfAllAtOnce) {
+TEST(ConvexHull, StreamingMatchesBatch) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     SCOPED_TRACE(seed);
     std::vector<Point2> all = places(seed, 30000);
     if (seed % 4 == 1) {
-      // A circle: all are corners, or nearly.
+      // On a circle all points, or nearly all, are corners.
       for (std::size_t i = 0; i < all.size(); ++i) {
         const double angle = static_cast<double>(i) * 0.7;
         all[i] = {std::cos(angle), std::sin(angle)};
@@ -89,7 +89,7 @@ TEST(ConvexHull, OfAStreamIsThatOfAllAtOnce) {
   }
 }
 
-TEST(ConvexHull, IsCrossedByLinesOutsideOrOnItsBorder) {
+TEST(ConvexHull, CrossingsAreOutsideOrOnTheBorder) {
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     SCOPED_TRACE(seed);
     const std::vector<Point2> hull = convex_hull(places(seed, 40));
@@ -112,7 +112,7 @@ TEST(ConvexHull, IsCrossedByLinesOutsideOrOnItsBorder) {
         const auto at = [&](double t) { return axis == 0 ? Point2{c, t} : Point2{t, c}; };
         EXPECT_TRUE(outside(at((*found)[0])));
         EXPECT_TRUE(outside(at((*found)[1])));
-        // Not by more than a rounding error.
+        // Off by at most a rounding error.
         const double size = (*found)[1] - (*found)[0];
         if (size > 1e-6 && part > 0 && part < 1) {
           EXPECT_FALSE(outside(at((*found)[0] + 1e-9 * size))) << part;

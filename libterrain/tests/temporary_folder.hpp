@@ -10,7 +10,7 @@
 
 namespace terrace::tests {
 
-/// A folder that goes with the object, whatever is in it.
+/// A folder that is removed with the object, including its contents.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -33,7 +33,7 @@ TEST(TileAddress, NeighboursShareTheirBorders) {
   EXPECT_EQ(box_of({5, 63, 31}).north, 90.0);
 }
 
-TEST(TileAddress, RangesHoldTheTilesThatMeetABox) {
+TEST(TileAddress, RangesContainTilesThatMeetABox) {
   std::uint64_t seed = 7;
   const auto random = [&](double low, double high) {
     seed = base::splitmix64(seed);
@@ -60,7 +60,7 @@ TEST(TileAddress, RangesHoldTheTilesThatMeetABox) {
   }
 }
 
-TEST(TileAddress, ABoxWithoutWidthHasATile) {
+TEST(TileAddress, BoxWithoutWidthHasATile) {
   const TileRange range = tiles_in({180, 90, 180, 90}, 3);
   EXPECT_EQ(range, (TileRange{15, 7, 15, 7}));
 }

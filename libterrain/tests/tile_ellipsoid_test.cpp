@@ -22,7 +22,7 @@ struct Random {
   }
 };
 
-TEST(Ellipsoid, GeocentricCoordinatesAndFramesAreThoseOfGeographicLib) {
+TEST(Ellipsoid, CoordinatesAndFramesMatchGeographicLib) {
   Random random{11};
   for (int round = 0; round < 2000; ++round) {
     SCOPED_TRACE(round);
@@ -45,7 +45,7 @@ TEST(Ellipsoid, GeocentricCoordinatesAndFramesAreThoseOfGeographicLib) {
   }
 }
 
-TEST(Ellipsoid, BoundingSpheresHoldTheirPoints) {
+TEST(Ellipsoid, BoundingSpheresContainTheirPoints) {
   Random random{5};
   std::vector<Point3> points{geocentric(10, 46, 0)};
   EXPECT_EQ(bounding_sphere(points).radius, 0);
@@ -69,7 +69,7 @@ bool hidden(const Point3& viewer, const Point3& point) {
   return first > 0 && first < 1 - 1e-9;
 }
 
-TEST(Ellipsoid, WhereTheHorizonPointIsHiddenSoIsTheTile) {
+TEST(Ellipsoid, TileIsHiddenIfHorizonPointIs) {
   Random random{3};
   int hidden_tiles = 0;
   for (int round = 0; round < 3000; ++round) {
@@ -96,7 +96,7 @@ TEST(Ellipsoid, WhereTheHorizonPointIsHiddenSoIsTheTile) {
   EXPECT_GT(hidden_tiles, 500);
 }
 
-TEST(Ellipsoid, AHemisphereIsNeverHidden) {
+TEST(Ellipsoid, HemisphereIsNeverHidden) {
   std::vector<Point3> points;
   for (double lon = -180; lon <= 0; lon += 15) {
     for (double lat = -90; lat <= 90; lat += 15) points.push_back(geocentric(lon, lat, 0));

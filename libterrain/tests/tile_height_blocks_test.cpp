@@ -91,7 +91,7 @@ class HeightBlocksOfAStore : public ::testing::Test {
   const fs::path& folder_ = scratch_.path();
 };
 
-TEST_F(HeightBlocksOfAStore, RangesAreThoseOfTheBlocks) {
+TEST_F(HeightBlocksOfAStore, RangesMatchBlocks) {
   const HeightBlocks blocks(store(), 2);
   int empty = 0;
   for (int round = 0; round < 3000; ++round) {
@@ -119,7 +119,7 @@ TEST_F(HeightBlocksOfAStore, RangesAreThoseOfTheBlocks) {
   EXPECT_GT(empty, 20);
 }
 
-TEST_F(HeightBlocksOfAStore, ABlockWithinAWindowHasData) {
+TEST_F(HeightBlocksOfAStore, FindsBlockWithDataInWindow) {
   const HeightBlocks blocks(store(), 2);
   int found = 0, none = 0;
   for (int round = 0; round < 3000; ++round) {

@@ -19,7 +19,7 @@ namespace terrace::terrain {
 
 namespace {
 
-/// Notes the box around all that it is asked.
+/// Records a box around all queries.
 class Spy final : public TileSurface {
  public:
   explicit Spy(AnalyticSurface& asked) : asked_(asked) {}
@@ -67,7 +67,7 @@ class Spy final : public TileSurface {
   AnalyticSurface& asked_;
 };
 
-TEST(TileInputs, NothingBeyondTheReachIsAsked) {
+TEST(TileInputs, QueriesStayWithinReach) {
   struct Place {
     double west, south, step;
   };
@@ -99,7 +99,7 @@ TEST(TileInputs, NothingBeyondTheReachIsAsked) {
   }
 }
 
-TEST(TileInputs, TheDigestTellsThemAll) {
+TEST(TileInputs, DigestDependsOnAllInputs) {
   AnalyticSurface hilly{10.13, 45.91, 0.01, 50, 50, hills};
   AnalyticSurface other{10.13, 45.91, 0.01, 50, 50, [](double lon, double lat) {
                           return hills(lon, lat) + (lon > 10.5 && lat > 46.2 ? 1.0 : 0.0);
@@ -136,7 +136,7 @@ TEST(TileInputs, TheDigestTellsThemAll) {
   EXPECT_EQ(std::set(seen.begin(), seen.end()).size(), seen.size());
 }
 
-TEST(TileInputs, FilesAreToldByTheirBytes) {
+TEST(TileInputs, FileDigestDependsOnBytes) {
   const tests::TemporaryFolder scratch;
   const std::string path = scratch.path() / "inputs";
   const auto digest = [&](const std::string& bytes) {

@@ -39,11 +39,11 @@ class TileJournalFile : public ::testing::Test {
 
 constexpr unsigned kTiles = 7;
 
-TEST_F(TileJournalFile, KnowsWhatWasFinished) {
+TEST_F(TileJournalFile, FindsFinishedTiles) {
   {
     TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
-    // Only what an earlier run did counts.
+    // Only the work of an earlier run counts.
     EXPECT_EQ(journal.find(address(0)), nullptr);
   }
   const TileJournal journal(folder_.string());
@@ -51,7 +51,7 @@ TEST_F(TileJournalFile, KnowsWhatWasFinished) {
   EXPECT_EQ(journal.find({9, 499, 380}), nullptr);
 }
 
-TEST_F(TileJournalFile, AnotherVersionBeginsAnew) {
+TEST_F(TileJournalFile, RestartsForAnotherVersion) {
   {
     TileJournal journal(folder_.string());
     journal.add(address(0), tile(0));
@@ -66,7 +66,7 @@ TEST_F(TileJournalFile, AnotherVersionBeginsAnew) {
   }
 }
 
-TEST_F(TileJournalFile, TheLastLineOfATileCounts) {
+TEST_F(TileJournalFile, UsesLastLineOfATile) {
   {
     TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(0), tile(i));
@@ -79,7 +79,7 @@ TEST_F(TileJournalFile, TheLastLineOfATileCounts) {
   EXPECT_TRUE(same(TileJournal(folder_.string()).find(address(0)), 2));
 }
 
-TEST_F(TileJournalFile, AFinishedOneSaysWhatIsThere) {
+TEST_F(TileJournalFile, FinishedJournalListsExistingTiles) {
   std::vector<TileJournal::Record> records;
   for (unsigned i = 0; i < kTiles; ++i) records.emplace_back(address(i), tile(i));
   {
@@ -92,7 +92,7 @@ TEST_F(TileJournalFile, AFinishedOneSaysWhatIsThere) {
             [](const auto& a, const auto& b) { return a.first < b.first; });
   EXPECT_EQ(read_tile_records(folder_.string()), sorted);
   const std::string whole = text();
-  // In whatever order they come; and not written if nothing is new.
+  // In any order; and the file is not written if nothing changed.
   const auto time = fs::last_write_time(path());
   {
     TileJournal journal(folder_.string());
@@ -111,7 +111,7 @@ TEST_F(TileJournalFile, AFinishedOneSaysWhatIsThere) {
   EXPECT_TRUE(read_tile_records((folder_ / "none").string()).empty());
 }
 
-TEST_F(TileJournalFile, AFinishedOneIsSortedThoughARunWasCutShortBefore) {
+TEST_F(TileJournalFile, FinishedJournalIsSortedAfterInterruption) {
   std::vector<TileJournal::Record> records;
   for (unsigned i = 0; i < kTiles; ++i) records.emplace_back(address(i), tile(i));
   const auto add_all = [&](TileJournal& journal) {
@@ -133,7 +133,7 @@ TEST_F(TileJournalFile, AFinishedOneIsSortedThoughARunWasCutShortBefore) {
   EXPECT_EQ(text(), whole);
 }
 
-TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
+TEST_F(TileJournalFile, TruncatedLineEndsRecords) {
   {
     TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));
@@ -148,7 +148,7 @@ TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
       TileJournal journal(folder_.string());
       for (unsigned i = 0; i < kTiles; ++i) {
         const FinishedTile* found = journal.find(address(i));
-        // The first line is the head.
+        // The first line is the header.
         if (i + 1 < lines) {
           EXPECT_TRUE(same(found, i)) << i;
         } else {
@@ -157,7 +157,7 @@ TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
       }
       journal.add({3, 1, 1}, tile(1));
     }
-    // What is added after the cut is read again.
+    // Records added after the truncation are read again.
     const TileJournal again(folder_.string());
     EXPECT_TRUE(same(again.find({3, 1, 1}), 1));
     if (lines > 1) {
@@ -166,7 +166,7 @@ TEST_F(TileJournalFile, ALineCutShortEndsWhatIsBelieved) {
   }
 }
 
-TEST_F(TileJournalFile, DamagedLinesEndWhatIsBelieved) {
+TEST_F(TileJournalFile, DamagedLineEndsRecords) {
   {
     TileJournal journal(folder_.string());
     for (unsigned i = 0; i < kTiles; ++i) journal.add(address(i), tile(i));

@@ -49,7 +49,7 @@ TEST(TileRanges, CoverExactlyTheTiles) {
   }
 }
 
-TEST(TileRanges, ARectangleIsOneRange) {
+TEST(TileRanges, RectangleIsOneRange) {
   std::vector<TileAddress> tiles;
   for (std::uint32_t y = 3; y < 9; ++y) {
     for (std::uint32_t x = 5; x < 20; ++x) tiles.push_back({4, x, y});
@@ -77,7 +77,7 @@ TEST_F(TileLayerFile, ReadsBack) {
   EXPECT_EQ(back.fingerprint, "abc");
 }
 
-TEST(TileLayerText, TellsThatMetadataListsTheZoomBelow) {
+TEST(TileLayerText, DeclaresMetadataAvailability) {
   TileLayer layer;
   layer.available = {{{0, 0, 1, 0}}};
   EXPECT_FALSE(nlohmann::json::parse(layer_json(layer)).contains("metadataAvailability"));
@@ -85,7 +85,7 @@ TEST(TileLayerText, TellsThatMetadataListsTheZoomBelow) {
   EXPECT_EQ(nlohmann::json::parse(layer_json(layer)).at("metadataAvailability"), 1);
 }
 
-TEST_F(TileLayerFile, RefusesWhatIsNoTileSet) {
+TEST_F(TileLayerFile, RejectsInvalidTileSets) {
   EXPECT_THROW(read_layer(path_), stream::Error);  // no file
   TileLayer layer;
   layer.available = {{{0, 0, 1, 0}}};
@@ -110,7 +110,7 @@ TEST_F(TileLayerFile, RefusesWhatIsNoTileSet) {
   EXPECT_THROW(read_layer(path_), stream::Error);
 }
 
-TEST_F(TileLayerFile, RefusesNumbersThatCountNothing) {
+TEST_F(TileLayerFile, RejectsInvalidCounts) {
   TileLayer layer;
   layer.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}};
   const nlohmann::json good = nlohmann::json::parse(layer_json(layer));
@@ -128,7 +128,7 @@ TEST_F(TileLayerFile, RefusesNumbersThatCountNothing) {
   }
 }
 
-TEST_F(TileLayerFile, AFolderWithoutTilesIsNotTakenForASetThatIsNotFinished) {
+TEST_F(TileLayerFile, FolderWithoutTilesIsNotAnUnfinishedSet) {
   for (const fs::path& folder : {scratch_.path(), scratch_.path() / "none"}) {
     try {
       check_tiles({.folder = folder});

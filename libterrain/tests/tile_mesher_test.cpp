@@ -20,14 +20,14 @@
 namespace terrace::terrain {
 namespace {
 
-/// Some 40,000 samples, well inside a tile of zoom 6 and across borders of deeper ones.
+/// About 40,000 samples, well inside a tile of zoom 6 and across borders of deeper ones.
 AnalyticSurface alps() { return {10.13, 45.91, 0.0031, 200, 200, hills}; }
 
 ZoomPlan plan_of(unsigned zoom, double max_error, const TileSurface& surface) {
   return plan_zoom(zoom, max_error, 2000, surface);
 }
 
-/// Places and heights on a border of a tile.
+/// Positions and heights on a border of a tile.
 std::vector<std::pair<unsigned, double>> side(const TileMesh& mesh,
                                               const std::vector<std::uint32_t>& list,
                                               const std::vector<std::uint16_t>& along) {
@@ -38,8 +38,8 @@ std::vector<std::pair<unsigned, double>> side(const TileMesh& mesh,
   return places;
 }
 
-/// Each inner edge twice, in opposite directions, the others on borders; all areas above 0 and
-/// together that of the tile.
+/// Each inner edge must occur twice, in opposite directions, the others on borders; all areas must
+/// be positive, with the area of the tile as their sum.
 void expect_whole(const TileMesh& mesh) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
   std::int64_t sum = 0;
@@ -62,7 +62,7 @@ void expect_whole(const TileMesh& mesh) {
   }
 }
 
-/// Every sample in a tile against its mesh, by brute force of measure_surface on all at once.
+/// Compares every sample in a tile with its mesh, using measure_surface on all at once.
 void expect_bound(const TileAddress& tile, const MadeTile& made, const ZoomPlan& plan,
                   TileSurface& surface) {
   const GeographicBox box = box_of(tile);
@@ -82,19 +82,19 @@ void expect_bound(const TileAddress& tile, const MadeTile& made, const ZoomPlan&
   const auto errors = tri::measure_surface(u, v, samples.height, vertices, made.mesh.triangles);
   EXPECT_EQ(errors.uncovered, 0u);
   EXPECT_LE(errors.largest, made.max_error + 1e-7);
-  // Where samples lie a few units of the tile apart, what rounding their places does on the
-  // steepest slope comes in between.
+  // If samples are a few units of the tile apart, rounding their places on the steepest slope adds
+  // to the error.
   constexpr double kSteepest = 20000;  // metres per degree
   const double unit = (box.east - box.west) / kTileUnits;
   EXPECT_LE(made.max_error, plan.max_error + 0.5 * plan.height_step +
                                 (16 * unit > surface.spacing() ? kSteepest * unit : 0.0));
   EXPECT_EQ(made.has_data, samples.size() > 0);
-  // Part by part it is the same.
+  // Measuring part by part gives the same.
   const TileHeights parts = measure_tile(tile, made.mesh, surface, tile);
   EXPECT_EQ(parts.samples, samples.size());
   EXPECT_EQ(parts.uncovered, 0u);
   EXPECT_DOUBLE_EQ(parts.max_error, errors.largest);
-  // And by the tiles two zooms below.
+  // So do the tiles two zooms below.
   TileHeights sum;
   for (const TileAddress& child : children_of(tile)) {
     for (const TileAddress& part : children_of(child)) {
@@ -114,7 +114,7 @@ void expect_sound(const TileAddress& tile, const MadeTile& made) {
   }
 }
 
-/// The same vertices on both sides of a border, at heights that each tile rounds by itself.
+/// Expects the same vertices on both sides of a border, at heights that each tile rounds by itself.
 void expect_fit(const TileMesh& mesh, const std::vector<std::pair<unsigned, double>>& side,
                 const TileMesh& other, const std::vector<std::pair<unsigned, double>>& others) {
   const auto rounding = [](const TileMesh& m) {
@@ -128,7 +128,7 @@ void expect_fit(const TileMesh& mesh, const std::vector<std::pair<unsigned, doub
   }
 }
 
-/// All tiles of a zoom in a range, checked, and their borders against each other.
+/// Checks all tiles of a zoom in a range, and their borders against each other.
 void check_zoom(unsigned zoom, const TileRange& range, double max_error, TileSurface& surface) {
   SCOPED_TRACE(testing::Message() << "zoom " << zoom << ", bound " << max_error);
   const ZoomPlan plan = plan_of(zoom, max_error, surface);
@@ -159,26 +159,26 @@ void check_zoom(unsigned zoom, const TileRange& range, double max_error, TileSur
   }
 }
 
-TEST(TileMesher, LeavesCutForTheCurveFitTogether) {
+TEST(TileMesher, LeavesDividedForCurvatureMatch) {
   AnalyticSurface surface = alps();
   check_zoom(0, {0, 0, 1, 0}, expected_error(0), surface);
   check_zoom(1, {1, 0, 3, 1}, expected_error(1), surface);
   check_zoom(2, {3, 2, 5, 3}, 60, surface);
 }
 
-TEST(TileMesher, LeavesCutForDataInACornerFitTogether) {
+TEST(TileMesher, LeavesDividedForDataInACornerMatch) {
   AnalyticSurface surface = alps();
   for (const unsigned zoom : {3U, 5U, 7U, 9U, 10U}) {
     TileRange range = tiles_in(surface.bounds(), zoom);
-    // Tiles without samples beside them too.
+    // Also adjacent tiles without samples.
     range = {range.x0 - 1, range.y0 - 1, range.x1 + 1, range.y1 + 1};
     if (zoom > 7) range = {range.x0, range.y0, range.x0 + 2, range.y0 + 2};
     check_zoom(zoom, range, 25, surface);
   }
 }
 
-TEST(TileMesher, DataAtTheBordersOfTilesFitsTogether) {
-  // Bounds on the lines between tiles, or a hair beside them; samples on the lines.
+TEST(TileMesher, TilesMatchWithDataOnBorders) {
+  // Bounds on the lines between tiles or slightly off them, and samples on the lines.
   for (const double shift : {0.0, 1e-9, -1e-9}) {
     SCOPED_TRACE(shift);
     AnalyticSurface surface{11.25 + shift, 45.0 + shift, 11.25 / 1024, 129, 129, hills};
@@ -188,7 +188,7 @@ TEST(TileMesher, DataAtTheBordersOfTilesFitsTogether) {
   }
 }
 
-TEST(TileMesher, ScatteredSmallRastersFitTogether) {
+TEST(TileMesher, TilesMatchForScatteredSmallRasters) {
   std::uint64_t seed = 5;
   const auto between = [&seed](double low, double high) {
     seed = base::splitmix64(seed);
@@ -229,7 +229,7 @@ TEST(TileMesher, EveryQualityKeepsTheBound) {
   }
 }
 
-TEST(TileMesher, NormalsAndWaterAreThoseOfTheSurface) {
+TEST(TileMesher, NormalsAndWaterMatchSurface) {
   AnalyticSurface surface{10.0, 46.0, 0.01,
                           100,  100,  [](double lon, double) { return 8000 * (lon - 10.4); }};
   const TileRange range = tiles_in(surface.bounds(), 8);
@@ -256,7 +256,7 @@ TEST(TileMesher, NormalsAndWaterAreThoseOfTheSurface) {
       EXPECT_NEAR(east / up, -8000 / metres, 0.001);
       EXPECT_NEAR(north / up, 0, 1e-5);
     }
-    // West of 10.4 degrees there is water.
+    // Water is west of 10.4 degrees.
     const auto wet = [&](unsigned column) {
       return made.mesh.water.size() == 1 ? made.mesh.water[0] : made.mesh.water[256 * 100 + column];
     };
@@ -267,7 +267,7 @@ TEST(TileMesher, NormalsAndWaterAreThoseOfTheSurface) {
   }
 }
 
-TEST(TileMesher, HeightsBeyondTheStepsAreTold) {
+TEST(TileMesher, ReportsHeightsBeyondSteps) {
   AnalyticSurface surface{10.0, 46.0, 0.01, 50, 50, [](double lon, double) { return 1e5 * lon; }};
   const TileRange range = tiles_in(surface.bounds(), 8);
   EXPECT_THROW(static_cast<void>(
@@ -289,13 +289,13 @@ TEST(TileMesher, SharedSidesChangeNothing) {
         EXPECT_EQ(encode_tile(alone.mesh, alone.header), encode_tile(beside.mesh, beside.header));
       }
     }
-    // The tiles took sides from each other.
+    // The tiles shared sides with each other.
     EXPECT_TRUE(shared.find({true, 0, range.y0 + 1, range.x0}) ||
                 shared.find({true, 1, range.y0 + 1, 2 * std::uint64_t{range.x0}}));
   }
 }
 
-TEST(SharedSides, ForgetTheOldest) {
+TEST(SharedSides, DropOldest) {
   SharedSides shared;
   const std::vector<TileSideVertex> side(1000);
   for (std::uint32_t line = 0; line < 2000; ++line) shared.keep({true, 0, line, 0}, side);
@@ -304,7 +304,7 @@ TEST(SharedSides, ForgetTheOldest) {
   EXPECT_FALSE(shared.find({true, 0, 0, 0}));
 }
 
-TEST(TileLeaves, CoverTheTileOnce) {
+TEST(TileLeaves, CoverTileOnce) {
   AnalyticSurface surface = alps();
   for (unsigned zoom = 0; zoom < 12; ++zoom) {
     SCOPED_TRACE(zoom);
@@ -324,7 +324,7 @@ TEST(TileLeaves, CoverTheTileOnce) {
   }
 }
 
-TEST(TileSides, GoAroundTheirLeaf) {
+TEST(TileSides, GoAroundTheLeaf) {
   AnalyticSurface surface = alps();
   const ZoomPlan plan = plan_of(7, 10, surface);
   const TileRange range = tiles_in(surface.bounds(), 7);

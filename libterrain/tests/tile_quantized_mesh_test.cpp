@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-// A lattice of side x side vertices in shuffled order.
+// Makes a lattice of side x side vertices in shuffled order.
 TileMesh lattice(std::uint32_t side, std::uint64_t seed) {
   TileMesh mesh;
   mesh.lowest = -12.5F;
@@ -69,7 +69,7 @@ void expect_equal(const TileMesh& a, const TileMesh& b) {
 }
 
 TEST(QuantizedMesh, ReadsBack) {
-  // 257 x 257 vertices need indices of 32 bits, 256 x 256 just do not.
+  // 257 x 257 vertices need 32-bit indices, 256 x 256 just do not.
   for (const std::uint32_t side : {2U, 3U, 17U, 256U, 257U}) {
     SCOPED_TRACE(side);
     TileMesh mesh = lattice(side, side);
@@ -94,7 +94,7 @@ TEST(QuantizedMesh, ReadsBack) {
   }
 }
 
-TEST(QuantizedMesh, OrderingKeepsTheTriangles) {
+TEST(QuantizedMesh, OrderingKeepsTriangles) {
   TileMesh mesh = lattice(9, 4);
   mesh.u.push_back(5);  // a vertex without a triangle
   mesh.v.push_back(5);
@@ -113,11 +113,12 @@ TEST(QuantizedMesh, OrderingKeepsTheTriangles) {
   EXPECT_EQ(mesh.size(), 81U);
 }
 
-TEST(QuantizedMesh, TheBytesAreThoseOfTheSpecification) {
+TEST(QuantizedMesh, BytesMatchSpecification) {
   TileMesh mesh = lattice(2, 1);
   order_vertices(mesh);
   const auto bytes = encode_tile(mesh, header_of_place());
-  // Header 88, four vertices with their number 28, two triangles 16, four lists of two 32.
+  // The header has 88 bytes, the count and four vertices 28, two triangles 16, four lists of two
+  // 32.
   EXPECT_EQ(bytes.size(), 88U + 28 + 16 + 32);
   const auto word = [&](std::size_t at) {
     std::uint16_t value = 0;
@@ -130,19 +131,19 @@ TEST(QuantizedMesh, TheBytesAreThoseOfTheSpecification) {
   EXPECT_EQ(word(126), 3);                                                   // the first one again
 }
 
-TEST(QuantizedMesh, EveryShortenedTileIsRefused) {
+TEST(QuantizedMesh, RejectsTruncatedTiles) {
   TileMesh mesh = lattice(4, 2);
   order_vertices(mesh);
   mesh.metadata = "{}";
   const auto bytes = encode_tile(mesh, header_of_place());
   const std::size_t before_extension = bytes.size() - (5 + 4 + 2);
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    if (size == before_extension) continue;  // a whole tile without the extension
+    if (size == before_extension) continue;  // a complete tile without the extension
     EXPECT_THROW(decode_tile(std::span(bytes).first(size), "short"), stream::Error) << size;
   }
 }
 
-TEST(QuantizedMesh, DamagedTilesAreRefusedOrRead) {
+TEST(QuantizedMesh, ReadsOrRejectsDamagedTiles) {
   TileMesh mesh = lattice(5, 3);
   order_vertices(mesh);
   mesh.water = {255};
@@ -169,7 +170,7 @@ TEST(QuantizedMesh, DamagedTilesAreRefusedOrRead) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(QuantizedMesh, NormalsComeBackWithinADegree) {
+TEST(QuantizedMesh, NormalsDecodeWithinADegree) {
   std::uint64_t seed = 12;
   const auto random = [&] {
     seed = base::splitmix64(seed);

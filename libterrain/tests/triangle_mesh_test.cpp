@@ -21,7 +21,7 @@ void append(std::vector<std::byte>& record, T value) {
   record.insert(record.end(), bytes.begin(), bytes.end());
 }
 
-TEST(TriangleMesh, TakesTheAttributesThatItHasColumnsFor) {
+TEST(TriangleMesh, ReadsAttributesWithColumns) {
   stream::MeshFile file;
   using stream::ScalarType;
   file.info.attributes = {{.name = "intensity", .type = ScalarType::u16},
@@ -44,7 +44,7 @@ TEST(TriangleMesh, TakesTheAttributesThatItHasColumnsFor) {
   const TriangleMesh mesh = triangle_mesh_of(std::move(file));
   EXPECT_EQ(mesh.positions, positions);
   EXPECT_EQ(mesh.triangles, (std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}}));
-  // 16 bits as they are, 8 bits and floats spread over 16.
+  // 16 bits unchanged, 8 bits and floats scaled to 16.
   for (const auto& colour : mesh.colours) {
     EXPECT_EQ(colour, (std::array<std::uint16_t, 3>{1000, 65535, 257}));
   }
@@ -64,7 +64,7 @@ MeshUnits units_of(int epsg, const std::string& unit, const std::string& heights
   return units;
 }
 
-TEST(MeshCoordinates, AreMetresInGlbWhateverTheUnits) {
+TEST(MeshCoordinates, AreMetresInGlbForAnyUnits) {
   const auto frame_of = [](const MeshUnits& units, const stream::Box3& bounds) {
     return mesh_coordinates("m.glb", {}, units, bounds).frame;
   };
@@ -80,7 +80,7 @@ TEST(MeshCoordinates, AreMetresInGlbWhateverTheUnits) {
   const auto pole = frame_of(units_of(4326, "degree"), {{-180, 90, 0}, {180, 90, 0}});
   ASSERT_TRUE(pole);
   EXPECT_GT(pole->metres[0], 0);
-  // A caller's own numbers, which are not latitudes.
+  // The caller's own numbers, which are not latitudes.
   EXPECT_FALSE(frame_of(units_of(4326, "degree"), {{400000, 5000000, 0}, {500000, 5100000, 9}}));
   const auto feet = frame_of(units_of(0, "foot"), {{0, 0, 0}, {1000, 1000, 9}});
   ASSERT_TRUE(feet);

@@ -22,7 +22,7 @@ TEST(ParseMemory, TakesPowersOf1024) {
   EXPECT_EQ(parse_memory("0"), 0u);
 }
 
-TEST(ParseMemory, RefusesWhatIsNoAmount) {
+TEST(ParseMemory, RejectsInvalidAmounts) {
   for (const char* text : {"", "M", "-1M", "12X", "1e30", "256 M", "nan", "inf", "12MM", "iB"}) {
     EXPECT_THROW(parse_memory(text), UsageError) << text;
   }
@@ -45,14 +45,14 @@ TEST(ParseSize, NeedsTwoPositiveNumbers) {
   }
 }
 
-TEST(ParseNumbers, TakesSignsAndRefusesGaps) {
+TEST(ParseNumbers, AcceptsSignsAndRejectsGaps) {
   EXPECT_EQ(parse_numbers("-1.5,2e3,+4", "x"), (std::vector<double>{-1.5, 2000, 4}));
   for (const char* text : {"", "1,", ",1", "1,,2", "1;2", "1,nan", "1,inf", "1 2"}) {
     EXPECT_THROW(parse_numbers(text, "x"), UsageError) << text;
   }
 }
 
-TEST(Readable, IsShort) {
+TEST(Readable, FormatsBriefly) {
   EXPECT_EQ(with_commas(0), "0");
   EXPECT_EQ(with_commas(999), "999");
   EXPECT_EQ(with_commas(1000), "1,000");
@@ -109,7 +109,7 @@ TEST(NumberText, ReadsBackAsTheSameDouble) {
 }
 
 // Oracle: the decimal text of the product, read as a double.
-TEST(DecimalMultiples, AreTheDoublesNearestToTheDecimalProducts) {
+TEST(DecimalMultiples, AreNearestDoublesToDecimalProducts) {
   EXPECT_EQ(number_text(DecimalMultiples(0.1)(std::int64_t{3})), "0.3");
   EXPECT_EQ(number_text(DecimalMultiples(0.1)(std::int64_t{-6})), "-0.6");
   EXPECT_EQ(number_text(DecimalMultiples(0.7)(std::int64_t{3})), "2.1");
@@ -119,7 +119,7 @@ TEST(DecimalMultiples, AreTheDoublesNearestToTheDecimalProducts) {
     EXPECT_EQ(DecimalMultiples(0.00025)(i), std::stod(std::to_string(25 * i) + "e-5"));
     EXPECT_EQ(DecimalMultiples(12.35)(i), std::stod(std::to_string(1235 * i) + "e-2"));
   }
-  // Steps without a short decimal, whole ones and huge counts: the product of the doubles.
+  // Steps without a short decimal, integers and huge counts: the product of the doubles.
   for (const double step : {1.0 / 3.0, 20.0, 1e300, 5e-324, 2.5e18}) {
     EXPECT_EQ(DecimalMultiples(step)(std::int64_t{1}), step);
     EXPECT_EQ(DecimalMultiples(step)(std::int64_t{5}), 5 * step);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a view of a store (stream::Store::where()) answers, against a store that was built of the
-// points that meet its condition and of no others.
+// Compares the answers of a view of a store (stream::Store::where()) with those of a store that was
+// built from only the points that meet its condition.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -49,14 +49,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A store, a condition, the view, and the store of the points that meet it alone.
+/// A store, a condition, the view, and the store of only the points that meet it.
 struct Pair {
   stream::Store view, alone;
 };
 
-/// Points of several classes, no two of one class at one place:
-/// 0 everywhere; 1 in a disk off the middle, so that most clusters have none; 2 one in 300; 3 and 4
-/// stand on each other, 3 with 0 too, as the returns of a pulse do.
+/// Writes points of several classes, with at most one of a class at each place: 0 everywhere; 1 in
+/// a disk off the middle, so that most clusters have none; 2 one in 300; 3 and 4 above each other,
+/// and 3 also above 0, like the returns of a pulse.
 void write_cloud(const fs::path& path, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -85,14 +85,14 @@ class ViewOfStore : public testing::Test {
     BuildRequest request;
     request.inputs = {input.string()};
     request.store = folder_.path() / name;
-    request.block_points = 200;  // few: more clusters, more levels
+    request.block_points = 200;  // few, for more clusters and more levels
     request.facility_cost = 1.0;
     request.selection.where = where;
     if (input.extension() == ".csv") request.crs.emplace().epsg = 32632;
     build_store(request);
     return stream::Store::open(request.store);
   }
-  /// For a cloud and a raster, under every condition that is tried.
+  /// Runs a check on a cloud and a raster, with every condition.
   void for_each_pair(const std::function<void(const Pair&)>& check) {
     const std::uint64_t seed = std::random_device()();
     const fs::path cloud = folder_.path() / "cloud.csv", raster = folder_.path() / "raster.tif";
@@ -144,7 +144,7 @@ Bits bits_of(const std::vector<GroundPoint>& points) {
   return bits;
 }
 
-TEST_F(ViewOfStore, HasTheHeightsOfItsPointsAlone) {
+TEST_F(ViewOfStore, UsesOnlyItsPointsForHeights) {
   for_each_pair([](const Pair& pair) {
     EXPECT_EQ(pair.view.bounds(), pair.alone.bounds());
     const stream::Box3 box = world_box(pair.alone.schema(), pair.view.whole().bounds());
@@ -167,7 +167,7 @@ TEST_F(ViewOfStore, HasTheHeightsOfItsPointsAlone) {
       SamplerOptions options{.method = method};
       std::vector<GroundPoint> found = sample_places(pair.view, places, options);
       EXPECT_EQ(bits_of(found), bits_of(sample_places(pair.alone, places, options)));
-      // Some by themselves, for which the store is read another way than for many.
+      // Some places alone, for which the store is read differently than for many.
       for (std::size_t i = 0; i < places.size(); i += 300) {
         EXPECT_EQ(bits_of(sample_places(pair.view, {&places[i], 1}, options)), bits_of({found[i]}));
       }
@@ -188,7 +188,7 @@ TEST_F(ViewOfStore, HasTheHeightsOfItsPointsAlone) {
   });
 }
 
-TEST_F(ViewOfStore, HasTheRasterAndTheContoursOfItsPointsAlone) {
+TEST_F(ViewOfStore, UsesOnlyItsPointsForRastersAndContours) {
   for_each_pair([&](const Pair& pair) {
     for (const RasterValue value : {RasterValue::height, RasterValue::slope}) {
       for (const std::string name : {"view", "alone"}) {
@@ -222,7 +222,7 @@ std::multiset<Triangle> triangles_of(const TriangleMesh& mesh) {
   return triangles;
 }
 
-TEST_F(ViewOfStore, HasTheMeshesOfItsPointsAlone) {
+TEST_F(ViewOfStore, UsesOnlyItsPointsForMeshes) {
   for_each_pair([&](const Pair& pair) {
     EXPECT_EQ(triangles_of(detail_mesh(pair.view, {})), triangles_of(detail_mesh(pair.alone, {})));
     DetailMeshOptions smooth;
@@ -236,7 +236,7 @@ TEST_F(ViewOfStore, HasTheMeshesOfItsPointsAlone) {
       EXPECT_NEAR(heights.at({p[0], p[1]}), p[2], 1e-9);
     }
 
-    // A mesh with a bound is within it of every point of the view; whole and in windows.
+    // A bounded mesh is within the bound of every point of the view, in one piece and in windows.
     std::vector<double> x, y, z;
     for_each_wanted_point(
         pair.alone, {},
@@ -267,7 +267,7 @@ TEST_F(ViewOfStore, HasTheMeshesOfItsPointsAlone) {
   });
 }
 
-TEST_F(ViewOfStore, HasTheTilesOfItsPointsAlone) {
+TEST_F(ViewOfStore, UsesOnlyItsPointsForTiles) {
   for_each_pair([&](const Pair& pair) {
     const std::string folder = path("tiles" + std::to_string(stores_)).string();
     const TilesRequest request{.folder = folder,
@@ -285,7 +285,7 @@ TEST_F(ViewOfStore, HasTheTilesOfItsPointsAlone) {
       EXPECT_GT(check.samples, 0U);
       for (const stream::Problem& problem : check.problems) ADD_FAILURE() << problem.what;
     }
-    // The zoom that shows every sample is that of its samples.
+    // The zoom that shows every sample depends on the view's samples.
     TilesRequest deepest = request;
     deepest.folder += "deepest";
     deepest.last_zoom.reset();
@@ -305,8 +305,8 @@ TEST_F(ViewOfStore, HasTheTilesOfItsPointsAlone) {
   });
 }
 
-// Windows beside each other, of coarser levels too, against all the points that meet the condition.
-TEST_F(ViewOfStore, WindowsHaveTheTrianglesOfAllItsPoints) {
+// Adjacent windows, also of coarser levels, compared with all points that meet the condition.
+TEST_F(ViewOfStore, WindowsHaveAllTrianglesOfItsPoints) {
   for_each_pair([](const Pair& pair) {
     constexpr double kAll = std::numeric_limits<double>::infinity();
     for (unsigned level = 0; level <= pair.view.top(); ++level) {
@@ -373,7 +373,7 @@ TEST_F(ViewOfStore, WindowsHaveTheTrianglesOfAllItsPoints) {
   });
 }
 
-TEST_F(ViewOfStore, OfNoPointsIsAnErrorThatNamesTheCondition) {
+TEST_F(ViewOfStore, EmptyViewIsAnErrorThatNamesTheCondition) {
   const fs::path cloud = path("cloud.csv");
   write_cloud(cloud, 1);
   const stream::Store view = build(cloud, "all", {}).where("class == 77");
