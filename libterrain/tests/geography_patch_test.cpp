@@ -21,7 +21,7 @@ constexpr PlacedBox kBoxes[] = {
     {"EPSG:2994", {635576, 848881}, {639005, 853539}},     // feet, another datum
     {"EPSG:27700", {0, 0}, {700000, 1300000}},
     {"EPSG:3857", {-2e7, -2e7}, {2e7, 2e7}},               // the world
-    {"EPSG:3413", {-60000, -60000}, {60000, 60000}},       // round the pole
+    {"EPSG:3413", {-60000, -60000}, {60000, 60000}},       // around the pole
     {"EPSG:32660", {770000, 1000000}, {870000, 1200000}},  // across the antimeridian
     {"EPSG:6931", {-2e7, -2e7}, {2e7, 2e7}},               // reaches beyond the earth
     {"EPSG:4326", {5, 45}, {10, 50}},

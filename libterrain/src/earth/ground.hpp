@@ -49,7 +49,7 @@ class Ground {
 
   /// What was assumed because the source does not say it; may be empty.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
-  /// The part of assumption() about a unit of heights that the source names but that is unknown.
+  /// The part of assumption() about a unit of heights that is named in the source and unknown.
   /// Empty if the unit is known or not named. Every conversion of heights to metres reports it.
   [[nodiscard]] const std::string& unknown_height_unit() const { return unknown_height_unit_; }
   /// Metres per unit of height, times the weight of heights.

@@ -136,7 +136,7 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
                                 std::to_string((needed >> 20) + 1) +
                                 "M of memory, `memory_bytes` allows " +
                                 std::to_string(memory_bytes >> 20) + "M",
-                       .remedy = "take a coarser `level` or a smaller `region`"});
+                       .remedy = "choose a coarser `level` or a smaller `region`"});
 }
 
 /// Returns the metric in the coordinates of the triangulation.

@@ -43,7 +43,6 @@ struct MetricChoice {
   /// Returns the metric between points ground = map * (position - origin), with positions in the
   /// CRS. A region contains a point if its box contains the position. map: invertible, except that
   /// the weight of heights may be 0; it does not mix heights with x and y.
-  /// count for nothing; x and y are not mixed with them.
   [[nodiscard]] cluster::Metric on_ground(const stream::Point3& origin,
                                           const cluster::LinearMap& map) const;
 };

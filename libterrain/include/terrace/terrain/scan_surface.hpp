@@ -16,7 +16,7 @@
 #include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 
-/// The surface that the points of a scan lie on.
+/// Surfaces from the points of a scan.
 
 namespace terrace::terrain {
 

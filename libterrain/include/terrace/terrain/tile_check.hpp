@@ -30,7 +30,7 @@ struct ZoomCheck {
   std::uint64_t samples = 0;    ///< in its tiles; samples on tile borders count in each tile
   std::uint64_t uncovered = 0;  ///< samples on no triangle, included in `samples`: they have no
                                 ///< error
-  double max_error = 0.0;       ///< metres; 0 if none was measured
+  double max_error = 0.0;       ///< in metres; 0 if there is none
 };
 
 struct TileCheckResult {
