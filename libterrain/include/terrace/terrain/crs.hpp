@@ -64,7 +64,6 @@ class CoordinateSystem {
   /// Reads a CRS as a source or store records it. Returns nullopt if `crs` does not name one.
   /// file: named in errors. Throws: stream::Error if the CRS is unknown, incomplete or contradicts
   /// itself.
-  /// things that contradict each other.
   static std::optional<CoordinateSystem> of(const stream::Crs& crs, const std::string& file);
   /// Returns the same system for data inside a box; operations are chosen for that area.
   [[nodiscard]] CoordinateSystem over(const stream::Box3& box) const;
@@ -184,7 +183,6 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 /// data, and GeoJSON is in the CRS that it names. GeoJSON that names none is in longitude and
 /// latitude (RFC 7946) if the CRS of the data is known and the numbers can be degrees, otherwise in
 /// the CRS of the data.
-/// of the data.
 class RegionConversion {
  public:
   RegionConversion() = default;

@@ -23,7 +23,6 @@ namespace terrace::terrain {
 /// Memory: about 16,000 points and their encoding by `writer`, twice per thread.
 /// Throws: stream::Error on a damaged store, for a point without an image in that CRS, or if
 /// writing fails; as for_each_wanted(); stream::Stopped.
-/// cannot be written; as for_each_wanted(); stream::Stopped.
 std::uint64_t write_points(const stream::Store& store, const Detail& detail,
                            stream::PointWriter& writer, const PlaceConversion& places = {},
                            stream::Overlay* overlay = nullptr, const Context& context = {});

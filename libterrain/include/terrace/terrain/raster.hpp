@@ -57,7 +57,7 @@ struct RasterOutcome {
 ///
 /// Tiles are computed in quadtree order, so that a store of points is triangulated little more than
 /// once. Memory: some tiles at a time, within the context's bound. Reports "cells"; notes any
-/// assumption about units that slopes rest on, and if no cell has data. Throws: stream::Error if
+/// assumption about units that slopes depend on, and if no cell has data. Throws: stream::Error if
 /// the region does not meet the store, or if the raster to align with is rotated or its CRS is
 /// unknown; UsageError for a grid of more than 2^31 columns or rows, and for `align` together with
 /// `cell` or another `to`.
