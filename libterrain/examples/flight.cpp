@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   const stream::Store store = stream::Store::open(argv[2]);
   terrain::StoreView<std::int32_t> view(store);  // for rasters; for points use <double>
 
-  std::set<tri::TriangleId> drawn;  // what a renderer would keep
+  std::set<tri::TriangleId> drawn;  // the triangles that a renderer keeps
   for (const auto t : view.model().triangulation().all_triangles()) drawn.insert(t);
   for (int frame = 0; frame < 2000 && (frame < 100 || !view.settled()); ++frame) {
     // Metres east, north and up from the middle of the store; the camera stops after 100 frames.

@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   terrain::StoreView<tri::DynamicSurface<std::int32_t>> view(store);
   const auto& surface = view.model().triangulation();
 
-  std::set<tri::TriangleId> drawn;  // what a renderer would keep
+  std::set<tri::TriangleId> drawn;  // the triangles that a renderer keeps
   for (const auto t : surface.all_triangles()) drawn.insert(t);
   const auto draw = [&](const auto& delta) {
     for (const auto t : delta.changes.removed_triangles) drawn.erase(t);

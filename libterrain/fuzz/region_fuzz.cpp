@@ -40,7 +40,7 @@ void use(const MetricChoice& metric) {
     const nlohmann::json list =
         nlohmann::json::parse(text.substr(text.find(':') + 1), nullptr, false);
     require(list.is_array() && list.size() == metric.regions.size(),
-            "what a store records is JSON");
+            "the record of a store is JSON");
   }
   const cluster::Metric ground = metric.on_ground({1, 2, 3}, {2, 2, 1});
   const double far = cluster::distance(ground, {0, 0, 0}, {3, 4, 5});

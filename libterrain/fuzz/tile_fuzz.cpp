@@ -52,7 +52,7 @@ bool read_description(std::string_view text) {
               again.bounds == layer.bounds && again.extensions == layer.extensions &&
               again.first_zoom == layer.first_zoom && again.max_errors == layer.max_errors &&
               again.fingerprint == layer.fingerprint,
-          "what is written is read back");
+          "the layer reads back as written");
   return true;
 }
 

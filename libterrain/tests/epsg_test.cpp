@@ -112,7 +112,7 @@ void check(const Code& row, Findings& found) {
     }
     const CoordinateSystem system(definition);
     if (!mean_the_same(system.crs_with_wkt1().wkt, wkt_of(definition))) {
-      found.fault(row.code, "what is written to LAS reads back as another system");
+      found.fault(row.code, "the WKT written to LAS reads back as another system");
     }
   } catch (const CrsError& error) {
     ++found.refused;

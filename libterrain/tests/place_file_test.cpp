@@ -35,7 +35,7 @@ TEST(PlaceFile, FindsPlaceColumnsByName) {
   EXPECT_THROW(PlaceLayout::of("id,first,second", "places.csv"), stream::Error);
 }
 
-TEST(PlaceFile, RefusesDecimalCommasInPlainWords) {
+TEST(PlaceFile, RejectsDecimalCommas) {
   const auto refusal = [](const auto& work) -> std::string {
     try {
       work();

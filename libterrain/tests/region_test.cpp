@@ -544,9 +544,10 @@ TEST(Region, AcceptsRingsThatTouchOnlyAtPoints) {
             std::string::npos);
   EXPECT_NE(refused({square, left, {{4, 4}, {8, 4}, {6, 5}}}).find("disconnected"),
             std::string::npos);
-  // A hole that leaves through a corner of another ring.
+  // A hole that crosses the shell.
   EXPECT_NE(refused({square, {{4, 4}, {10, 3}, {8, 5}}}).find("Self-intersection"),
             std::string::npos);
+  // A hole inside another hole.
   EXPECT_NE(refused({square, left, {{1, 4}, {2, 3.75}, {3, 4}}}).find("Nested holes at 1, 4"),
             std::string::npos);
   // Two rings that share a side, and a hole that repeats the shell.

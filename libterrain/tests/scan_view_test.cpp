@@ -27,7 +27,7 @@ namespace {
 using ScanSurface3 = tri::DynamicSurface<std::int32_t>;
 using ScanView = StoreView<ScanSurface3>;
 
-/// What a renderer keeps: the corners of triangles as they were when they were added.
+/// The corners of triangles as they were when they were added, as a renderer keeps them.
 class DrawnSurface {
  public:
   using Corners = std::array<ScanSurface3::Point, 3>;

@@ -63,8 +63,8 @@ TEST(Readable, FormatsBriefly) {
   EXPECT_EQ(counted(1, "vertex") + " of " + counted(2, "vertex"), "1 vertex of 2 vertices");
   EXPECT_EQ(counted(4, "tetrahedron"), "4 tetrahedra");
   EXPECT_EQ(counted(2, "entry"), "2 entries");
-  EXPECT_EQ(counted(1, "sample", "lies", "lie") + " here", "1 sample lies here");
-  EXPECT_EQ(counted(0, "sample", "lies", "lie"), "0 samples lie");
+  EXPECT_EQ(counted(1, "sample", "is", "are") + " here", "1 sample is here");
+  EXPECT_EQ(counted(0, "sample", "is", "are"), "0 samples are");
   EXPECT_EQ(readable_bytes(12), "12 bytes");
   EXPECT_EQ(readable_bytes(256u << 20), "256 MiB");
   EXPECT_EQ(readable_bytes((std::uint64_t{3} << 30) + (std::uint64_t{1} << 28)), "3.25 GiB");
@@ -91,7 +91,7 @@ TEST(Readable, FormatsBriefly) {
   EXPECT_EQ(readable_seconds(3723), "1:02:03");
 }
 
-TEST(PlainNumber, HasNoExponentWhereItNeedsNone) {
+TEST(PlainNumber, AvoidsExponents) {
   EXPECT_EQ(plain_number(5e5), "500000");
   EXPECT_EQ(plain_number(-1.5e-5), "-0.000015");
   EXPECT_EQ(plain_number(0.1), "0.1");

@@ -56,7 +56,7 @@ struct Pair {
 
 /// Writes points of several classes, with at most one of a class at each place: 0 everywhere; 1 in
 /// a disk off the middle, so that most clusters have none; 2 one in 300; 3 and 4 above each other,
-/// and 3 also above 0, like the returns of a pulse.
+/// and 3 also above a point of 0, like the returns of a pulse.
 void write_cloud(const fs::path& path, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };

@@ -17,8 +17,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// A text that is read as long as no stop is requested.
-class HeardText {
+/// Iterates over a text and throws stream::Stopped once a stop is requested.
+class StoppableText {
  public:
   using iterator_category = std::input_iterator_tag;
   using value_type = char;
@@ -26,22 +26,22 @@ class HeardText {
   using pointer = const char*;
   using reference = const char&;
 
-  HeardText(const char* at, const std::stop_token& stop) : at_(at), stop_(&stop) {}
+  StoppableText(const char* at, const std::stop_token& stop) : at_(at), stop_(&stop) {}
   reference operator*() const { return *at_; }
-  HeardText& operator++() {
+  StoppableText& operator++() {
     constexpr std::uintptr_t kBetweenChecks = 0x10000;
     if (reinterpret_cast<std::uintptr_t>(++at_) % kBetweenChecks == 0 && stop_->stop_requested()) {
       throw stream::Stopped();
     }
     return *this;
   }
-  HeardText operator++(int) {
-    HeardText before = *this;
+  StoppableText operator++(int) {
+    StoppableText before = *this;
     ++*this;
     return before;
   }
-  bool operator==(const HeardText& other) const { return at_ == other.at_; }
-  bool operator!=(const HeardText& other) const { return at_ != other.at_; }
+  bool operator==(const StoppableText& other) const { return at_ == other.at_; }
+  bool operator!=(const StoppableText& other) const { return at_ != other.at_; }
 
  private:
   const char* at_;
@@ -84,8 +84,8 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
   }
   if (file.bad()) return std::nullopt;
   try {
-    return nlohmann::json::parse(HeardText(text.data(), stop),
-                                 HeardText(text.data() + text.size(), stop));
+    return nlohmann::json::parse(StoppableText(text.data(), stop),
+                                 StoppableText(text.data() + text.size(), stop));
   } catch (const nlohmann::json::parse_error& error) {
     const std::size_t byte = std::min(error.byte == 0 ? 0 : error.byte - 1, text.size());
     fail(place_of(text, byte), byte == text.size() ? "the JSON is cut off" : "is not JSON");

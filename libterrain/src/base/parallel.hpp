@@ -12,8 +12,8 @@
 
 namespace terrace::terrain {
 
-/// base::parallel_for() that hears a stop: after a request no further item begins, and
-/// stream::Stopped is thrown.
+/// base::parallel_for() with a stop token: after a stop request it starts no further item and
+/// throws stream::Stopped.
 template <class Work>
 void parallel_for(std::size_t items, unsigned threads, const Work& work,
                   const std::stop_token& stop = {}) {
@@ -27,8 +27,8 @@ void parallel_for(std::size_t items, unsigned threads, const Work& work,
   });
 }
 
-/// Calls work(first_row, last_row) for bands of rows, concurrently. A band must not touch the rows
-/// of another. Errors and stops: as above.
+/// Calls work(first_row, last_row) concurrently for bands of rows; last_row is excluded. A band
+/// must not touch the rows of another. Errors and stops: as above.
 template <class Work>
 void for_bands(std::uint32_t rows, unsigned threads, const Work& work,
                const std::stop_token& stop = {}) {

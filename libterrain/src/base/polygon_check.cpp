@@ -22,12 +22,12 @@ namespace {
 
 constexpr const char* kCrossing = "Self-intersection";
 
-/// The sweep goes through the corners from left to right, at equal x upwards. It keeps the edges
-/// under way in their order from below. No two of them cross before the place of the sweep, as the
-/// first crossing is found when its edges become neighbours; so the order never changes.
+/// Visits the corners from left to right and, at equal x, from below. Keeps the edges that cross
+/// the sweep line in order from below. No two of them cross before the sweep line, because a
+/// crossing is found when its edges become neighbours; so their order never changes.
 ///
-/// Rings may touch each other in single places. Then the polygon is valid if no ring crosses
-/// another there, and if the places do not close a circle of rings, which would cut the interior.
+/// Rings may touch each other at single places. The polygon is then valid if no ring crosses
+/// another there and the touching rings do not form a cycle, which would cut the interior in two.
 class PolygonSweep {
  public:
   PolygonSweep(const Polygon& polygon, const std::stop_token& stop) : stop_(stop) {
@@ -54,13 +54,13 @@ class PolygonSweep {
   }
 
  private:
-  /// Corners of a ring are consecutive.
+  /// A ring's corners are consecutive.
   struct Ring {
     std::uint32_t begin, end;
     std::uint32_t first = 0;        ///< the corner where the sweep meets it
-    bool counter_clockwise = true;  ///< known from there on
+    bool counter_clockwise = true;  ///< known once the sweep has met `first`
   };
-  /// An edge leads from a corner to the next one of its ring, whose number it has.
+  /// Orders edges from below. An edge has the number of the corner at which it begins.
   struct FromBelow {
     using is_transparent = void;
     const PolygonSweep* sweep;
@@ -73,10 +73,10 @@ class PolygonSweep {
     }
   };
   using Status = std::set<std::uint32_t, FromBelow>;
-  /// A way out of a place along an edge of a ring.
+  /// A direction in which an edge leaves a place.
   struct Direction {
     Point2 to;
-    std::uint32_t pass;  ///< the number of the ring's way through the place
+    std::uint32_t pass;  ///< which passage of a ring through the place it belongs to
   };
 
   void check_stop(std::size_t step) const {
@@ -87,7 +87,7 @@ class PolygonSweep {
   void add_ring(const std::vector<Point2>& given) {
     Ring ring{static_cast<std::uint32_t>(corners_.size()), 0};
     for (const Point2& p : given) {
-      // A corner may be given several times in a row.
+      // A corner may be repeated.
       if (corners_.size() > ring.begin && corners_.back() == p) continue;
       corners_.push_back(p);
     }
@@ -129,18 +129,18 @@ class PolygonSweep {
   [[nodiscard]] const Point2& right(std::uint32_t edge) const {
     return corners_[leads_on(edge) ? next(edge) : edge];
   }
-  /// 1: the place is above the edge's line, 0: on it, -1: below.
+  /// Returns 1 if the place is above the edge's line, 0 if on it, -1 if below.
   [[nodiscard]] int side(std::uint32_t edge, const Point2& place) const {
     return tri::orientation(left(edge), right(edge), place);
   }
-  /// For two edges of which none crosses the other and that overlap in the direction of the sweep.
+  /// Requires edges that do not cross each other and that both cross some sweep line.
   [[nodiscard]] bool is_below(std::uint32_t a, std::uint32_t b) const {
     if (a == b) return false;
     if (left(b) < left(a)) return !is_below(b, a);
     const int begins = side(a, left(b));
     return begins != 0 ? begins > 0 : side(a, right(b)) > 0;
   }
-  /// Whether the ring's inside is above the edge.
+  /// Whether the interior of the ring is above the edge.
   [[nodiscard]] bool inside_above(std::uint32_t edge) const {
     return leads_on(edge) == rings_[ring_of_[edge]].counter_clockwise;
   }
@@ -163,7 +163,7 @@ class PolygonSweep {
         ++inside;
       }
     }
-    // Those through the place, and one on either side.
+    // Checks the edges that begin at or pass through the place, and one neighbour on each side.
     auto at = high;
     for (std::size_t i = 0; i < inside && at != status_.begin(); ++i) --at;
     if (at != status_.begin()) --at;
@@ -175,8 +175,8 @@ class PolygonSweep {
     for (const std::uint32_t corner : corners) place_hole(corner);
   }
 
-  /// Whether the ways of the rings through a place neither cross nor run along each other. Fails if
-  /// not.
+  /// Whether the passages of rings through a place neither cross nor overlap. Records a fault if
+  /// they do.
   bool fit_together(const Point2& place, std::span<const std::uint32_t> corners,
                     std::uint32_t passing) {
     directions_.clear();
@@ -206,7 +206,7 @@ class PolygonSweep {
       }
     }
     if (touching_.size() == 1) return true;
-    // Ways that do not cross are nested like brackets.
+    // Passages that do not cross are nested like brackets.
     std::vector<std::uint32_t> open;
     for (const Direction& d : directions_) {
       if (!open.empty() && open.back() == d.pass) {
@@ -222,8 +222,8 @@ class PolygonSweep {
     return join(place);
   }
 
-  /// Rings that touch in a place. Fails if one ring touches itself, or if they are connected
-  /// already.
+  /// Connects the rings that touch at a place. Records a fault and returns false if a ring touches
+  /// itself or if they are already connected.
   bool join(const Point2& place) {
     std::sort(touching_.begin(), touching_.end());
     if (std::adjacent_find(touching_.begin(), touching_.end()) != touching_.end()) {
@@ -245,11 +245,11 @@ class PolygonSweep {
     return ring;
   }
 
-  /// Whether the edges cross in a place inside both.
+  /// Whether the edges cross at a place inside both.
   [[nodiscard]] bool crosses(std::uint32_t a, std::uint32_t b) const {
     return side(a, left(b)) * side(a, right(b)) < 0 && side(b, left(a)) * side(b, right(a)) < 0;
   }
-  /// Rounded.
+  /// Returns the place where the edges cross, rounded.
   [[nodiscard]] Point2 crossing_of(std::uint32_t a, std::uint32_t b) const {
     const Point2 &p = left(a), &q = left(b);
     const Point2 u{right(a)[0] - p[0], right(a)[1] - p[1]},
@@ -259,7 +259,7 @@ class PolygonSweep {
     return {p[0] + share * u[0], p[1] + share * u[1]};
   }
 
-  /// Finds how a ring turns, where the sweep meets it.
+  /// Determines the orientation of a ring at its first corner.
   void find_turn(std::uint32_t corner) {
     Ring& ring = rings_[ring_of_[corner]];
     if (ring.first != corner) return;
@@ -267,7 +267,7 @@ class PolygonSweep {
         tri::orientation(corners_[before(corner)], corners_[corner], corners_[next(corner)]) > 0;
   }
 
-  /// Fails if what is next to a hole, below its first corner, is not the inside of the polygon.
+  /// Records a fault if the place below a hole's first corner is not in the polygon's interior.
   void place_hole(std::uint32_t corner) {
     const Ring& ring = rings_[ring_of_[corner]];
     if (ring.first != corner || ring_of_[corner] == 0) return;
@@ -285,10 +285,10 @@ class PolygonSweep {
   std::vector<Point2> corners_;
   std::vector<std::uint32_t> ring_of_;
   std::vector<Ring> rings_;
-  std::vector<std::uint32_t> sets_;  ///< of rings that touch
+  std::vector<std::uint32_t> sets_;  ///< union-find of the rings that touch
   Status status_{FromBelow{this}};
   std::vector<Direction> directions_;
-  std::vector<std::uint32_t> touching_;  ///< rings through a place
+  std::vector<std::uint32_t> touching_;  ///< the rings through a place
   std::optional<std::string> fault_;
 };
 

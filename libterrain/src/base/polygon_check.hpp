@@ -9,10 +9,10 @@
 
 namespace terrace::terrain {
 
-/// What makes a polygon invalid by OGC Simple Features, and where; nullopt if it is valid. Exact,
-/// and O(n log n) for n corners of any shape: a sweep over the edges.
-/// Source: M. Shamos, D. Hoey, Geometric intersection problems, 1976.
-/// Requires finite coordinates, and a ring at least. Throws: stream::Stopped.
+/// Returns why and where a polygon is invalid by OGC Simple Features; nullopt if it is valid.
+/// Sweeps over the edges; exact, O(n log n) for n corners in any arrangement. Source: M. Shamos, D.
+/// Hoey, Geometric intersection problems, 1976. Requires finite coordinates and at least one ring.
+/// Throws: stream::Stopped.
 [[nodiscard]] std::optional<std::string> fault_of(const Polygon& polygon,
                                                   const std::stop_token& stop = {});
 

@@ -12,7 +12,7 @@ namespace terrace::terrain {
 /// Reports the progress of one task to its context, and on destruction its end.
 class ProgressReport {
  public:
-  /// what: what is counted, such as "points". The context must outlive the report.
+  /// what: the things counted, such as "points". The context must outlive the report.
   ProgressReport(const Context& context, std::string what)
       : context_(context), what_(std::move(what)) {}
   ~ProgressReport() {

@@ -280,9 +280,8 @@ void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longit
   if (!joint || request.most_points > 0) return;
   if (request.entities != stream::Entities::points) {
     // Their corners are attributes, which cannot be shifted.
-    context.say(
-        "the points " + joint->what +
-        ", and what connects them goes around the earth: continue longitudes beyond 180");
+    context.say("the points " + joint->what +
+                ", and what connects them goes around the earth: continue longitudes beyond 180");
     return;
   }
   if (!request.open &&
@@ -292,7 +291,7 @@ void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longit
         {.file = request.inputs.front(),
          .where = {},
          .cause = "its points " + joint->what +
-                  ", which is found only at the end of the input, and it can be read only once",
+                  ", which is known only at the end, and the input can be read only once",
          .remedy = "name a file, or count longitudes from 0 to 360 or continue them beyond 180"});
   }
   throw AcrossAntimeridian{*joint};
@@ -313,8 +312,8 @@ std::string name_of(cluster::Effort effort) {
 
 namespace {
 
-/// middle: given if points are to be joined across the antimeridian. Throws: AcrossAntimeridian if
-/// it is not given but needed.
+/// middle: for joining points across the antimeridian; see JoinedLongitudes. Throws:
+/// AcrossAntimeridian if it is missing but needed.
 BuildOutcome build_once(const BuildRequest& request, const Context& context,
                         std::optional<double> middle) {
   const std::uint64_t memory_bytes = context.memory_or(kMemory);

@@ -31,7 +31,7 @@ struct ContourParts {
 
 /// Draws the lines of a raster at level 0.
 void draw_lattice_contours(const ContourParts& parts);
-/// Draws the lines of points, or of a raster at a level above 0.
+/// Draws the lines of points, or of a raster at a coarser level.
 void draw_point_contours(const ContourParts& parts);
 
 /// Returns the box in stored coordinates around a region's box.

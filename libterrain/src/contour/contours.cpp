@@ -60,7 +60,7 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
                 "give a larger `interval`");
 }
 
-/// Why a store with points has no lines.
+/// Returns why there are no lines although the store has points.
 std::string reason_for_none(const stream::Store& store, const ContourRequest& request) {
   const std::string interval = plain_number(request.interval);
   const stream::Channel& z = store.schema().coordinates[2];

@@ -69,7 +69,7 @@ class EllipsoidalHeights {
   /// Adds everything that the conversion depends on, except for the bytes of a geoid file: unit and
   /// PROJ's operation.
   void add_to(Digest& digest) const;
-  /// What the user should know: an unknown unit, unconverted heights. May be empty.
+  /// Returns a note for the user on an unknown unit or unconverted heights; may be empty.
   [[nodiscard]] const std::string& note() const { return note_; }
 
  private:

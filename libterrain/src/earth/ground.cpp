@@ -119,7 +119,7 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
 
   // The heights' own unit if it is named, then that of a CRS in feet, then metres.
   const std::string& own = placement_.coordinates[2].unit;
-  // A file may name the unit in WKT alone.
+  // A file may name the unit only in its WKT.
   const double of_heights = crs.vertical_unit.empty() && known ? known->metres_per_height : 0;
   const std::string of_crs = of_heights != 0 ? unit_name(of_heights) : crs.vertical_unit;
   const std::string& word = own.empty() ? of_crs : own;

@@ -47,7 +47,7 @@ class Ground {
   /// area.
   [[nodiscard]] bool projected() const { return kind_ == Kind::projected; }
 
-  /// What was assumed because the source does not say it; may be empty.
+  /// Returns a note on assumptions that fill gaps in the source; may be empty.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
   /// The part of assumption() about a unit of heights that is named in the source and unknown.
   /// Empty if the unit is known or not named. Every conversion of heights to metres reports it.

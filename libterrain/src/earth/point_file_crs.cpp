@@ -10,8 +10,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// As Ground takes it. In their own CRS heights without a unit stay without: readers assume the
-/// same again.
+/// Returns the unit that Ground uses. If nothing is converted and no unit is known, returns an
+/// empty string, because readers then make the same assumption again.
 std::string unit_of_heights(const stream::Placement& own, bool converted) {
   if (!own.coordinates[2].unit.empty()) return own.coordinates[2].unit;
   if (!own.crs.vertical_unit.empty()) return own.crs.vertical_unit;
@@ -21,11 +21,11 @@ std::string unit_of_heights(const stream::Placement& own, bool converted) {
                                                 : std::string();
 }
 
-/// Nothing for a local system. Throws: CrsError.
+/// Returns the definition to record; nullopt for a local system. Throws: CrsError.
 std::optional<CrsDefinition> definition_in_file(const stream::Placement& own,
                                                 const std::optional<stream::Crs>& other) {
   stream::Crs crs = own.crs;
-  crs.vertical_unit.clear();  // that of its WKT or code counts
+  crs.vertical_unit.clear();  // the WKT or code decides
   std::optional<CrsDefinition> definition = definition_of(crs);
   if (!other) return definition;
   std::optional<CrsDefinition> written = definition_of(*other);
@@ -53,7 +53,7 @@ stream::Crs crs_of_point_file(const stream::Placement& own,
     const std::optional<double> metres = metres_in_unit(unit);
     std::optional<CrsDefinition> definition = definition_in_file(own, other);
     if (definition) {
-      // Readers of what names no unit take heights for metres, unless x and y are in feet.
+      // Without a unit, readers assume metres for heights, unless x and y are in feet.
       const bool assumed = definition->geographic || definition->metres_per_unit >= 1;
       const bool said = definition->metres_per_height != 0;
       if (metres && (said || !assumed || *metres != 1)) write_height_unit(*definition, *metres);
@@ -64,7 +64,7 @@ stream::Crs crs_of_point_file(const stream::Placement& own,
     const std::optional<stream::Crs> local = local_crs_of(crs);
     if (local && !is_geocentric(*local) && metres) crs.wkt = with_height_unit(*local, *metres);
   } catch (const CrsError&) {
-    // The file repeats what is recorded.
+    // The file repeats the record of the source.
   }
   return crs;
 }
@@ -77,8 +77,8 @@ std::string lost_height_unit(const std::string& path, const stream::PointWriter&
     const std::string unit = unit_of_heights(own, other.has_value());
     if (unit.empty() || metres_in_unit(unit).value_or(0) == 1) return {};
     return path + ": heights are in " + plural_unit(unit) +
-           ", and the format has no place for a unit: whatever reads the file takes them for "
-           "metres; write LAS or LAZ to keep the unit";
+           ", and the format has no place for a unit, so programs read them as metres; write LAS "
+           "or LAZ to keep the unit";
   } catch (const CrsError&) {
     return {};
   }

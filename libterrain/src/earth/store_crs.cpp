@@ -191,9 +191,9 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
 
 namespace {
 
-/// Throws: stream::Error for a region beyond a pole. file: of GeoJSON.
+/// Throws: stream::Error for a region beyond a pole. file: the GeoJSON file, if any.
 void check_region(const Region& region, double most, const std::string& file) {
-  // The outermost cells of a raster of the globe may lie half beyond.
+  // Half of the outermost cells of a global raster may be beyond a pole.
   constexpr double kHalfCell = 1;
   const stream::Box3& box = region.box();
   const std::array<Point2, 2> corners{{{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}};
@@ -209,7 +209,7 @@ Region RegionConversion::operator()(Region region) const {
     check_region(region, to_regions_->to().most_latitude(), given ? given->file : std::string());
     return region_in(region, *to_regions_, bounds_);
   }
-  // Longitudes alone have turns that short, in degrees or gradians.
+  // Only longitudes, in degrees or gradians, have a turn this short.
   constexpr double kLongestTurn = 400;
   const bool turns = turn_ > 0 && turn_ <= kLongestTurn;
   const double most = turns ? turn_ / 4 : std::numeric_limits<double>::infinity();

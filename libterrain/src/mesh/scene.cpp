@@ -62,7 +62,7 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   }
   std::vector<double> shown;
   const double each = whole / static_cast<double>(kShownHeights);
-  // Areas so small that they are hardly numbers add up to steps of 0.
+  // With subnormal areas, steps may round to 0.
   if (!(each >= std::numeric_limits<double>::min()) || !std::isfinite(whole)) return shown;
   double before = 0;
   for (std::size_t i = 0; i < areas.size(); ++i) {

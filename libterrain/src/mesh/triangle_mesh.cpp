@@ -88,7 +88,7 @@ struct Coordinates {
     }
   }
 
-  /// "; heights are converted from feet", if they are not in metres.
+  /// Returns "; heights are converted from feet" or similar; empty if they are in metres.
   [[nodiscard]] std::string heights_too() const {
     return metres[2] == 1 ? "" : "; heights are converted from " + plural_unit(height_unit);
   }
@@ -111,7 +111,7 @@ struct Coordinates {
   Point2 middle{};
   double width = 0;
   std::string height_unit;
-  bool known = false;  ///< of x and y
+  bool known = false;  ///< whether the unit of x and y is known
   bool local = false, degrees = false;
   double widest_error = 0;  ///< relative error of lengths from west to east
 };

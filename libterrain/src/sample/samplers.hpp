@@ -13,7 +13,7 @@ namespace terrace::terrain {
 std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
                                                     const SamplerOptions& options,
                                                     const Context& context);
-/// Samples points, or a raster at a level above 0.
+/// Samples points, or a raster at a coarser level.
 std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
                                                   const SamplerOptions& options,
                                                   const Context& context);

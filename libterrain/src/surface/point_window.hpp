@@ -141,7 +141,7 @@ class PointWindow {
     Origin origin;
   };
   /// A group of nearby points of one cluster: pending_[begin] and the following; or, if it has no
-  /// points of its own, the groups that follow, up to `next`.
+  /// points itself, the groups that follow, up to `next`.
   struct Group {
     StoredBox box;
     std::size_t begin = 0, count = 0, next = 0;

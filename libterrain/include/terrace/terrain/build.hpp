@@ -91,7 +91,7 @@ struct BuildOutcome {
 /// the same bytes. Uses 256 MiB of memory unless the context sets another bound. Reports "points",
 /// and at the end notes an unknown CRS and similar findings.
 /// Throws: stream::Error; stream::Stopped if the context requests a stop. Either leaves no new
-/// store, and a store that was to be replaced is untouched.
+/// store, and a store to replace is left untouched.
 BuildOutcome build_store(const BuildRequest& request, const Context& context = {});
 
 /// Convert "fast", "default", "fine" and "full" to an effort and back.

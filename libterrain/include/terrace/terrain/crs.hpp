@@ -90,12 +90,12 @@ class CoordinateSystem {
   /// it.
   [[nodiscard]] stream::Crs crs_with_wkt1() const;
 
-  /// What the user should know about the conversion: "EPSG:... to WGS 84 by \"...\" within 2 m";
+  /// Returns a note for the user on the conversion: "EPSG:... to WGS 84 by \"...\" within 2 m";
   /// empty if no conversion is needed or possible.
   [[nodiscard]] std::string wgs84_note() const;
   /// Whether longitudes and latitudes of WGS 84 can be computed.
   [[nodiscard]] bool reaches_wgs84() const;
-  /// Whether longitudes and latitudes of its own datum are used as WGS 84 without a shift.
+  /// Whether longitudes and latitudes of the CRS's datum are used as WGS 84 without a shift.
   [[nodiscard]] bool counts_as_wgs84() const;
 
   /// Convert x, y to longitude and latitude of WGS 84 in degrees, in place, and back. Places
@@ -154,7 +154,7 @@ class Transformation {
   [[nodiscard]] const CoordinateSystem& to() const { return to_; }
   /// Whether both systems are the same, so that nothing is converted.
   [[nodiscard]] bool identity() const { return same_; }
-  /// What the user should know about the operation; empty if coordinates stay on their datum.
+  /// Returns a note for the user on the operation; empty if coordinates stay on their datum.
   [[nodiscard]] std::string note() const;
 
  private:
@@ -208,10 +208,10 @@ class RegionConversion {
   /// `box`; nullopt if the file uses the CRS of the data. Throws: as above.
   [[nodiscard]] std::optional<Transformation> to_places(const PlacesCrs& given,
                                                         const stream::Box3& box) const;
-  /// Sets the function that receives notes: what was assumed about a GeoJSON file's CRS, and which
-  /// operation converts from it.
+  /// Sets the function that receives notes: assumptions about the CRS of a GeoJSON file, and the
+  /// operation that converts from it.
   void on_note(std::function<void(const std::string&)> note) { note_ = std::move(note); }
-  /// What the user should know about the conversion; empty if there is nothing to report.
+  /// Returns a note for the user on the conversion; empty if there is nothing to report.
   [[nodiscard]] std::string note() const { return to_regions_ ? to_regions_->note() : ""; }
 
  private:

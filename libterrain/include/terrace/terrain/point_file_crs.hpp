@@ -7,19 +7,19 @@
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/schema.hpp>
 
-/// What a file of points says of its coordinates.
+/// The CRS and the units that a file of points records.
 
 namespace terrace::terrain {
 
-/// The CRS for stream::PointHeader of points of `own`, with WKT 1 (OGC 01-009), which LAS asks for,
-/// or WKT 2 where that cannot say it. It names the unit of heights, unless that is the metre and
-/// readers assume it. other: the CRS that x and y were converted to; heights stay as they are.
-/// A CRS that is not known stays as it is.
+/// Returns the CRS that stream::PointHeader records for points placed by `own`. It has WKT 1 (OGC
+/// 01-009), which LAS requires, or WKT 2 if WKT 1 cannot express it. It names the unit of heights,
+/// except for metres if readers assume them. other: the CRS that x and y were converted to; heights
+/// are not converted. An unknown CRS is returned unchanged.
 stream::Crs crs_of_point_file(const stream::Placement& own,
                               const std::optional<stream::Crs>& other = std::nullopt);
 
-/// Says that the file does not record the unit of heights, which readers take for another; empty if
-/// it does, or if nothing is lost. path: of the file.
+/// Returns a note that the file does not record the unit of heights, so that readers assume another
+/// one; empty if it records the unit or if nothing is lost. path: of the file.
 std::string lost_height_unit(const std::string& path, const stream::PointWriter& writer,
                              const stream::Placement& own,
                              const std::optional<stream::Crs>& other = std::nullopt);

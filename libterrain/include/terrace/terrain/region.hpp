@@ -60,7 +60,8 @@ class Region {
   /// Returns the union of polygons, each with heights from `low` to `high`. file: named in errors.
   /// Throws: stream::Error if there are no polygons or one is invalid (a ring that crosses itself
   /// or touches itself along a line, has fewer than three corners, no area or a coordinate that is
-  /// not finite; a hole outside; holes that cross), naming polygon, ring and place; stream::Stopped.
+  /// not finite; a hole outside; holes that cross), naming polygon, ring and place;
+  /// stream::Stopped.
   static Region of_polygons(std::vector<Polygon> polygons, double low, double high,
                             const std::string& file = {}, const std::stop_token& stop = {});
 

@@ -60,7 +60,7 @@ struct ScanSurface {
 /// Restores the surface of the points that `detail` wants, in metres on the ground; degrees are
 /// converted about the middle of the points' box. Throws: stream::Error on a damaged store, and if
 /// the points do not fit in the context's memory (the message says how much they need); UsageError
-/// for tetrahedra together with a method; what the method throws; stream::Stopped.
+/// for tetrahedra together with a method; stream::Stopped; any exception of the method.
 [[nodiscard]] ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
                                        const ScanSurfaceOptions& options = {},
                                        const Context& context = {});

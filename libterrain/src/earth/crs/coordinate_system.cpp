@@ -195,7 +195,7 @@ stream::Crs CoordinateSystem::crs() const {
       is_geographic() ? angle_name(own.degrees_per_unit) : unit_name(own.metres_per_unit);
   if (own.metres_per_height != 0) {
     crs.vertical_unit = unit_name(own.metres_per_height);
-    // A length without a name is an unknown unit, not a missing one.
+    // Records the length of a unit without a name, so that the unit is not missing.
     if (crs.vertical_unit.empty()) crs.vertical_unit = number_text(own.metres_per_height) + " m";
   }
   return crs;

@@ -83,7 +83,7 @@ std::string bound(const std::string& text, const DatumShift& shift) {
   return result + "]]";
 }
 
-/// Whether the WKT is that of a vertical system.
+/// Whether the WKT defines a vertical system.
 bool is_vertical(const std::string& wkt) { return wkt.starts_with("VERT"); }
 
 std::string compound(const std::string& name, const std::string& wkt,
@@ -97,7 +97,7 @@ std::string length_name(double metres) {
   return name.empty() ? "unknown" : name;
 }
 
-/// A vertical system of which nothing but the name and the unit is known.
+/// Returns the WKT of a vertical system with only a name and a unit.
 std::string vertical_wkt(const std::string& name, double metres) {
   return "VERTCRS[" + wkt_name(name) +
          ",VDATUM[\"unknown\"],CS[vertical,1],AXIS[\"height (H)\",up]," + "LENGTHUNIT[" +

@@ -79,7 +79,7 @@ inline constexpr char kUnknownHeights[] = "unknown";
 /// Returns the name of a unit that metres_in_unit() knows, such as "metre", "foot" or "US survey
 /// foot"; empty for other units.
 std::string unit_name(double metres);
-/// "feet", "US survey feet", "metres".
+/// Returns the plural: "feet", "US survey feet", "metres".
 std::string plural_unit(const std::string& unit);
 
 /// Returns "ellipsoidal", "orthometric" or an empty string, as stores record it.

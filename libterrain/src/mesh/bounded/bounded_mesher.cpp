@@ -80,20 +80,20 @@ Aim BoundedMesher::aim_within(double bound) const {
   return {first, sure, bound};
 }
 
-unsigned BoundedMesher::threads_within_memory(std::uint64_t each, std::uint64_t beside,
+unsigned BoundedMesher::threads_within_memory(std::uint64_t each, std::uint64_t shared,
                                               const std::string& purpose) const {
   const std::uint64_t memory = context_.memory_or(0);
-  if (memory < beside + each) {
+  if (memory < shared + each) {
     throw stream::Error({.file = store_.path().string(),
                          .where = {},
                          .cause = "a mesh with a bound needs " +
-                                  std::to_string(((beside + each) >> 20) + 1) + "M of memory" +
+                                  std::to_string(((shared + each) >> 20) + 1) + "M of memory" +
                                   purpose + ", `memory_bytes` allows " +
                                   std::to_string(memory >> 20) + "M",
                          .remedy = "allow more"});
   }
   return static_cast<unsigned>(std::min<std::uint64_t>(
-      context_.threads, (memory - beside) / std::max<std::uint64_t>(each, 1)));
+      context_.threads, (memory - shared) / std::max<std::uint64_t>(each, 1)));
 }
 
 }  // namespace terrace::terrain

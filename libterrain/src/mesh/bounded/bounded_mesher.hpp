@@ -68,10 +68,10 @@ class BoundedMesher {
 
   /// Throws: stream::Error if the rounding of the file's format is too coarse for the bound.
   [[nodiscard]] Aim aim_within(double bound) const;
-  /// Returns how many threads the memory allows, with `each` bytes per window and `beside` bytes in
-  /// addition. purpose: follows the needed memory in the error, such as " for 5 points at a time".
-  /// Throws: stream::Error if memory does not suffice for one thread.
-  [[nodiscard]] unsigned threads_within_memory(std::uint64_t each, std::uint64_t beside,
+  /// Returns how many threads the memory allows, with `each` bytes per window and `shared` bytes
+  /// for all of them. purpose: follows the needed memory in the error, such as " for 5 points at a
+  /// time". Throws: stream::Error if memory does not suffice for one thread.
+  [[nodiscard]] unsigned threads_within_memory(std::uint64_t each, std::uint64_t shared,
                                                const std::string& purpose = {}) const;
 
   /// Makes windows with `threads` threads and joins them in order: make(worker, i) returns a

@@ -157,7 +157,7 @@ void Planner::add_sides() {
 /// A height along a line.
 struct ProfilePlace {
   double at = 0.0, height = 0.0;
-  bool sample = false;  ///< whether a sample is there
+  bool sample = false;  ///< whether it is a sample
 };
 
 /// The Delaunay triangulation of some samples as a surface.

@@ -16,7 +16,7 @@ namespace {
 
 /// The most samples to take at once.
 constexpr double kMostSamples = 1U << 18;
-/// In degrees: a box this narrow is as good as one place, and dividing it does not help.
+/// In degrees: a box this narrow is practically one place, so dividing it does not help.
 constexpr double kNarrowest = 1e-9;
 /// The most points to triangulate at once if places need them.
 constexpr double kMostTogether = 1U << 15;

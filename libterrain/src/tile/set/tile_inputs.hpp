@@ -11,7 +11,7 @@
 
 namespace terrace::terrain {
 
-/// What the bytes of a tile depend on, in addition to its zoom's plan and the surface.
+/// The inputs that determine a tile's bytes, in addition to its zoom's plan and the surface.
 struct TileInputs {
   TileMeshOptions mesh;
   bool gzip = false;

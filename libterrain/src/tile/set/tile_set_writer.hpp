@@ -99,15 +99,15 @@ class TileSetWriter {
   void conclude(const Zoom& zoom);
   void remove_others();
   void begin_change();
-  /// Whether another program has put a tile into a finished set: neither the journal nor layer.json
-  /// lists it. Of an unfinished set, whose last tiles may not be listed yet, any tile is ours.
+  /// Whether another program put the tile into a finished set, so that neither the journal nor
+  /// layer.json lists it. Always false for an unfinished set, where the last tiles may be unlisted.
   [[nodiscard]] bool is_stranger(const TileAddress& tile) const;
 
   const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
   const TileSetOptions& options_;
   const Context& context_;
   const std::string& layer_path_;
-  std::optional<TileLayer> finished_;  ///< the set that was there before
+  std::optional<TileLayer> finished_;  ///< the earlier finished set
   TileJournal journal_;
   std::vector<TileJournal::Record> records_;
   std::vector<std::unique_ptr<Zoom>> zooms_;  ///< from the first requested one on

@@ -118,8 +118,9 @@ void Inventory::zoom(unsigned zoom) {
     }
   }
   if (missing > kMostNamed) {
-    problem(layer_path_, label + ": " + counted(missing - kMostNamed, "more listed tile",
-                                                "does not exist", "do not exist"));
+    problem(layer_path_, label + ": " +
+                             counted(missing - kMostNamed, "more listed tile", "does not exist",
+                                     "do not exist"));
   }
   for (std::size_t i = 0; i < there.size(); ++i) {
     if (named[i] == 1) continue;
