@@ -11,7 +11,7 @@ import re
 import subprocess
 import sys
 
-TITLE = re.compile(r'[a-z0-9][a-z0-9_./+-]*(?:, [a-z0-9_./+-]+)*: [A-Z][^.]*[^.\s]$|Merge |Revert "')
+TITLE = re.compile(r'[a-z0-9][a-z0-9_./+-]*(?:, [a-z0-9_./+-]+)*: [A-Z].*[^.\s]$|Merge |Revert "')
 MOST_LETTERS = 72
 # Words that begin a statement or a report instead of saying what the commit does.
 NO_IMPERATIVE = re.compile(r': (?:The|A|An|It|What|Some|All|Now|Fixed|Fixes|Adds|Added|Changes|Changed|Adding|Fixing) ')
