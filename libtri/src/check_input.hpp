@@ -34,7 +34,7 @@ inline void check_count(std::size_t present, std::size_t added) {
   if (added <= kMaxVertices - present) return;
   throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
                           std::to_string(present) + " exist and " + std::to_string(added) +
-                          " were to be added");
+                          " are added");
 }
 
 }  // namespace terrace::tri

@@ -9,9 +9,9 @@
 #include <type_traits>
 #include <utility>
 
-/// Growing arrays of plain data for the triangulation: unlike std::vector they leave new elements
-/// uninitialised, and once they are large they grow by an eighth without a second copy if the
-/// system can move pages, and use huge pages (a sixth faster, as accesses are scattered).
+/// Growing arrays of plain data for the triangulation. Unlike std::vector they leave new elements
+/// uninitialised. Large arrays grow by an eighth, without a second copy if the system can move
+/// pages, and use huge pages, which is a sixth faster because accesses are scattered.
 
 namespace terrace::tri {
 
@@ -77,7 +77,7 @@ class Pool {
 
  private:
   [[nodiscard]] std::size_t grown() const {
-    // What is smaller than a huge page is copied when it grows, and its pages are new each time.
+    // An array smaller than a huge page is copied when it grows, and its pages are new each time.
     const std::size_t doubled = 2 * capacity_ + 16;
     if (doubled * sizeof(T) < kHugePage) return doubled;
     // Grows by whole huge pages: memory first used as small pages stays in them.

@@ -224,7 +224,7 @@ TEST(ViewBudget, KeepsTheTimeLimit) {
   }
 }
 
-// One stall of the clock must not slow down later steps for ever.
+// One stall of the clock must not slow down later steps forever.
 TEST(ViewBudget, RecoversFromAStall) {
   World world(3, Shape::random, 2000);
   while (world.source.levels[0].size() < 40) world = World(world.seed + 1, Shape::random, 2000);

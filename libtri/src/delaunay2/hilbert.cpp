@@ -42,7 +42,7 @@ class Cells {
     }
   }
 
-  /// All points are equal (or as good as).
+  /// All points are equal (or nearly so).
   [[nodiscard]] bool single() const { return single_; }
   [[nodiscard]] std::uint32_t key(std::uint32_t number) const {
     const Point& p = points_[number];

@@ -12,7 +12,7 @@
 
 namespace terrace::tri::planar {
 
-/// What the way to a point costs, see base::StopTicks.
+/// Cost of the walk to a point, see base::StopTicks.
 inline constexpr std::size_t kTicksOfWalk = 256;
 
 /// Joins a vertex, which has its slot and point but no triangle, to a triangulation with triangles.

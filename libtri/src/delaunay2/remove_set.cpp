@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removes a set of vertices as one hole, after J. Skala, thesis, section 8.1, but for the whole set
-// at once: all triangles at the vertices are taken out first. If they leave a simple disc (or
+// Removes a set of vertices as one hole, after J. Skala, thesis, section 8.1, extended to the whole
+// set at once: all triangles at the vertices are taken out first. If they leave a simple disc (or
 // several), it is filled in one go. The thesis requires that a vertex is on the hole's boundary and
 // that no boundary vertex occurs twice; here these rules become one count (Euler's formula) and one
 // comparison.

@@ -15,7 +15,7 @@ constexpr double kFar = 1e150;
 constexpr double kMaxDemand = 1e299;
 constexpr std::size_t kBlock = 256;
 
-/// Only the first entries are used, as many as there are boxes.
+/// Only the first entries are used, one per box.
 using Block = std::array<double, kBlock>;
 
 struct Boxes {

@@ -244,8 +244,8 @@ void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
   request(candidate, candidate.want, bytes);
 }
 
-// Requests early the clusters that may be wanted soon, and keeps them in the cache if they are
-// there.
+// Requests early the clusters that may be wanted soon, and keeps those that are in
+// the cache.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::ask_soon() {
   std::size_t examined = 0;
