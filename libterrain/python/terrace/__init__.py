@@ -2,17 +2,19 @@
 """Terrain, scans and point sets larger than memory, from numpy.
 
 ``build`` streams rasters, point clouds and arrays into a *store*: an on-disk hierarchy of clusters, which
-``open(path)`` or ``Store(path)`` opens again. A ``Store`` gives points, meshes, heights, contours, tiles and live
-views at any level of detail. The methods that it is made of work alone: ``Delaunay2`` and ``Delaunay3``,
-``bounded_mesh``, ``interpolate``, ``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and ``TriangleTree``;
-and what it reads: ``read_points``, ``write_points``, ``Transformation``.
+``open(path)`` or ``Store(path)`` opens again. A ``Store`` provides points, meshes, heights, contours, tiles and live
+views at any level of detail.
 
-Long calls release the interpreter's lock, use all cores unless ``threads`` says otherwise, and end soon
-after Ctrl-C. Results depend on the input and the options alone, not on threads or machine.
+The methods behind it also work without a store: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
+``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and
+``TriangleTree``. So do ``read_points``, ``write_points`` and ``Transformation``.
 
-Errors: ``ValueError`` for arguments that make no sense, ``TypeError`` for objects that cannot be used,
-``OSError`` (``FileNotFoundError`` and the like) where the system refused, ``MemoryError``, and
-``terrace.Error`` for what is wrong with data: one line with file, place, cause and remedy.
+Long calls release the interpreter's lock, use all cores unless ``threads`` limits them, and end soon after Ctrl-C.
+Results depend only on the input and the options, not on the number of threads or the machine.
+
+Errors: ``ValueError`` for invalid arguments, ``TypeError`` for unusable objects, ``OSError`` (such as
+    ``FileNotFoundError``) for failed system calls, ``MemoryError``, and ``terrace.Error`` for bad data: one line with
+    file, place, cause and remedy.
 
 >>> import numpy as np, tempfile, terrace
 >>> y, x = np.mgrid[0:60, 0:80]
@@ -45,7 +47,7 @@ from ._view import MeshDelta, Multiresolution, View, ViewDelta
 
 open = Store.open
 __version__ = '0.1.0'
-# Not `open`: `from terrace import *` must leave Python's own alone.
+# Without `open`, so that `from terrace import *` does not hide Python's.
 __all__ = [
     'Assignment', 'BoundedMesh', 'ClusterBlock', 'Clusters', 'Delaunay2', 'Delaunay3', 'DynamicSurface', 'Error',
     'FeatureCollection', 'HalvingMatching', 'KMeans', 'Matching', 'MatchingTree', 'Mesh', 'MeshChanges',

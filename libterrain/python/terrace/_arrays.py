@@ -1,23 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arrays as users hold them, as numpy's."""
+"""Converts the arrays that users pass in to numpy arrays."""
 
 import numpy as np
 
 
 def filled(array):
-    """NaN where a masked array is masked; others as they are."""
+    """Returns a masked array of numbers with NaN where it is masked; returns other arrays unchanged."""
     if not isinstance(array, np.ma.MaskedArray) or array.dtype.kind not in 'iuf':
         return array
     return (array if array.dtype.kind == 'f' else array.astype(np.float64)).filled(np.nan)
 
 
 def as_array(given, what):
-    """An array of whatever has the array, buffer or DLPack protocol. Floats that are masked are NaN."""
+    """Returns an array of any object with numpy's array interface, the buffer protocol or DLPack.
+
+    Masked floats become NaN.
+
+    Raises: TypeError for objects that are not numbers; ValueError for masked values of a type without NaN.
+    """
     if isinstance(given, np.ma.MaskedArray):
         if given.dtype.kind == 'f':
             return filled(given)
         if np.ma.is_masked(given):
-            raise ValueError(f'{what} has masked values, which {given.dtype} cannot mark; leave them out or fill them')
+            raise ValueError(f'{what} has masked values, which {given.dtype} cannot represent; remove or fill them')
         return given.data
     if isinstance(given, np.ndarray):
         return given
@@ -25,12 +30,12 @@ def as_array(given, what):
         return np.from_dlpack(given)
     array = np.asarray(given)
     if array.dtype.kind == 'O':
-        raise TypeError(f'{what} is no array of numbers')
+        raise TypeError(f'{what} is not an array of numbers')
     return array
 
 
 def as_numbers(given, what):
-    """The same as contiguous doubles. Raises: TypeError for what is not real numbers."""
+    """Returns a contiguous float64 array, as as_array() otherwise. Raises: TypeError unless it holds real numbers."""
     array = as_array(filled(given), what)
     if array.dtype.kind not in 'iufb':
         raise TypeError(f'{what} has the type {array.dtype}; real numbers are needed')
@@ -38,7 +43,7 @@ def as_numbers(given, what):
 
 
 def as_rows(given, what, widths=(2, 3)):
-    """Points in rows. An empty list is no points."""
+    """Returns points as float64 rows, shape (n, w) with w in ``widths``. An empty list gives zero points."""
     array = as_numbers(given, what)
     if array.size == 0 and array.ndim == 1:
         array = array.reshape(0, widths[0])
@@ -49,7 +54,7 @@ def as_rows(given, what, widths=(2, 3)):
 
 
 def as_native(array, what):
-    """An array of a type that the library knows, without a copy where that is possible."""
+    """Returns an array of a type that the library supports, without a copy where possible."""
     if array.dtype.kind == 'b':
         return array.view(np.uint8)
     if array.dtype == np.float16:
@@ -60,12 +65,15 @@ def as_native(array, what):
 
 
 def as_numbered(given, what, width=None, least=0, most=2 ** 32 - 2):
-    """Whole numbers in one dimension, or in rows of `width`, as they come. Raises: TypeError, ValueError."""
+    """Returns integers from ``least`` to ``most``, in one dimension or in rows of ``width``, in the given type.
+
+    Raises: TypeError, ValueError.
+    """
     array = as_array(given, what)
     if array.size == 0:
         array = np.empty((0,) if width is None else (0, width), np.uint32)
     if array.dtype.kind not in 'iu':
-        raise TypeError(f'{what} are whole numbers, not {array.dtype}')
+        raise TypeError(f'{what} must be whole numbers, not {array.dtype}')
     if array.ndim != (1 if width is None else 2) or width not in (None, array.shape[-1]):
         raise ValueError(f'{what} must have the shape {"(n,)" if width is None else f"(n, {width})"}, not {array.shape}')
     if array.size and (array.min() < least or array.max() > most):
@@ -74,23 +82,26 @@ def as_numbered(given, what, width=None, least=0, most=2 ** 32 - 2):
 
 
 def as_labels(labels):
-    """Whole numbers of any size as 0, 1, ..; None as none. Raises: TypeError."""
+    """Renumbers integer labels of any size as 0, 1, ...; None gives an empty array. Raises: TypeError."""
     if labels is None:
         return np.empty(0, np.uint32)
     labels = as_array(labels, 'labels')
     if labels.dtype.kind not in 'iu':
-        raise TypeError(f'labels are whole numbers, not {labels.dtype}')
+        raise TypeError(f'labels must be whole numbers, not {labels.dtype}')
     return np.unique(labels, return_inverse=True)[1].reshape(labels.shape).astype(np.uint32)
 
 
-def whole(value, what, least=0, bits=64):
-    """A whole number that an unsigned integer of so many bits holds. Raises: TypeError, ValueError."""
+def as_integer(value, what, least=0, bits=64):
+    """Returns an integer of at least ``least`` that fits into an unsigned integer of ``bits`` bits.
+
+    Raises: TypeError, ValueError.
+    """
     try:
         number = value.__index__()
     except AttributeError:
-        raise TypeError(f'`{what}` is a whole number, not {value!r}') from None
+        raise TypeError(f'`{what}` must be a whole number, not {value!r}') from None
     if number < least:
-        raise ValueError(f'`{what}` is at least {least}, not {number}')
+        raise ValueError(f'`{what}` must be at least {least}, not {number}')
     if number >= 2 ** bits:
-        raise ValueError(f'`{what}` is below 2^{bits}, not {number}')
+        raise ValueError(f'`{what}` must be below 2^{bits}, not {number}')
     return number

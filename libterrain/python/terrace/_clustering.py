@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import _core
-from ._arrays import as_array, as_numbered, as_numbers, as_rows, whole
+from ._arrays import as_array, as_integer, as_numbered, as_numbers, as_rows
 from ._job import job
 
 
 def _threads(threads):
-    return 0 if threads is None else whole(threads, 'threads', 1, bits=32)
+    return 0 if threads is None else as_integer(threads, 'threads', 1, bits=32)
 
 
 def _weights(weights):
@@ -21,50 +21,60 @@ def _weights(weights):
 
 
 def linkage(points, method='single', *, edges=None, single_precision=False, memory=None, gpu=False, threads=None):
-    """Hierarchical clustering by the methods of scipy.cluster.hierarchy.linkage.
+    """Hierarchical clustering with the methods of scipy.cluster.hierarchy.linkage.
 
-    points: shape (n, 2) or (n, 3), finite, with Euclidean distances; or the distances of all pairs in one dimension, as
-    scipy.spatial.distance.pdist. method: 'single', 'complete', 'average', 'weighted', 'ward', 'centroid', 'median'; of
-    distances the last three are meaningful only if these are Euclidean. Returns: float64, shape (n - 1, 4), as SciPy: the
-    two clusters of each merge, its height and the number of points. Heights ascend, except with 'centroid' and
-    'median', where a merge may be lower than its parts. Equal distances allow several results; 'average' and
-    'weighted' give SciPy's, to the last bit.
+    points: shape (n, 2) or (n, 3), finite, compared by Euclidean distance; or a one-dimensional array with the
+        distances of all pairs, in the order of scipy.spatial.distance.pdist.
+    method: 'single', 'complete', 'average', 'weighted', 'ward', 'centroid' or 'median'. For distances the last three
+        are meaningful only if the distances are Euclidean.
+    edges: integers, shape (m, 2). Single linkage considers only these pairs, which is enough if they include the
+        edges of a Delaunay triangulation.
+    single_precision: halves the memory of the methods that need a matrix.
+    memory: upper bound of that memory in bytes.
+    gpu: runs 'single' or 'complete' on the first CUDA device, if the module was built with CUDA.
 
-    Of points 'single' takes O(n log n) time; 'ward', 'centroid' and 'median' O(n^2), and 120 n bytes; 'complete',
-    'average' and 'weighted', and all of distances, O(n^2) and 4 n^2 bytes, half of that with ``single_precision``.
-    memory: the most bytes they may take. edges: whole numbers, shape (m, 2): single linkage looks at these pairs alone,
-    which suffices if those of a Delaunay triangulation are among them. gpu: 'single' or 'complete' on the first CUDA
-    device, if the module was built with CUDA. Raises: ValueError; RuntimeError without such a device. Source: J. Skala,
-    4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree; D. Muellner, 2011.
+    Returns: float64, shape (n - 1, 4), as SciPy does: the two clusters of each merge, its height and its number of
+        points. Heights ascend, except that with 'centroid' and 'median' a merge may be lower than its parts. Equal
+        distances allow several results; 'average' and 'weighted' match SciPy's to the last bit.
+    Raises: ValueError; RuntimeError if there is no CUDA device.
+
+    Cost for points: 'single' takes O(n log n) time; 'ward', 'centroid' and 'median' take O(n^2) time and 120 n bytes.
+    The other methods, and all methods for distances, take O(n^2) time and 4 n^2 bytes, or 2 n^2 bytes with
+    ``single_precision``.
+
+    Source: J. Skala, 4.2.1, 7.6; O. Boruvka, 1926, over a kD-tree; D. Muellner, 2011.
 
     >>> linkage([[0, 0], [1, 0], [5, 0]])
     array([[0., 1., 1., 2.],
            [2., 3., 4., 3.]])
     """
     array = as_numbers(points, 'points')
-    how = {'threads': _threads(threads), 'single_precision': bool(single_precision), 'gpu': bool(gpu),
-           'memory': 0 if memory is None else whole(memory, 'memory', 1)}
+    options = {'threads': _threads(threads), 'single_precision': bool(single_precision), 'gpu': bool(gpu),
+               'memory': 0 if memory is None else as_integer(memory, 'memory', 1)}
     if gpu and method not in ('single', 'complete'):
-        raise ValueError("`gpu` is for method='single' or 'complete'")
+        raise ValueError("`gpu` needs method='single' or 'complete'")
     if edges is not None:
         if method != 'single' or gpu:
-            raise ValueError("`edges` are for method='single', not on a GPU")
+            raise ValueError("`edges` need method='single' and no `gpu`")
         edges = as_numbered(edges, 'edges', 2)
     if array.ndim == 1 and array.size > 0:
         if edges is not None or gpu:
-            raise ValueError('`edges` and `gpu` are for points')
+            raise ValueError('`edges` and `gpu` need points, not distances')
         count = (1 + math.isqrt(1 + 8 * array.size)) // 2
         if count * (count - 1) // 2 != array.size:
-            raise ValueError(f'{array.size} distances are not those of all pairs')
-        return _core.linkage_of_distances(count, array, method, how)
-    return _core.linkage(as_rows(array, 'points'), method, edges, how)
+            raise ValueError(f'{array.size} distances are not all pairs of any number of points')
+        return _core.linkage_of_distances(count, array, method, options)
+    return _core.linkage(as_rows(array, 'points'), method, edges, options)
 
 
 def tree_linkage(edges, lengths):
-    """The linkage whose merges are the edges of a tree by ascending length, as of spanning_tree() in any metric.
+    """Returns the linkage that merges along the edges of a tree, given in any metric, in order of length.
 
-    edges: whole numbers, shape (n - 1, 2), in any order, that connect the points 0 .. n - 1. lengths: not negative.
-    Returns: rows as linkage(). O(n log n). Raises: ValueError, naming an edge that closes a cycle.
+    edges: integers, shape (n - 1, 2), in any order, connecting the points 0 .. n - 1.
+    lengths: one per edge, not negative.
+
+    Returns: rows as linkage() does. O(n log n).
+    Raises: ValueError, which names the edge if one closes a cycle.
 
     >>> tree_linkage([[1, 2], [0, 1]], [4, 1])
     array([[0., 1., 1., 2.],
@@ -74,10 +84,14 @@ def tree_linkage(edges, lengths):
 
 
 def spanning_tree(points, *, threads=None):
-    """The minimum spanning tree of points: the lines of least total length that connect all.
+    """Returns the minimum spanning tree of points: the edges of least total length that connect all points.
 
-    points: shape (n, 2) or (n, 3), finite. Returns: (edges, uint32, shape (n - 1, 2), numbers of points; their lengths,
-    float64), in no particular order. O(n log n). Raises: ValueError. Source: O. Boruvka, 1926.
+    points: shape (n, 2) or (n, 3), finite.
+
+    Returns: (edges, uint32, shape (n - 1, 2), indices of points; lengths, float64), in no particular order.
+    Raises: ValueError.
+
+    Takes O(n log n) time. Source: O. Boruvka, 1926.
 
     >>> spanning_tree([[0, 0], [5, 0], [1, 0]])[1].sum()
     5.0
@@ -86,22 +100,31 @@ def spanning_tree(points, *, threads=None):
 
 
 def flat_clusters(rows, *, count=None, height=None):
-    """The label of each point, 0, 1, .. in the order of appearance, by a cut of a linkage: at most ``count``
-    clusters, or the largest clusters inside which no merge is higher than ``height``.
+    """Cuts a linkage into flat clusters and returns the label of each point: 0, 1, ... in order of first appearance.
+
+    count: cut into at most this many clusters.
+    height: cut into the largest clusters that contain no merge above this height. Give exactly one of the two.
+
+    Returns: uint32, shape (n,).
+    Raises: ValueError.
 
     >>> flat_clusters(linkage([[0, 0], [1, 0], [5, 0]]), count=2)
     array([0, 0, 1], dtype=uint32)
     """
     if (count is None) == (height is None):
         raise ValueError('flat_clusters() needs either `count` or `height`')
-    return _core.cut(as_rows(rows, 'the linkage', (4,)), None if count is None else whole(count, 'count', 1),
+    return _core.cut(as_rows(rows, 'the linkage', (4,)), None if count is None else as_integer(count, 'count', 1),
                      None if height is None else float(height))
 
 
 @dataclass(frozen=True)
 class KMeans:
-    """centres: shape (k, 2) or (k, 3). labels: the nearest centre of each point. inertia: the sum of (weighted)
-    squared distances."""
+    """The result of kmeans().
+
+    centres: float64, shape (k, 2) or (k, 3).
+    labels: the index of the centre nearest to each point.
+    inertia: the sum of the (weighted) squared distances.
+    """
 
     centres: np.ndarray
     labels: np.ndarray
@@ -114,11 +137,18 @@ class KMeans:
 
 
 def kmeans(points, clusters, *, weights=None, seed=1, restarts=1, max_iterations=300, tolerance=0.0, threads=None):
-    """k-means by Lloyd's iteration, exact, from seeds by greedy k-means++ or from given centres.
+    """k-means by Lloyd's iteration, exact, starting from greedy k-means++ seeds or from given centres.
 
-    points: shape (n, 2) or (n, 3). clusters: their number, or the centres to start from. tolerance: a run ends when no
-    centre moves by more than this share of the bounding box's diagonal; 0: when no label changes. Of ``restarts`` the
-    best counts. Sources: S. Lloyd, 1982; D. Arthur, S. Vassilvitskii, 2007; T. Kanungo et al., 2002.
+    points: shape (n, 2) or (n, 3).
+    clusters: the number of clusters, or the centres to start from.
+    restarts: number of runs; the best one is returned.
+    tolerance: a run ends when no centre moves by more than this fraction of the bounding box's diagonal; with 0, when
+        no label changes.
+
+    Returns: a KMeans.
+    Raises: ValueError, TypeError.
+
+    Source: S. Lloyd, 1982; D. Arthur, S. Vassilvitskii, 2007; T. Kanungo et al., 2002.
 
     >>> kmeans([[0, 0], [0, 1], [9, 0], [9, 1]], 2)
     <terrace.KMeans: 2 clusters, inertia 1>
@@ -126,21 +156,25 @@ def kmeans(points, clusters, *, weights=None, seed=1, restarts=1, max_iterations
     points = as_rows(points, 'points')
     start, count = None, 0
     if np.ndim(clusters) == 0:
-        count = whole(clusters, 'clusters', 1)
+        count = as_integer(clusters, 'clusters', 1)
     else:
         start = as_rows(clusters, 'clusters', points.shape[1:])
         if len(start) == 0:
-            raise ValueError('there is not one centre to start from')
+            raise ValueError('`clusters` has no centres to start from')
     centres, labels, inertia, iterations, converged = _core.k_means(
-        points, start, count, _weights(weights), whole(seed, 'seed'), whole(restarts, 'restarts', 1),
-        whole(max_iterations, 'max_iterations'), float(tolerance), _threads(threads))
+        points, start, count, _weights(weights), as_integer(seed, 'seed'), as_integer(restarts, 'restarts', 1),
+        as_integer(max_iterations, 'max_iterations'), float(tolerance), _threads(threads))
     return KMeans(centres[:, :points.shape[1]], labels, inertia, iterations, converged)
 
 
 @dataclass(frozen=True)
 class Clusters:
-    """facilities: the points that represent clusters, ascending. labels: the cluster of each point, -1 for an outlier.
-    cost: the sum of the three that follow it. lower_bound: no solution costs less; 0: not known."""
+    """The result of cluster() and facility_location().
+
+    facilities: uint32, the indices of the points that represent clusters, ascending.
+    labels: int64, the index of each point's cluster, -1 for an outlier.
+    lower_bound: no solution costs less; 0 if not known.
+    """
 
     facilities: np.ndarray
     labels: np.ndarray
@@ -151,7 +185,7 @@ class Clusters:
 
     @property
     def cost(self):
-        """What is minimised."""
+        """The total cost that is minimised: opening, connection and outlier costs."""
         return self.opening_cost + self.connection_cost + self.outlier_cost
 
     def __repr__(self):
@@ -159,36 +193,47 @@ class Clusters:
 
 
 def _search(method, effort, count, seed, threads, bound_steps, restarts, **more):
-    given = {'method': method, 'effort': effort, 'seed': whole(seed, 'seed'), 'threads': _threads(threads),
-             'bound_steps': whole(bound_steps, 'bound_steps')}
+    given = {'method': method, 'effort': effort, 'seed': as_integer(seed, 'seed'), 'threads': _threads(threads),
+             'bound_steps': as_integer(bound_steps, 'bound_steps')}
     if count is not None:
-        given['count'] = whole(count, 'count', 1)
+        given['count'] = as_integer(count, 'count', 1)
     if restarts is not None:
-        given['restarts'] = whole(restarts, 'restarts', 1)
+        given['restarts'] = as_integer(restarts, 'restarts', 1)
     return {**given, **more}
 
 
 def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='default', metric='euclidean', weights=None, channels=None,
             outlier_price=float('inf'), seed=1, bound_steps=0, restarts=None, steps=None, start=None, assign_nearest=False,
             ordered=False, threads=None):
-    """Facility location: clusters whose number is not given but costs; or, with ``count``, k-median: exactly so many.
+    """Clusters points by facility location: each cluster has a cost, and the number of clusters follows from it.
 
-    Each cluster costs ``facility_cost`` times the diagonal of the points' bounding box, each point its (weighted) distance
-    to its cluster's representative, which is one of the points; the sum is minimised.
+    Each cluster costs ``facility_cost`` times the diagonal of the points' bounding box. Each point costs its
+    (weighted) distance to its cluster's representative, which is one of the points. The sum is minimised. With
+    ``count`` the problem is k-median instead: exactly ``count`` clusters, which cost nothing.
 
-    points: shape (n, 2) or (n, 3); or entities of k corners each, shape (n, k, 2) or (n, k, 3): segments, triangles,
-    polylines, by entity_distances(). count: in place of facility_cost, method and effort; O(n^2) for a round of
-    exchanges, the best of ``restarts``. method: 'fast', the default for points (not with outliers or channels); the
-    thesis's local searches 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities'; on the matrix of
-    distances (8 n^2 bytes) 'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' where GLPK was built in.
-    effort: 'fast', 'default', 'fine', 'full'. metric: 'euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'.
-    outlier_price: what leaving a point out costs, times the diagonal. channels: shape (n, c): attributes as further
-    axes of distances, in the unit of the coordinates; the diagonal has them too. bound_steps: subgradient steps of a
-    search for lower_bound, some 100; 0: none. Not used with ``count``. Local searches: ``steps`` candidates in place of
-    what effort says; start: Clusters to begin with; assign_nearest: at the end each point goes to its nearest
-    representative. ordered: entities of three corners are polylines, not triangles. Ctrl-C ends local searches soon.
+    points: shape (n, 2) or (n, 3); or entities with k corners each, shape (n, k, 2) or (n, k, 3): segments, triangles
+        or polylines, compared by entity_distances().
+    count: overrides facility_cost, method and effort. A round of exchanges takes O(n^2); the best of ``restarts`` is
+        returned.
+    method: 'fast', the default for points, which supports neither outliers nor channels; the local searches of the
+        thesis 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree' and 'facilities'; on the matrix of distances
+        (8 n^2 bytes) 'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' if the module was built with
+        GLPK.
+    effort: 'fast', 'default', 'fine' or 'full'.
+    metric: 'euclidean', 'squared', 'minkowski:P' or 'elliptical:FILE'.
+    channels: shape (n, c): attributes that count as additional axes of distances and of the diagonal, in the unit of
+        the coordinates.
+    outlier_price: the cost of leaving a point out, as a multiple of the diagonal.
+    bound_steps: subgradient steps of a search for lower_bound, about 100; 0 for no search. Not used with ``count``.
+    steps: the number of candidates of a local search; overrides effort.
+    start: Clusters from which a local search starts.
+    assign_nearest: whether a local search ends by assigning each point to its nearest representative.
+    ordered: whether entities with three corners are polylines instead of triangles.
 
-    Returns: Clusters. Raises: ValueError. Sources: J. Skala, 4.2.3, 7.1, 7.3, chapter 9; for k-median L. O'Callaghan et al., 2002.
+    Returns: Clusters. Ctrl-C ends local searches soon.
+    Raises: ValueError, TypeError.
+
+    Source: J. Skala, 4.2.3, 7.1, 7.3, chapter 9; for k-median L. O'Callaghan et al., 2002.
 
     >>> found = cluster([[0, 0], [0, 1], [9, 0], [9, 1]], facility_cost=0.2)
     >>> found.labels
@@ -200,28 +245,35 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
         method = 'automatic' if entities or channels is not None else 'fast'
     more = {'assign_nearest': bool(assign_nearest)}
     if steps is not None:
-        more['steps'] = whole(steps, 'steps')
+        more['steps'] = as_integer(steps, 'steps')
     if start is not None:
         if not isinstance(start, Clusters):
-            raise TypeError(f'`start` is Clusters, not {type(start).__name__}')
+            raise TypeError(f'`start` must be Clusters, not {type(start).__name__}')
         more['start'] = (start.facilities, start.labels)
-    how = _search(method, effort, count, seed, threads, bound_steps, restarts, **more)
+    search = _search(method, effort, count, seed, threads, bound_steps, restarts, **more)
     if entities:
         if metric != 'euclidean' or channels is not None:
-            raise ValueError('entities have no `metric` and no `channels`')
-        return Clusters(*_core.entity_location(array, bool(ordered), float(facility_cost), _weights(weights), float(outlier_price), how))
+            raise ValueError('entities do not support `metric` and `channels`')
+        return Clusters(*_core.entity_location(array, bool(ordered), float(facility_cost), _weights(weights), float(outlier_price), search))
     return Clusters(*_core.facility_location(as_rows(array, 'points'), float(facility_cost), metric, _weights(weights),
-                                             None if channels is None else as_numbers(channels, 'channels'), float(outlier_price), how))
+                                             None if channels is None else as_numbers(channels, 'channels'), float(outlier_price), search))
 
 
 def entity_distances(a, b=None, *, ordered=False):
-    """How far the corners of one entity must move to coincide with those of another: the root mean square under the
-    best correspondence.
+    """Returns how far the corners of one entity must move to coincide with those of another.
 
-    a, b: shape (n, k, 2) or (n, k, 3): segments (k = 2), triangles (3), or polylines, whose corners keep their order or
-    its reverse; of three corners if ``ordered``. b: ``a`` itself by default. Returns: float64, shape (len(a), len(b)):
-    a metric, which facility_location() and, above the diagonal, linkage() take. Raises: ValueError. Source: J. Skala,
-    chapter 9.
+    The distance is the root mean square of the moves under the best correspondence of corners.
+
+    a: shape (n, k, 2) or (n, k, 3): segments (k = 2), triangles (k = 3), or polylines, whose corners keep their order
+        or its reverse.
+    b: entities with as many corners; ``a`` by default.
+    ordered: whether entities with three corners are polylines.
+
+    Returns: float64, shape (len(a), len(b)). It is a metric, which facility_location() and, from the part above the
+        diagonal, linkage() accept.
+    Raises: ValueError.
+
+    Source: J. Skala, chapter 9.
 
     >>> entity_distances([[[0, 0], [1, 0]]], [[[1, 2], [0, 2]]])
     array([[2.]])
@@ -232,31 +284,44 @@ def entity_distances(a, b=None, *, ordered=False):
 
 
 def clusters_of_size(points, size, *, seed=1, progress=None, threads=None):
-    """Cuts a large set into compact parts: the clusters of that level of a hierarchy whose mean size is nearest to
-    ``size`` (as a factor). Levels have clusters of some 85 points, 7,000, and so on; up to 10,000 points are one cluster.
+    """Divides a large set of points into compact clusters of about ``size`` points.
 
-    points: shape (n, 2) or (n, 3), finite. Returns: uint32, shape (n,): the cluster of each point, from 0 without gaps.
-    O(n log n); Ctrl-C ends it soon. Raises: ValueError. Source: J. Skala, 7.1.
+    A hierarchy is built, and the level whose mean cluster size is closest to ``size`` by ratio is returned. Levels
+    have clusters of about 85 points, 7,000 points and so on; up to 10,000 points form one cluster.
+
+    points: shape (n, 2) or (n, 3), finite.
+
+    Returns: uint32, shape (n,): the cluster of each point, numbered from 0 without gaps. O(n log n); Ctrl-C ends it
+        soon.
+    Raises: ValueError.
+
+    Source: J. Skala, 7.1.
 
     >>> labels = clusters_of_size(np.random.default_rng(1).random((20000, 2)), 100)
     >>> 150 < labels.max() < 300
     True
     """
-    return _core.clusters_of_size(as_rows(points, 'points'), float(size), whole(seed, 'seed'), job(progress, threads))
+    return _core.clusters_of_size(as_rows(points, 'points'), float(size), as_integer(seed, 'seed'), job(progress, threads))
 
 
 def facility_location(connection, opening=None, *, count=None, method='interchange', effort='default', seed=1, bound_steps=300,
                       restarts=None, seconds=float('inf'), threads=None):
-    """Facility location with any costs: which facilities to open, and which of them serves each client.
+    """Solves facility location with arbitrary costs: which facilities to open, and which of them serves each client.
 
-    connection: shape (facilities, clients), not negative; a matrix of distances for entities of any kind. opening: the
-    cost of each facility, or one for all. With ``count`` exactly so many open, at no cost (k-median). method:
-    'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' where GLPK was built in. restarts: independent
-    searches in place of what effort says; seconds: none is perturbed after so long. bound_steps: the steps of a search
-    for lower_bound; 0: none. Each takes O(facilities * clients); 12 bytes per entry of the matrix.
+    connection: shape (facilities, clients), not negative. A matrix of distances clusters entities of any kind.
+    opening: the cost of each facility, or one cost for all of them.
+    count: opens exactly this many facilities, at no cost (k-median).
+    method: 'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' if the module was built with GLPK.
+    bound_steps: the steps of a search for lower_bound; 0 for no search.
+    restarts: the number of independent searches; overrides effort.
+    seconds: no search is perturbed after this time.
 
-    Returns: Clusters, whose facilities are rows and whose labels are of clients. Raises: ValueError. Sources: J. Skala,
-    4.2.3, 7.3; D. Erlenkotter, 1978.
+    Each step takes O(facilities * clients) time. Memory: 12 bytes per entry of the matrix.
+
+    Returns: Clusters, whose facilities are rows and whose labels belong to the clients.
+    Raises: ValueError.
+
+    Source: J. Skala, 4.2.3, 7.3; D. Erlenkotter, 1978.
 
     >>> found = facility_location([[1, 9, 9], [9, 1, 2]], 3)
     >>> found.facilities, found.labels, found.cost, found.lower_bound > 9.9
@@ -264,7 +329,7 @@ def facility_location(connection, opening=None, *, count=None, method='interchan
     """
     connection = as_numbers(connection, 'connection')
     if connection.ndim != 2:
-        raise ValueError(f'connection costs have two dimensions, not {connection.ndim}')
+        raise ValueError(f'connection costs must have two dimensions, not {connection.ndim}')
     if opening is None:
         if count is None:
             raise ValueError('facility_location() needs `opening` or `count`')
@@ -281,16 +346,16 @@ class ClusterBlock:
     """A finished block of stream_clusters(). Points are numbered within the block."""
 
     level: int
-    number: int  #: of the block on its level
+    number: int  #: index of the block on its level
     points: np.ndarray  #: float64, shape (n, 3)
     values: np.ndarray  #: structured, the other fields of the points; without fields if they have none
-    children: np.ndarray  #: uint64, shape (n, level): the clusters that each point heads on levels 0, 1, ..
-    first: np.ndarray  #: cluster c has the points order[first[c]:first[c + 1]], its representative among them
+    children: np.ndarray  #: uint64, shape (n, level): the clusters that each point represents on levels 0, 1, ...
+    first: np.ndarray  #: cluster c has the points order[first[c]:first[c + 1]], including its representative
     order: np.ndarray
-    representatives: np.ndarray  #: int64, the point of each cluster, -1 for the root
-    boxes: np.ndarray  #: shape (clusters, 6), of all points below, least coordinates first
+    representatives: np.ndarray  #: int64, the representative of each cluster, -1 for the root
+    boxes: np.ndarray  #: shape (clusters, 6), the box around all points below, minima first
     errors: np.ndarray  #: no point below is farther from the representative
-    descendants: np.ndarray  #: uint64, the points of level 0 below, with the representative
+    descendants: np.ndarray  #: uint64, the number of points of level 0 below, including the representative
 
     def __repr__(self):
         return f'<terrace.ClusterBlock: {len(self.representatives)} clusters of {len(self.points)} points, level {self.level}>'
@@ -298,18 +363,24 @@ class ClusterBlock:
 
 def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, effort='default', method='automatic',
                     metric='euclidean', seed=1, threads=None):
-    """Builds the hierarchy of clusters that stores are made of, from any number of points in one pass and constant
-    memory, and hands it to the caller's sink.
+    """Builds a hierarchy of clusters as in a store, and passes its blocks to a function.
 
-    batches: an iterable of arrays of shape (n, 2) or (n, 3), or of structured arrays with x, y, z (such as points of a
-    Store), all of one type; further fields travel with the points. At best those of a batch lie together. sink: called
-    as sink(block) with each ClusterBlock as soon as it is finished, those of a level in order: their clusters are
-    numbered consecutively from 0. The points of the top level come last, as one cluster without a representative. Options: as of
-    build(); distances are those of the coordinates.
+    Reads the points in one pass and in constant memory.
 
-    Returns: a dict: points, top, level_points, level_clusters (the root counts as a cluster of the top). What the
-    iterable or the sink raises ends the work. Raises: ValueError, TypeError. Threads do not change the result. Source:
-    J. Skala, 4.3, 7.1.2, 7.2.
+    batches: an iterable of arrays of shape (n, 2) or (n, 3), or of structured arrays with fields x, y and z (such as
+        points of a Store), all of the same type. Other fields stay with their points. Points of a batch should be
+        close together.
+    sink: called as sink(block) with each ClusterBlock as soon as it is finished. The blocks of a level arrive in
+        order, and their clusters are numbered consecutively from 0. The points of the top level arrive last, as one
+        cluster without a representative.
+
+    The other options are those of build(); distances are those of the coordinates. An exception from the iterable or
+    the sink ends the work. The number of threads does not change the result.
+
+    Returns: a dict with points, top, level_points and level_clusters (the root counts as a cluster of the top level).
+    Raises: ValueError, TypeError.
+
+    Source: J. Skala, 4.3, 7.1.2, 7.2.
 
     >>> random, sizes = np.random.default_rng(1), []
     >>> made = stream_clusters((random.random((5000, 2)) for _ in range(4)), lambda block: sizes.append(len(block.points)))
@@ -317,7 +388,7 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
     (20000, True, 20000)
     """
     if not callable(sink):
-        raise TypeError('`sink` is a function')
+        raise TypeError('`sink` must be a function')
     batches = iter(batches)
     head = next(batches, None)
     fields = []
@@ -327,25 +398,25 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
             fields = [name for name in head.dtype.names if name not in ('x', 'y', 'z')]
     kind = np.dtype([(name, head.dtype[name]) for name in fields])
     if kind.hasobject:
-        raise TypeError('the fields of points are numbers, not objects')
+        raise TypeError('the fields of points must be numbers, not objects')
 
     def pairs():
         for batch in [] if head is None else itertools.chain([head], batches):
             batch = as_array(batch, 'a batch')
             if not batch.dtype.names:
                 if fields:
-                    raise ValueError('the batches have not the same fields')
+                    raise ValueError('the batches do not have the same fields')
                 rows = as_rows(batch, 'a batch')
                 if rows.shape[1] == 2:
                     rows = np.column_stack((rows, np.zeros(len(rows))))
                 yield rows, np.empty((len(rows), 0), np.uint8)
                 continue
             if batch.dtype.names != head.dtype.names or any(batch.dtype[name] != head.dtype[name] for name in fields):
-                raise ValueError('the batches have not the same fields')
+                raise ValueError('the batches do not have the same fields')
             batch = batch.reshape(-1)
             missing = [axis for axis in 'xyz' if axis not in batch.dtype.names]
             if missing:
-                raise ValueError(f'points have x, y and z: {", ".join(missing)} is missing')
+                raise ValueError(f'points need x, y and z: {", ".join(missing)} is missing')
             values = np.empty(len(batch), kind)
             for name in fields:
                 values[name] = batch[name]
@@ -359,5 +430,5 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
         sink(ClusterBlock(**block))
 
     return _core.stream_clusters(pairs(), take, {
-        'bytes': kind.itemsize, 'block_points': whole(block_points, 'block_points', 2), 'facility_cost': float(facility_cost),
-        'effort': effort, 'method': method, 'metric': metric, 'seed': whole(seed, 'seed'), 'threads': _threads(threads)})
+        'bytes': kind.itemsize, 'block_points': as_integer(block_points, 'block_points', 2), 'facility_cost': float(facility_cost),
+        'effort': effort, 'method': method, 'metric': metric, 'seed': as_integer(seed, 'seed'), 'threads': _threads(threads)})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coordinates of one reference system in another."""
+"""Converts coordinates between reference systems."""
 
 import numpy as np
 
@@ -10,14 +10,19 @@ from ._sources import crs_text
 
 
 class Transformation:
-    """From one coordinate reference system to another, by one operation between their datums.
+    """A conversion from one coordinate reference system to another, by one operation between their datums.
 
-    source, target: 'EPSG:n', a name, WKT, PROJJSON, a .prj file, or an object with to_wkt(). x is always the longitude
-    or easting, y the latitude or northing. area: a box of the source in which the coordinates lie; the operation is
-    chosen for it. datum_shift: to WGS 84, seven numbers as TOWGS84 has them, for the system whose datum has no way
-    there. Threads may share one. 0.6 to 5 million places a second. Raises: ValueError for a system that is not known;
-    Error where nothing leads from one datum to the other. Source: PROJ's definitions and operations, GeographicLib's
-    projections.
+    source, target: 'EPSG:n', a name, WKT, PROJJSON, a .prj file, or an object with to_wkt(). x is always the
+        longitude or easting, y the latitude or northing.
+    area: a box in the source system that contains the coordinates; the operation is chosen for it.
+    datum_shift: seven numbers in the order of TOWGS84, or three, that lead to WGS 84. They apply to the system whose
+        datum has no known operation.
+
+    Threads may share a Transformation. It converts 0.6 to 5 million places per second.
+
+    Raises: ValueError for an unknown system; Error if no operation connects the two datums.
+
+    Source: PROJ's definitions and operations, GeographicLib's projections.
 
     >>> Transformation('EPSG:4326', 'EPSG:32632').forward([[9, 48]]).round(2)
     array([[ 500000.  , 5316300.22]])
@@ -30,11 +35,11 @@ class Transformation:
         if datum_shift is not None:
             datum_shift = [float(number) for number in datum_shift]
             if len(datum_shift) not in (3, 7):
-                raise ValueError(f'`datum_shift` is three or seven numbers, not {len(datum_shift)}')
+                raise ValueError(f'`datum_shift` must be three or seven numbers, not {len(datum_shift)}')
             datum_shift += [0.0] * (7 - len(datum_shift))
         area = as_region(area)
         if isinstance(area, dict):
-            raise ValueError('`area` is a box')
+            raise ValueError('`area` must be a box')
         self._core = _core.Transformation(*texts, datum_shift, area)
 
     def _convert(self, places, back):
@@ -43,17 +48,22 @@ class Transformation:
         return made if places.shape[1] == 2 else np.column_stack((made, places[:, 2]))
 
     def forward(self, places):
-        """Places of the source in the target. places: shape (n, 2) or (n, 3), whose heights stay. Returns: float64, the
-        same shape; NaN where the target shows no such place. Raises: ValueError."""
+        """Converts places from the source to the target system.
+
+        places: shape (n, 2), or (n, 3), whose heights are kept.
+
+        Returns: float64, the same shape; NaN for places that the target system cannot represent.
+        Raises: ValueError.
+        """
         return self._convert(places, False)
 
     def reverse(self, places):
-        """Places of the target in the source, otherwise as forward()."""
+        """Converts places from the target to the source system; otherwise as forward()."""
         return self._convert(places, True)
 
     @property
     def note(self):
-        """What to know of the operation, such as its accuracy; empty if coordinates stay on their datum."""
+        """A remark on the operation, such as its accuracy; empty if the datum does not change."""
         return self._core.note()
 
     def __repr__(self):

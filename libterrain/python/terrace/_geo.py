@@ -13,13 +13,13 @@ from ._sources import crs_text
 
 
 class FeatureCollection(dict):
-    """A GeoJSON FeatureCollection, as shapely, geopandas and others take it by ``__geo_interface__``."""
+    """A GeoJSON FeatureCollection, which shapely, geopandas and others accept through ``__geo_interface__``."""
 
     @property
     def __geo_interface__(self):
         return dict(self)
 
-    _units = None  #: for pictures, as the core has them
+    _units = None  #: from the core, to draw pictures
 
     def _repr_png_(self):
         lines = [np.asarray(line['geometry']['coordinates'], np.float64)[:, :2] for line in self['features']]
@@ -45,14 +45,16 @@ def _polygons(geometry):
         return _polygons(geometry['geometry']) if geometry['geometry'] is not None else []
     parts = {'GeometryCollection': 'geometries', 'FeatureCollection': 'features'}.get(kind)
     if parts is None:
-        raise ValueError(f'`region` is a box or polygons, not a {kind}')
+        raise ValueError(f'`region` must be a box or polygons, not a {kind}')
     return [polygon for part in geometry[parts] for polygon in _polygons(part)]
 
 
 def geojson(given):
-    """(A GeoJSON dict, the name of its CRS): of a dict, an object with ``__geo_interface__`` or the name of a file. The
-    name is that of the object's ``crs``, as geopandas has it, or of the dict's; '' if neither says anything, None if the
-    dict says that it is not known."""
+    """Returns (a GeoJSON dict, the name of its CRS) for a dict, an object with ``__geo_interface__`` or a file name.
+
+    The name comes from the object's ``crs``, as in geopandas, or from the dict's ``crs``. It is '' if neither is
+    given, None if the dict says that the CRS is unknown.
+    """
     crs = None
     if isinstance(given, (str, os.PathLike)):
         with open(given, encoding='utf-8') as file:
@@ -71,10 +73,15 @@ def geojson(given):
 
 
 def region(given):
-    """A box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]), in the CRS of the store or source; an
-    object with ``__geo_interface__``, a GeoJSON dict or the name of a GeoJSON file, of polygons, in the CRS that it names.
-    Without one they are in longitude and latitude, as GeoJSON is, if the CRS of the store or source is known and the
-    numbers can be that; else in the CRS of the store or source. None: everywhere."""
+    """Returns a region in the form that the core expects; None, for everywhere, stays None.
+
+    given: a box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]), in the CRS of the store or
+        source; or polygons as an object with ``__geo_interface__``, a GeoJSON dict or the name of a GeoJSON file, in
+        the CRS that they name. Polygons that name no CRS are in longitude and latitude, as GeoJSON is, if the CRS of
+        the store or source is known and the numbers are in range; otherwise in the CRS of the store or source.
+
+    Raises: ValueError, TypeError.
+    """
     if given is None:
         return None
     name = os.fspath(given) if isinstance(given, (str, os.PathLike)) else '`region`'
@@ -90,12 +97,12 @@ def region(given):
     try:
         numbers = [float(number) for number in given]
     except TypeError:
-        raise TypeError('`region` is a box of four or six numbers, or polygons') from None
+        raise TypeError('`region` must be a box of four or six numbers, or polygons') from None
     if len(numbers) not in (4, 6):
-        raise ValueError(f'`region` is a box of four or six numbers, not {len(numbers)}')
+        raise ValueError(f'`region` must be a box of four or six numbers, not {len(numbers)}')
     half = len(numbers) // 2
     if any(not low <= high for low, high in zip(numbers, numbers[half:])):
-        raise ValueError('`region` is a box whose least coordinates come first')
+        raise ValueError('`region` must be a box with its minima first')
     if half == 2:
         return (*numbers[:2], -math.inf, *numbers[2:], math.inf)
     return tuple(numbers)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a job runs: its progress, notes, threads and memory."""
+"""Progress, notes, threads and memory of long calls."""
 
 import logging
 import sys
 
-from ._arrays import whole
+from ._arrays import as_integer
 
 notes = logging.getLogger('terrace')
 
 
 class _Line:
-    """A line on a terminal that is written over."""
+    """Shows progress on one terminal line that is overwritten."""
 
     def __init__(self):
         self._written = False
@@ -27,7 +27,7 @@ class _Line:
 
 
 class _Bars:
-    """tqdm's bars, in a notebook its widgets."""
+    """Shows progress with tqdm, which uses widgets in a notebook."""
 
     def __init__(self, tqdm):
         self._tqdm, self._bar, self._what = tqdm, None, None
@@ -60,14 +60,18 @@ def _shown_progress():
 
 
 def job(progress=None, threads=None, memory=None):
-    """What the compiled half takes. progress: None, True for a bar, or
-    called as progress(what, count, fraction, ended): what is counted, how many so far, the share that is done
-    (0: not known), and whether this is the last call of what is counted."""
+    """Returns the (progress, note, threads, memory) tuple that the compiled half expects.
+
+    progress: None, True for a bar, or a function called as progress(what, count, fraction, ended): the kind of items
+        counted, their number so far, the fraction done (0 if not known), and whether this is the last call for them.
+
+    Raises: TypeError, ValueError.
+    """
     if progress is True:
         progress = _shown_progress()
     elif progress is False:
         progress = None
     if progress is not None and not callable(progress):
-        raise TypeError('`progress` is None, True or a function')
-    return (progress, notes.info, 0 if threads is None else whole(threads, 'threads', 1, bits=32),
-            0 if memory is None else whole(memory, 'memory', 1))
+        raise TypeError('`progress` must be None, True or a function')
+    return (progress, notes.info, 0 if threads is None else as_integer(threads, 'threads', 1, bits=32),
+            0 if memory is None else as_integer(memory, 'memory', 1))

@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Assignment and matching of least cost."""
+"""Assignment and matching with minimum cost."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import _core
-from ._arrays import as_array, as_labels, as_numbered, as_numbers, as_rows, whole
+from ._arrays import as_array, as_integer, as_labels, as_numbered, as_numbers, as_rows
 
 
 @dataclass(frozen=True)
 class Assignment:
-    """columns: the column of each row, -1 for none. cost: their sum. row_duals, column_duals: labels that prove it,
-    ``row_duals[i] + column_duals[j] <= costs[i, j]``, with equality for chosen pairs.
+    """The result of assignment().
 
-    Unpacks as (rows, columns) of the chosen pairs, as scipy.optimize.linear_sum_assignment returns.
+    It unpacks as (rows, columns) of the chosen pairs, like the result of scipy.optimize.linear_sum_assignment.
+
+    columns: the column assigned to each row, -1 for none.
+    cost: the sum of the chosen costs.
+    row_duals, column_duals: labels that prove the optimum: ``row_duals[i] + column_duals[j] <= costs[i, j]``, with
+        equality for chosen pairs.
     """
 
     columns: np.ndarray
@@ -31,12 +35,20 @@ class Assignment:
 
 
 def assignment(costs, columns=None, *, shape=None):
-    """The assignment of rows to columns of least cost (Kuhn-Munkres).
+    """Assigns rows to columns with minimum total cost (Kuhn-Munkres).
 
-    costs: shape (rows, columns); float64, float32 and int32 are taken as they are. With two arguments: two sets of
-    points, shape (n, 2) or (n, 3), by Euclidean distance, whose matrix is never made. Of a sparse matrix of
-    scipy.sparse only the stored pairs may be chosen; if they allow no assignment, ValueError is raised. With ``shape``, (rows,
-    columns), ``costs(row)`` returns the costs of a row, always the same ones, and no matrix is held. O(n^3) at worst.
+    costs: one of these:
+
+    - a matrix, shape (rows, columns); float64, float32 and int32 are used without conversion;
+    - a sparse matrix of scipy.sparse, of which only stored pairs may be chosen;
+    - a set of points, shape (n, 2) or (n, 3), with ``columns`` as a second set: costs are Euclidean distances, and no
+      matrix is made;
+    - with ``shape``, (rows, columns), a function costs(row) that returns the costs of a row, the same ones at every
+      call; no matrix is kept.
+
+    Returns: an Assignment. O(n^3) time in the worst case.
+    Raises: ValueError, also if a sparse matrix allows no assignment; TypeError.
+
     Source: J. Skala, 4.3.1; R. Jonker, A. Volgenant, 1987.
 
     >>> assignment([[4, 1, 3], [2, 0, 5], [3, 2, 2]])
@@ -44,9 +56,9 @@ def assignment(costs, columns=None, *, shape=None):
     """
     if shape is not None:
         if columns is not None or not callable(costs):
-            raise TypeError('`shape` goes with a function that returns the costs of a row')
+            raise TypeError('`shape` needs a function that returns the costs of a row')
         rows, columns = shape
-        return Assignment(*_core.assign_rows(whole(rows, 'shape'), whole(columns, 'shape'),
+        return Assignment(*_core.assign_rows(as_integer(rows, 'shape'), as_integer(columns, 'shape'),
                                              lambda row: as_numbers(costs(row), 'a row of costs')))
     if columns is not None:
         a = as_rows(costs, 'the rows\' points')
@@ -66,8 +78,13 @@ def assignment(costs, columns=None, *, shape=None):
 
 @dataclass(frozen=True)
 class Matching:
-    """mates: the partner of each point, -1 for one that is left over. cost: the sum of the pairs' distances. bound: no
-    matching costs less, up to rounding. optimal: whether this is the optimum."""
+    """The result of matching() and edge_matching().
+
+    mates: the partner of each point, -1 for one without a partner.
+    cost: the sum of the pairs' distances.
+    bound: no matching costs less, up to rounding.
+    optimal: whether the cost is proven to be minimal.
+    """
 
     mates: np.ndarray
     cost: float
@@ -76,7 +93,7 @@ class Matching:
 
     @property
     def pairs(self):
-        """int64, shape (n // 2, 2), the smaller number first."""
+        """The pairs, int64, shape (n // 2, 2), with the smaller number first."""
         first = np.flatnonzero(self.mates > np.arange(len(self.mates)))
         return np.column_stack((first, self.mates[first]))
 
@@ -85,68 +102,93 @@ class Matching:
 
 
 def matching(points, *, labels=None, exact_limit=500_000, window=50_000, rounds=8, tolerance=1e-3, threads=None):
-    """Pairs of points with the least sum of Euclidean distances; of an odd number one is left over.
+    """Pairs points so that the sum of Euclidean distances is minimal.
 
-    points: shape (n, 2) or (n, 3). Up to ``exact_limit`` points the optimum, beyond it windows of ``window`` points
-    matched in ``rounds``, with a proven bound, until a round gains less than the share ``tolerance``. labels: whole
-    numbers; the points of each label are matched first, then those left over, then windows. About n^1.2. Source: J.
-    Skala, 4.3.2, 7.5; J. Edmonds, 1965; W. Cook, A. Rohe, 1999.
+    Of an odd number of points, one stays without a partner.
+
+    points: shape (n, 2) or (n, 3).
+    exact_limit: up to this number of points the result is optimal. Larger sets are matched in windows, with a proven
+        bound.
+    window: the number of points in a window.
+    rounds, tolerance: windows are matched at most ``rounds`` times, until a round lowers the cost by less than the
+        fraction ``tolerance``.
+    labels: integers. Points with the same label are matched first, then those left over, then windows.
+
+    Returns: a Matching, in about n^1.2 time.
+    Raises: ValueError, TypeError.
+
+    Source: J. Skala, 4.3.2, 7.5; J. Edmonds, 1965; W. Cook, A. Rohe, 1999.
 
     >>> matching([[0, 0], [5, 0], [0, 1], [5, 2]])
     <terrace.Matching: 2 pairs, cost 3, optimal>
     """
     points = as_rows(points, 'points')
     match = _core.match_points3 if points.shape[1] == 3 else _core.match_points2
-    return Matching(*match(points, as_labels(labels), whole(exact_limit, 'exact_limit', 1), whole(window, 'window', 4),
-                           whole(rounds, 'rounds', bits=32), float(tolerance), _threads(threads)))
+    return Matching(*match(points, as_labels(labels), as_integer(exact_limit, 'exact_limit', 1), as_integer(window, 'window', 4),
+                           as_integer(rounds, 'rounds', bits=32), float(tolerance), _threads(threads)))
 
 
 @dataclass(frozen=True, repr=False)
 class HalvingMatching(Matching):
-    """iterations: how many were done. steps: shape (k, 2), the iterations that lowered the cost and the cost after each:
-    a convergence curve."""
+    """The result of halving_matching().
+
+    iterations: the number of iterations that ran.
+    steps: shape (k, 2), a convergence curve: the iterations that lowered the cost, and the cost after each.
+    """
 
     iterations: int
     steps: np.ndarray
 
 
 def halving_matching(points, *, method='monotone', distances=False, iterations=None, seconds=float('inf'), seed=1, threads=None):
-    """Pairs by halving: the points are repeatedly divided into two halves at random, which are matched at the least
-    total distance. Neither method is exact; matching() is.
+    """Pairs points by repeatedly dividing them into two random halves, which are matched at the least total distance.
 
-    points: shape (n, 2) or (n, 3); with ``distances=True`` the symmetric matrix of distances of any things. method: 'monotone'
-    divides each current pair, so no iteration makes the matching worse; 'monte-carlo', as published, takes the best of
-    independent iterations. iterations: as many as points by default, each O(n^3) at worst; seconds: none begins after so long.
-    Returns: a HalvingMatching, whose bound is 0: not known. Raises: ValueError. Source: J. Skala, 7.5.1.
+    The result is approximate; matching() finds the optimum.
+
+    points: shape (n, 2) or (n, 3).
+    distances: whether ``points`` is a symmetric matrix of distances, shape (n, n), between things of any kind.
+    method: 'monotone' divides each current pair, so no iteration makes the matching worse. 'monte-carlo', as
+        published, keeps the best of independent iterations.
+    iterations: as many as points by default, each O(n^3) in the worst case.
+    seconds: no iteration begins after this time.
+
+    Returns: a HalvingMatching. Its bound is 0 because none is known.
+    Raises: ValueError.
+
+    Source: J. Skala, 7.5.1.
 
     >>> halving_matching([[0, 0], [5, 0], [0, 1], [5, 2]])
     <terrace.HalvingMatching: 2 pairs, cost 3>
     """
     array = as_numbers(points, 'points') if distances else as_rows(points, 'points')
     mates, cost, done, steps = _core.match_by_halving(array, bool(distances), method,
-                                                      0 if iterations is None else whole(iterations, 'iterations', 1),
-                                                      float(seconds), whole(seed, 'seed'), _threads(threads))
+                                                      0 if iterations is None else as_integer(iterations, 'iterations', 1),
+                                                      float(seconds), as_integer(seed, 'seed'), _threads(threads))
     return HalvingMatching(mates, cost, 0.0, False, done, steps)
 
 
 def edge_matching(edges, weights, count=None):
-    """The perfect matching of least weight of a graph.
+    """Returns the perfect matching of a graph with minimum total weight.
 
-    edges: whole numbers, shape (m, 2): vertices 0, 1, ..; parallel ones are allowed. weights: one for each edge, of any
-    sign. count: the number of vertices, by default the largest named and one. Optimal for weights rounded to 2^-52 of the
-    largest. Returns: a Matching. Raises: ValueError if there is no perfect matching. Source: J. Edmonds, 1965;
-    V. Kolmogorov, 2009.
+    edges: integers, shape (m, 2): vertices 0, 1, ...; parallel edges are allowed.
+    weights: one per edge, of any sign. The result is optimal for weights rounded to 2^-52 of the largest.
+    count: the number of vertices, by default the largest named number plus one.
+
+    Returns: a Matching.
+    Raises: ValueError if there is no perfect matching.
+
+    Source: J. Edmonds, 1965; V. Kolmogorov, 2009.
 
     >>> edge_matching([[0, 1], [1, 2], [2, 3], [3, 0]], [5, 1, 5, 2])
     <terrace.Matching: 2 pairs, cost 3, optimal>
     """
     edges = as_numbered(edges, 'edges', 2)
     largest = int(edges.max()) if edges.size else -1
-    count = largest + 1 if count is None else whole(count, 'count')
+    count = largest + 1 if count is None else as_integer(count, 'count')
     if count > 2 * len(edges):
         raise ValueError(f'{len(edges)} edges cannot match {count} vertices')
     return Matching(*_core.match_edges(count, edges.astype(np.uint32), as_numbers(weights, 'weights')))
 
 
 def _threads(threads):
-    return 0 if threads is None else whole(threads, 'threads', 1, bits=32)
+    return 0 if threads is None else as_integer(threads, 'threads', 1, bits=32)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes that a store gives."""
+"""Triangle meshes."""
 
 import os
 
@@ -12,7 +12,10 @@ from ._pictures import light, relief_png, triangles_svg
 
 
 def metres_per_unit(places, units):
-    """Metres in a unit of x, y and z in the middle of places, shape (n, 3); units: as the core has them, None if not known."""
+    """Returns the metres per unit of x, y and z at the centre of places, shape (n, 3).
+
+    units: the units from the core, or None if unknown, which gives ones.
+    """
     known = places[np.isfinite(places).all(axis=1)]
     if units is None or len(known) == 0:
         return np.ones(3)
@@ -20,12 +23,13 @@ def metres_per_unit(places, units):
 
 
 class Mesh:
-    """Triangles between vertices; unpacks as ``vertices, triangles = mesh``.
+    """A triangle mesh; unpacks as ``vertices, triangles = mesh``.
 
-    A notebook shows it from above as shaded relief, in metres on the ground where the units are known.
+    A notebook shows it from above as shaded relief, in metres on the ground if the units are known.
 
-    vertices: float64, shape (n, 3), in the CRS that was asked for. triangles: uint32, shape (m, 3), numbers of
-    vertices, counter-clockwise seen from above. levels: uint8, the highest level of each vertex, or None.
+    vertices: float64, shape (n, 3), in the requested CRS.
+    triangles: uint32, shape (m, 3), rows of ``vertices``, counter-clockwise seen from above.
+    levels: uint8, the highest level of each vertex in its store, or None.
     """
 
     def __init__(self, vertices, triangles, levels=None):
@@ -33,14 +37,14 @@ class Mesh:
 
     @classmethod
     def _of(cls, made):
-        """As the core gives it: arrays, and the units of the coordinates."""
+        """Wraps what the core returns: the arrays, and the units of the coordinates."""
         mesh = Mesh(*made[:3])
         mesh._units = made[3]
         return mesh
 
     @property
     def vertices(self):
-        """Float64, shape (n, 3)."""
+        """Coordinates, float64, shape (n, 3). Setting them discards the units."""
         return self._vertices
 
     @vertices.setter
@@ -52,19 +56,25 @@ class Mesh:
 
     @classmethod
     def read(cls, path):
-        """The triangles of a file: .ply, .glb, .obj, .off, .stl, polygons cut into fans. Raises: ValueError for one without
-        triangles; OSError; Error."""
+        """Reads a mesh file: .ply, .glb, .obj, .off or .stl. Polygons are divided into fans of triangles.
+
+        Raises: ValueError for a file without triangles; OSError; Error.
+        """
         path = os.fspath(path)
-        with open(path, 'rb'):  # what is not there is an error of the system
+        with open(path, 'rb'):  # raises OSError if there is no such file
             return Mesh._of(_core.read_mesh(os.fsencode(path)))
 
     def save(self, path, replace=False):
-        """Writes a mesh file by its ending: .ply, .obj, .glb, whole or not at all; or .svg, a picture from above.
+        """Writes a mesh file in the format of its extension: .ply, .obj or .glb, or .svg for a picture from above.
 
-        glTF has no unit but the metre: in .glb the coordinates that a store gives in degrees or feet become metres (see
-        "Meshes in metres" in tools/README.md), and ``asset.extras`` of the file says how to get them back. After ``vertices``
-        has been set, and in a mesh made of arrays, they are taken as they are. A note of what was done goes to
-        ``logging.getLogger('terrace')``."""
+        .ply, .obj and .glb files appear only when complete. glTF knows only metres, so .glb files of a store in
+        degrees or feet are converted to metres (see "Meshes in metres" in tools/README.md), and ``asset.extras`` in
+        the file describes how to convert back. A mesh made of arrays, or whose ``vertices`` have been set, is written
+        unconverted. A note of the conversion goes to ``logging.getLogger('terrace')``.
+
+        path: the file to write.
+        replace: whether an existing file is overwritten.
+        """
         path = os.fspath(path)
         if path.endswith('.svg'):
             with open(path, 'w' if replace else 'x', encoding='ascii') as file:
@@ -80,20 +90,29 @@ class Mesh:
         return vertices, as_numbered(self.triangles, 'triangles', 3, most=len(vertices) - 1)
 
     def measures(self):
-        """A dict: faces, vertices (with a face), edges, area, volume (enclosed, negative inside out), components,
-        euler_characteristic (2 for a sphere, 2 less for each handle), border_edges, non_manifold_edges, closed. Raises:
-        ValueError. O(n log n)."""
+        """Measures the mesh as a surface in space, in O(n log n) time.
+
+        Returns: a dict with faces, vertices (that have a face), edges, area, volume (enclosed, negative if inside
+            out), components, euler_characteristic (2 for a sphere, 2 less for each handle), border_edges,
+            non_manifold_edges and closed.
+        Raises: ValueError.
+        """
         return _core.measure(*self._parts())
 
     def turned_outward(self):
-        """The same mesh with components of negative volume turned inside out. Raises: ValueError."""
+        """Returns the mesh with components of negative volume turned inside out. Raises: ValueError."""
         return Mesh._of((self.vertices, _core.turned_outward(*self._parts()), self.levels, self._units))
 
     def errors(self, samples):
-        """Vertical distances of samples from the mesh, whose triangles must not overlap seen from above.
+        """Measures the vertical distances of samples from the mesh, in O(n) time.
 
-        samples: shape (n, 3). Returns: a dict: samples, uncovered (on no triangle: not measured), max_error, rms_error,
-        worst (the sample with the largest error, -1 for none). Raises: ValueError. O(n).
+        Seen from above, the triangles of the mesh must not overlap.
+
+        samples: shape (n, 3).
+
+        Returns: a dict with samples, uncovered (samples on no triangle, not measured), max_error, rms_error and worst
+            (the index of the sample with the largest error, -1 for none).
+        Raises: ValueError.
 
         >>> flat = Mesh(np.array([[0., 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]]))
         >>> flat.errors([[0.2, 0.2, 3], [1, 1, 0]])
@@ -103,7 +122,7 @@ class Mesh:
         return _core.measure_surface(*columns, *self._parts())
 
     def area(self):
-        """Of the surface, in square units of its coordinates."""
+        """Returns the area of the surface in space, in square units of its coordinates."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
@@ -128,7 +147,9 @@ class Mesh:
 class BoundedMesh(Mesh):
     """A mesh whose vertical error was measured at every sample.
 
-    max_error, rms_error: metres. samples: how many were measured; uncovered: of these, those on no triangle.
+    max_error, rms_error: in metres.
+    samples: the number of samples measured.
+    uncovered: the number of samples on no triangle.
     """
 
     def __init__(self, vertices, triangles, measured):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures for notebooks, of numpy and zlib alone."""
+"""Pictures for notebooks, made with numpy and zlib only."""
 
 import math
 import struct
@@ -7,15 +7,15 @@ import zlib
 
 import numpy as np
 
-MOST_PIXELS = 600  #: of the longer side, so a picture has at most 360 KB
-MOST_SPANS = 8_000_000  #: rows of pixels in triangles, and a quarter of the pixels in them; with more the picture gets smaller
-MOST_FRAGMENTS = 1_000_000  #: looked at together
-MOST_WIRES = 3000  #: triangles whose sides are drawn
+MOST_PIXELS = 600  #: length of the longer side, so a picture has at most 360 KB
+MOST_SPANS = 8_000_000  #: pixel rows in triangles, and a quarter of the pixels in them; a picture with more is made smaller
+MOST_FRAGMENTS = 1_000_000  #: pixels of triangles processed at a time
+MOST_WIRES = 3000  #: sides are drawn up to this number of triangles
 _SIDES = [[0, 1], [1, 2], [2, 0]]
 
 
 def png(pixels):
-    """A PNG of bytes, shape (rows, columns) or (rows, columns, 3)."""
+    """Encodes bytes, shape (rows, columns) or (rows, columns, 3), as a PNG."""
     pixels = np.ascontiguousarray(pixels, dtype=np.uint8)
     rows, columns = pixels.shape[:2]
     lines = np.zeros((rows, 1 + pixels[0].size), np.uint8)
@@ -30,7 +30,7 @@ def png(pixels):
 
 
 def grey_png(values):
-    """The values from dark to light, white where there are none; a large raster is thinned."""
+    """Draws values from dark to light, white where they are not finite. Large rasters are thinned."""
     step = max(1, -(-max(values.shape) // MOST_PIXELS))
     shown = np.asarray(values[::step, ::step], dtype=np.float64)
     some = np.isfinite(shown)
@@ -43,7 +43,7 @@ def grey_png(values):
 
 
 class _Frame:
-    """Pixels of a picture of places, shape (n, 2), with y upwards."""
+    """Maps places, shape (n, 2), with y upwards, to the pixels of a picture."""
 
     def __init__(self, places, most=MOST_PIXELS):
         self.low = places.min(axis=0) if len(places) else np.zeros(2)
@@ -52,28 +52,29 @@ class _Frame:
         self.columns, self.rows = (min(max(1, math.ceil(side * self.scale)), most) for side in size)
 
     def __call__(self, places):
-        """Columns and rows of places, in pixels from the upper left corner."""
+        """Returns columns and rows of places, in pixels from the upper left corner."""
         return np.column_stack(((places[:, 0] - self.low[0]) * self.scale, self.rows - (places[:, 1] - self.low[1]) * self.scale))
 
 
 def _shown(places, parts):
-    """The parts of which no place is beyond what pixels can be computed of. parts: numbers of places, shape (n, k)."""
+    """Returns the rows of ``parts``, shape (n, k), whose places are all small enough to compute pixels."""
     with np.errstate(invalid='ignore'):
         good = (np.abs(places) < 1e150).all(axis=1)
     return parts[good[parts].all(axis=1)]
 
 
 def _spans(corners):
-    """The first row and the number of rows of pixels whose middle line each triangle crosses."""
+    """Returns, for each triangle, the first pixel row whose centre line it crosses and the number of such rows."""
     first = np.ceil(corners[:, :, 1].min(axis=1) - 0.5)
     return first.astype(np.int64), np.maximum(np.floor(corners[:, :, 1].max(axis=1) - 0.5) - first + 1, 0).astype(np.int64)
 
 
 @np.errstate(over='ignore', invalid='ignore', divide='ignore')
 def _depths(corners, heights, shape):
-    """The greatest height of triangles at the middle of each pixel, -inf where there is none.
+    """Returns the greatest height of the triangles at each pixel's centre, -inf outside all triangles.
 
-    corners: pixels, shape (n, 3, 2). heights: shape (n, 3).
+    corners: in pixels, shape (n, 3, 2).
+    heights: shape (n, 3).
     """
     deep = np.full(shape[0] * shape[1], -np.inf)
     (x0, y0), (x1, y1), (x2, y2) = (corners[:, i].T for i in range(3))
@@ -81,7 +82,7 @@ def _depths(corners, heights, shape):
     corners, heights, area = corners[area != 0], heights[area != 0], area[area != 0]
     (x0, y0), (x1, y1), (x2, y2) = (corners[:, i].T for i in range(3))
     z0, z1, z2 = heights.T
-    # The plane of each triangle.
+    # Slopes of each triangle's plane.
     along_x = ((z1 - z0) * (y2 - y0) - (z2 - z0) * (y1 - y0)) / area
     along_y = ((z2 - z0) * (x1 - x0) - (z1 - z0) * (x2 - x0)) / area
     first, count = _spans(corners)
@@ -95,7 +96,7 @@ def _depths(corners, heights, shape):
             x = a[:, 0] + (middle - a[:, 1]) * ((b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1]))
             left = np.where(crosses, np.minimum(left, x), left)
             right = np.where(crosses, np.maximum(right, x), right)
-        # A little wider: triangles that share a side must leave no gap.
+        # Widened slightly, so that triangles that share a side leave no gap.
         begin = np.ceil(np.clip(left, 0, shape[1]) - 0.5 - 1e-9).clip(0)
         wide = (np.floor(np.clip(right, 0, shape[1]) - 0.5 + 1e-9).clip(None, shape[1] - 1) - begin + 1).clip(0)
         wide = np.where((right >= left) & (row >= 0) & (row < shape[0]), wide, 0).astype(np.int64)
@@ -122,13 +123,16 @@ def _depths(corners, heights, shape):
 
 
 def _counted(counts):
-    """The numbers 0, 1, .. as often as their counts say, and the place of each among its equals."""
+    """Returns the indices 0, 1, ..., each repeated by its count, and the position of each entry within its run."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
 def _draw_lines(ends, shape):
-    """The pixels under lines. ends: pixels, shape (n, 2, 2). Returns: bool, of the shape."""
+    """Returns a bool array of ``shape`` that marks the pixels under lines.
+
+    ends: in pixels, shape (n, 2, 2).
+    """
     drawn = np.zeros(shape, bool)
     steps = np.minimum(np.ceil(np.abs(ends[:, 1] - ends[:, 0]).max(axis=1)), 2 * MOST_PIXELS).astype(np.int64) + 1
     for begin in range(0, len(ends), 2000):
@@ -141,7 +145,7 @@ def _draw_lines(ends, shape):
 
 
 def _slopes(heights, axis):
-    """Differences of neighbours along an axis, of both sides if there are both; 0 where there is none."""
+    """Returns the slope along an axis from the neighbours on both sides, or the one there is; 0 without neighbours."""
     ahead = np.full(heights.shape, np.nan)
     behind = ahead.copy()
     steps = np.diff(heights, axis=axis)
@@ -156,9 +160,11 @@ def _slopes(heights, axis):
 
 @np.errstate(over='ignore', invalid='ignore')
 def relief_png(vertices, triangles):
-    """Triangles seen from above as shaded relief, lit from the north-west, 45 degrees high; with their sides if they are few.
+    """Draws triangles from above as shaded relief, lit from the north-west at 45 degrees.
 
-    vertices: shape (n, 3), all in one unit. White where there is no triangle.
+    The sides of triangles are drawn if there are few.
+
+    vertices: shape (n, 3), with the same unit on all axes. The picture is white outside the triangles.
     """
     vertices = np.asarray(vertices, np.float64)
     triangles = _shown(vertices, np.asarray(triangles).astype(np.int64).reshape(-1, 3))
@@ -182,7 +188,8 @@ def relief_png(vertices, triangles):
 
 
 def plane_png(points, triangles):
-    """Triangles of the plane: their sides, or, if these would touch, how dense the vertices are. Darker is denser."""
+    """Draws the sides of triangles in the plane or, if these would touch, the density of vertices (darker is denser).
+    """
     triangles = _shown(points, triangles.astype(np.int64))
     used, triangles = np.unique(triangles, return_inverse=True)
     triangles = triangles.reshape(-1, 3)
@@ -201,7 +208,7 @@ def plane_png(points, triangles):
 
 
 def lines_png(lines):
-    """Lines seen from above. lines: arrays of shape (n, 2)."""
+    """Draws lines from above. lines: arrays of shape (n, 2)."""
     ends = [np.stack((line[:-1], line[1:]), axis=1) for line in lines if len(line) > 1]
     ends = np.concatenate(ends).reshape(-1, 2) if ends else np.zeros((0, 2))
     frame = _Frame(ends)
@@ -210,7 +217,7 @@ def lines_png(lines):
 
 
 def triangles_svg(xy, triangles, shade):
-    """All triangles seen from above; shade: from 0 to 1, one per triangle."""
+    """Draws all triangles from above. shade: from 0 to 1, one per triangle."""
     tones = np.clip(60 + 190 * shade, 0, 255).astype(int)
     places = xy if len(xy) else np.zeros((1, 2))
     low, size = np.nanmin(places, axis=0), np.ptp(places, axis=0)
@@ -224,7 +231,7 @@ def triangles_svg(xy, triangles, shade):
 
 
 def light(vertices, triangles):
-    """How bright each triangle is under a light from the north-west, 0 to 1."""
+    """Returns the brightness of each triangle, 0 to 1, under a light from the north-west."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)
     normals[normals[:, 2] < 0] *= -1

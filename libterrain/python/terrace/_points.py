@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points from files and to files, without a store."""
+"""Reads points from files and writes them, without a store."""
 
 import os
 
@@ -29,8 +29,11 @@ def _reading(sources, transform, crs, nodata, attributes, options, function):
 
 
 class PointReader:
-    """Points in batches, from point_batches(). dtype: of the batches; crs: a dict of what the source says, as
-    Store.info has it. Threads may share one."""
+    """An iterator over batches of points, made by point_batches(). Threads may share one.
+
+    dtype: the type of the batches.
+    crs: a dict that describes the CRS of the source, as in Store.info.
+    """
 
     def __init__(self, core):
         self._core = core
@@ -52,12 +55,18 @@ class PointReader:
 
 
 def point_batches(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
-    """Points of files or arrays, batch by batch in constant memory, those of a batch close together as the source has them.
+    """Reads points of files or arrays in batches, in constant memory.
 
-    sources, transform, crs, nodata, attributes: as of build(). Options: ``where``, ``region``, ``keep``, ``drop``,
-    ``resolution``, ``input_format``, ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` as of
-    build(); ``block_points`` (10000), the most in a batch. Returns: a PointReader, an iterator of structured arrays: x,
-    y, z in the CRS, then attributes as Store.points() gives them. Raises: Error for bad data, OSError, ValueError.
+    Points that are close together in the source share a batch.
+
+    sources, transform, crs, nodata, attributes: as in build().
+    options: ``where``, ``region``, ``keep``, ``drop``, ``resolution``, ``input_format``, ``entities``,
+        ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` as in build(); ``block_points`` (10000), the
+        largest size of a batch.
+
+    Returns: a PointReader, an iterator of structured arrays: x, y, z in the CRS, then the attributes as in
+        Store.points().
+    Raises: Error for bad data, OSError, ValueError.
 
     >>> [len(batch) for batch in point_batches(np.zeros((25000, 3)))]
     [10000, 10000, 5000]
@@ -67,7 +76,9 @@ def point_batches(sources, *, transform=None, crs=None, nodata=None, attributes=
 
 
 def read_points(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
-    """All points of files or arrays in one structured array, as point_batches() gives them.
+    """Reads all points of files or arrays into one structured array.
+
+    Arguments and errors are those of point_batches().
 
     >>> read_points(np.arange(6.0).reshape(2, 3), where='z > 3')
     array([(3., 4., 5.)], dtype=[('x', '<f8'), ('y', '<f8'), ('z', '<f8')])
@@ -78,13 +89,17 @@ def read_points(sources, *, transform=None, crs=None, nodata=None, attributes=No
 
 def write_points(path, points, *, transform=None, crs=None, nodata=None, attributes=None, format=None, replace=False, progress=None,
                  threads=None, **options):
-    """Writes points to a file by its ending: .laz, .las, .copc.laz, .ply, .csv, .xyz; whole or not at all.
+    """Writes points to a file in the format of its extension: .laz, .las, .copc.laz, .ply, .csv or .xyz.
 
-    points, transform, crs, nodata, attributes, options: as of point_batches(): files too, which are converted in
-    constant memory. format: in place of the ending: 'xyz', 'csv', 'ply', 'ply-ascii', 'las', 'laz', 'copc'. Returns: a
-    dict: points, nodata (cells without data; points left out as a coordinate is NaN), rounding (how far a coordinate
-    was moved, at most, to the lattice of LAS). Raises: FileExistsError or another OSError; Error; ValueError;
-    KeyboardInterrupt on Ctrl-C, and then no file stands.
+    The file appears only when complete.
+
+    points, transform, crs, nodata, attributes, options: as in point_batches(). Files are converted in constant
+        memory.
+    format: overrides the extension: 'xyz', 'csv', 'ply', 'ply-ascii', 'las', 'laz' or 'copc'.
+
+    Returns: a dict with points, nodata (cells without data, and points left out because a coordinate is NaN) and
+        rounding (the largest distance by which a coordinate was moved to the grid of LAS).
+    Raises: FileExistsError or another OSError; Error; ValueError; KeyboardInterrupt on Ctrl-C, which leaves no file.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rasters that a store gives."""
+"""Rasters computed from a store."""
 
 import os
 
@@ -10,23 +10,25 @@ from ._pictures import grey_png
 
 
 class Raster:
-    """Samples on a grid, NaN where there are none.
+    """Samples on a grid, NaN where there is no surface.
 
-    values: float32, as the GeoTIFF has them, or uint8 (hillshade); shape (rows, columns). transform: six numbers a, b,
-    c, d, e, f from columns and rows of the cells' *corners* to x and y, as rasterio's and GDAL's affine transforms.
-    crs: 'EPSG:n' or WKT, None if it is not known. """
+    values: shape (rows, columns), float32, as in a GeoTIFF, or uint8 for a hillshade.
+    transform: six numbers a, b, c, d, e, f from columns and rows of the cells' *corners* to x and y, as in rasterio's
+        and GDAL's affine transforms.
+    crs: 'EPSG:n' or WKT, None if unknown.
+    """
 
     def __init__(self, values, transform, crs):
         self.values, self.transform, self.crs = values, transform, crs
 
     @property
     def shape(self):
-        """Rows and columns."""
+        """The numbers of rows and columns."""
         return self.values.shape
 
     @property
     def bounds(self):
-        """min x, min y, max x, max y of the corners."""
+        """The box around all cells: min x, min y, max x, max y."""
         a, b, c, d, e, f = self.transform
         rows, columns = self.shape
         x = [c + a * i + b * j for i in (0, columns) for j in (0, rows)]

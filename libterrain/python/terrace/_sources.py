@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What can be built into a store: files, and arrays as other packages hold them."""
+"""Sources of a store: files, and arrays of numpy and other packages."""
 
 import os
 
@@ -10,23 +10,26 @@ from ._job import notes
 
 
 def crs_text(crs):
-    """What a CRS object or text of another package says: a name, code or WKT; None if nothing."""
+    """Returns the name, code or WKT of a CRS object or text of any package; None if it is empty.
+
+    Raises: TypeError for other objects.
+    """
     if crs is None or isinstance(crs, str):
         return crs or None
     if isinstance(crs, (int, np.integer)):
         return f'EPSG:{crs}'
     if hasattr(crs, 'to_wkt'):
         return crs.to_wkt() or None
-    raise TypeError(f'`crs` is a text such as EPSG:32632, or has to_wkt(), unlike {crs!r}')
+    raise TypeError(f'`crs` must be a text such as EPSG:32632, or have to_wkt(), unlike {crs!r}')
 
 
 def _centred(transform):
-    """From columns and rows of corners, as rasterio's and GDAL's transforms, to those of centres."""
+    """Converts a transform of cell corners, as in rasterio and GDAL, to one of cell centres."""
     if transform is None:
         return (1.0, 0.0, 0.0, 0.0, -1.0, 0.0)
     numbers = [float(number) for number in tuple(transform)[:6]]
     if len(numbers) != 6 or not np.all(np.isfinite(numbers)) or numbers[0] * numbers[4] == numbers[1] * numbers[3]:
-        raise ValueError('`transform` is six numbers a, b, c, d, e, f with x = a * column + b * row + c and '
+        raise ValueError('`transform` must be six numbers a, b, c, d, e, f with x = a * column + b * row + c and '
                          'y = d * column + e * row + f')
     a, b, c, d, e, f = numbers
     return (a, b, c + (a + b) / 2, d, e, f + (d + e) / 2)
@@ -37,7 +40,7 @@ def _raster(samples, transform, nodata, name, scale=1.0, offset=0.0):
     if samples.ndim == 3 and samples.shape[0] == 1:
         samples = samples[0]
     if samples.ndim != 2:
-        raise ValueError(f'a raster has two dimensions, not {samples.ndim}')
+        raise ValueError(f'a raster must have two dimensions, not {samples.ndim}')
     if samples.size == 0:
         raise ValueError('the raster is empty')
     return {'name': name, 'samples': samples, 'transform': _centred(transform),
@@ -53,18 +56,20 @@ def _points(columns, attributes, name):
     if len(sizes) != 1 or len(next(iter(sizes))) != 1:
         raise ValueError('the columns of points must have one dimension and the same length')
     if next(iter(sizes)) == (0,):
-        raise ValueError('there is not one point')
+        raise ValueError('there are no points')
     return {'name': name, 'columns': columns, 'attributes': attributes}
 
 
 def _records(array, fields, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
-    """Records with x, y and z, or with X, Y and Z as LAS stores them (with scales and offsets). Fields of several numbers
-    become name_0, name_1, ..."""
+    """Returns a source for records with x, y and z, or with X, Y and Z as LAS stores them (with scales and offsets).
+
+    Fields of several numbers become name_0, name_1, ...
+    """
     for axes in ('xyz', 'XYZ'):
         if all(axis in fields for axis in axes):
             break
     else:
-        raise ValueError(f'points have fields x, y and z, or X, Y and Z, not {", ".join(fields)}')
+        raise ValueError(f'points need fields x, y and z, or X, Y and Z, not {", ".join(fields)}')
     columns = [_column(axis.lower(), np.asarray(array[axis]), scales[i], offsets[i]) for i, axis in enumerate(axes)]
     attributes = []
     for field in fields:
@@ -77,16 +82,19 @@ def _records(array, fields, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
 
 
 def _laspy_crs(data):
-    """Of a laspy.LasData, which reads it with pyproj."""
+    """Returns the CRS of a laspy.LasData, which laspy reads with pyproj, or None."""
     try:
         return data.header.parse_crs()
     except (AttributeError, ImportError) as missing:
-        notes.info('the CRS of the points is not known (%s); give `crs`', missing)
+        notes.info('the CRS of the points is not known (%s); pass `crs`', missing)
         return None
 
 
 def _xarray(array, transform, crs, nodata):
-    """An xarray.DataArray: rioxarray's accessor, else the CF attributes that it keeps, else the coordinates."""
+    """Returns transform, CRS and nodata of an xarray.DataArray.
+
+    They come from rioxarray's accessor, or from the CF attributes that rioxarray writes, or from the coordinates.
+    """
     if hasattr(array, 'rio'):
         rio = array.rio
         return (rio.transform() if transform is None else transform, rio.crs if crs is None else crs,
@@ -107,7 +115,7 @@ def _xarray(array, transform, crs, nodata):
         steps = (x[-1] - x[0]) / (len(x) - 1), (y[-1] - y[0]) / (len(y) - 1)
         for places, step in zip((x, y), steps):
             if not np.allclose(np.diff(places), step, rtol=1e-6, atol=0):
-                raise ValueError('the coordinates of the raster are not at equal distances')
+                raise ValueError('the coordinates of the raster are not evenly spaced')
         transform = (steps[0], 0, x[0] - steps[0] / 2, 0, steps[1], y[0] - steps[1] / 2)
     if nodata is None:
         nodata = array.attrs.get('_FillValue', array.attrs.get('nodata'))
@@ -116,24 +124,27 @@ def _xarray(array, transform, crs, nodata):
 
 def _alone(kind, transform, nodata, attributes):
     if transform is not None or nodata is not None or attributes is not None:
-        raise ValueError(f'`transform`, `nodata` and `attributes` are not for {kind}')
+        raise ValueError(f'{kind} do not support `transform`, `nodata` and `attributes`')
 
 
 def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
-    """(what the compiled half takes, the CRS as text or None)"""
+    """Returns (the source in the form that the core expects, its CRS as text or None).
+
+    Raises: TypeError, ValueError.
+    """
     if attributes is not None and not hasattr(attributes, 'items'):
         raise TypeError('`attributes` is a dict of columns')
     if isinstance(given, (str, os.PathLike)):
         given = [given]
     if isinstance(given, (list, tuple)) and not given:
-        raise ValueError('there is no source: name a file, or give an array')
+        raise ValueError('there is no source: pass a file name or an array')
     if isinstance(given, (list, tuple)) and any(isinstance(name, (str, os.PathLike)) for name in given):
         for number, name in enumerate(given):
             if not isinstance(name, (str, os.PathLike)):
-                raise TypeError(f'source {number} is of type {type(name).__name__}: beside names of files there can be only such')
+                raise TypeError(f'source {number} is of type {type(name).__name__}: files and arrays cannot be mixed')
     if isinstance(given, (list, tuple)) and all(isinstance(name, (str, os.PathLike)) for name in given):
         if transform is not None or nodata is not None or attributes is not None:
-            raise ValueError('`transform`, `nodata` and `attributes` are for arrays: files have their own')
+            raise ValueError('files do not support `transform`, `nodata` and `attributes`: they have their own')
         return [os.fsencode(name) for name in given], crs_text(crs)
     records = getattr(given, 'points', given)
     if hasattr(records, 'point_format') and hasattr(records, 'scales'):  # laspy.LasData, or its points
@@ -146,11 +157,11 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         band = given.GetRasterBand(1)
         c, a, b, f, d, e = given.GetGeoTransform()
         samples = band.ReadAsArray()
-        if band.GetMaskFlags() == 2:  # gdal.GMF_PER_DATASET: a mask, and no alpha band
+        if band.GetMaskFlags() == 2:  # gdal.GMF_PER_DATASET: a mask, not an alpha band
             samples = filled(np.ma.array(samples, mask=band.GetMaskBand().ReadAsArray() == 0))
         return _raster(samples, (a, b, c, d, e, f) if transform is None else transform, band.GetNoDataValue() if nodata is None else nodata,
                        '<gdal>', band.GetScale() or 1.0, band.GetOffset() or 0.0), crs_text(crs or given.GetProjection())
-    if hasattr(given, 'transform'):  # a dataset of rasterio's, a Raster, or another array with an affine transform
+    if hasattr(given, 'transform'):  # a rasterio dataset, a Raster, or another array with an affine transform
         samples, scale, offset = given, 1.0, 0.0
         if hasattr(given, 'read'):
             masked = [flag.name for flag in given.mask_flag_enums[0]] == ['per_dataset']
@@ -165,7 +176,7 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         _alone('columns', transform, nodata, attributes)
         wrong = [axis for axis in 'xyz' if axis not in given]
         if wrong:
-            raise ValueError(f'points have x, y and z: {", ".join(wrong)} is missing')
+            raise ValueError(f'points need x, y and z: {", ".join(wrong)} is missing')
         arrays = {name: as_array(column, f'"{name}"') for name, column in given.items()}
         return _points([_column(axis, arrays[axis]) for axis in 'xyz'],
                        [_column(name, column) for name, column in arrays.items() if name not in ('x', 'y', 'z')],
@@ -175,11 +186,11 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
         _alone('structured arrays', transform, nodata, attributes)
         return _records(array.reshape(-1), array.dtype.names, '<array>'), crs_text(crs)
     if array.ndim not in (2, 3):
-        raise ValueError(f'a source array has the shape (n, 3): points, or (rows, columns): a raster, not {array.shape}')
+        raise ValueError(f'a source array must have the shape (n, 3) for points or (rows, columns) for a raster, not {array.shape}')
     if array.ndim == 2 and array.shape[1] == 3 and transform is None:
         more = [] if attributes is None else [
             _column(name, as_array(column, f'"{name}"')) for name, column in attributes.items()]
         return _points([_column(axis, array[:, i]) for i, axis in enumerate('xyz')], more, '<array>'), crs_text(crs)
     if attributes is not None:
-        raise ValueError('`attributes` are for points: a raster has none')
+        raise ValueError('rasters do not support `attributes`')
     return _raster(array, transform, nodata, '<array>'), crs_text(crs)

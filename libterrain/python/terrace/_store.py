@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores: built from files and arrays, and asked for what they hold."""
+"""Builds stores from files and arrays, and queries them."""
 
 import errno
 import json
@@ -10,7 +10,7 @@ import tempfile
 import numpy as np
 
 from . import _core
-from ._arrays import as_rows, whole
+from ._arrays import as_integer, as_rows
 from ._geo import FeatureCollection, geojson, region as as_region
 from ._job import job, notes
 from ._mesh import BoundedMesh, Mesh
@@ -36,17 +36,20 @@ def checked(options, known, function):
 
 
 def xyz(points):
-    """The coordinates of a structured array of points as an array of shape (n, 3), without a copy."""
+    """Returns the coordinates of a structured array of points as an array of shape (n, 3), without a copy.
+
+    Raises: TypeError, ValueError.
+    """
     if not isinstance(points, np.ndarray):
-        raise TypeError('points are a structured array')
+        raise TypeError('`points` must be a structured array')
     fields = points.dtype.fields or {}
     if points.ndim != 1 or any(fields.get(axis, ())[:2] != (np.dtype(np.float64), 8 * i) for i, axis in enumerate('xyz')):
-        raise ValueError('points have one dimension and the fields x, y and z, of float64, first')
+        raise ValueError('`points` must have one dimension and begin with the float64 fields x, y and z')
     return np.lib.stride_tricks.as_strided(points['x'], (len(points), 3), (points.strides[0], 8))
 
 
 def real_values(records, attributes):
-    """Attributes that are stored with a scale or offset, as real values (float64), like files written of them."""
+    """Converts attributes that are stored with a scale or offset to real values (float64)."""
     scaled = {a['name']: a for a in attributes if a['scale'] != 1 or a['offset'] != 0}
     if not scaled:
         return records
@@ -61,47 +64,59 @@ def real_values(records, attributes):
 
 
 def _smoothing(method='laplacian', iterations=10, strength=0.5, pass_band=0.1, edge_height=0.0):
-    return method, whole(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height)
+    return method, as_integer(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height)
 
 
 def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=None, progress=None, threads=None,
           memory=None, **options):
-    """Streams points or rasters once into a store, in constant memory, and opens it.
+    """Streams points or rasters once, in constant memory, into a store, and opens it.
 
-    sources: the name of a file or several (GeoTIFF, LAS, LAZ, COPC, PLY, text and others; several rasters form
-    a mosaic), or what is in memory:
+    sources: a file name or several (GeoTIFF, LAS, LAZ, COPC, PLY, text and others; several rasters form a mosaic), or
+        data in memory:
 
-    - an array of shape (n, 3): points, with ``attributes`` (a dict of columns) beside them;
-    - a structured array with fields x, y, z (or X, Y, Z) and further ones, a dict of columns, a
-      ``pandas.DataFrame`` with such columns, a ``laspy.LasData`` or its ``points``, also part of them;
-    - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f from
-      columns and rows of corners to x and y, as rasterio's) and ``nodata``. An array of three columns is a
-      raster if ``transform`` is given;
-    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio or GDAL, a Raster, any array
-      with ``transform`` (and ``crs``, ``nodata``);
-    - anything else with numpy's array interface, the buffer protocol or DLPack.
+    - an array of shape (n, 3): points, optionally with ``attributes``, a dict of columns;
+    - a structured array with fields x, y, z (or X, Y, Z) and others, a dict of columns, a ``pandas.DataFrame`` with
+      such columns, a ``laspy.LasData`` or all or some of its ``points``;
+    - an array of shape (rows, columns), masked or not: a raster, with ``transform`` (six numbers a, b, c, d, e, f
+      from columns and rows of cell corners to x and y, as in rasterio) and ``nodata``. An array with three columns is
+      a raster if ``transform`` is given;
+    - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio or GDAL, a Raster, any
+      array with a ``transform`` (and ``crs``, ``nodata``);
+    - any other object with numpy's array interface, the buffer protocol or DLPack.
 
-    Arrays are read in place. Points with a coordinate that is NaN or masked are left out and count as nodata, as
-    samples that are not finite do; infinite coordinates are refused.
+    Arrays are read in place. Points with a NaN or masked coordinate, and samples that are not finite, are left out
+    and counted as nodata. Infinite coordinates are an error.
 
-    store: the folder to make; it appears when it is whole. crs: of the source, in place of what it says: 'EPSG:n',
-    a name, WKT, or an object with to_wkt().
+    store: the folder to create. It appears only when complete.
+    crs: the CRS of the source, which overrides the one it declares: 'EPSG:n', a name, WKT, or an object with
+        to_wkt().
+    progress: None, True for a bar (tqdm's if installed), or a function called as progress(what, count, fraction,
+        ended).
+    threads: the number of threads; all cores by default.
+    memory: in bytes; 256 MiB by default.
 
-    Options: ``replace`` an existing store; ``where`` ('classification == 2'), ``region`` (box, polygons), ``keep``,
-    ``drop`` (names of attributes) say what is read; ``block_points`` (10000) are clustered together, at
-    ``facility_cost`` (3.0, times a block's diagonal), with ``effort`` 'fast', 'default', 'fine' or 'full', ``z_weight``
-    of heights, a ``metric`` ('euclidean', 'squared', 'minkowski:P', 'elliptical:FILE'), ``channels`` (pairs of an
-    attribute and metres per unit) and ``outlier_price``, by a ``method`` of cluster(); ``order`` 'auto', 'stream' or
-    'spatial'; ``vertical`` 'ellipsoidal' or 'orthometric'; ``seed``; of files ``input_format``, ``entities``,
-    ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour`` ('mapbox', 'terrarium'), ``resolution``,
-    ``datum_shift``.
+    Options for all sources:
 
-    progress: None, True for a bar (tqdm's where it is), or a function called as progress(what, count, fraction,
-    ended). threads: all cores unless given. memory: bytes, 256 MiB unless given. The store depends on the source,
-    the options and the seed alone.
+    - ``replace``: overwrite an existing store.
+    - ``where`` (such as 'classification == 2'), ``region`` (a box or polygons), ``keep`` and ``drop`` (names of
+      attributes): the part of the source to read.
+    - ``block_points`` (10000): the number of points that are clustered together.
+    - ``facility_cost`` (3.0, a multiple of a block's diagonal), ``effort`` ('fast', 'default', 'fine' or 'full'),
+      ``z_weight`` (of heights), ``metric`` ('euclidean', 'squared', 'minkowski:P' or 'elliptical:FILE'), ``channels``
+      (pairs of an attribute and metres per unit), ``outlier_price`` and ``method``: the clustering, as in cluster().
+    - ``order``: 'auto', 'stream' or 'spatial'.
+    - ``vertical``: 'ellipsoidal' or 'orthometric'.
+    - ``seed``: of random choices.
 
-    Returns: the opened Store. Raises: Error for bad data, OSError, ValueError, TypeError; KeyboardInterrupt on
-    Ctrl-C. No store stands then. Notes of what was assumed go to ``logging.getLogger('terrace')``.
+    Options for files: ``input_format``, ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour``
+    ('mapbox' or 'terrarium'), ``resolution``, ``datum_shift``.
+
+    The store depends only on the source, the options and the seed. Assumptions about the data are logged to
+    ``logging.getLogger('terrace')``.
+
+    Returns: the opened Store.
+    Raises: Error for bad data, OSError, ValueError, TypeError; KeyboardInterrupt on Ctrl-C. A failed build leaves no
+        partial store.
 
     Source: J. Skala, Algorithms for manipulating large geometric data, chapter 7.
 
@@ -120,17 +135,18 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
         given['crs'] = text
     path = os.fspath(store)
     if os.path.lexists(path) and not given.get('replace'):
-        raise FileExistsError(errno.EEXIST, 'exists already; give another name or replace=True', path)
+        raise FileExistsError(errno.EEXIST, 'already exists; pass another name or replace=True', path)
     _core.build(source, os.fsencode(path), given, job(progress, threads, memory))
     return Store(path)
 
 
 class Store:
-    """A store opened for reading: ``Store('alps.store')``; ``terrace.open`` and ``Store.open`` are the same. Any number of
-    threads may use it at once; a fork of the process may too.
+    """A store opened for reading: ``Store('alps.store')``. ``terrace.open`` and ``Store.open`` do the same.
 
-    Close it, or use it as a context manager; a closed store raises ValueError. Raises: FileNotFoundError; Error if the
-    store is damaged or of a newer version.
+    Any number of threads may use it at once, and so may a fork of the process. Close it, or use it as a context
+    manager; a closed store raises ValueError.
+
+    Raises: FileNotFoundError; Error if the store is damaged or was written by a newer version.
     """
 
     def __init__(self, path):
@@ -148,11 +164,11 @@ class Store:
 
     @classmethod
     def open(cls, path):
-        """Opens the store in a folder, as ``Store(path)`` does."""
+        """Opens the store in a folder, like ``Store(path)``."""
         return cls(path)
 
     def close(self):
-        """Work that other threads are at goes on to its end."""
+        """Closes the store. Calls that are running in other threads still finish."""
         self._core.close()
 
     @property
@@ -188,14 +204,20 @@ class Store:
 
     @property
     def info(self):
-        """A dict: points, bytes, bounds (six numbers in the CRS, least first), crs, vertical, attributes, levels
-        (level 0 first; points are those of that level and above), top, grid, columns and rows, transform (to the
-        centres of cells), nodata (cells left out), parameters, checksum."""
+        """A dict that describes the store.
+
+        points, bytes, top, checksum, parameters: of the whole store.
+        bounds: six numbers in the CRS, minima first.
+        crs, vertical, attributes: as recorded when it was built.
+        levels: level 0 first; ``points`` counts the points on that level and above.
+        grid, columns, rows, transform: of a raster; the transform is to the centres of cells.
+        nodata: the number of samples left out.
+        """
         return json.loads(json.dumps(self._info))
 
     @property
     def bounds(self):
-        """(min x, min y, min z, max x, max y, max z) in the CRS."""
+        """The bounding box (min x, min y, min z, max x, max y, max z) in the CRS."""
         return tuple(self._info['bounds'])
 
     @property
@@ -204,14 +226,18 @@ class Store:
         return self._info['top']
 
     def where(self, condition):
-        """A view of the store: a Store that has only the points that meet a condition on attributes, x, y and z, such
-        as 'classification == 2 && return_number == last'. What a store can answer a view answers for these points, as
-        a store built of them alone would at level 0; a coarser level has those of its points that meet the condition.
-        Only clusters(), models and views under a camera know nothing of conditions.
+        """Returns a view of the store: a Store with only the points that meet a condition.
 
-        The points are counted once, for which the clusters that may have some are read, with all attributes: 0.2 us for
-        each of their points from a laser survey. A view reads the files of its store, but each of the two is closed by
-        itself. Raises: Error for a bad condition, or if no point meets it.
+        The view answers queries as a store built from these points alone would at level 0; a coarser level has those
+        of its points that meet the condition. clusters(), Multiresolution and View do not support conditions.
+
+        condition: on attributes, x, y and z, such as 'classification == 2 && return_number == last'.
+
+        The points are counted once. For this the clusters that may contain some are read, with all attributes: 0.2
+        microseconds for each of their points in a laser scan. A view reads the files of its store, but each is closed
+        separately.
+
+        Raises: Error for an invalid condition, or if no point meets it.
 
         >>> import tempfile
         >>> points = np.random.default_rng(1).random((2000, 3))
@@ -223,29 +249,31 @@ class Store:
         return Store(self._core.where(condition))
 
     def level_within(self, most_points):
-        """The finest level of at most so many points; the top if none has so few."""
-        return _core.level_within(self._core, whole(most_points, 'most_points'))
+        """Returns the finest level with at most ``most_points`` points; the top level if all have more."""
+        return _core.level_within(self._core, as_integer(most_points, 'most_points'))
 
     def points(self, region=None, level=None, where=None, *, focus=(), cluster=None, crs=None, progress=None,
                threads=None):
-        """The points of a level and above, inside a region, that meet a condition.
+        """Returns the points of a level and above that are in a region and meet a condition.
 
         region: a box of four or six numbers in the store's CRS, polygons (an object with ``__geo_interface__``, a
-        GeoJSON dict or file) in the CRS that they name, or None. Polygons that name none are in longitude and latitude, as
-        GeoJSON is, if the store's CRS is known and the numbers can be that; else in the store's. where: a condition on
-        attributes, x, y and z, such as 'classification == 2 && z < 100'. focus: pairs (region, level) with finer levels.
-        cluster: in place of region and focus, a pair (L, N): the points that cluster N of level L stands for. level: 0
-        unless given; with a cluster, its own. crs: that the coordinates
-        are wanted in.
+            GeoJSON dict or file) in the CRS that they name, or None. Polygons without a CRS are in longitude and
+            latitude, as GeoJSON is, if the store's CRS is known and the numbers are in range; otherwise in the
+            store's CRS.
+        level: 0 by default; with ``cluster``, the cluster's level.
+        where: a condition on attributes, x, y and z, such as 'classification == 2 && z < 100'.
+        focus: pairs (region, level) with finer levels.
+        cluster: a pair (level, number): the points that this cluster represents. It replaces region and focus.
+        crs: of the returned coordinates; by default the store's.
 
-        Returns: a structured array: x, y, z (float64), then the attributes with their types (float64 where they have
-        a scale). ``xyz()`` gives its coordinates as an array (n, 3). Order: coarser levels first.
+        Returns: a structured array: x, y, z (float64), then the attributes in their types (float64 if they have a
+            scale). Coarser levels come first. ``xyz()`` returns its coordinates as an array of shape (n, 3).
         """
         focus = list(focus)
         focuses, cluster = self._focuses(focus), self._cluster(cluster, region, focus)
         if level is None:
             level = cluster[0] if cluster else 0
-        records = self._core.points(whole(level, 'level', bits=32), as_region(region), focuses, where or '', cluster,
+        records = self._core.points(as_integer(level, 'level', bits=32), as_region(region), focuses, where or '', cluster,
                                     (crs_text(crs) or ''), job(progress, threads))
         return real_values(records, self._info['attributes'])
 
@@ -254,36 +282,47 @@ class Store:
         if cluster is None:
             return None
         if region is not None or len(focus):
-            raise ValueError('give either `cluster` or `region` and `focus`')
+            raise ValueError('pass either `cluster` or `region` and `focus`')
         cluster = tuple(cluster)
         if len(cluster) != 2:
-            raise ValueError('`cluster` is a pair of its level and its number there')
-        return whole(cluster[0], 'cluster', bits=32), whole(cluster[1], 'cluster')
+            raise ValueError('`cluster` must be a pair of a level and a number')
+        return as_integer(cluster[0], 'cluster', bits=32), as_integer(cluster[1], 'cluster')
 
     @staticmethod
     def _focuses(focus):
-        return [(as_region(place), whole(level, 'level', bits=32)) for place, level in focus]
+        return [(as_region(place), as_integer(level, 'level', bits=32)) for place, level in focus]
 
     def clusters(self, level=0, *, progress=None, threads=None):
-        """What is known of each cluster of a level. Returns: a structured array: bounds (six numbers in the CRS that
-        hold all points below, a little more than they need), error (metres; no point below is farther from the
-        representative), descendants (points of level 0 below), members. The number of a row is that of
-        ``points(cluster=(level, number))``."""
-        made = self._core.clusters(whole(level, 'level', bits=32), job(progress, threads))
+        """Describes each cluster of a level.
+
+        Returns: a structured array with bounds (six numbers in the CRS: a slightly enlarged box around all points
+            below), error (metres; no point below is farther from the representative), descendants (the number of
+            points of level 0 below) and members. Row N describes the cluster ``points(cluster=(level, N))``.
+        """
+        made = self._core.clusters(as_integer(level, 'level', bits=32), job(progress, threads))
         return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
 
     def count(self, box):
-        """The number of points in a box of four or six numbers, of which only the border is read. Points within
-        rounding of the border may count or not. Raises: ValueError for a rotated raster."""
+        """Counts the points in a box of four or six numbers, reading only clusters on its border.
+
+        Points within rounding of the border may or may not count.
+
+        Raises: ValueError for a rotated raster.
+        """
         box = as_region(box)
         if not isinstance(box, tuple):
-            raise ValueError('count() takes a box')
+            raise ValueError('count() needs a box')
         return self._core.count(box)
 
     def own_region(self, region, crs):
-        """A region of another CRS in that of the store: a GeoJSON dict of a MultiPolygon that names its CRS, with enough
-        corners to keep outlines within a millionth of their length; without the heights of a box. Raises: Error if no operation
-        converts from there."""
+        """Converts a region from another CRS to the store's CRS.
+
+        Corners are added so that outlines deviate by at most a millionth of their length. The heights of a box are
+        dropped.
+
+        Returns: a GeoJSON dict of a MultiPolygon that names its CRS.
+        Raises: ValueError; Error if no operation connects the two systems.
+        """
         text = crs_text(crs)
         if region is None or text is None:
             raise ValueError('own_region() needs a region and its CRS')
@@ -292,64 +331,80 @@ class Store:
                 'coordinates': [[ring + ring[:1] for ring in polygon] for polygon in polygons]}
 
     def query(self, *, box=None, near=None, k=None, radius=None, level=0, where=''):
-        """The points in a box, or near a place: the ``k`` nearest, or all within a ``radius`` in metres.
+        """Returns the points in a box, or near a place: the ``k`` nearest, or all within a ``radius``.
 
-        near: (x, y) or (x, y, z) in the store's CRS; without z heights do not count in distances, which are in metres
-        on the ground. where: a condition as in points(). Returns: a structured array as points() does; near a place
-        the nearest first, with a field ``distance``.
+        near: (x, y) or (x, y, z) in the store's CRS. Distances are in metres on the ground; they include heights only
+            if z is given.
+        radius: in metres.
+        where: a condition as in points().
+
+        Returns: a structured array as in points(). Near a place it is sorted by distance and has a field
+            ``distance``.
         """
         if (box is None) == (near is None):
             raise ValueError('query() needs either `box` or `near`')
-        level = whole(level, 'level', bits=32)
+        level = as_integer(level, 'level', bits=32)
         if box is not None:
             if k is not None or radius is not None:
-                raise ValueError('`k` and `radius` go with `near`')
+                raise ValueError('`k` and `radius` need `near`')
             return self.points(region=box, level=level, where=where)
         if (k is None) == (radius is None):
             raise ValueError('`near` needs either `k` or `radius`')
         place = [float(number) for number in near]
         if k is not None:
-            k = whole(k, 'k', 1)
+            k = as_integer(k, 'k', 1)
         return real_values(self._core.near(place, k, radius, level, where), self._info['attributes'])
 
     def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):
-        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, whole(level, 'level', bits=32), max_edge, (crs_text(crs) or ''),
+        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, as_integer(level, 'level', bits=32), max_edge, (crs_text(crs) or ''),
                             job(progress, threads, memory))
 
     def heights(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
                 memory=None):
-        """Heights of the surface at places.
+        """Returns the heights of the surface at places.
 
-        xy: shape (n, 2), in the store's CRS or in ``crs``. method: 'linear' on the triangulated samples or the Delaunay
-        triangulation of the points, 'natural' neighbours (Sibson), or 'nearest'. level: of the points that count.
-        max_edge: metres; triangles with a longer side do not count (not for rasters at level 0).
+        Pass many places at once: each takes about a microsecond, and only the parts of the store around them are
+        read.
 
-        Returns: float64, shape (n,), in the store's vertical unit; NaN where there is no surface. Give many places
-        at once: about a microsecond each, and the parts of the store around them are read.
+        xy: shape (n, 2), in the store's CRS or in ``crs``.
+        method: 'linear' on the triangulated samples of a raster or the Delaunay triangulation of points, 'natural'
+            neighbours (Sibson), or 'nearest'.
+        level: the points to use: those of this level and above.
+        max_edge: in metres; triangles with a longer side are left out (not for rasters at level 0).
+
+        Returns: float64, shape (n,), in the store's vertical unit; NaN where there is no surface.
         """
         return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 0]
 
     def gradients(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
                   memory=None):
-        """Gradients of the surface at places, as heights(): float64, shape (n, 2), metres of height gained per metre
-        on the ground going east and north (of the store's CRS)."""
+        """Returns the gradients of the surface at places, east and north in the store's CRS.
+
+        The arguments are those of heights().
+
+        Returns: float64, shape (n, 2), in metres of height per metre on the ground; NaN where there is no surface.
+        """
         return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 1:]
 
     def raster(self, value='height', *, cell=None, align=None, region=None, crs=None, method='linear', level=0, max_edge=None,
                path=None, replace=False, progress=None, threads=None, memory=None):
-        """The surface on a grid: 'height', 'slope' (degrees), 'aspect' (degrees clockwise from north, downhill) or
-        'hillshade' (1 to 255, 0 where there is none).
+        """Computes the surface, or a value derived from it, on a grid.
 
-        cell: side of a cell in units of the output's CRS, at whose multiples cells begin, so that rasters of one cell size
-        fit each other; by default a raster's own. align: in its place, the name of a raster whose cells, all of them, and
-        CRS are taken. region: box or polygons. crs: of the output. path: where to write it as a Cloud Optimized GeoTIFF,
-        with ``replace`` over what is there.
+        value: 'height', 'slope' (degrees), 'aspect' (degrees clockwise from north, downhill) or 'hillshade' (1 to
+            255, 0 where there is no surface).
+        cell: the side of a cell in units of the output's CRS; a raster's own by default. Cells begin at multiples of
+            it, so rasters with equal cells align.
+        align: a raster file whose grid and CRS to use; replaces ``cell``.
+        region: a box or polygons, as in points().
+        crs: of the output; the store's by default.
+        path: a Cloud Optimized GeoTIFF to write.
+        replace: whether an existing file is overwritten.
 
         Returns: a Raster: ``values``, ``transform``, ``crs``.
         """
         def make(name):
             _core.write_raster(self._core, os.fsencode(name), value, cell, b'' if align is None else os.fsencode(align),
-                               as_region(region), (crs_text(crs) or ''), method, whole(level, 'level', bits=32),
+                               as_region(region), (crs_text(crs) or ''), method, as_integer(level, 'level', bits=32),
                                max_edge, replace, job(progress, threads, memory))
             return read_raster(name)
 
@@ -359,51 +414,57 @@ class Store:
             return make(os.path.join(folder, 'raster.tif'))
 
     def profile(self, line, step=None, *, method='linear', level=0, max_edge=None, progress=None, threads=None):
-        """The surface along a line.
+        """Returns the surface along a line.
 
-        line: shape (n, 2), in the store's CRS, or a GeoJSON dict or an object with ``__geo_interface__`` of a LineString,
-        in the CRS that points() takes a region in. step: metres;
-        without it the line's own places and every place where the linear surface bends.
+        line: shape (n, 2), in the store's CRS; or a LineString as a GeoJSON dict or an object with
+            ``__geo_interface__``, with the CRS rules of a region in points().
+        step: in metres. By default the profile has the line's own vertices and every place where the linear surface
+            bends.
 
-        Returns: float64, shape (m, 4): metres from the line's begin (geodesic where the CRS is known), x, y, height
-        (NaN where there is none).
+        Returns: float64, shape (m, 4): metres from the start of the line (geodesic if the CRS is known), x, y, height
+            (NaN where there is no surface).
         """
         crs = None
         if hasattr(line, '__geo_interface__') or isinstance(line, dict):
             line, crs = geojson(line)
             line = np.asarray([place[:2] for place in line['coordinates']])
-        return _core.profile(self._core, as_rows(line, 'line', (2,)), crs, step, method, whole(level, 'level', bits=32), max_edge,
+        return _core.profile(self._core, as_rows(line, 'line', (2,)), crs, step, method, as_integer(level, 'level', bits=32), max_edge,
                              job(progress, threads))
 
     def contours(self, interval, *, level=0, max_edge=None, region=None, lonlat=None, progress=None, threads=None,
                  memory=None):
-        """Lines of equal height, every ``interval`` in the store's vertical unit.
+        """Returns contour lines of the surface.
 
-        lonlat: True for longitude and latitude of WGS 84, as GeoJSON has them; False for the store's own x and y; by
-        default the first where its CRS leads there, else the second, which is logged.
+        interval: the height between contours, in the store's vertical unit.
+        lonlat: True for longitude and latitude in WGS 84, as GeoJSON requires; False for the store's x and y. By
+            default longitude and latitude if the CRS can be converted to them; otherwise x and y, which is logged.
 
-        Returns: a FeatureCollection (a dict, with ``__geo_interface__``) of LineStrings, each with its height as the
-        property ``elev``; higher ground is on a line's right. Raises: Error if longitudes and latitudes are not known.
+        Returns: a FeatureCollection (a dict, with ``__geo_interface__``) of LineStrings, each with its height in the
+            property ``elev``. Higher ground is to the right of a line.
+        Raises: Error if longitude and latitude are requested but not known.
         """
-        text, own = _core.contours(self._core, float(interval), whole(level, 'level', bits=32), max_edge, as_region(region),
+        text, own = _core.contours(self._core, float(interval), as_integer(level, 'level', bits=32), max_edge, as_region(region),
                                    None if lonlat is None else bool(lonlat), job(progress, threads, memory))
         if own and lonlat is None:
-            notes.info('contours are in the store\'s own x and y: nothing leads from its CRS to WGS 84')
+            notes.info('contours are in the store\'s own x and y: its CRS cannot be converted to WGS 84')
         lines = FeatureCollection(json.loads(text))
         lines._units = _core.units(self._core) if own else _core.lonlat_units()
         return lines
 
     def mesh(self, level=None, region=None, *, focus=(), where=None, cluster=None, metric='euclidean', crs=None, max_points=None,
              smoothing=None, overlay=None, save_overlay=None, replace=False, progress=None, threads=None, memory=None):
-        """The Delaunay triangulation of a level, with finer detail in focuses.
+        """Returns the Delaunay triangulation of a level, with finer detail in focuses.
 
-        Where a raster has no data there are no triangles, but for gaps narrower than the clusters beside them.
+        Areas of a raster without data have no triangles, unless they are narrower than the clusters next to them.
 
-        level: by default the finest of at most ``max_points`` (100,000). region, focus, where, cluster, crs: as
-        points(); the triangles that reach into the region come whole. metric: 'elliptical:FILE' lets triangles follow
-        it. smoothing: a method of Delaunay2.smooth(), or a dict of ``method`` and its options; with a region inside it
-        only. overlay: a file of other heights, which ``save_overlay`` writes: those that are not the store's, which
-        never changes; with ``replace`` over what is there.
+        level: by default the finest level with at most ``max_points`` points (100,000).
+        region, focus, where, cluster, crs: as in points(). Triangles that reach into the region are not cut.
+        metric: 'elliptical:FILE' adapts the triangles to a metric.
+        smoothing: a method of Delaunay2.smooth(), or a dict of ``method`` and its options. With a region, only
+            heights inside it are smoothed.
+        overlay: a file of heights that replace the store's.
+        save_overlay: a file to write, with the heights that differ from the store's. The store never changes.
+        replace: whether an existing overlay file is overwritten.
 
         Returns: a Mesh, which unpacks as (vertices, triangles).
         """
@@ -414,51 +475,65 @@ class Store:
         if level is None:
             level = self.level_within(100_000 if max_points is None else max_points)
         elif max_points is not None:
-            raise ValueError('mesh() takes either `level` or `max_points`')
+            raise ValueError('mesh() accepts either `level` or `max_points`')
         heights = {'replace': bool(replace)}
         if smoothing is not None:
             heights['smoothing'] = _smoothing(**({'method': smoothing} if isinstance(smoothing, str) else smoothing))
         for name, path in (('overlay', overlay), ('save', save_overlay)):
             if path is not None:
                 heights[name] = os.fsencode(path)
-        return Mesh._of(_core.mesh(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '',
+        return Mesh._of(_core.mesh(self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '',
                                    cluster, metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
 
     def lines(self, level=0, region=None, where=None, *, focus=(), progress=None, threads=None, memory=None):
-        """The lines of a store that was built with ``entities`` 'segments' or 'polylines', of mixed levels of detail.
+        """Returns the lines of a store built with ``entities`` 'segments' or 'polylines', at mixed levels of detail.
 
-        level, region, where, focus: as points(); a piece is where its first vertex is. Returns: (lines, a list of
-        float64 arrays of shape (n, 3), n >= 2; the number of each in the order in which they were read, int64): a line of which
-        something is not wanted comes in several. Raises: ValueError for a store of something else. All in memory.
+        All lines are held in memory. A line is divided where parts of it are left out.
+
+        level, region, where, focus: as in points(). A piece belongs to the region that contains its first vertex.
+
+        Returns: (lines, a list of float64 arrays of shape (n, 3), n >= 2; numbers, int64, the position of each line
+            in the input).
+        Raises: ValueError if the store has no lines.
         """
-        vertices, begins, numbers = _core.lines(self._core, whole(level, 'level', bits=32), as_region(region), self._focuses(focus),
+        vertices, begins, numbers = _core.lines(self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus),
                                                 where or '', job(progress, threads, memory))
         return np.split(vertices, begins[1:-1]) if len(numbers) else [], numbers
 
     def surface(self, level=0, region=None, where=None, *, tetrahedra=False, progress=None, threads=None, memory=None):
-        """The surface that a scan was taken from: of any shape, in space, through its points. All in memory.
+        """Reconstructs the surface in space that a scan was taken from, through its points.
 
-        level, region, where: as points(). Returns: a Mesh, whose triangles are counter-clockwise seen from outside. Where
-        the scan does not go all round, the surface is open. With ``tetrahedra`` (vertices, float64, shape (n, 3);
-        those inside the closed surface, uint32, shape (m, 4)). Source: J. Skala, section 8.3.
+        The surface is open where the scan does not go all the way round. All points are held in memory.
+
+        level, region, where: as in points().
+        tetrahedra: whether to return the solid inside the closed surface instead.
+
+        Returns: a Mesh with triangles counter-clockwise seen from outside; with ``tetrahedra`` (vertices, float64,
+            shape (n, 3); tetrahedra, uint32, shape (m, 4)).
+
+        Source: J. Skala, section 8.3.
         """
-        made = _core.surface(self._core, whole(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
+        made = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
                              job(progress, threads, memory))
         return made if tetrahedra else Mesh._of(made)
 
     def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
                      region=None, where=None, crs=None, path=None, replace=False, progress=None, threads=None, memory=None):
-        """The mesh with the fewest triangles that is within ``max_error`` metres of every sample, verified on each,
-        or the best of at most ``max_points`` vertices.
+        """Returns a mesh with few triangles that is within ``max_error`` metres of every sample, verified on each.
 
-        quality: 'greedy', 'removal' or 'fitted', each with fewer triangles and more time. duplicates: which of samples
-        at one place counts: 'all', 'min', 'max', 'mean', 'first', 'error'. fill: of a raster's cells without data:
-        'none' leaves holes, 'flat', 'interpolate'. path: where to write it (.ply, .obj, .glb); other formats than PLY round
-        numbers in their own way and get a mesh that is verified as they have it. crs: of the vertices, in place of the
-        store's; the bound holds over its x and y. In .glb the coordinates are metres, see Mesh.save().
+        Give either max_error or max_points. The mesh is computed window by window; memory is constant apart from the
+        result.
 
-        Returns: a BoundedMesh: ``vertices``, ``triangles``, ``max_error``, ``rms_error``. It is made window by window
-        in constant memory, but for the arrays.
+        max_points: instead of bounding the error, makes the best mesh with at most this many vertices.
+        quality: 'greedy', 'removal' or 'fitted'. Each has fewer triangles than the one before and takes longer.
+        duplicates: the sample to use of several at one place: 'all', 'min', 'max', 'mean', 'first' or 'error'.
+        fill: a raster's cells without data: 'none' leaves holes; 'flat' and 'interpolate' fill them.
+        region, where: as in points().
+        crs: of the vertices; the store's by default. The bound holds over x and y in that CRS.
+        path: a file to write: .ply, .obj or .glb. Formats other than PLY round numbers, and the mesh is verified as
+            the file has it. Coordinates in .glb are in metres, see Mesh.save().
+
+        Returns: a BoundedMesh: ``vertices``, ``triangles``, ``max_error``, ``rms_error``.
         """
         if (max_error is None) == (max_points is None):
             raise ValueError('bounded_mesh() needs either `max_error` or `max_points`')
@@ -467,17 +542,17 @@ class Store:
         if max_error is not None:
             max_error = float(max_error)
             if not 0 <= max_error < math.inf:
-                raise ValueError(f'`max_error` is a number of metres, not {max_error}')
+                raise ValueError(f'`max_error` must be a number of metres, not {max_error}')
             options['max_error'] = max_error
         else:
-            options['max_points'] = whole(max_points, 'max_points', 3)
-        how = job(progress, threads, memory)
+            options['max_points'] = as_integer(max_points, 'max_points', 3)
+        context = job(progress, threads, memory)
 
         def make(name, say=None):
-            measured = _core.bounded_mesh(self._core, os.fsencode(name), options, how)
+            measured = _core.bounded_mesh(self._core, os.fsencode(name), options, context)
             if say and measured['note']:
                 say(measured['note'])
-            if measured['triangles'] == 0:  # such a file is not read as a mesh
+            if measured['triangles'] == 0:  # Mesh.read() refuses such a file
                 return BoundedMesh(np.empty((0, 3)), np.empty((0, 3), np.uint32), measured)
             return BoundedMesh(*_core.read_mesh(os.fsencode(name))[:2], measured)
 
@@ -485,7 +560,7 @@ class Store:
             path = os.fspath(path)
             if path.endswith('.ply'):
                 return make(path, say=notes.info)
-            note = _core.bounded_mesh(self._core, os.fsencode(path), options, how)['note']
+            note = _core.bounded_mesh(self._core, os.fsencode(path), options, context)['note']
             if note:
                 notes.info(note)
         with tempfile.TemporaryDirectory() as folder:
@@ -494,16 +569,17 @@ class Store:
     def tiles(self, folder, zooms=None, *, progress=None, threads=None, memory=None, **options):
         """Writes quantized-mesh tiles for web globes, and layer.json.
 
-        zooms: (first, last); by default from 0 to the zoom that shows every sample. Options: ``max_error`` (metres at
-        the deepest zoom), ``quality``, ``vertical`` ('recorded', 'ellipsoidal', 'orthometric', 'ignore'), ``geoid`` (a
-        file), ``fill`` ('interpolate', 'flat' with ``flat_height``), ``water``, ``water_height``, ``normals``,
-        ``metadata``, ``gzip``, ``name``, ``resume`` (keep what is up to date), ``replace``.
+        zooms: (first, last); by default from 0 to the zoom that shows every sample.
+        options: ``max_error`` (metres at the deepest zoom), ``quality``, ``vertical`` ('recorded', 'ellipsoidal',
+            'orthometric' or 'ignore'), ``geoid`` (a file), ``fill`` ('interpolate', or 'flat' with ``flat_height``),
+            ``water``, ``water_height``, ``normals``, ``metadata``, ``gzip``, ``name``, ``resume`` (keep tiles that
+            are up to date), ``replace``.
 
-        Returns: a dict: tiles, bytes, made, kept, removed, zooms (zoom, tiles, max_error).
+        Returns: a dict with tiles, bytes, made, kept, removed and zooms (zoom, tiles, max_error).
         """
         given = checked(options, _TILE_OPTIONS, 'tiles')
         if zooms is not None:
-            given['first_zoom'], given['last_zoom'] = (whole(zoom, 'zooms', bits=32) for zoom in zooms)
+            given['first_zoom'], given['last_zoom'] = (as_integer(zoom, 'zooms', bits=32) for zoom in zooms)
         return _core.write_tiles(self._core, os.fsencode(folder), given, job(progress, threads, memory))
 
     def verify(self, *, progress=None, threads=None):
@@ -512,6 +588,6 @@ class Store:
 
     @property
     def __geo_interface__(self):
-        """The bounds in the CRS as a GeoJSON Polygon."""
+        """The bounds in the store's CRS as a GeoJSON Polygon."""
         x0, y0, _, x1, y1, _ = self.bounds
         return {'type': 'Polygon', 'coordinates': (((x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)),)}

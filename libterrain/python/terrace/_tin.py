@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes with a bound of their error, and interpolation, straight from arrays."""
+"""Bounded-error meshes and interpolation, directly from arrays."""
 
 import math
 
 import numpy as np
 
 from . import _core
-from ._arrays import as_numbers, as_rows, whole
+from ._arrays import as_integer, as_numbers, as_rows
 from ._delaunay import Delaunay2
 from ._mesh import BoundedMesh
 from ._sources import source_of
@@ -18,20 +18,24 @@ def _values(column):
 
 def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal', duplicates='all', min_angle=5.0, frame=None, transform=None,
                  nodata=None):
-    """The mesh with few triangles that is within ``max_error`` of every sample, verified on each, or the best of at
-    most ``max_points`` vertices: of an array, without a store.
+    """Meshes an array with few triangles and within ``max_error`` of every sample, verified on each.
 
-    samples: points or a raster in memory, as build() takes them: shape (n, 3), or (rows, columns) with ``transform``, a
-    Raster, an xarray.DataArray, laspy's records. A raster is not rotated and has at most 65,535 rows and columns; NaN
-    and ``nodata`` in it are no samples, nor are points with a coordinate that is NaN. quality: 'greedy', 'removal' or
-    'fitted', each with fewer triangles and more time. duplicates: which of several points at one place counts: 'all',
-    'min', 'max', 'mean', 'first', 'error'. For points: ``min_angle``, degrees up to 30, below which removal makes no
-    triangle; frame: shape (k, 3), a convex polygon, counter-clockwise, in place of their hull, kept exactly; points
-    outside do not count.
+    Give either max_error or max_points. Store.bounded_mesh() handles data larger than memory.
 
-    Returns: a BoundedMesh; its errors are in the unit of heights. Raises: ValueError; TypeError for files. About 1 us
-    per vertex inserted. Source: M. Garland, P. Heckbert, CMU-CS-95-181. Store.bounded_mesh() is for what is larger than
-    memory.
+    samples: points or a raster in memory, as in build(): shape (n, 3), or (rows, columns) with ``transform``, a
+        Raster, an xarray.DataArray, or laspy's records. A raster must not be rotated and has at most 65,535 rows and
+        columns. Cells with NaN or ``nodata``, and points with a NaN coordinate, are skipped.
+    max_points: instead of bounding the error, makes the best mesh with at most this many vertices.
+    quality: 'greedy', 'removal' or 'fitted'. Each has fewer triangles than the one before and takes longer.
+    duplicates: the sample to use of several points at one place: 'all', 'min', 'max', 'mean', 'first' or 'error'.
+    min_angle: for points; in degrees, up to 30. Removal makes no triangle with a smaller angle.
+    frame: for points; shape (k, 3), a convex polygon, counter-clockwise, which replaces their hull and is kept
+        exactly. Points outside it are ignored.
+
+    Returns: a BoundedMesh, with errors in the unit of heights. Takes about 1 microsecond per inserted vertex.
+    Raises: ValueError; TypeError for files.
+
+    Source: M. Garland, P. Heckbert, CMU-CS-95-181.
 
     >>> y, x = np.mgrid[0:60, 0:80]
     >>> mesh = bounded_mesh(20 * np.sin(x / 9) * np.cos(y / 7), 0.5, transform=(10, 0, 0, 0, -10, 0))
@@ -42,11 +46,11 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
         raise ValueError('bounded_mesh() needs either `max_error` or `max_points`')
     bound = 0.0 if max_error is None else float(max_error)
     if not 0 <= bound < math.inf:
-        raise ValueError(f'`max_error` is a number, not negative, not {bound}')
-    most = 0 if max_points is None else whole(max_points, 'max_points', 4)
+        raise ValueError(f'`max_error` must be finite and not negative, not {bound}')
+    most = 0 if max_points is None else as_integer(max_points, 'max_points', 4)
     source, _ = source_of(samples, transform=transform, nodata=nodata)
     if isinstance(source, list):
-        raise TypeError('bounded_mesh() takes arrays; build() takes files')
+        raise TypeError('bounded_mesh() needs arrays; for files use build()')
     if 'columns' in source:
         frame = np.empty((0, 3)) if frame is None else as_rows(frame, 'frame', (3,))
         coordinates = [_values(column) for column in source['columns']]
@@ -55,10 +59,10 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
             coordinates = [column[known] for column in coordinates]
         return BoundedMesh(*_core.tin_of_points(*coordinates, bound, most, quality, duplicates, float(min_angle), frame))
     if frame is not None:
-        raise ValueError('`frame` is for points')
+        raise ValueError('rasters do not support `frame`')
     a, b, c, d, e, f = source['transform']
     if b != 0 or d != 0:
-        raise ValueError('the raster is rotated: build a store of it, or give points')
+        raise ValueError('the raster is rotated: build a store of it, or pass points')
     heights = source['samples']
     missing = None if source['nodata'] is None else heights == source['nodata']
     heights = np.array(heights, dtype=np.float32 if heights.dtype == np.float32 else np.float64)
@@ -73,12 +77,16 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
 
 
 def interpolate(samples, places, method='linear', *, threads=None):
-    """Heights at places between scattered samples, as scipy.interpolate.griddata.
+    """Interpolates heights at places between scattered samples, as scipy.interpolate.griddata does.
 
-    samples: shape (n, 3): x, y and the value; of samples at one place the last counts. places: shape (m, 2). method:
-    'linear' (in Delaunay's triangles), 'natural' (Sibson's natural neighbours) or 'nearest'. Returns: float64, shape (m,);
-    NaN outside the hull, but for 'nearest'. Raises: ValueError. For gradients, or to ask more than once, see
-    Delaunay2.heights().
+    To compute gradients, or to interpolate repeatedly, use Delaunay2.heights().
+
+    samples: shape (n, 3): x, y and the value. Of several samples at one place the last one is used.
+    places: shape (m, 2).
+    method: 'linear' (in Delaunay triangles), 'natural' (Sibson's natural neighbours) or 'nearest'.
+
+    Returns: float64, shape (m,); NaN outside the hull, except with 'nearest'.
+    Raises: ValueError.
 
     >>> interpolate([[0, 0, 1], [1, 0, 2], [0, 1, 3]], [[0.25, 0.5], [2, 2]])
     array([2.25,  nan])
@@ -89,13 +97,18 @@ def interpolate(samples, places, method='linear', *, threads=None):
 
 
 def simplify_line(t, heights, max_error):
-    """A chain of few of the samples along a line within ``max_error`` of each: the ends, then the sample of greatest
-    error, and so on.
+    """Selects few samples of a line so that the straight pieces between them are within ``max_error`` of all samples.
 
-    t: positions along the line, ascending, shape (n,); of equal ones the first counts. heights: one for each. Returns:
-    (the samples that are kept, int64, ascending; the largest error). It depends on these samples alone, so both sides
-    of a border get the same chain. Usually O(n log n). Raises: ValueError. Source: D. Douglas, T. Peucker, 1973, with
-    vertical distances.
+    It takes both ends, then repeatedly the sample with the largest error. The result depends only on these samples,
+    so both sides of a border get the same chain.
+
+    t: positions along the line, ascending, shape (n,). Of equal positions the first one is used.
+    heights: one per position.
+
+    Returns: (the indices of the selected samples, int64, ascending; the largest error). Usually O(n log n).
+    Raises: ValueError.
+
+    Source: D. Douglas, T. Peucker, 1973, with vertical distances.
 
     >>> simplify_line([0, 1, 2, 3], [0, 0.1, 0, 5], 0.5)
     (array([0, 2, 3]), 0.1)

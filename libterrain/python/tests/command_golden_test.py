@@ -50,8 +50,8 @@ class Golden(unittest.TestCase):
         expected = self.lines[command]
         name = shlex.split(command)[shlex.split(command).index('-o') + 1]
         if summary is not None:
-            told = json.loads(next(line for line in expected if line.startswith('summary '))[8:])
-            self.assertEqual(summary, {key: told[key] for key in summary}, command)
+            listed = json.loads(next(line for line in expected if line.startswith('summary '))[8:])
+            self.assertEqual(summary, {key: listed[key] for key in summary}, command)
             return
         found = golden_test.hash_lines('.', '', name, rounded=False)
         # The journal of a set of tiles may change between releases.

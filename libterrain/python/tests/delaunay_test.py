@@ -167,22 +167,22 @@ class Triangulations(unittest.TestCase):
                 made.remove(random.choice(made.vertices, 30, replace=False))
                 if step % 2:
                     made.insert(random.random((5, width)))
-                told = made.changes()
-                for vertex, place in zip(told.removed_vertices.tolist(), told.removed_points):
+                changes = made.changes()
+                for vertex, place in zip(changes.removed_vertices.tolist(), changes.removed_points):
                     self.assertEqual(places.pop(vertex), tuple(place))
-                places.update(zip(told.added_vertices.tolist(), map(tuple, made.points[told.added_vertices])))
-                gone = {frozenset(row) for row in told.removed_simplices.tolist()}
+                places.update(zip(changes.added_vertices.tolist(), map(tuple, made.points[changes.added_vertices])))
+                gone = {frozenset(row) for row in changes.removed_simplices.tolist()}
                 self.assertTrue(gone <= simplices)
-                simplices = (simplices - gone) | {frozenset(row) for row in told.added_simplices.tolist()}
+                simplices = (simplices - gone) | {frozenset(row) for row in changes.added_simplices.tolist()}
                 self.assertEqual(simplices, {frozenset(row) for row in made.simplices.tolist()})
                 self.assertEqual(places, dict(zip(made.vertices.tolist(), map(tuple, made.points[made.vertices]))))
             self.assertEqual(len(added), 40)
             before = made.changes()
-            self.assertEqual((len(before.added_vertices), before.added_simplices.shape[1:]), (0, told.added_simplices.shape[1:]))
+            self.assertEqual((len(before.added_vertices), before.added_simplices.shape[1:]), (0, changes.added_simplices.shape[1:]))
             both = made.insert(random.random((4, width)))
             made.remove(both)
-            self.assertEqual(len(made.changes().added_vertices), 0)  # came and went
-            self.assertIn('came', repr(told))
+            self.assertEqual(len(made.changes().added_vertices), 0)  # inserted and removed
+            self.assertIn('added', repr(changes))
 
     def test_vertex_neighbours_are_scipys(self):
         for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3)):

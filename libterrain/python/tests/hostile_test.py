@@ -261,9 +261,9 @@ class Hostile(unittest.TestCase):
                                             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True))
                     for seed in seeds]
         for seed, child in children:
-            told = child.communicate()[0]
-            self.assertEqual(child.returncode, 0, f'seed {seed}: {told[-8000:]}')
-            self.assertGreater(int(told.split('done')[1]), CALLS // 50, f'seed {seed}: hardly a call went through')
+            output = child.communicate()[0]
+            self.assertEqual(child.returncode, 0, f'seed {seed}: {output[-8000:]}')
+            self.assertGreater(int(output.split('done')[1]), CALLS // 50, f'seed {seed}: hardly a call went through')
 
     def test_nothing_crashes(self):
         if SECONDS == 0:

@@ -84,9 +84,9 @@ class Jobs(StoreCase):
                 except KeyboardInterrupt:
                     print('interrupted')
         ''')
-        told = subprocess.run([sys.executable, '-c', code, self.path('cloud'), self.path('interrupted-tiles')],
+        output = subprocess.run([sys.executable, '-c', code, self.path('cloud'), self.path('interrupted-tiles')],
                               stdout=subprocess.PIPE, text=True, check=True).stdout
-        self.assertEqual(told.split(), ['interrupted'] * 12)
+        self.assertEqual(output.split(), ['interrupted'] * 12)
         self.assertFalse(os.path.exists(self.path('interrupted-tiles.laz')))
 
     def test_ctrl_c_ends_work_in_memory_that_would_take_minutes(self):
@@ -108,8 +108,8 @@ class Jobs(StoreCase):
                     print('interrupted')
         ''')
         with subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True) as child:
-            told, _ = child.communicate(timeout=600)
-        self.assertEqual(told.split(), ['interrupted'] * 11)
+            output, _ = child.communicate(timeout=600)
+        self.assertEqual(output.split(), ['interrupted'] * 11)
 
     def test_other_threads_go_on(self):
         turns, stop = [0], threading.Event()
@@ -153,10 +153,10 @@ class Jobs(StoreCase):
 
     def shown(self, hidden):
         code = f'import sys; sys.modules[{hidden!r}] = None; import terrace; terrace.build({ALPS!r}, sys.argv[1], progress=True)'
-        told = subprocess.run([sys.executable, '-c', code, self.path(f'without-{hidden}')], stderr=subprocess.PIPE, text=True,
+        output = subprocess.run([sys.executable, '-c', code, self.path(f'without-{hidden}')], stderr=subprocess.PIPE, text=True,
                               check=True).stderr
-        self.assertTrue(told.endswith('\n'))
-        return told
+        self.assertTrue(output.endswith('\n'))
+        return output
 
     def test_a_line_of_progress(self):
         self.assertRegex(self.shown(hidden='tqdm'), r'\d+ % [\d,]+ points')

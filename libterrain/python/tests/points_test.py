@@ -23,9 +23,9 @@ class Points(StoreCase):
         records = self.records()
         for ending in ('ply', 'csv', 'xyz', 'las', 'laz', 'copc.laz'):
             path = self.path('points.' + ending)
-            told = terrace.write_points(path, records, crs='EPSG:32632')
-            self.assertEqual(told['points'], len(records))
-            self.assertLess(told['rounding'], 1e-9)
+            written = terrace.write_points(path, records, crs='EPSG:32632')
+            self.assertEqual(written['points'], len(records))
+            self.assertLess(written['rounding'], 1e-9)
             back = terrace.read_points(path)
             if ending == 'copc.laz':
                 back, records = np.sort(back, order=['x', 'y', 'z']), np.sort(records, order=['x', 'y', 'z'])
@@ -63,8 +63,8 @@ class Points(StoreCase):
         got = terrace.read_points(path, where='classification == 2', region=(0, 0, 300500, 1e7), keep=['intensity'])
         self.assertEqual(got.dtype.names, ('x', 'y', 'z', 'intensity'))
         np.testing.assert_array_equal(got['intensity'], wanted['intensity'])
-        told = terrace.write_points(self.path('part.ply'), path, where='classification == 2', region=(0, 0, 300500, 1e7))
-        self.assertEqual(told['points'], len(wanted))
+        written = terrace.write_points(self.path('part.ply'), path, where='classification == 2', region=(0, 0, 300500, 1e7))
+        self.assertEqual(written['points'], len(wanted))
 
     def test_longitudes_of_regions_may_be_whole_turns_away(self):
         samples, transform = np.arange(400, dtype=np.int16).reshape(20, 20), (1 / 1200, 0, 8.3, 0, -1 / 1200, 46.5)

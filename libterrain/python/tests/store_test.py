@@ -269,7 +269,7 @@ class Stores(StoreCase):
         # On the ground: the map's scale is within a thousandth.
         np.testing.assert_allclose(got['distance'], distances[order], rtol=1e-3)
         self.assertEqual(len(self.scan.query(near=place, k=10 ** 6)), len(self.points))
-        with self.assertRaisesRegex(ValueError, '`k` is at least 1'):
+        with self.assertRaisesRegex(ValueError, '`k` must be at least 1'):
             self.scan.query(near=place, k=0)
         within = self.scan.query(near=place, radius=50.0)
         self.assertTrue((within['distance'] <= 50).all())
@@ -345,7 +345,7 @@ class Stores(StoreCase):
                            ('seed', lambda: terrace.kmeans(self.points, 3, seed=2 ** 64)), ('rounds', lambda: terrace.matching(self.points, rounds=2 ** 32)),
                            ('threads', lambda: terrace.linkage(self.points, threads=2 ** 32)),
                            ('passes', lambda: terrace.rotate_tree([[0, 1]], [[0, 0], [1, 1]], passes=2 ** 32))):
-            with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` is below 2\\^(32|64)'):
+            with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` must be below 2\\^(32|64)'):
                 call()
 
     def test_names_that_promise_another_format_are_refused(self):
@@ -453,7 +453,7 @@ class Sources(StoreCase):
                 return np.column_stack([self[name] for name in self.columns])
         self.assert_same(Frame(), self.scan, **options)
         for wrong in ({'attributes': {'more': self.classes}}, {'nodata': 0}, {'transform': TRANSFORM}):
-            with self.assertRaisesRegex(ValueError, 'are not for columns'):
+            with self.assertRaisesRegex(ValueError, 'columns do not support'):
                 self.built(columns, **wrong)
         wide = np.zeros((2 * len(self.points), 5))
         wide[::2, 1:4] = self.points

@@ -55,8 +55,8 @@ class Stubs(unittest.TestCase):
                                        ('also.py', SCRIPT.replace('max_error=', 'maximum='), 1)):
                 with open(os.path.join(folder, name), 'w', encoding='utf-8') as file:
                     file.write(textwrap.dedent(text))
-                told = mypy(folder, 'mypy', '--strict', '--no-error-summary', name)
-                self.assertEqual(told.returncode, faults, told.stdout)
+                result = mypy(folder, 'mypy', '--strict', '--no-error-summary', name)
+                self.assertEqual(result.returncode, faults, result.stdout)
 
     def test_the_stubs_are_true(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -65,8 +65,8 @@ class Stubs(unittest.TestCase):
                 for name in os.listdir(terrace.__path__[0]):
                     if name.startswith('_') and name.endswith('.py') and name != '__init__.py':
                         file.write(f'[mypy-terrace.{name[:-3]}]\nignore_errors = True\n')
-            told = mypy(folder, 'mypy.stubtest', 'terrace', '--ignore-missing-stub', '--mypy-config-file', 'mypy.ini')
-            self.assertEqual(told.returncode, 0, told.stdout)
+            result = mypy(folder, 'mypy.stubtest', 'terrace', '--ignore-missing-stub', '--mypy-config-file', 'mypy.ini')
+            self.assertEqual(result.returncode, 0, result.stdout)
 
 
 if __name__ == '__main__':

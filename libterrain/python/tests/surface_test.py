@@ -90,10 +90,10 @@ class MeshesOfArrays(unittest.TestCase):
     def test_errors_of_any_mesh(self):
         samples = self.wavy()
         mesh = terrace.bounded_mesh(samples, 0.1)
-        told = mesh.errors(samples)
-        self.assertEqual((told['samples'], told['uncovered']), (3000, 0))
-        self.assertAlmostEqual(told['max_error'], mesh.max_error, places=12)
-        self.check_bound(mesh, samples, told['max_error'])
+        report = mesh.errors(samples)
+        self.assertEqual((report['samples'], report['uncovered']), (3000, 0))
+        self.assertAlmostEqual(report['max_error'], mesh.max_error, places=12)
+        self.check_bound(mesh, samples, report['max_error'])
         above = samples + [0, 0, 10]
         self.assertAlmostEqual(mesh.errors(np.vstack((above, [[9, 9, 0]])))['rms_error'], 10, delta=0.1)
         self.assertEqual(mesh.errors([])['worst'], -1)
@@ -191,12 +191,12 @@ class Interpolation(unittest.TestCase):
         for method in ('linear', 'natural', 'nearest'):
             apart = samples[:, 2] - mesh.heights(wavy, self.asked, method)
             measured = ~np.isnan(apart)
-            told = mesh.vertical_distances(wavy, samples, method)
-            self.assertEqual((told['count'], told['outside']), (measured.sum(), (~measured).sum()))
+            report = mesh.vertical_distances(wavy, samples, method)
+            self.assertEqual((report['count'], report['outside']), (measured.sum(), (~measured).sum()))
             for name, expected in (('max', np.nanmax(np.abs(apart))), ('mean', np.nanmean(np.abs(apart))), ('bias', np.nanmean(apart)),
                                    ('rms', np.sqrt(np.nanmean(apart ** 2)))):
-                self.assertAlmostEqual(told[name], expected, places=12)
-            self.assertEqual(told['worst'], np.nanargmax(np.abs(apart)))
+                self.assertAlmostEqual(report[name], expected, places=12)
+            self.assertEqual(report['worst'], np.nanargmax(np.abs(apart)))
         self.assertEqual(mesh.vertical_distances(wavy, [])['worst'], -1)
         for wrong in (lambda: mesh.vertical_distances(wavy[:9], samples), lambda: mesh.vertical_distances(wavy, self.asked)):
             with self.assertRaises(ValueError):
@@ -236,15 +236,15 @@ class Interpolation(unittest.TestCase):
 
     def test_quality(self):
         mesh = terrace.Delaunay2(self.xy)
-        told = mesh.quality(mesh.by_vertex(np.full(3000, 2.0)), datum=0.5)
+        report = mesh.quality(mesh.by_vertex(np.full(3000, 2.0)), datum=0.5)
         a, b, c = (mesh.points[mesh.simplices[:, i]] for i in range(3))
         area = np.abs(np.cross(b - a, c - a)).sum() / 2
-        self.assertEqual(told['triangles'], len(mesh.simplices))
+        self.assertEqual(report['triangles'], len(mesh.simplices))
         for name, expected in (('area', area), ('surface_area', area), ('volume_above', 1.5 * area), ('volume_below', 0)):
-            self.assertAlmostEqual(told[name], expected, places=9)
+            self.assertAlmostEqual(report[name], expected, places=9)
         lengths = np.linalg.norm(np.concatenate((b - a, c - b, a - c)), axis=1)
-        self.assertAlmostEqual(told['max_edge'], lengths.max(), places=12)
-        self.assertAlmostEqual(told['min_edge'], lengths.min(), places=12)
+        self.assertAlmostEqual(report['max_edge'], lengths.max(), places=12)
+        self.assertAlmostEqual(report['min_edge'], lengths.min(), places=12)
 
     def test_misuse(self):
         mesh = terrace.Delaunay2(self.xy)
@@ -361,9 +361,9 @@ class Shapes(unittest.TestCase):
         more /= np.linalg.norm(more, axis=1)[:, None]
         made.remove(made.ids[:150])
         made.insert(more)
-        told = made.mesh().measures()
-        self.assertEqual((told['components'], told['euler_characteristic'], told['closed']), (1, 2, True))
-        self.assertAlmostEqual(told['volume'], 4 / 3 * np.pi, delta=0.1)
+        report = made.mesh().measures()
+        self.assertEqual((report['components'], report['euler_characteristic'], report['closed']), (1, 2, True))
+        self.assertAlmostEqual(report['volume'], 4 / 3 * np.pi, delta=0.1)
         made.restore()
         self.assertEqual(made.digest(), terrace.DynamicSurface(np.vstack((ball[150:], more))).digest())
         self.assertIn('triangles', repr(made))
@@ -386,13 +386,13 @@ class Shapes(unittest.TestCase):
 
         outward = terrace.Delaunay3(corners + np.random.default_rng(2).normal(scale=1e-3, size=(8, 3))).shape('flood').surface
         inside_out = terrace.Mesh(outward.vertices, outward.triangles[:, ::-1])
-        told = inside_out.measures()
-        self.assertAlmostEqual(told['volume'], signed(inside_out), places=12)
-        self.assertLess(told['volume'], -5.9)
+        report = inside_out.measures()
+        self.assertAlmostEqual(report['volume'], signed(inside_out), places=12)
+        self.assertLess(report['volume'], -5.9)
         turned = inside_out.turned_outward()
-        self.assertAlmostEqual(turned.measures()['volume'], -told['volume'], places=12)
-        self.assertAlmostEqual(turned.area(), told['area'], places=9)
-        self.assertEqual((told['faces'], told['vertices'], told['edges'], told['euler_characteristic'], told['border_edges'], told['components']),
+        self.assertAlmostEqual(turned.measures()['volume'], -report['volume'], places=12)
+        self.assertAlmostEqual(turned.area(), report['area'], places=9)
+        self.assertEqual((report['faces'], report['vertices'], report['edges'], report['euler_characteristic'], report['border_edges'], report['components']),
                          (12, 8, 18, 2, 0, 1))
         opened = terrace.Mesh(outward.vertices, outward.triangles[1:]).measures()
         self.assertEqual((opened['border_edges'], opened['closed']), (3, False))

@@ -18,18 +18,18 @@ from python_case import COMMAND, TRANSFORM, StoreCase, sorted_rows
 class Tiles(StoreCase):
     def test_a_set_of_tiles(self):
         folder = self.path('tiles')
-        told = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal')
+        report = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal')
         with open(os.path.join(folder, 'layer.json'), encoding='utf-8') as file:
             self.assertEqual(json.load(file)['format'], 'quantized-mesh-1.0')
         tiles = [os.path.join(root, name) for root, _, names in os.walk(folder) for name in names
                  if name.endswith('.terrain')]
-        self.assertEqual(len(tiles), told['tiles'])
-        self.assertEqual([zoom['zoom'] for zoom in told['zooms']], list(range(13)))
+        self.assertEqual(len(tiles), report['tiles'])
+        self.assertEqual([zoom['zoom'] for zoom in report['zooms']], list(range(13)))
         with open(tiles[0], 'rb') as file:
             head = struct.unpack('<3d2f', file.read(32))
         self.assertTrue(all(abs(c) < 7e6 for c in head[:3]))
         again = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal', resume=True)
-        self.assertEqual((again['made'], again['kept']), (0, told['tiles']))
+        self.assertEqual((again['made'], again['kept']), (0, report['tiles']))
         if COMMAND:
             subprocess.run([COMMAND, 'verify', folder, '--store', self.path('hills'), '--vertical', 'ellipsoidal', '-q'], check=True)
             other = self.path('tiles-of-command')
@@ -41,9 +41,9 @@ class Tiles(StoreCase):
 
     def test_the_check_of_a_set(self):
         folder = self.path('checked')
-        told = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal', max_error=2)
+        report = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal', max_error=2)
         sound = terrace.verify_tiles(folder, self.raster, vertical='ellipsoidal')
-        self.assertEqual((sound['faults'], sound['tiles'], sound['torn']), ([], told['tiles'], 0))
+        self.assertEqual((sound['faults'], sound['tiles'], sound['torn']), ([], report['tiles'], 0))
         deepest = sound['zooms'][-1]
         self.assertEqual(deepest['zoom'], 12)
         self.assertTrue(0 < deepest['max_error'] <= 2)
@@ -174,10 +174,10 @@ class Views(StoreCase):
     def test_attributes_and_places(self):
         view = terrace.View(self.scan, 'points', reader='frame')
         delta = view.frame((0, -900, 500), seconds=5)
-        told = view.attributes(delta.added_vertices)
+        report = view.attributes(delta.added_vertices)
         places = view.to_metres(self.points)
         classes = {tuple(place): number for place, number in zip(np.round(places, 6), self.classes)}
-        self.assertEqual([classes[tuple(place)] for place in np.round(delta.added_positions, 6)], told['class'].tolist())
+        self.assertEqual([classes[tuple(place)] for place in np.round(delta.added_positions, 6)], report['class'].tolist())
         # Metres from the middle, up by height.
         np.testing.assert_allclose(places[:, 2], self.points[:, 2], rtol=0, atol=1e-9)
         np.testing.assert_allclose(np.ptp(places, axis=0), np.ptp(self.points, axis=0), rtol=1e-3)
@@ -211,9 +211,9 @@ class Views(StoreCase):
         take(view.restore())
         number = {vertex: at for at, vertex in enumerate(vertices)}
         mesh = terrace.Mesh(np.array([*vertices.values()]), np.array([[number[corner] for corner in row] for row in triangles.values()]))
-        told = mesh.measures()
-        self.assertEqual((told['euler_characteristic'], told['closed']), (2, True))
-        self.assertAlmostEqual(told['volume'] / (4 / 3 * np.pi * 1e6), 1, delta=0.02)
+        report = mesh.measures()
+        self.assertEqual((report['euler_characteristic'], report['closed']), (2, True))
+        self.assertAlmostEqual(report['volume'] / (4 / 3 * np.pi * 1e6), 1, delta=0.02)
 
     def test_misuse(self):
         view = terrace.View(self.scan)
@@ -295,10 +295,10 @@ class Models(StoreCase):
             clusters = model.children()
             self.assertEqual(len(clusters), len(np.unique(clusters, axis=0)))
             chosen = clusters[::3]
-            told = store.clusters(store.top - 1)
+            report = store.clusters(store.top - 1)
             for cluster in chosen:
                 info = model.cluster_info(cluster)
-                row = told[int(cluster[1])]
+                row = report[int(cluster[1])]
                 np.testing.assert_allclose(info['bounds'], row['bounds'])
                 self.assertEqual((info['error'], info['members']), (row['error'], row['members']))
                 whole.append(model.expand(cluster))
