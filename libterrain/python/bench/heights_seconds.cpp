@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What bars.py compares Python's heights with. Usage: heights_seconds STORE PLACES THREADS
-// PLACES: pairs of native doubles in the store's CRS. Prints seconds, the least of five, and the
-// sum of the heights.
+// The C++ counterpart to Store.heights() in bars.py. Usage: heights_seconds STORE PLACES THREADS
+// PLACES: a file of pairs of native doubles in the store's CRS. Prints the least of five times in
+// seconds, and the sum of the heights.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

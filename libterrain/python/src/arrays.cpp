@@ -29,14 +29,14 @@ stream::ScalarType scalar_type(const py::dtype& type, const std::string& what) {
   }
   throw py::type_error(what + " has the type " +
                        std::string(py::str(static_cast<const py::object&>(type))) +
-                       "; numbers of 8 to 64 bits in the machine's byte order are needed");
+                       "; numbers of 8 to 64 bits in native byte order are needed");
 }
 
 py::dtype record_type(const stream::Schema& schema, const std::vector<std::string>& more) {
   py::list fields;
   for (const char* name : {"x", "y", "z"}) fields.append(py::make_tuple(name, "f8"));
   for (const stream::Channel& attribute : schema.attributes) {
-    // Names of the coordinates, and names that come twice, get a mark.
+    // numpy needs unique names: append underscores to duplicates and to names of coordinates.
     std::string name = attribute.name;
     const auto taken = [&] {
       for (const py::handle field : fields) {

@@ -21,15 +21,16 @@
 
 #include "core.hpp"
 
-/// numpy's arrays and the library's spans and vectors.
+/// Conversions between numpy arrays and the library's spans and vectors.
 
 namespace terrace::python {
 
-/// Contiguous; what has another type or layout is converted.
+/// A contiguous array; arguments of another type or layout are converted.
 template <class T>
 using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
 
-/// Rows of N numbers, without a copy. Throws: ValueError for another shape, naming `what`.
+/// Returns an array as rows of N numbers, without a copy.
+/// Throws: ValueError, which names `what`, for another shape.
 template <std::size_t N, class T>
 std::span<const std::array<T, N>> rows_of(const Array<T>& array, const char* what) {
   if (array.ndim() != 2 || array.shape(1) != static_cast<py::ssize_t>(N)) {
@@ -40,17 +41,18 @@ std::span<const std::array<T, N>> rows_of(const Array<T>& array, const char* wha
           static_cast<std::size_t>(array.shape(0))};
 }
 
-/// Points of space, or of the plane, which get z = 0. Throws: ValueError for another shape.
+/// Returns points of shape (n, 3), or of shape (n, 2) with z = 0. Throws: ValueError for others.
 std::vector<std::array<double, 3>> points3_of(const Array<double>& given);
 
-/// A one-dimensional array. Throws: ValueError for another shape, naming `what`.
+/// Returns a one-dimensional array, without a copy.
+/// Throws: ValueError, which names `what`, for another shape.
 template <class T>
 std::span<const T> numbers_of(const Array<T>& array, const char* what) {
   if (array.ndim() != 1) throw py::value_error(std::string(what) + " must have one dimension");
   return {array.data(), static_cast<std::size_t>(array.shape(0))};
 }
 
-/// The vector's own memory as an array.
+/// Returns an array that takes over the vector's memory.
 template <class T>
 py::array_t<T> to_array(std::vector<T>&& values) {
   auto* const kept = new std::vector<T>(std::move(values));
@@ -66,15 +68,15 @@ py::array_t<T> to_array(std::vector<std::array<T, N>>&& values) {
                         reinterpret_cast<const T*>(kept->data()), owner);
 }
 
-/// Numbers with -1 in place of `nobody`.
-inline py::array_t<std::int64_t> with_nobody(std::span<const std::uint32_t> numbers,
-                                             std::uint32_t nobody) {
+/// Returns the numbers with -1 in place of `missing`.
+inline py::array_t<std::int64_t> with_missing(std::span<const std::uint32_t> numbers,
+                                              std::uint32_t missing) {
   std::vector<std::int64_t> result(numbers.begin(), numbers.end());
-  std::replace(result.begin(), result.end(), std::int64_t{nobody}, std::int64_t{-1});
+  std::replace(result.begin(), result.end(), std::int64_t{missing}, std::int64_t{-1});
   return to_array(std::move(result));
 }
 
-/// The value of a name. Throws: ValueError that lists the known ones.
+/// Returns the value with a name. Throws: ValueError that lists the known names.
 template <class T>
 T named(const std::string& name, const char* what,
         std::initializer_list<std::pair<std::string_view, T>> known) {
@@ -83,10 +85,11 @@ T named(const std::string& name, const char* what,
     if (text == name) return value;
     list += (list.empty() ? "" : ", ") + std::string(text);
   }
-  throw py::value_error("`" + std::string(what) + "` is one of " + list + ", not '" + name + "'");
+  throw py::value_error("`" + std::string(what) + "` must be one of " + list + ", not '" + name +
+                        "'");
 }
 
-/// The value of an option, if it is given. Throws: TypeError for one of another type.
+/// Sets `value` to an option if it is given. Throws: TypeError for a value of another type.
 template <class T>
 void take_option(const py::dict& options, const char* name, T& value) {
   if (!options.contains(name)) return;
@@ -98,30 +101,32 @@ void take_option(const py::dict& options, const char* name, T& value) {
   }
 }
 
-/// numpy's name of a type: "u1", "f8".
+/// Returns numpy's name of a type, such as "u1" or "f8".
 std::string type_name(stream::ScalarType type);
-/// Throws: TypeError for what is no number of 8 to 64 bits in the machine's byte order.
+/// Throws: TypeError unless it is a number of 8 to 64 bits in native byte order.
 stream::ScalarType scalar_type(const py::dtype& type, const std::string& what);
 
-/// Coordinates and attributes of points as numpy's structured type: x, y, z as doubles, then the
-/// attributes as they are stored, packed; `more` doubles at the end.
+/// Returns numpy's structured type for points, packed: x, y, z as doubles, then the attributes in
+/// their stored types, then a double for each name in `more`.
 py::dtype record_type(const stream::Schema& schema, const std::vector<std::string>& more = {});
-/// The attributes alone, as records hold them.
+/// Returns the part of record_type() with only the attributes.
 py::dtype attributes_type(const stream::Schema& schema);
-/// Dicts of name, dtype, scale, offset and unit; of what is known of a CRS.
+/// Returns a dict with name, dtype, scale, offset and unit for each attribute.
 py::list attributes_info(const stream::Schema& schema);
+/// Returns a dict that describes a CRS.
 py::dict crs_info(const stream::Crs& crs);
-/// Records of such a type.
+/// Returns packed records of a structured type as an array.
 py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type);
 
-/// None; a tuple of six numbers: a box; a dict of polygons, each a list of arrays (n, 2), crs, None
-/// or a name as of terrain::PlacesCrs, and name, for messages.
+/// Converts a region from the package: None; a box as a tuple of six numbers; or a dict with
+/// polygons (each a list of arrays (n, 2)), crs (None, or a name as in terrain::PlacesCrs) and name
+/// (for messages).
 std::optional<terrain::Region> region_of(const py::object& given);
-/// A line for the package's log.
+/// Writes a line to the package's log.
 void log_note(const std::string& line);
-/// A region in the CRS of the data; what was assumed is logged.
+/// Converts a region to the CRS of the data and logs assumptions.
 terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion);
-/// Of `given`, for a store.
+/// Converts a region from the package to the CRS of a store.
 std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store);
 
 }  // namespace terrace::python

@@ -61,7 +61,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   if (request.block_points < 2 || request.block_points > 1'000'000) {
     throw py::value_error("`block_points` must be between 2 and 1000000");
   }
-  if (!(request.facility_cost > 0)) throw py::value_error("`facility_cost` must be above 0");
+  if (!(request.facility_cost > 0)) throw py::value_error("`facility_cost` must be positive");
   if (!(request.z_weight >= 0)) throw py::value_error("`z_weight` must not be negative");
   if (request.band < 1) throw py::value_error("`band` counts from 1");
   return request;
@@ -71,9 +71,9 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
 
 void bind_build(py::module_& module) {
   module.def("build", [](const py::object& source, const std::string& path, const py::dict& options,
-                         const py::tuple& how) {
+                         const py::tuple& job) {
     const terrain::BuildRequest request = request_of(source, path, options);
-    const terrain::BuildOutcome outcome = Job(how).run(
+    const terrain::BuildOutcome outcome = Job(job).run(
         [&](const terrain::Context& context) { return terrain::build_store(request, context); });
     py::dict result;
     result["points"] = outcome.points;

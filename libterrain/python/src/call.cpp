@@ -55,9 +55,9 @@ void run_apart(const std::function<void()>& work, std::stop_source& stop) {
   if (failed) std::rethrow_exception(failed);
 }
 
-Job::Job(const py::tuple& how) : progress_(how[0]), note_(how[1]) {
-  const auto threads = how[2].cast<unsigned>();
-  const auto memory = how[3].cast<std::uint64_t>();
+Job::Job(const py::tuple& job) : progress_(job[0]), note_(job[1]) {
+  const auto threads = job[2].cast<unsigned>();
+  const auto memory = job[3].cast<std::uint64_t>();
   context_.threads = all_or(threads);
   if (memory > 0) context_.memory_bytes = memory;
   context_.stop = stop_.get_token();
@@ -65,7 +65,7 @@ Job::Job(const py::tuple& how) : progress_(how[0]), note_(how[1]) {
     context_.progress = [this](const terrain::Progress& at) {
       constexpr double kBetweenReports = 0.05;
       const double time = now();
-      // The last report of a piece of work need not say how far it came.
+      // The last report of a piece of work may have no count.
       if (at.count > 0) last_count_ = at.count, last_fraction_ = at.fraction;
       if (!at.ended && time - last_report_ < kBetweenReports) return;
       last_report_ = time;

@@ -17,12 +17,13 @@
 
 namespace terrace::python {
 
-/// Runs work on a thread of its own without the interpreter's lock, while this thread looks for
-/// signals; one that raises, as Ctrl-C does, requests `stop` and is raised once the work has ended.
+/// Runs work on another thread without the interpreter's lock, while this thread checks for
+/// signals. A signal that raises an exception, such as Ctrl-C, requests `stop`; the exception is
+/// raised when the work has ended.
 void run_apart(const std::function<void()>& work, std::stop_source& stop);
 
-/// The same for work() or work(stop token); what takes no token is not stopped, and Ctrl-C is
-/// raised when it has ended.
+/// Returns work() or work(stop token), run as by run_apart(). Work without a token runs to its end
+/// before Ctrl-C is raised.
 template <class Work>
 auto released(Work&& work) {
   std::stop_source stop;
@@ -43,29 +44,29 @@ auto released(Work&& work) {
   }
 }
 
-/// What ends the work of a library that takes a check, once `stop` is requested.
+/// Returns a check for the libraries that ends their work once `stop` is requested.
 inline std::function<void()> stop_check(const std::stop_token& stop) {
   return [stop] {
     if (stop.stop_requested()) throw stream::Stopped();
   };
 }
 
-/// A number of threads, 0 for one per core.
+/// Returns the number of threads, or one per core for 0.
 inline unsigned all_or(unsigned threads) {
   return threads > 0 ? threads : std::max(1U, std::thread::hardware_concurrency());
 }
 
-/// A job of libterrain's: its context from Python's objects.
+/// A libterrain call whose context comes from Python objects.
 class Job {
  public:
-  /// how: (progress, note, threads, memory). progress: None, or called as progress(what, count,
-  /// fraction, ended) from time to time; what it raises ends the job. note: None, or called with
-  /// lines of text. threads: 0 for one per core; memory: bytes, 0 for the library's own choice.
-  explicit Job(const py::tuple& how);
+  /// job: (progress, note, threads, memory). progress: None, or called repeatedly as progress(what,
+  /// count, fraction, ended); an exception from it ends the job. note: None, or called with lines
+  /// of text. threads: 0 for one per core. memory: in bytes, 0 for the library's default.
+  explicit Job(const py::tuple& job);
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;
 
-  /// work(context)
+  /// Returns work(context).
   template <class Work>
   auto run(Work&& work) {
     using Result = std::invoke_result_t<Work, const terrain::Context&>;
@@ -80,16 +81,16 @@ class Job {
 
  private:
   void run_here(const std::function<void()>& work);
-  /// Calls Python from a working thread.
+  /// Calls Python from a worker thread.
   void call_python(const std::function<void()>& call);
 
   py::object progress_, note_;
   terrain::Context context_;
   std::stop_source stop_;
-  std::exception_ptr raised_;  ///< by progress or note
+  std::exception_ptr raised_;  ///< from progress or note
   double last_report_ = 0;
-  std::uint64_t last_count_ = 0;  ///< and
-  double last_fraction_ = 0;      ///< of the piece of work that goes on
+  std::uint64_t last_count_ = 0;  ///< of the current piece of work
+  double last_fraction_ = 0;      ///< likewise
 };
 
 }  // namespace terrace::python

@@ -23,7 +23,7 @@
 namespace terrace::python {
 namespace {
 
-/// Rows a, b, height, size.
+/// Returns rows of a, b, height, size.
 std::vector<std::array<double, 4>> rows_of_merges(const cluster::Dendrogram& made) {
   std::vector<std::array<double, 4>> rows;
   rows.reserve(made.merges.size());
@@ -34,14 +34,14 @@ std::vector<std::array<double, 4>> rows_of_merges(const cluster::Dendrogram& mad
   return rows;
 }
 
-/// threads; entry and memory of the matrix.
-cluster::LinkageOptions linkage_options(const py::dict& how) {
+/// Reads the number of threads, and the matrix's type and memory limit.
+cluster::LinkageOptions linkage_options(const py::dict& choices) {
   cluster::LinkageOptions options;
   bool single_precision = false;
-  take_option(how, "single_precision", single_precision);
+  take_option(choices, "single_precision", single_precision);
   if (single_precision) options.entry = cluster::MatrixEntry::float32;
-  take_option(how, "memory", options.memory_limit);
-  take_option(how, "threads", options.threads);
+  take_option(choices, "memory", options.memory_limit);
+  take_option(choices, "threads", options.threads);
   options.threads = all_or(options.threads);
   return options;
 }
@@ -58,14 +58,14 @@ cluster::LinkageMethod linkage_named(const std::string& method) {
                                         {"median", median}});
 }
 
-/// edges: if given, single linkage restricted to these pairs.
+/// Returns the linkage of points. edges: if given, single linkage considers only these pairs.
 py::array linkage(const Array<double>& given, const std::string& method,
-                  const std::optional<Array<std::uint32_t>>& edges, const py::dict& how) {
+                  const std::optional<Array<std::uint32_t>>& edges, const py::dict& choices) {
   const std::vector<cluster::Point3> points = points3_of(given);
   const cluster::LinkageMethod kind = linkage_named(method);
-  cluster::LinkageOptions options = linkage_options(how);
+  cluster::LinkageOptions options = linkage_options(choices);
   bool gpu = false;
-  take_option(how, "gpu", gpu);
+  take_option(choices, "gpu", gpu);
   std::span<const cluster::PointPair> pairs;
   if (edges) pairs = rows_of<2>(*edges, "edges");
   return to_array(released([&](const std::stop_token& stop) {
@@ -81,12 +81,12 @@ py::array linkage(const Array<double>& given, const std::string& method,
   }));
 }
 
-/// The linkage of the edges of a tree and their lengths.
+/// Returns the linkage along the edges of a tree in order of length.
 py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& lengths) {
   const auto pairs = rows_of<2>(ends, "edges");
   const auto heights = numbers_of(lengths, "lengths");
   if (pairs.size() != heights.size()) {
-    throw py::value_error("there are " + std::to_string(heights.size()) + " lengths of " +
+    throw py::value_error("there are " + std::to_string(heights.size()) + " lengths for " +
                           std::to_string(pairs.size()) + " edges");
   }
   return to_array(released([&](const std::stop_token& stop) {
@@ -99,26 +99,26 @@ py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& le
   }));
 }
 
-/// distances: of all pairs i < j of `count` things, by i, then j.
+/// Returns the linkage of `count` things. distances: of all pairs i < j, ordered by i, then j.
 py::array linkage_of_distances(std::size_t count, const Array<double>& given,
-                               const std::string& method, const py::dict& how) {
+                               const std::string& method, const py::dict& choices) {
   const cluster::LinkageMethod kind = linkage_named(method);
   const auto distances = numbers_of(given, "distances");
   if (count == 0 || count > cluster::kMostDendrogramPoints ||
       distances.size() != count * (count - 1) / 2) {
-    throw py::value_error("there are not as many distances as pairs");
+    throw py::value_error("the number of distances does not match the number of pairs");
   }
   const auto of_pair = [&](std::uint32_t i, std::uint32_t j) {
     return distances[i * (2 * count - i - 1) / 2 + (j - i - 1)];
   };
-  cluster::LinkageOptions options = linkage_options(how);
+  cluster::LinkageOptions options = linkage_options(choices);
   return to_array(released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     return rows_of_merges(cluster::linkage(count, of_pair, kind, options));
   }));
 }
 
-/// (ends of each edge, lengths)
+/// Returns (ends of each edge, lengths).
 py::tuple spanning_tree(const Array<double>& given, unsigned threads) {
   const std::vector<cluster::Point3> points = points3_of(given);
   std::vector<std::array<std::uint32_t, 2>> edges;
@@ -144,7 +144,8 @@ py::array cut(const Array<double>& given, std::optional<std::size_t> count,
     for (std::size_t i = 0; i < rows.size(); ++i) {
       for (const std::size_t column : std::initializer_list<std::size_t>{0, 1, 3}) {
         if (rows[i][column] >= 0 && rows[i][column] <= most) continue;
-        throw std::invalid_argument("row " + std::to_string(i) + " of the linkage is none");
+        throw std::invalid_argument("row " + std::to_string(i) +
+                                    " of the linkage has an invalid number");
       }
       dendrogram.merges.push_back({static_cast<std::uint32_t>(rows[i][0]),
                                    static_cast<std::uint32_t>(rows[i][1]), rows[i][2],
@@ -157,7 +158,7 @@ py::array cut(const Array<double>& given, std::optional<std::size_t> count,
   }));
 }
 
-/// (centres, labels, sse, iterations, converged)
+/// Returns (centres, labels, sum of squared distances, iterations, converged).
 py::tuple k_means(const Array<double>& given, const py::object& start, std::size_t clusters,
                   const Array<double>& weights, std::uint64_t seed, std::size_t restarts,
                   std::size_t max_iterations, double tolerance, unsigned threads) {
@@ -166,7 +167,7 @@ py::tuple k_means(const Array<double>& given, const py::object& start, std::size
   if (!start.is_none()) centres = points3_of(start.cast<Array<double>>());
   const auto weighing = numbers_of(weights, "weights");
   if (!weighing.empty() && weighing.size() != points.size()) {
-    throw py::value_error("there are " + std::to_string(weighing.size()) + " weights of " +
+    throw py::value_error("there are " + std::to_string(weighing.size()) + " weights for " +
                           std::to_string(points.size()) + " points");
   }
   cluster::KMeansOptions options{.clusters = clusters,
@@ -184,20 +185,21 @@ py::tuple k_means(const Array<double>& given, const py::object& start, std::size
                         made.sse, made.iterations, made.converged);
 }
 
-/// (facilities, labels, opening, connection and outlier cost, lower bound); -1: an outlier.
+/// Returns (facilities, labels with -1 for outliers, opening cost, connection cost, outlier cost,
+/// lower bound).
 py::tuple arrays_of_solution(cluster::FacilitySolution&& made) {
   return py::make_tuple(to_array(std::move(made.facilities)),
-                        with_nobody(made.assignment, cluster::kOutlier), made.opening_cost,
+                        with_missing(made.assignment, cluster::kOutlier), made.opening_cost,
                         made.connection_cost, made.outlier_cost, made.lower_bound);
 }
 
-/// How a problem is solved.
+/// Options for solving a facility location problem.
 struct Search {
-  /// count: exactly so many facilities, which cost nothing.
+  /// Solves facility location, or k-median with `count` free facilities if that is set.
   template <class Problem>
   py::tuple solve(const Problem& problem) const {
     return arrays_of_solution(released([&](const std::stop_token& stop) {
-      const auto goes_on = [&](auto...) { return !stop.stop_requested(); };
+      const auto keep_going = [&](auto...) { return !stop.stop_requested(); };
       if constexpr (!std::is_same_v<Problem, cluster::FacilityEntities>) {
         if (count) {
           cluster::KMedianOptions search = median;
@@ -205,18 +207,19 @@ struct Search {
           return k_median(problem, *count, search);
         }
       } else if (count) {
-        throw std::invalid_argument("entities have no k-median: give the matrix of distances");
+        throw std::invalid_argument(
+            "k-median does not support entities: pass their matrix of distances");
       }
       cluster::FacilityOptions search = options;
-      search.progress = goes_on;
+      search.progress = keep_going;
       search.check_stop = stop_check(stop);
       if (start) search.start = &*start;
       cluster::FacilitySolution made = cluster::solve(problem, search);
-      // A search for a better lower bound than the method's own.
+      // Searches for a better lower bound than the method's.
       if (bound_steps > 0) {
         const cluster::LowerBoundOptions bounding{.steps = bound_steps,
                                                   .threads = options.threads,
-                                                  .progress = goes_on,
+                                                  .progress = keep_going,
                                                   .check_stop = search.check_stop};
         const double bound = cluster::lower_bound(problem, made, bounding).lower_bound;
         made.lower_bound = std::max(made.lower_bound, bound);
@@ -268,14 +271,14 @@ Search search_of(const py::dict& given) {
   return search;
 }
 
-/// cluster::kOutlier for -1 is what the cast above gives.
+// The cast above turns -1 into kOutlier.
 static_assert(cluster::kOutlier == static_cast<std::uint32_t>(std::int64_t{-1}));
 
 py::tuple facility_location(const Array<double>& given, double facility_cost,
                             const std::string& metric, const Array<double>& weights,
                             const std::optional<Array<double>>& channels, double outlier_price,
-                            const py::dict& how) {
-  Search search = search_of(how);
+                            const py::dict& choices) {
+  Search search = search_of(choices);
   if (!search.options.restarts) search.median.restarts = 1;
   search.median.bound_steps = 0;
   const std::vector<cluster::Point3> points = points3_of(given);
@@ -288,7 +291,7 @@ py::tuple facility_location(const Array<double>& given, double facility_cost,
   std::vector<double> ones;
   if (channels) {
     if (channels->ndim() != 2 || static_cast<std::size_t>(channels->shape(0)) != points.size()) {
-      throw py::value_error("`channels` has one row for each point");
+      throw py::value_error("`channels` must have one row per point");
     }
     ones.assign(static_cast<std::size_t>(channels->shape(1)), 1.0);
     problem.channels = {.values = {channels->data(), static_cast<std::size_t>(channels->size())},
@@ -297,9 +300,9 @@ py::tuple facility_location(const Array<double>& given, double facility_cost,
   return search.solve(problem);
 }
 
-/// Entities of the same number of corners each.
+/// Entities with the same number of corners each.
 struct Entities {
-  /// given: shape (n, corners, 2 or 3). ordered: polylines, also of three corners.
+  /// given: shape (n, corners, 2 or 3). ordered: whether three corners are a polyline.
   Entities(const Array<double>& given, bool ordered_) : ordered(ordered_) {
     if (given.ndim() != 3 || given.shape(1) < 1) {
       throw py::value_error("entities must have the shape (n, corners, 2 or 3)");
@@ -333,8 +336,9 @@ struct Entities {
 };
 
 py::tuple entity_location(const Array<double>& given, bool ordered, double facility_cost,
-                          const Array<double>& weights, double outlier_price, const py::dict& how) {
-  const Search search = search_of(how);
+                          const Array<double>& weights, double outlier_price,
+                          const py::dict& choices) {
+  const Search search = search_of(choices);
   const Entities entities(given, ordered);
   const double diagonal = cluster::diagonal(cluster::Euclidean{}, base::box_of(entities.places));
   return search.solve(cluster::FacilityEntities{.count = entities.count,
@@ -350,10 +354,11 @@ py::tuple entity_location(const Array<double>& given, bool ordered, double facil
                                                 .outlier_price = outlier_price * diagonal});
 }
 
-/// Row by row, the distances of each of `a` from each of `b`.
+/// Returns the distances of each entity of `a` from each of `b`, row by row.
 py::array entity_distances(const Array<double>& a, const Array<double>& b, bool ordered) {
   const Entities from(a, ordered), to(b, ordered);
-  if (from.corners != to.corners) throw py::value_error("the entities have not as many corners");
+  if (from.corners != to.corners)
+    throw py::value_error("`a` and `b` have different numbers of corners");
   return to_array(released([&] {
     std::vector<double> distances;
     distances.reserve(from.count * to.count);
@@ -366,11 +371,12 @@ py::array entity_distances(const Array<double>& a, const Array<double>& b, bool 
   }));
 }
 
-/// Costs of connecting a facility (row) with a client (column), and of opening each facility.
+/// Solves facility location. connection: the cost of each facility (row) for each client (column).
+/// opening: the cost of opening each facility.
 py::tuple facility_matrix(const Array<double>& connection, const Array<double>& opening,
-                          const py::dict& how) {
-  if (connection.ndim() != 2) throw py::value_error("connection costs have two dimensions");
-  const Search search = search_of(how);
+                          const py::dict& choices) {
+  if (connection.ndim() != 2) throw py::value_error("connection costs must have two dimensions");
+  const Search search = search_of(choices);
   return search.solve(cluster::FacilityMatrix{
       .facilities = static_cast<std::size_t>(connection.shape(0)),
       .clients = static_cast<std::size_t>(connection.shape(1)),
@@ -379,9 +385,9 @@ py::tuple facility_matrix(const Array<double>& connection, const Array<double>& 
 }
 
 py::array clusters_of_size(const Array<double>& given, double size, std::uint64_t seed,
-                           const py::tuple& how) {
+                           const py::tuple& job) {
   const std::vector<cluster::Point3> points = points3_of(given);
-  return to_array(Job(how).run([&](const terrain::Context& context) {
+  return to_array(Job(job).run([&](const terrain::Context& context) {
     const auto report = [&](std::uint64_t done) {
       context.check_stop();
       if (!context.progress) return;

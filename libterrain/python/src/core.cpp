@@ -20,7 +20,7 @@ namespace {
 
 py::handle error_type;  // terrace.Error, kept by the module
 
-/// Parameters that the libraries and the module call by different names.
+/// Parameters that have different names in the libraries (first) and in the module.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParameters{{
     {"`channel`", "`channels`"},
     {"`format`", "`input_format`"},
@@ -33,8 +33,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParamete
     {"`zoom`", "`zooms`"},
 }};
 
-/// The library's errors as Python's: a failed system call as OSError of its kind, other faults of
-/// data as terrace.Error, values that make no sense as ValueError.
+/// Translates the library's errors to Python's: failed system calls to OSError, bad data to
+/// terrace.Error, invalid values to ValueError.
 void translate(std::exception_ptr thrown) {
   try {
     std::rethrow_exception(thrown);

@@ -6,17 +6,16 @@
 
 #include <pybind11/pybind11.h>
 
-/// The compiled half of the Python module: conversions and calls only. One source per concept adds
-/// its functions to the module; python/terrace has what users see.
+/// The compiled half of the Python module, which only converts and calls. One source per concept
+/// adds its functions to the module. The package in python/terrace is the public interface.
 
 namespace terrace::python {
 
 namespace py = pybind11;
 
-/// Text that may name files, whose bytes need not be UTF-8: others become what os.fsdecode() makes
-/// of them.
+/// Decodes text like os.fsdecode(), because it may contain file names that are not UTF-8.
 py::str text_of(std::string_view text);
-/// A message of the libraries, whose parameters are called as users of the module know them.
+/// Returns a message from the libraries with the module's names of parameters.
 py::str message_of(std::string text);
 
 void bind_build(py::module_& module);

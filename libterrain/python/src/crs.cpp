@@ -16,8 +16,8 @@ namespace {
 
 using Shift = std::optional<terrain::DatumShift>;
 
-/// shift: of the one whose datum does not count as WGS 84; of `to` if neither does. box: where the
-/// data lie in `from`.
+/// shift: for the system whose datum is not WGS 84, or for `to` if neither is.
+/// box: the extent of the data in `from`.
 terrain::Transformation transformation(const std::string& from, const std::string& to,
                                        const Shift& shift, const py::object& box) {
   auto own = terrain::CoordinateSystem::parse(from);
@@ -27,7 +27,7 @@ terrain::Transformation transformation(const std::string& from, const std::strin
   return {own, other};
 }
 
-/// A region of another CRS as polygons of the store's, and the name of that CRS.
+/// Returns a region of another CRS as polygons in the store's CRS, and the name of the latter.
 std::pair<std::vector<terrain::Polygon>, std::string> own_region(const OpenStore& open,
                                                                  const py::object& region,
                                                                  const std::string& crs) {

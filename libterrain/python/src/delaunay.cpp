@@ -9,7 +9,7 @@
 namespace terrace::python {
 namespace {
 
-/// What triangulations and surfaces share.
+/// Binds the methods that triangulations and surfaces share.
 template <class Shared>
 auto bind_mesh_of_points(py::module_& module, const char* name) {
   return py::class_<Shared>(module, name)
@@ -35,7 +35,7 @@ auto bind_triangulation(py::module_& module, const char* name) {
       .def("nearest", &Shared::nearest);
 }
 
-/// Maps with their boxes (lower corner, upper corner).
+/// Boxes (lower corner, upper corner) and the map in each.
 template <std::size_t N>
 using MetricRegions =
     std::vector<std::tuple<std::array<double, N>, std::array<double, N>, tri::LinearMap<N>>>;
@@ -67,7 +67,7 @@ std::vector<std::array<std::int32_t, N>> numbers_of_corners(
   return rows;
 }
 
-/// Triangles adapted to a metric for each region.
+/// Returns the triangles adapted to a metric for each region.
 py::array adapted2(SharedDelaunay2& shared, const MetricRegions<2>& regions) {
   const tri::MetricField2 field = field_of<2>(regions);
   return to_array(shared.read(0, [&](const auto& mesh, const std::stop_token& stop) {
@@ -76,7 +76,7 @@ py::array adapted2(SharedDelaunay2& shared, const MetricRegions<2>& regions) {
   }));
 }
 
-/// (tetrahedra, facets where no flip is possible)
+/// Returns (tetrahedra, the number of facets that cannot be flipped).
 py::tuple adapted3(SharedDelaunay3& shared, const MetricRegions<3>& regions) {
   const tri::MetricField3 field = field_of<3>(regions);
   const tri::MetricTetrahedra made =

@@ -29,8 +29,8 @@ bool finite(const std::array<Number, N>& p) {
   return std::all_of(p.begin(), p.end(), [](Number c) { return c - c == 0; });
 }
 
-/// The places in an order in which the next one is mostly near the last (Morton's): a walk from
-/// there is short.
+/// Returns the indices of places in Morton order, in which successive places are mostly close
+/// together, so that walks between them are short.
 template <std::size_t N>
 std::vector<std::size_t> near_order(std::span<const std::array<double, N>> places) {
   constexpr unsigned kBits = 16;
@@ -50,7 +50,7 @@ std::vector<std::size_t> near_order(std::span<const std::array<double, N>> place
     if (!finite(places[at])) continue;
     std::array<std::uint32_t, N> cell{};
     for (std::size_t i = 0; i < N; ++i) {
-      // Halves, so that no difference overflows.
+      // Halved so that differences cannot overflow.
       const double share = (places[at][i] / 2 - low[i] / 2) / (high[i] / 2 - low[i] / 2);
       cell[i] = share > 0 ? static_cast<std::uint32_t>(share * ((1U << kBits) - 1)) : 0;
     }
@@ -65,8 +65,8 @@ std::vector<std::size_t> near_order(std::span<const std::array<double, N>> place
   return order;
 }
 
-/// What differs between kinds of meshes: kCorners of a simplex, ids of simplices and access to
-/// them.
+/// Differences between kinds of meshes: the number kCorners of a simplex's corners, the ids of
+/// simplices and access to them.
 template <std::size_t N, class Metric>
 struct Triangulation;
 template <class Metric>
@@ -112,7 +112,7 @@ struct SurfaceKind {
   static std::size_t count(const Type& of) { return of.triangle_count(); }
 };
 
-/// A triangulation that Python's threads may share: one works on it at a time.
+/// A triangulation that Python's threads may share; one works on it at a time.
 template <std::size_t N, class Metric = tri::Euclidean, class Kind_ = Triangulation<N, Metric>>
 class SharedDelaunay {
  public:
@@ -124,14 +124,14 @@ class SharedDelaunay {
   SharedDelaunay() = default;
   explicit SharedDelaunay(const Metric& metric) : mesh_(metric) {}
 
-  /// work(mesh), which changes it as a whole.
+  /// Returns work(mesh), which changes the mesh. items: a measure of the work.
   template <class Work>
   auto change(std::size_t items, Work&& work) {
     return locked(items + size_, [&] { return work(mesh_); });
   }
 
-  /// work(mesh) or work(mesh, stop token), which only reads it and takes about as long as a pass
-  /// over it and so many items.
+  /// Returns work(mesh) or work(mesh, stop token), which only reads the mesh and takes about as
+  /// long as a pass over it and over `items` items.
   template <class Work>
   auto read(std::size_t items, Work&& work) {
     if constexpr (std::is_invocable_v<Work, const Mesh&, const std::stop_token&>) {
@@ -220,7 +220,7 @@ class SharedDelaunay {
     }));
   }
 
-  /// Compressed rows by number of vertex: where each begins, the vertices joined to it.
+  /// Returns compressed rows by vertex number: the offset of each row, and the adjacent vertices.
   [[nodiscard]] py::tuple adjacent() {
     std::vector<std::int32_t> joined;
     auto begins = locked(size_, [&] {
@@ -246,8 +246,8 @@ class SharedDelaunay {
     });
   }
 
-  /// What came and went since then or the last call. Throws: std::invalid_argument unless a journal
-  /// was started.
+  /// Returns the changes since start_journal() or the previous call.
+  /// Throws: std::invalid_argument unless a journal was started.
   [[nodiscard]] py::dict take_changes() {
     std::vector<std::int32_t> added, removed;
     std::vector<Point> removed_points;
@@ -313,7 +313,8 @@ class SharedDelaunay {
     return locked(size_, [&] { return mesh_.hash(); });
   }
 
-  /// Under read() or a change. Throws: std::invalid_argument for a vertex that is not there.
+  /// Returns the vertices with the given numbers. Call it only from read() or change().
+  /// Throws: std::invalid_argument for a vertex that does not exist.
   std::vector<tri::VertexId> checked(std::span<const std::int32_t> handles) const {
     std::vector<tri::VertexId> vertices;
     vertices.reserve(handles.size());
@@ -335,7 +336,7 @@ class SharedDelaunay {
     return row;
   }
 
-  /// Builds an empty mesh, which stays empty if it is stopped or fails.
+  /// Inserts the first points into an empty mesh, which stays empty if this is stopped or fails.
   std::vector<tri::VertexId> build(std::span<const Point> points, const std::stop_token& stop) {
     mesh_.set_check_stop(stop_check(stop));
     try {
@@ -354,7 +355,7 @@ class SharedDelaunay {
     }
   }
 
-  /// work() or work(stop token). For much work signals are looked for.
+  /// Returns work() or work(stop token) under the mutex. Long work can be interrupted by signals.
   template <class Work>
   auto locked(std::size_t items, Work&& work) {
     constexpr std::size_t kMuch = 10000;
@@ -375,7 +376,7 @@ class SharedDelaunay {
     return alone({});
   }
 
-  /// The row of each simplex in simplices(), by slot.
+  /// Returns the row of each simplex in simplices(), by slot.
   std::vector<std::int32_t> rows_of_simplices() const {
     std::vector<std::int32_t> rank(Kind::slots(mesh_), -1);
     std::int32_t next = 0;
@@ -384,9 +385,9 @@ class SharedDelaunay {
   }
 
   std::mutex mutex_;
-  Mesh mesh_;                          ///< under the mutex only
+  Mesh mesh_;                          ///< guarded by mutex_
   bool recording_ = false;             ///< likewise
-  std::atomic<std::size_t> size_ = 0;  ///< vertices after the last piece of work
+  std::atomic<std::size_t> size_ = 0;  ///< number of vertices after the last piece of work
 };
 
 using SharedDelaunay2 = SharedDelaunay<2>;

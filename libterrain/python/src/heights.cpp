@@ -30,14 +30,14 @@ terrain::SamplerOptions sampler_of(const std::string& method, unsigned level,
   return {.method = interpolation_named(method), .level = level, .max_edge = max_edge};
 }
 
-/// Rows of height, east, north.
+/// Returns rows of height and the gradient to east and north.
 py::array sample(const OpenStore& open, const Array<double>& xy, const std::string& method,
                  unsigned level, std::optional<double> max_edge, const std::string& crs,
-                 const py::tuple& how) {
+                 const py::tuple& job) {
   const stream::Store store = open.get();
   const auto given = rows_of<2>(xy, "xy");
   const terrain::SamplerOptions options = sampler_of(method, level, max_edge);
-  std::vector<terrain::GroundPoint> found = Job(how).run([&](const terrain::Context& context) {
+  std::vector<terrain::GroundPoint> found = Job(job).run([&](const terrain::Context& context) {
     const auto change = change_to(store, crs);
     if (!change) return sample_places(store, given, options, context);
     std::vector<terrain::Point2> places(given.begin(), given.end());
@@ -53,12 +53,12 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
                              reinterpret_cast<const double*>(kept->data()), owner);
 }
 
-/// Rows of metres, x, y, height.
-/// crs: of GeoJSON, as of terrain::PlacesCrs; None: the line is in the store's.
+/// Returns rows of metres, x, y, height.
+/// crs: the CRS of GeoJSON as in terrain::PlacesCrs, or None if the line is in the store's CRS.
 py::array profile(const OpenStore& open, const Array<double>& line,
                   const std::optional<std::string>& crs, std::optional<double> step,
                   const std::string& method, unsigned level, std::optional<double> max_edge,
-                  const py::tuple& how) {
+                  const py::tuple& job) {
   const stream::Store store = open.get();
   terrain::ProfileRequest request;
   request.sampler = sampler_of(method, level, max_edge);
@@ -71,18 +71,18 @@ py::array profile(const OpenStore& open, const Array<double>& line,
     for (const terrain::Point2& p : request.line) box.include(stream::Point3{p[0], p[1], 0});
     request.to_line = conversion.to_places({.name = *crs, .file = "`line`"}, box);
   }
-  if (step && !(*step > 0)) throw py::value_error("`step` must be above 0");
+  if (step && !(*step > 0)) throw py::value_error("`step` must be positive");
   request.step = step;
-  return to_array(Job(how).run([&](const terrain::Context& context) {
+  return to_array(Job(job).run([&](const terrain::Context& context) {
     std::vector<std::array<double, 4>> rows;
-    // Twice while the vector grows.
+    // A growing vector needs its old and its new memory at once.
     const std::uint64_t most = context.memory_or(0) / (3 * sizeof rows[0]);
     terrain::profile(
         store, request,
         [&](std::span<const terrain::ProfilePoint> points) {
           if (rows.size() + points.size() > most) {
             throw terrain::UsageError("the profile would have more than " + std::to_string(most) +
-                                      " points, which memory does not hold");
+                                      " points, which do not fit into memory");
           }
           for (const terrain::ProfilePoint& p : points) {
             rows.push_back({p.metres, p.place[0], p.place[1], p.height});
@@ -99,28 +99,28 @@ bool reaches_wgs84(const stream::Store& store) {
   return system && system->over(world_box(schema, store.bounds())).reaches_wgs84();
 }
 
-/// (GeoJSON, whether it is in the store's own CRS)
+/// Returns (GeoJSON, whether it is in the store's CRS).
 py::tuple contours(const OpenStore& open, double interval, unsigned level,
                    std::optional<double> max_edge, const py::object& region,
-                   std::optional<bool> lonlat, const py::tuple& how) {
+                   std::optional<bool> lonlat, const py::tuple& job) {
   const stream::Store store = open.get();
-  if (!(interval > 0)) throw py::value_error("`interval` must be above 0");
+  if (!(interval > 0)) throw py::value_error("`interval` must be positive");
   const terrain::ContourRequest request{.interval = interval,
                                         .level = level,
                                         .max_edge = max_edge,
                                         .region = region_of(region, store),
                                         .own_crs = !(lonlat ? *lonlat : reaches_wgs84(store))};
-  const std::string text = Job(how).run([&](const terrain::Context& context) {
+  const std::string text = Job(job).run([&](const terrain::Context& context) {
     std::string lines;
-    // Twice while the text grows, and once more as Python's.
+    // The growing text needs its old and its new memory at once, and Python copies the result.
     const std::uint64_t most = context.memory_or(0) / 4;
     write_contours(
         store, request,
         [&](std::string_view more) {
           if (lines.size() + more.size() > most) {
             throw terrain::UsageError("the contours would take more than " + std::to_string(most) +
-                                      " bytes of text, which memory does not hold; give a larger "
-                                      "`interval`");
+                                      " bytes of text, which do not fit into memory; pass a "
+                                      "larger `interval`");
           }
           lines += more;
         },
@@ -133,7 +133,7 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
 void write_raster(const OpenStore& open, const std::string& path, const std::string& value,
                   std::optional<double> cell, const std::string& align, const py::object& region,
                   const std::string& crs, const std::string& method, unsigned level,
-                  std::optional<double> max_edge, bool replace, const py::tuple& how) {
+                  std::optional<double> max_edge, bool replace, const py::tuple& job) {
   format_of_output(terrain::outputs::kRasterFile, path);
   const stream::Store store = open.get();
   using terrain::RasterValue;
@@ -149,21 +149,21 @@ void write_raster(const OpenStore& open, const std::string& path, const std::str
       .region = region_of(region, store),
       .output = path,
       .replace = replace};
-  if (cell && !(*cell > 0)) throw py::value_error("`cell` must be above 0");
-  Job(how).run([&](const terrain::Context& context) {
+  if (cell && !(*cell > 0)) throw py::value_error("`cell` must be positive");
+  Job(job).run([&](const terrain::Context& context) {
     request.to = change_to(store, crs);
     terrain::write_raster(store, request, context);
   });
 }
 
-/// What names the CRS for CoordinateSystem::parse(); empty if there is none.
+/// Returns a name of the CRS for CoordinateSystem::parse(), or an empty text.
 std::string name_of_crs(const stream::Crs& crs, const std::string& file) {
   if (crs.epsg != 0) return "EPSG:" + std::to_string(crs.epsg);
   const auto system = terrain::CoordinateSystem::of(crs, file);
   return system ? system->crs().wkt : std::string();
 }
 
-/// A GeoTIFF: samples, which of them are valid, transform to the centres, CRS.
+/// Reads a GeoTIFF. Returns (samples, which of them are valid, transform to cell centres, CRS).
 py::tuple read_geotiff(const std::string& path) {
   const std::unique_ptr<stream::Raster> raster =
       released([&] { return stream::open_geotiff(path); });

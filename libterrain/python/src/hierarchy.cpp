@@ -21,7 +21,7 @@ std::vector<T> copy_of(std::span<const T> from) {
   return {from.begin(), from.end()};
 }
 
-/// Hands finished blocks, as dicts of arrays, to a function of Python's.
+/// Passes finished blocks, as dicts of arrays, to a Python function.
 class CallSink final : public cluster::HierarchySink {
  public:
   explicit CallSink(const py::function& take) : take_(take) {}
@@ -76,7 +76,7 @@ class CallSink final : public cluster::HierarchySink {
     block["children"] = to_array(std::move(of.children));
     block["first"] = to_array(std::move(of.first));
     block["order"] = to_array(std::move(of.order));
-    block["representatives"] = with_nobody(of.representatives, cluster::kNoRepresentative);
+    block["representatives"] = with_missing(of.representatives, cluster::kNoRepresentative);
     block["boxes"] = to_array(std::move(of.boxes));
     block["errors"] = to_array(std::move(of.errors));
     block["descendants"] = to_array(std::move(of.descendants));
@@ -86,7 +86,7 @@ class CallSink final : public cluster::HierarchySink {
   const py::function& take_;
 };
 
-/// Waits for its threads, which may call Python.
+/// Releases the interpreter's lock while the builder waits for its threads, which may call Python.
 struct Builder {
   Builder(cluster::HierarchyOptions options, cluster::HierarchySink& sink)
       : work(std::make_unique<cluster::HierarchyBuilder>(std::move(options), sink)) {}
@@ -100,7 +100,7 @@ struct Builder {
   std::unique_ptr<cluster::HierarchyBuilder> work;
 };
 
-/// batches: pairs of points (n, 3) and their bytes (n, bytes).
+/// batches: pairs of points (n, 3) and their payload (n, bytes).
 py::dict stream_clusters(const py::iterable& batches, const py::function& take,
                          const py::dict& given) {
   cluster::HierarchyOptions options;

@@ -16,10 +16,10 @@
 namespace terrace::python {
 namespace {
 
-/// (column of each row or -1, cost, row duals, column duals)
+/// Returns (column of each row or -1, cost, row duals, column duals).
 template <class Number>
 py::tuple arrays_of_assignment(matching::BasicAssignment<Number>&& made) {
-  return py::make_tuple(with_nobody(made.column, matching::kUnassigned), made.cost,
+  return py::make_tuple(with_missing(made.column, matching::kUnassigned), made.cost,
                         to_array(std::move(made.row_dual)), to_array(std::move(made.column_dual)));
 }
 
@@ -34,18 +34,18 @@ py::tuple assign(const py::array_t<T, py::array::c_style>& costs) {
   }));
 }
 
-/// row_of(number): the costs of that row. The matrix is never stored.
+/// row_of(i) returns the costs of row i. The matrix is never stored.
 py::tuple assign_rows(std::size_t rows, std::size_t columns, const py::function& row_of) {
   return arrays_of_assignment(released([&](const std::stop_token& stop) {
     return matching::assign_rows(rows, columns, [&](std::size_t row, std::span<double> costs) {
       const py::gil_scoped_acquire held;
-      // What ends the work is Ctrl-C, which is raised in its place.
+      // Only Ctrl-C requests a stop, and it is raised instead of this.
       if (stop.stop_requested()) throw py::value_error("stopped");
       const auto given = Array<double>(row_of(row));
       const auto numbers = numbers_of(given, "a row of costs");
       if (numbers.size() != costs.size()) {
         throw py::value_error("row " + std::to_string(row) + " has " +
-                              std::to_string(numbers.size()) + " costs of " +
+                              std::to_string(numbers.size()) + " costs for " +
                               std::to_string(costs.size()) + " columns");
       }
       std::copy(numbers.begin(), numbers.end(), costs.begin());
@@ -61,7 +61,7 @@ py::tuple assign_places(const Array<double>& a, const Array<double>& b) {
   }));
 }
 
-/// (mate of each point or -1, cost, bound, optimal)
+/// Returns (mate of each point or -1, cost, bound, optimal).
 template <std::size_t N>
 py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
                 std::size_t exact_limit, std::size_t window, unsigned rounds, double tolerance,
@@ -78,12 +78,12 @@ py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
     options.check_stop = stop_check(stop);
     return match_large(points, options);
   });
-  return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, made.dual_bound,
+  return py::make_tuple(with_missing(made.mate, matching::kNobody), made.cost, made.dual_bound,
                         made.optimal);
 }
 
-/// (mates, cost, iterations done, rows of iteration and cost where it fell). distances: `given` is
-/// the matrix of them, not points.
+/// Returns (mates, cost, number of iterations, rows of iteration and cost for each improvement).
+/// distances: whether `given` is a matrix of distances instead of points.
 py::tuple match_by_halving(const Array<double>& given, bool distances, const std::string& method,
                            std::uint64_t iterations, double seconds, std::uint64_t seed,
                            unsigned threads) {
@@ -118,11 +118,11 @@ py::tuple match_by_halving(const Array<double>& given, bool distances, const std
     }
     return result;
   });
-  return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, made.iterations,
+  return py::make_tuple(with_missing(made.mate, matching::kNobody), made.cost, made.iterations,
                         to_array(std::move(steps)));
 }
 
-/// Compressed rows; the same.
+/// Assigns rows to columns; the costs are compressed rows.
 py::tuple assign_sparse(const Array<std::uint64_t>& begin, const Array<std::uint32_t>& column,
                         const Array<double>& cost, std::size_t columns) {
   const auto offsets = numbers_of(begin, "offsets of rows");
@@ -136,13 +136,13 @@ py::tuple assign_sparse(const Array<std::uint64_t>& begin, const Array<std::uint
   }));
 }
 
-/// As match(), of a graph.
+/// Matches the vertices of a graph. Returns the same as match().
 py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
                       const Array<double>& weights) {
   const auto pairs = rows_of<2>(ends, "edges");
   const auto costs = numbers_of(weights, "weights");
   if (pairs.size() != costs.size()) {
-    throw py::value_error("there are " + std::to_string(costs.size()) + " weights of " +
+    throw py::value_error("there are " + std::to_string(costs.size()) + " weights for " +
                           std::to_string(pairs.size()) + " edges");
   }
   double bound = 0;
@@ -157,7 +157,7 @@ py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
     bound = result.dual_bound();
     return result;
   });
-  return py::make_tuple(with_nobody(made.mate, matching::kNobody), made.cost, bound, true);
+  return py::make_tuple(with_missing(made.mate, matching::kNobody), made.cost, bound, true);
 }
 
 }  // namespace

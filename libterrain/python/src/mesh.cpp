@@ -21,7 +21,7 @@
 namespace terrace::python {
 namespace {
 
-/// As Python holds units, for units_from(): bytes, for names need not be UTF-8.
+/// Returns units as a tuple for units_from(), with bytes because names may not be UTF-8.
 py::tuple to_python(const terrain::MeshUnits& units) {
   const stream::Crs& crs = units.crs;
   return py::make_tuple(crs.epsg, crs.geographic, py::bytes(crs.name), py::bytes(crs.wkt),
@@ -43,7 +43,7 @@ terrain::MeshUnits units_from(const py::object& units) {
   return made;
 }
 
-/// (vertices, triangles, levels, units)
+/// Returns (vertices, triangles, levels, units).
 py::tuple arrays_of(terrain::TriangleMesh&& mesh, const py::object& units = py::none()) {
   py::object levels = py::none();
   if (!mesh.levels.empty()) levels = to_array(std::move(mesh.levels));
@@ -51,19 +51,19 @@ py::tuple arrays_of(terrain::TriangleMesh&& mesh, const py::object& units = py::
                         levels, units);
 }
 
-/// To the CRS of that name, if it is not empty.
+/// Returns the conversion to the CRS with a name; an empty name changes nothing.
 terrain::PlaceConversion places_to(const stream::Store& store, const std::string& crs) {
   const auto to = change_to(store, crs);
   return to ? terrain::PlaceConversion(*to, store) : terrain::PlaceConversion();
 }
 
-/// heights: "smoothing" (method, iterations, strength, pass band, edge height), the files "overlay"
-/// and "save", "replace".
+/// heights: a dict with "smoothing" (method, iterations, strength, pass band, edge height), the
+/// files "overlay" and "save", and "replace".
 py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
                const py::list& focuses, const std::string& where,
                const std::optional<std::pair<unsigned, std::uint64_t>>& cluster,
                const std::string& metric, const py::dict& heights, const std::string& crs,
-               const py::tuple& how) {
+               const py::tuple& job) {
   const stream::Store store = open.get(where);
   terrain::Detail detail = detail_of(store, level, region, focuses);
   if (cluster) {
@@ -88,7 +88,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   take_option(heights, "replace", replace);
   if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
   terrain::MeshUnits units;
-  terrain::TriangleMesh made = Job(how).run([&](const terrain::Context& context) {
+  terrain::TriangleMesh made = Job(job).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
     std::optional<stream::Overlay> overlay;
     if (!overlay_path.empty()) {
@@ -109,12 +109,12 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   return arrays_of(std::move(made), to_python(units));
 }
 
-/// As arrays_of(), and the tetrahedra inside the surface in place of its triangles if asked for.
+/// Returns the surface as arrays_of() does, or (vertices, tetrahedra inside it).
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
-                  const std::string& where, bool tetrahedra, const py::tuple& how) {
+                  const std::string& where, bool tetrahedra, const py::tuple& job) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, py::list());
-  terrain::ScanSurface made = Job(how).run([&](const terrain::Context& context) {
+  terrain::ScanSurface made = Job(job).run([&](const terrain::Context& context) {
     return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
   });
   if (!tetrahedra) {
@@ -124,12 +124,12 @@ py::tuple surface(const OpenStore& open, unsigned level, const py::object& regio
                         to_array(std::move(made.tetrahedra)));
 }
 
-/// (vertices, the first vertex of each line and their number, the number of each line)
+/// Returns (vertices, the offset of each line and the total, the number of each line).
 py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
-                const py::list& focuses, const std::string& where, const py::tuple& how) {
+                const py::list& focuses, const std::string& where, const py::tuple& job) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, focuses);
-  terrain::LineSet made = Job(how).run([&](const terrain::Context& context) {
+  terrain::LineSet made = Job(job).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
     return detail_lines(store, detail, context);
   });
@@ -143,7 +143,7 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
 }
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
-                      const py::tuple& how) {
+                      const py::tuple& job) {
   const stream::Store store = open.get(given["where"].cast<std::string>());
   format_of_output(terrain::outputs::kMeshFile, path);
   terrain::BoundedMeshOptions options;
@@ -157,7 +157,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
   options.fill = fill_named(given["fill"].cast<std::string>());
   const auto crs = given["crs"].cast<std::string>();
-  const terrain::BoundedMeshResult outcome = Job(how).run([&](const terrain::Context& context) {
+  const terrain::BoundedMeshResult outcome = Job(job).run([&](const terrain::Context& context) {
     options.places = places_to(store, crs);
     return write_bounded_mesh(store, options, context);
   });
@@ -210,7 +210,7 @@ void bind_mesh(py::module_& module) {
   });
   module.def("units",
              [](const OpenStore& open) { return to_python(terrain::MeshUnits(open.get())); });
-  // Of WGS 84.
+  // Units of longitude and latitude in WGS 84.
   module.def("lonlat_units", [] {
     terrain::MeshUnits units;
     units.crs.epsg = 4326;
@@ -218,7 +218,7 @@ void bind_mesh(py::module_& module) {
     units.crs.horizontal_unit = "degree";
     return to_python(units);
   });
-  // By the same rule as in files that have no unit but the metre.
+  // The same rule as for .glb files, which are in metres.
   module.def("metres_per_unit", [](const py::object& units, double x0, double y0, double z0,
                                    double x1, double y1, double z1) {
     const auto frame =

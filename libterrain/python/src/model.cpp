@@ -26,7 +26,7 @@ py::array_t<std::uint64_t> array_of(const std::vector<tri::ClusterId>& clusters)
   return to_array(std::move(rows));
 }
 
-/// The plane's triangulation of a store at mixed levels, which Python's threads may share.
+/// The triangulation of a store at mixed levels, which Python's threads may share.
 template <class Coord>
 class SharedModel {
  public:
@@ -39,7 +39,7 @@ class SharedModel {
     released([&] { model_ = std::make_unique<Model>(source_, start); });
   }
 
-  /// One step: step(model) returns its delta.
+  /// Applies step(model), which returns its delta.
   template <class Step>
   py::dict change(Step&& step) {
     MeshChange made;
@@ -73,18 +73,18 @@ class SharedModel {
     for (const auto& [box, fine] : focuses) detail.focuses.push_back({stored(box), fine});
     return detail;
   }
-  /// Around a box of the CRS.
+  /// Returns the stored box around a box in the CRS.
   [[nodiscard]] tri::Box3 stored(const FlatBox& box) const {
     const stream::Box3 flat{{box[0], box[1], 0}, {box[2], box[3], 0}};
     const stream::Box3 around = stored_box(store_.schema(), flat);
     return tri::box2(around.min[0], around.min[1], around.max[0], around.max[1]);
   }
-  /// (box, error, members)
+  /// Returns (box, error, members).
   py::tuple record(const ClusterPair& pair) {
     const tri::ClusterId id = cluster(pair);
     const tri::ClusterRecord of = ask([&](Model& model) {
       if (!model.is_expanded(id) && !model.can_expand(id)) {
-        throw std::invalid_argument(to_string(id) + " is not below an expanded one");
+        throw std::invalid_argument(to_string(id) + " is not directly below an expanded cluster");
       }
       return model.record(id);
     });

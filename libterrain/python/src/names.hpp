@@ -10,8 +10,8 @@
 #include <terrace/tri/point_tin.hpp>
 #include <terrace/tri/smoothing.hpp>
 
-/// Names that Python uses for the libraries' choices. All throw ValueError that lists the known
-/// ones.
+/// The libraries' enumerators by their names in Python. All throw ValueError that lists the known
+/// names.
 
 namespace terrace::python {
 

@@ -17,12 +17,12 @@
 #include "call.hpp"
 #include "sources.hpp"
 
-/// Points from files or arrays, without a store, and to files.
+/// Reads points from files or arrays and writes them to files, without a store.
 
 namespace terrace::python {
 namespace {
 
-/// Blocks of a source, in coordinates of its CRS. Python's threads may share one.
+/// Reads the blocks of a source, in coordinates of its CRS. Python's threads may share one.
 class PointReader {
  public:
   PointReader(const py::object& source, const py::dict& given, unsigned threads) : held_(source) {
@@ -36,7 +36,7 @@ class PointReader {
     voids_.emplace(source_->info());
   }
 
-  /// Records, or None at the end.
+  /// Returns the next records, or None at the end.
   py::object next() {
     std::vector<std::byte> records;
     bool some = false;
@@ -70,7 +70,7 @@ class PointReader {
   [[nodiscard]] const stream::Schema& schema() const { return source_->info(); }
 
  private:
-  py::object held_;  ///< the arrays that are read
+  py::object held_;  ///< keeps the arrays alive
   py::dtype type_;
   std::mutex mutex_;
   std::unique_ptr<stream::PointSource> source_;
@@ -79,14 +79,14 @@ class PointReader {
   bool ended_ = false;
 };
 
-/// (points written, points left out as a coordinate is NaN, how far a coordinate was moved at most)
+/// Returns (points written, points left out because a coordinate is NaN, largest rounding error).
 py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
-                       const std::string& format, bool replace, const py::tuple& how) {
+                       const std::string& format, bool replace, const py::tuple& job) {
   format_of_output(terrain::outputs::kPointFile, path, format);
   const OpenSource open = opener_of(source);
   std::uint64_t points = 0, nodata = 0;
   double rounding = 0;
-  Job(how).run([&](const terrain::Context& context) {
+  Job(job).run([&](const terrain::Context& context) {
     stream::SourceOptions options;
     {
       const py::gil_scoped_acquire held;

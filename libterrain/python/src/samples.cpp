@@ -12,39 +12,38 @@
 #include "delaunay.hpp"
 #include "names.hpp"
 
-/// What is computed from heights of a triangulation's vertices, which are given by number of
-/// vertex.
+/// Functions of a triangulation and the heights of its vertices, given by slot.
 
 namespace terrace::python {
 namespace {
 
-/// The heights of vertices. Throws: ValueError unless there is one for each number of vertex.
+/// Returns the heights of vertices. Throws: ValueError unless there is one for each slot.
 template <class Mesh>
 std::span<const double> heights_of(std::span<const double> values, const Mesh& mesh) {
   if (values.size() >= mesh.vertex_slots()) return values;
   throw py::value_error("there are " + std::to_string(values.size()) + " `values` for " +
                         std::to_string(mesh.vertex_slots()) +
-                        " numbers of vertices; by_vertex() puts them in order");
+                        " vertex numbers; use by_vertex() to order them");
 }
 
 py::array heights(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& places,
                   const std::string& method, unsigned threads) {
-  const tri::Interpolation how = interpolation_named(method);
+  const tri::Interpolation interpolation = interpolation_named(method);
   const auto values = numbers_of(given, "values");
   const auto asked = rows_of<2>(places, "places");
   return to_array(shared.read(asked.size(), [&](const auto& mesh) {
-    return heights_at(mesh, heights_of(values, mesh), asked, how, threads);
+    return heights_at(mesh, heights_of(values, mesh), asked, interpolation, threads);
   }));
 }
 
-/// Compressed rows of places: weights, vertices, where each row begins.
+/// Returns compressed rows, one per place: weights, vertices, the offset of each row.
 py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const std::string& method) {
-  const tri::Interpolation how = interpolation_named(method);
+  const tri::Interpolation interpolation = interpolation_named(method);
   const auto asked = rows_of<2>(places, "places");
   std::vector<double> shares;
   std::vector<std::int32_t> vertices;
   auto begins = shared.read(asked.size(), [&](const auto& mesh) {
-    // As they are found, and where those of each place are among them.
+    // All weights in the order of the walk, and the offset of each place's weights.
     std::vector<tri::VertexWeight> all, found;
     std::vector<std::size_t> first(asked.size());
     std::vector<std::int64_t> rows(asked.size() + 1, 0);
@@ -53,7 +52,7 @@ py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const st
       if (!finite(asked[i])) {
         throw std::invalid_argument("place " + std::to_string(i) + " is not finite");
       }
-      weights_at(mesh, asked[i], how, found, near);
+      weights_at(mesh, asked[i], interpolation, found, near);
       if (!found.empty()) near = found.front().vertex;
       first[i] = all.size();
       rows[i + 1] = static_cast<std::int64_t>(found.size());
@@ -74,7 +73,7 @@ py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const st
                         to_array(std::move(begins)));
 }
 
-/// Rows of min angle, aspect, area, surface area, volume above, volume below.
+/// Returns rows of min angle, aspect, area, surface area, volume above, volume below.
 py::array triangle_quality(SharedDelaunay2& shared, const Array<double>& given, double datum) {
   const auto values = numbers_of(given, "values");
   return to_array(shared.read(0, [&](const auto& mesh) {
@@ -91,11 +90,11 @@ py::array triangle_quality(SharedDelaunay2& shared, const Array<double>& given, 
 
 py::dict distances(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& points,
                    const std::string& method, unsigned threads) {
-  const tri::Interpolation how = interpolation_named(method);
+  const tri::Interpolation interpolation = interpolation_named(method);
   const auto values = numbers_of(given, "values");
   const auto samples = rows_of<3>(points, "samples");
   const tri::VerticalDistances made = shared.read(samples.size(), [&](const auto& mesh) {
-    return vertical_distances(mesh, heights_of(values, mesh), samples, how, threads);
+    return vertical_distances(mesh, heights_of(values, mesh), samples, interpolation, threads);
   });
   py::dict result;
   result["count"] = made.count;
@@ -111,7 +110,7 @@ py::dict distances(SharedDelaunay2& shared, const Array<double>& given, const Ar
 py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
                     const Array<double>& places, const std::string& method, unsigned threads) {
   using tri::GradientFrom;
-  const auto how = named<GradientFrom>(
+  const auto source = named<GradientFrom>(
       method, "method",
       {{"linear", GradientFrom::kTriangles}, {"natural", GradientFrom::kNaturalNeighbours}});
   const auto values = numbers_of(given, "values");
@@ -120,14 +119,14 @@ py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
     std::vector<std::array<double, 2>> rows;
     rows.reserve(asked.size());
     for (const tri::Gradient& g :
-         gradients_at(mesh, heights_of(values, mesh), asked, how, threads)) {
+         gradients_at(mesh, heights_of(values, mesh), asked, source, threads)) {
       rows.push_back({g.x, g.y});
     }
     return rows;
   }));
 }
 
-/// All heights, those that have moved and the others. vertices: those that may move, or None.
+/// Returns all heights after smoothing. vertices: those that may move, or None for all.
 py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
                  const std::optional<Array<std::int32_t>>& vertices, const std::string& method,
                  unsigned iterations, double strength, double pass_band, double edge_height) {

@@ -10,8 +10,8 @@
 namespace terrace::python {
 namespace {
 
-/// (kept tetrahedra and triangles of the surface, as corners by number of vertex; volume; lids were
-/// left out; components; Euler characteristic)
+/// Returns (corners of the kept tetrahedra, corners of the surface's triangles, volume, whether
+/// lids were left out, components, Euler characteristic).
 template <class Metric>
 py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule,
                 const std::string& criterion, double edge_factor, bool keep_vertices, bool lids,
@@ -77,7 +77,7 @@ py::dict measure(const Array<double>& vertices, const Array<std::uint32_t>& tria
   return result;
 }
 
-/// The triangles, those of components with negative volume inside out.
+/// Returns the triangles with components of negative volume turned inside out.
 py::array turned_outward(const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
   tri::Surface surface = surface_of(vertices, triangles);
   released([&] { tri::turn_outward(surface); });

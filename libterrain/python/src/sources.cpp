@@ -40,7 +40,7 @@ stream::MemoryPoints points_of_columns(const py::dict& given) {
     points.info.coordinates[axis] = channel_of(columns.at(axis));
     points.coordinates[axis] = column_of(columns[axis]);
   }
-  // Scale and offset of x and y are those of the transform.
+  // The transform holds the scale and offset of x and y.
   auto& xy = points.info.world.xy;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     stream::Channel& channel = points.info.coordinates[axis];
@@ -85,7 +85,7 @@ bool opens_twice(const py::object& source) {
   return std::none_of(names.begin(), names.end(), stream::reads_once);
 }
 
-/// where, keep, drop, resolution and region.
+/// Reads where, keep, drop, resolution and region.
 stream::Selection selection_of(const py::object& source, const py::dict& given,
                                const stream::SourceOptions& options) {
   stream::Selection selection;
@@ -149,7 +149,7 @@ stream::SourceOptions reading_of(const py::object& source, const py::dict& given
   set("block_points", options.block_points);
   set("band", options.band);
   set("cell", options.cell);
-  if (options.block_points < 1) throw py::value_error("`block_points` must be above 0");
+  if (options.block_points < 1) throw py::value_error("`block_points` must be positive");
   if (options.band < 1) throw py::value_error("`band` counts from 1");
   if (given.contains("crs")) {
     options.crs = terrain::crs_named(given["crs"].cast<std::string>());

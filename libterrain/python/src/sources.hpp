@@ -9,20 +9,21 @@
 
 #include "core.hpp"
 
-/// What Python reads points from, and which of them.
+/// Point sources given by Python, and the options that select points.
 
 namespace terrace::python {
 
 using OpenSource =
     std::function<std::unique_ptr<stream::PointSource>(const stream::SourceOptions&)>;
 
-/// source: a list of names of files; or arrays as a dict, which must live as long as the source:
-/// {"name", "columns": 3 coordinates, "attributes"} with columns as dicts of array, name, scale and
-/// offset, or {"name", "samples": 2D, "transform": six numbers to a sample's place, "nodata",
-/// "scale", "offset"}.
+/// Returns a function that opens a source: a list of file names, or a dict of arrays, which must
+/// outlive the source. Points are {"name", "columns": 3 coordinates, "attributes"}, with columns as
+/// dicts of array, name, scale and offset. A raster is {"name", "samples": 2D, "transform": six
+/// numbers to a sample's place, "nodata", "scale", "offset"}.
 OpenSource opener_of(const py::object& source);
 
-/// How `source` is read; the region is moved to where it lies.
+/// Returns the options for reading `source`, with the region moved to the data's range of
+/// longitudes.
 stream::SourceOptions reading_of(const py::object& source, const py::dict& options,
                                  unsigned threads = 1, std::stop_token stop = {});
 stream::HeightsOfColour colours_of(const py::dict& options);

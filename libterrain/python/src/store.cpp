@@ -16,7 +16,7 @@
 namespace terrace::python {
 namespace {
 
-/// The number of points of each level and above, the mean height of all, and the box around them.
+/// The number of points on each level and above, the mean height, and the bounding box.
 struct Extent {
   std::vector<std::uint64_t> points;
   double mean_height = 0.0;
@@ -99,7 +99,7 @@ void append(std::vector<std::byte>& to, std::span<const double> numbers,
 /// Appends the wanted points of some clusters to packed records.
 class RecordsPart final : public terrain::WantedPart {
  public:
-  /// to: the conversion of places, if any.
+  /// to: the conversion of places, or null.
   RecordsPart(const terrain::WantedPoints& wanted, std::size_t payload,
               const terrain::Transformation* to, std::vector<std::byte>& all)
       : wanted_(wanted), payload_(payload), to_(to), all_(all) {}
@@ -128,7 +128,7 @@ class RecordsPart final : public terrain::WantedPart {
 py::array points(const OpenStore& open, unsigned level, const py::object& region,
                  const py::list& focuses, const std::string& where,
                  std::optional<std::pair<unsigned, std::uint64_t>> cluster, const std::string& crs,
-                 const py::tuple& how) {
+                 const py::tuple& job) {
   const stream::Store store = open.get(where);
   terrain::Detail detail = detail_of(store, level, region, focuses);
   if (cluster) {
@@ -136,11 +136,11 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
     detail.cluster = static_cast<stream::ClusterId>(id);
   }
   const std::size_t payload = store.schema().payload_size();
-  std::vector<std::byte> records = Job(how).run([&](const terrain::Context& context) {
+  std::vector<std::byte> records = Job(job).run([&](const terrain::Context& context) {
     const auto to = change_to(store, crs);
     note_idle_focuses(store, detail, context);
     std::vector<std::byte> bytes;
-    // Known beforehand where everything is wanted.
+    // The size is known in advance if all points are wanted.
     if (!detail.region && detail.focuses.empty() && !detail.cluster && where.empty()) {
       bytes.reserve(store.levels()[level].points * (sizeof(stream::Point3) + payload));
     }
@@ -154,11 +154,11 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
   return to_records(std::move(records), record_type(store.schema()));
 }
 
-/// A row for each cluster of a level: the box in the CRS, error, descendants, members.
-py::array clusters(const OpenStore& open, unsigned level, const py::tuple& how) {
+/// Returns a row for each cluster of a level: the box in the CRS, error, descendants, members.
+py::array clusters(const OpenStore& open, unsigned level, const py::tuple& job) {
   const stream::Store store = open.get();
   if (level > store.top()) throw py::value_error("the store has no level " + std::to_string(level));
-  return to_array(Job(how).run([&](const terrain::Context& context) {
+  return to_array(Job(job).run([&](const terrain::Context& context) {
     std::vector<std::array<double, 9>> rows;
     const std::uint64_t count = store.levels()[level].clusters;
     rows.reserve(count);
@@ -174,7 +174,7 @@ py::array clusters(const OpenStore& open, unsigned level, const py::tuple& how) 
   }));
 }
 
-/// Records of found points, with their distance at the end.
+/// Returns the records of found points, each with its distance at the end.
 std::vector<std::byte> records_of(const stream::StoreQuery& query,
                                   const std::vector<stream::FoundPoint>& found) {
   const stream::StoreSchema& schema = query.store().schema();
@@ -196,7 +196,7 @@ py::array near(const OpenStore& open, const std::vector<double>& place,
                const std::string& where) {
   const stream::Store store = open.get(where);
   if (place.size() != 2 && place.size() != 3)
-    throw py::value_error("`near` has two or three numbers");
+    throw py::value_error("`near` must be two or three numbers");
   terrain::NearPlace wanted{.xy = {place[0], place[1]}};
   if (place.size() == 3) wanted.z = place[2];
   std::vector<std::byte> records = released([&](std::stop_token stop) {
@@ -208,7 +208,7 @@ py::array near(const OpenStore& open, const std::vector<double>& place,
   return to_records(std::move(records), record_type(store.schema(), {"distance"}));
 }
 
-/// A box as it lies in the store: where longitudes have turns these are several side by side.
+/// Returns a region's box in the store, or several side by side where it crosses the antimeridian.
 std::vector<stream::Box3> boxes_of(const terrain::Region& region) {
   std::vector<std::array<double, 2>> spans;
   for (const terrain::Polygon& polygon : region.polygons()) {
@@ -253,7 +253,7 @@ terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::
 
 tri::ClusterId cluster_of(const stream::Store& store, unsigned level, std::uint64_t number) {
   if (level > store.top() || number >= store.levels()[level].clusters) {
-    throw py::value_error("the store has no cluster " + std::to_string(number) + " of level " +
+    throw py::value_error("the store has no cluster " + std::to_string(number) + " on level " +
                           std::to_string(level));
   }
   return tri::cluster_id(level, number);
@@ -295,7 +295,7 @@ void bind_store(py::module_& module) {
       .def("where",
            [](const OpenStore& open, const std::string& condition) {
              const stream::Store view = open.get(condition);
-             released([&] { return view.bounds(); });  // throws if no point is left
+             released([&] { return view.bounds(); });  // throws if no point meets the condition
              return OpenStore(view);
            })
       .def("info", &info_of)
@@ -308,7 +308,7 @@ void bind_store(py::module_& module) {
              const std::array<double, 6>& xy = store.schema().world.xy;
              if (xy[1] != 0 || xy[3] != 0)
                throw py::value_error(
-                   "the raster is rotated: a box of its CRS is none of its columns and rows");
+                   "the raster is rotated: boxes do not follow its columns and rows");
              const terrain::Region region = region_of(given, store).value();
              return released([&] {
                std::uint64_t points = 0;
@@ -318,9 +318,9 @@ void bind_store(py::module_& module) {
                return points;
              });
            })
-      .def("verify", [](const OpenStore& open, const py::tuple& how) {
+      .def("verify", [](const OpenStore& open, const py::tuple& job) {
         const stream::Store store = open.get();
-        return Job(how).run([&](const terrain::Context& context) {
+        return Job(job).run([&](const terrain::Context& context) {
           std::vector<std::string> faults;
           store.with_stop(context.stop)
               .verify([&](const stream::Problem& problem) { faults.push_back(text_of(problem)); },

@@ -16,28 +16,28 @@
 
 namespace terrace::python {
 
-/// A store as Python holds it: open until it is closed.
+/// A store opened by Python, until it is closed.
 class OpenStore {
  public:
   explicit OpenStore(const std::string& path) : store_(stream::Store::open(path)) {}
   explicit OpenStore(const stream::Store& store) : store_(store) {}
 
-  /// A copy, which is cheap: another thread may close this store meanwhile. where: the condition of
-  /// a view. Throws: ValueError once it is closed; terrace.Error for a bad condition.
+  /// Returns a cheap copy, because another thread may close this store meanwhile.
+  /// where: the condition of a view.
+  /// Throws: ValueError once it is closed; terrace.Error for an invalid condition.
   [[nodiscard]] stream::Store get(const std::string& where = {}) const {
     if (!store_) throw py::value_error("the store is closed");
     return store_->where(where);
   }
-  /// Throws: ValueError for a view, too.
+  /// Returns a copy like get(). Throws: ValueError also for a view with a condition.
   [[nodiscard]] stream::Store get_whole() const {
     stream::Store store = get();
     if (store.condition() != nullptr) {
-      throw py::value_error(
-          "it has all points of a store, and no condition: give the store itself");
+      throw py::value_error("views with a condition are not supported here: pass the store itself");
     }
     return store;
   }
-  /// Work under way goes on with the files that it has.
+  /// Closes the store. Running calls continue with the files that they hold.
   void close() { store_.reset(); }
   [[nodiscard]] bool closed() const { return !store_; }
 
@@ -45,23 +45,23 @@ class OpenStore {
   std::optional<stream::Store> store_;
 };
 
-/// level, region and focuses (pairs of region and level).
+/// Returns the detail of a level, a region and focuses (pairs of region and level).
 /// Throws: ValueError for a level that the store does not have.
 terrain::Detail detail_of(const stream::Store& store, unsigned level, const py::object& region,
                           const py::list& focuses);
 
-/// A cluster by its level and its number there. Throws: ValueError for one that the store does not
-/// have.
+/// Returns a cluster by its level and its number on that level.
+/// Throws: ValueError for a cluster that the store does not have.
 tri::ClusterId cluster_of(const stream::Store& store, unsigned level, std::uint64_t number);
 
-/// Stored coordinates of a point in the CRS, and those around a box of it.
+/// Converts a point from the CRS to stored coordinates, and a box to the stored box around it.
 stream::Point3 stored_point(const stream::Schema& schema, const stream::Point3& world);
 stream::Box3 stored_box(const stream::Schema& schema, const stream::Box3& world);
 
-/// File, place and what is wrong there.
+/// Returns file, offset and description of a problem in one line.
 std::string text_of(const stream::Problem& problem);
 
-/// To the CRS of that name; nullopt for an empty one.
+/// Returns the transformation to the CRS with a name, or nullopt for an empty name.
 std::optional<terrain::Transformation> change_to(const stream::Store& store,
                                                  const std::string& crs);
 

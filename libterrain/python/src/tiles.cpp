@@ -49,14 +49,14 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
   request.vertical = reference_named(text("vertical", "recorded"));
   request.fill = fill_named(text("fill", "interpolate"));
   if (request.fill == terrain::Fill::none)
-    throw py::value_error("tiles have no holes: `fill` is flat or interpolate");
+    throw py::value_error("tiles cannot have holes: `fill` must be flat or interpolate");
   return request;
 }
 
 /// open: the store to compare heights with, or null.
 py::dict check_tiles(const std::string& folder, const OpenStore* open,
                      std::optional<double> max_error, const std::string& vertical,
-                     const std::string& geoid, const py::tuple& how) {
+                     const std::string& geoid, const py::tuple& job) {
   if (!terrain::is_tile_folder(folder)) throw py::value_error(folder + " holds no set of tiles");
   std::optional<stream::Store> store;
   if (open != nullptr) store = open->get();
@@ -65,7 +65,7 @@ py::dict check_tiles(const std::string& folder, const OpenStore* open,
                                           .store = store ? &*store : nullptr,
                                           .vertical = reference_named(vertical),
                                           .geoid = geoid};
-  const terrain::TileCheckResult made = Job(how).run(
+  const terrain::TileCheckResult made = Job(job).run(
       [&](const terrain::Context& context) { return terrain::check_tiles(request, context); });
   py::dict result;
   py::list faults, zooms;
@@ -92,10 +92,10 @@ py::dict check_tiles(const std::string& folder, const OpenStore* open,
 void bind_tiles(py::module_& module) {
   module.def("check_tiles", &check_tiles);
   module.def("write_tiles", [](const OpenStore& open, const std::string& folder,
-                               const py::dict& given, const py::tuple& how) {
+                               const py::dict& given, const py::tuple& job) {
     const stream::Store store = open.get();
     const terrain::TilesRequest request = tiles_request(folder, given);
-    const terrain::TilesOutcome outcome = Job(how).run([&](const terrain::Context& context) {
+    const terrain::TilesOutcome outcome = Job(job).run([&](const terrain::Context& context) {
       return terrain::write_tiles(store, request, context);
     });
     py::dict result;

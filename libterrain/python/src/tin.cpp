@@ -22,7 +22,7 @@ py::dict measures(double max_error, double rms_error, std::size_t samples, std::
   return result;
 }
 
-/// (vertices, triangles, measures). max_points 0: no limit.
+/// Returns (vertices, triangles, measures). max_points: 0 for no limit.
 py::tuple tin_of_points(const Array<double>& x, const Array<double>& y, const Array<double>& z,
                         double max_error, std::size_t max_points, const std::string& quality,
                         const std::string& duplicates, double min_angle,
@@ -42,12 +42,12 @@ py::tuple tin_of_points(const Array<double>& x, const Array<double>& y, const Ar
       measures(errors.largest, errors.rms, errors.covered + errors.uncovered, errors.uncovered));
 }
 
-/// The same of rows and columns, NaN: no sample. Vertices are column, row, height.
+/// The same for a grid, in which NaN is not a sample. Vertices are (column, row, height).
 template <class T>
 py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double column_step,
                       double row_step, double max_error, std::size_t max_points,
                       const std::string& quality) {
-  if (heights.ndim() != 2) throw py::value_error("a raster has two dimensions");
+  if (heights.ndim() != 2) throw py::value_error("a raster must have two dimensions");
   constexpr py::ssize_t kMost = 65535;
   if (heights.shape(0) > kMost || heights.shape(1) > kMost) {
     throw py::value_error("the raster has more than 65,535 rows or columns: build a store of it");
@@ -76,7 +76,7 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
                         measures(check.max_error, check.rms_error, check.samples, check.uncovered));
 }
 
-/// (sample of each vertex, the largest error)
+/// Returns (the sample of each vertex, the largest error).
 py::tuple simplify_line(const Array<double>& t, const Array<double>& heights, double max_error) {
   const auto along = numbers_of(t, "t"), values = numbers_of(heights, "heights");
   double largest = 0;
@@ -90,7 +90,7 @@ py::tuple simplify_line(const Array<double>& t, const Array<double>& heights, do
   return py::make_tuple(to_array(std::move(samples)), largest);
 }
 
-/// Columns of samples against any surface.
+/// Measures columns of samples against any surface.
 py::dict measure_surface(const Array<double>& x, const Array<double>& y, const Array<double>& z,
                          const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");

@@ -17,7 +17,7 @@
 namespace terrace::python {
 namespace {
 
-/// A function of Python's from positions, an array, to the partner of each or -1.
+/// Wraps a Python function from an array of positions to the partner of each position or -1.
 template <class Point>
 matching::LevelMatcher<Point> matcher_of(const py::object& given) {
   if (given.is_none()) return {};
@@ -37,7 +37,7 @@ matching::LevelMatcher<Point> matcher_of(const py::object& given) {
   };
 }
 
-/// (rows a, b, distance, size; the level of each row; positions of the rows' nodes)
+/// Returns (rows of a, b, distance, size; the level of each row; the positions of the rows' nodes).
 template <std::size_t N>
 py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
                   const Array<std::uint32_t>& labels, const py::object& matcher, unsigned threads) {
@@ -66,20 +66,21 @@ py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
                         to_array(std::move(made.positions)));
 }
 
-/// Rows of numbers of nodes; any linkage's first two columns.
+/// Converts rows of two node numbers, such as the first two columns of a linkage.
 std::vector<matching::TreeChildren> children_of(const Array<double>& given) {
   std::vector<matching::TreeChildren> children;
   for (const auto& [a, b] : rows_of<2>(given, "the tree")) {
     constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
     if (!(a >= 0 && a <= kMost && b >= 0 && b <= kMost)) {
-      throw py::value_error("row " + std::to_string(children.size()) + " of the tree is none");
+      throw py::value_error("row " + std::to_string(children.size()) +
+                            " of the tree has an invalid number");
     }
     children.push_back({static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)});
   }
   return children;
 }
 
-/// Children of the rows after rotations. lower, upper: corners of the boxes of the primitives.
+/// Returns the children of each row after rotations. lower, upper: corners of the leaves' boxes.
 template <std::size_t N>
 py::array rotated(const Array<double>& rows, const Array<double>& lower, const Array<double>& upper,
                   unsigned passes) {
@@ -101,7 +102,7 @@ py::array rotated(const Array<double>& rows, const Array<double>& lower, const A
   }));
 }
 
-/// Numbers and distances of what queries have found, -1 and infinity for nothing.
+/// Indices and distances of the items found, -1 and infinity for none.
 struct Found {
   explicit Found(std::size_t count)
       : indices(count, std::int64_t{-1}),
@@ -118,7 +119,7 @@ struct Found {
   std::vector<double> distances;
 };
 
-/// The k nearest of each place, row by row.
+/// Returns the k points nearest to each place, row by row.
 template <std::size_t N>
 py::tuple nearest_points(const matching::PointHierarchy<N>& tree, const Array<double>& places,
                          std::size_t k) {
@@ -134,7 +135,7 @@ py::tuple nearest_points(const matching::PointHierarchy<N>& tree, const Array<do
   return std::move(found).arrays();
 }
 
-/// hit(ray) of each ray: (number or -1, t or infinity).
+/// Returns hit(ray) for each ray: (index or -1, t or infinity).
 template <class Hit>
 py::tuple first_hits(const Array<double>& origins, const Array<double>& directions, Hit&& hit) {
   const auto from = rows_of<3>(origins, "origins"), towards = rows_of<3>(directions, "directions");

@@ -20,7 +20,7 @@
 namespace terrace::python {
 namespace {
 
-/// What a frame did.
+/// The changes made by a frame.
 struct ViewChange : MeshChange {
   std::size_t expanded = 0, collapsed = 0, missing = 0, pending = 0, points = 0;
   bool settled = false;
@@ -41,16 +41,16 @@ class AnyView {
  public:
   virtual ~AnyView() = default;
   virtual ViewChange frame(const tri::View& view, double seconds) = 0;
-  /// Everything there is, as added.
+  /// Returns the whole model as a change that adds it.
   virtual ViewChange whole() = 0;
   virtual terrain::ViewTraffic traffic() = 0;
   virtual ViewChange restore(unsigned threads) = 0;
-  /// how: nothing unpins.
-  virtual void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> how) = 0;
-  /// Records of the store's schema. Throws: std::invalid_argument for a vertex that is not there or
-  /// whose attributes are no longer kept.
+  /// Pins a cluster, or unpins it if `pin` is empty.
+  virtual void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> pin) = 0;
+  /// Returns records of the store's schema. Throws: std::invalid_argument for a vertex that does
+  /// not exist or whose attributes are no longer kept.
   virtual std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) = 0;
-  /// Metres east, north and up of points in stored coordinates.
+  /// Converts points from stored coordinates to metres east, north and up.
   virtual void to_metres(std::span<stream::Point3> points) = 0;
 };
 
@@ -76,8 +76,8 @@ class ViewOf final : public AnyView {
   ViewChange restore(unsigned threads) override {
     return described(changes().of(view_.restore(threads)));
   }
-  void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> how) override {
-    how ? view_.pin(cluster, *how) : view_.unpin(cluster);
+  void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> pin) override {
+    pin ? view_.pin(cluster, *pin) : view_.unpin(cluster);
   }
   std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) override {
     std::vector<std::byte> records;
@@ -89,7 +89,7 @@ class ViewOf final : public AnyView {
       const auto record = view_.attributes(vertex);
       if (record.empty()) {
         throw std::invalid_argument("the attributes of vertex " + std::to_string(number) +
-                                    " are no longer kept: ask after the frame that adds it");
+                                    " are no longer kept: read them after the frame that adds it");
       }
       records.insert(records.end(), record.begin(), record.end());
     }
@@ -115,7 +115,7 @@ class ViewOf final : public AnyView {
   StoreView view_;
 };
 
-/// A view that Python's threads may share, and that a fork of the process may not use.
+/// A view that Python's threads may share, but a fork of the process may not use.
 class SharedView {
  public:
   SharedView(const OpenStore& open, const std::string& kind, bool reads_in_frame,
@@ -140,7 +140,7 @@ class SharedView {
     }
   }
   ~SharedView() {
-    // Its thread is not there to be waited for.
+    // In a fork the view's thread does not exist, so the destructor would wait forever.
     if (getpid() != process_) static_cast<void>(view_.release());
   }
   SharedView(const SharedView&) = delete;
@@ -150,7 +150,7 @@ class SharedView {
   template <class Work>
   auto locked(Work&& work) {
     if (getpid() != process_) {
-      throw py::value_error("a view is not there after a fork: make one in this process");
+      throw py::value_error("a view cannot be used after a fork: make one in this process");
     }
     const py::gil_scoped_release released;
     const std::lock_guard lock(mutex_);
@@ -173,9 +173,9 @@ class SharedView {
   }
   void pin(unsigned level, std::uint64_t number, std::optional<bool> expanded) {
     const tri::ClusterId cluster = cluster_of(store_, level, number);
-    std::optional<tri::ViewPin> how;
-    if (expanded) how = *expanded ? tri::ViewPin::expanded : tri::ViewPin::collapsed;
-    locked([&] { view_->pin(cluster, how); });
+    std::optional<tri::ViewPin> pin;
+    if (expanded) pin = *expanded ? tri::ViewPin::expanded : tri::ViewPin::collapsed;
+    locked([&] { view_->pin(cluster, pin); });
   }
   py::array attributes(const Array<std::int32_t>& given) {
     const auto vertices = numbers_of(given, "vertices");
@@ -201,7 +201,7 @@ class SharedView {
 tri::Point3 point_of(const py::object& given, const char* what) {
   const auto array = given.cast<Array<double>>();
   const auto numbers = numbers_of(array, what);
-  if (numbers.size() != 3) throw py::value_error(std::string(what) + " has three numbers");
+  if (numbers.size() != 3) throw py::value_error(std::string(what) + " must be three numbers");
   return {numbers[0], numbers[1], numbers[2]};
 }
 
@@ -217,7 +217,7 @@ tri::View view_of(const py::dict& given) {
   if (!given["matrix"].is_none()) {
     const auto array = given["matrix"].cast<Array<double>>();
     const auto rows = rows_of<4>(array, "matrix");
-    if (rows.size() != 4) throw py::value_error("matrix must have the shape (4, 4)");
+    if (rows.size() != 4) throw py::value_error("`matrix` must have the shape (4, 4)");
     std::array<double, 16> matrix{};
     std::copy_n(array.data(), 16, matrix.begin());
     view.camera = tri::matrix_camera(matrix, number("height"));

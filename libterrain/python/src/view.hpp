@@ -15,7 +15,7 @@
 
 namespace terrace::python {
 
-/// What came and went in a model of a store's points: columns of numbers and places.
+/// Vertices and triangles added to and removed from a model of a store's points, as columns.
 struct MeshChange {
   std::vector<std::int32_t> added_vertices, removed_vertices, moved_vertices;
   std::vector<stream::Point3> added_positions, moved_positions;
@@ -41,7 +41,7 @@ std::int32_t number_of(Id of) {
   return static_cast<std::int32_t>(tri::slot(of));
 }
 
-/// The changes of a model; place(vertex): where a vertex is.
+/// Collects the changes of a model. place(vertex) returns the position of a vertex.
 template <class Shown, class Place>
 class MeshChanges {
  public:
@@ -69,7 +69,7 @@ class MeshChanges {
     return change;
   }
 
-  /// Everything there is, as added.
+  /// Returns the whole model as a change that adds it.
   [[nodiscard]] MeshChange whole() const {
     MeshChange change;
     for (const tri::VertexId v : model_.triangulation().all_vertices()) add(change, v);

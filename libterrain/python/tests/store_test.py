@@ -147,7 +147,7 @@ class Stores(StoreCase):
             with self.assertRaises(terrace.Error):
                 self.scan.where(none)
         for whole in (terrace.View, terrace.Multiresolution):
-            with self.assertRaisesRegex(ValueError, 'give the store itself'):
+            with self.assertRaisesRegex(ValueError, 'pass the store itself'):
                 whole(view)
         view.close()
         with self.assertRaises(ValueError):
