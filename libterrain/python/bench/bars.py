@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the module with the packages that its users know, in one run.
+"""Compares the module's speed with other packages.
 
-bars.py HEIGHTS_SECONDS [WORD...]   the C++ program built beside this module; rows that have one of the words.
-PYTHONPATH names the module.
+Usage: bars.py HEIGHTS_SECONDS [WORD...]
+HEIGHTS_SECONDS: the C++ program built with this module. WORD: measures only tasks whose names contain one of the words.
+PYTHONPATH must contain the module.
 
-Each row: what, ours with all cores, ours with one thread, theirs, all in seconds (the least of some runs), and how
-many times faster we are with all cores. A package that is missing is named and left out.
+Prints a row per task: seconds with all cores, with one thread and of the other package (each the least of several runs),
+and the factor by which the module is faster with all cores. Tasks whose package is missing are skipped with a note.
 """
 
 import math
@@ -33,7 +34,7 @@ def seconds(work, runs=3):
 
 
 def limited(work, limit):
-    """Seconds of work() in a process of its own, or (limit, True) if it takes longer."""
+    """Returns (seconds, whether it was stopped) for work() in a child process, stopped after `limit` seconds."""
     child = multiprocessing.get_context('fork').Process(target=work)
     begin = time.perf_counter()
     child.start()
@@ -69,13 +70,13 @@ def heights(program):
         cores = os.cpu_count() or 1
 
         def theirs(threads):
-            told = subprocess.run([program, os.path.join(folder, 'dem'), name, str(threads)], check=True, text=True,
-                                  stdout=subprocess.PIPE).stdout.split()
+            printed = subprocess.run([program, os.path.join(folder, 'dem'), name, str(threads)], check=True, text=True,
+                                     stdout=subprocess.PIPE).stdout.split()
             found = store.heights(places, threads=threads)
-            assert math.isclose(math.fsum(found[~np.isnan(found)]), float(told[1]), rel_tol=1e-9)
-            return float(told[0])
+            assert math.isclose(math.fsum(found[~np.isnan(found)]), float(printed[1]), rel_tol=1e-9)
+            return float(printed[0])
 
-        # In turn, as the machine is not always as fast.
+        # Alternately, because the machine's speed varies.
         turns = [(seconds(lambda: store.heights(places), 5), theirs(cores)) for _ in range(4)]
         return min(ours for ours, _ in turns), seconds(lambda: store.heights(places, threads=1), 5), min(other for _, other in turns)
 
@@ -86,9 +87,9 @@ def cloud():
     points = random.random((1_000_000, 3)) * [1000, 1000, 50]
     places = random.random((1_000_000, 2)) * 980 + 10
     with tempfile.TemporaryDirectory() as folder:
-        def ours(**how):
-            store = terrace.build(points, os.path.join(folder, 'cloud'), replace=True, **how)
-            return store.heights(places, **how)
+        def ours(**options):
+            store = terrace.build(points, os.path.join(folder, 'cloud'), replace=True, **options)
+            return store.heights(places, **options)
 
         fast, one = seconds(ours, 2), seconds(lambda: ours(threads=1), 1)
         begin = time.perf_counter()
@@ -138,7 +139,7 @@ def k_means():
     points = random.random((200_000, 3))
     start = points[:100]
     theirs = seconds(lambda: KMeans(100, init=start, n_init=1, max_iter=100, tol=0).fit(points), 1)
-    ours = lambda **how: terrace.kmeans(points, start, max_iterations=100, **how)
+    ours = lambda **options: terrace.kmeans(points, start, max_iterations=100, **options)
     return seconds(ours), seconds(lambda: ours(threads=1)), theirs
 
 
@@ -166,7 +167,7 @@ def main():
     program, words = sys.argv[1], sys.argv[2:]
     for what, needs, goal, run in (
             ('heights, 1 M places of 4 M samples: C++', 'numpy', '0.9', lambda: heights(program)),
-            ('heights, 1 M places in 1 M points, all in: SciPy', 'scipy', '10', cloud),
+            ('heights, 1 M places in 1 M points, with build: SciPy', 'scipy', '10', cloud),
             ('linkage, single, 10,000 points: fastcluster', 'fastcluster', '3', lambda: linkage('single')),
             ('linkage, complete, 10,000 points: fastcluster', 'fastcluster', '3', lambda: linkage('complete')),
             *((f'linkage, {method}, 10,000 points: fastcluster', 'fastcluster', '-', lambda method=method: linkage(method))
@@ -182,7 +183,7 @@ def main():
             ('assignment, 4,000 x 4,000, distances: SciPy', 'scipy', '2', lambda: assignment(4000, True))):
         if not words or any(word in what for word in words):
             bar(what, needs, goal, run)
-    for before, what in (('time', "numpy's included"), ('numpy, time', "after numpy's")):
+    for before, what in (('time', 'including numpy'), ('numpy, time', 'after numpy')):
         code = f'import {before}; t = time.perf_counter(); import terrace; print(time.perf_counter() - t)'
         imported = min(float(subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, check=True).stdout)
                        for _ in range(5))

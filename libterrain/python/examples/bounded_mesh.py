@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A GeoTIFF becomes a mesh within an error of every sample, and a picture: bounded_mesh.py DEM.tif METRES"""
+"""Converts a GeoTIFF to a mesh with a bounded error, and to a picture: bounded_mesh.py DEM.tif METRES"""
 import sys
 
 import terrace

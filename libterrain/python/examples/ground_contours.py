@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The contours of a laser scan's ground, as GeoJSON: ground_contours.py SCAN.laz INTERVAL"""
+"""Writes the contours of a laser scan's ground as GeoJSON: ground_contours.py SCAN.laz INTERVAL"""
 import json
 import sys
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A renderer's triangles while a camera flies over a store: view_deltas.py STORE"""
+"""Keeps a renderer's triangles up to date while a camera flies over a store: view_deltas.py STORE"""
 import sys
 
 import terrace

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # %% [markdown]
-# # Clustering, matching, triangulations: the methods alone
+# # Clustering, matching and triangulations of arrays
 #
-# The methods of J. Skala's thesis work on arrays, without a store.
+# The methods of J. Skala's thesis also work on arrays, without a store.
 
 # %%
 import numpy as np
@@ -13,7 +13,7 @@ middles = random.random((12, 2)) * 100
 points = np.concatenate([middle + 2 * random.standard_normal((400, 2)) for middle in middles])
 
 # %% [markdown]
-# Facility location needs no number of clusters but what one costs. Its representatives are points of the input.
+# Facility location needs the cost of a cluster instead of the number of clusters. Points of the input represent clusters.
 
 # %%
 for cost in (0.02, 0.1, 0.5):
@@ -23,8 +23,8 @@ exact = terrace.cluster(points[::20], 0.1, method='jain-vazirani')
 print(f'every 20th point: cost {exact.cost:.0f}, no solution below {exact.lower_bound:.0f}')
 
 # %% [markdown]
-# Linkage has SciPy's methods and gives SciPy's rows, so SciPy's dendrograms draw them; k-means takes the representatives as
-# its start.
+# Linkage has SciPy's methods and returns rows like SciPy's, so SciPy can draw them as dendrograms. k-means can start from
+# the representatives.
 
 # %%
 for method in ('complete', 'average', 'ward'):
@@ -33,7 +33,7 @@ for method in ('complete', 'average', 'ward'):
 print('k-means:', terrace.kmeans(points, 12), 'from representatives:', terrace.kmeans(points, points[found.facilities]))
 
 # %% [markdown]
-# Pairs: a matching of least total distance with the proof of it, and the assignment of one set to another.
+# Pair points with the least total distance, with a proof, or assign the points of one set to another.
 
 # %%
 pairs = terrace.matching(points)
@@ -43,7 +43,7 @@ chosen = terrace.assignment(points, moved)
 print(chosen, f'{(chosen.columns == np.arange(len(points))).mean():.0%} of the points get their own copy')
 
 # %% [markdown]
-# The hierarchy of clusters that stores are made of takes any number of points in one pass; here a function counts its clusters.
+# Stores consist of a hierarchy of clusters, built in one pass from any number of points. Here a function counts its clusters.
 
 # %%
 clusters = {}
@@ -57,7 +57,7 @@ made = terrace.stream_clusters((random.random((10000, 3)) for _ in range(30)), c
 print(f'{made["points"]} points, clusters by level: {dict(sorted(clusters.items()))}')
 
 # %% [markdown]
-# A triangulation that changes: what is inserted and removed again leaves no trace.
+# Triangulations can change. Points that are inserted and removed again leave no trace.
 
 # %%
 triangulation = terrace.Delaunay2(points)

@@ -2,8 +2,8 @@
 # %% [markdown]
 # # Laser scans: from points to ground and contours
 #
-# Any LAS, LAZ or COPC file will do: `terrace.build('scan.laz', ...)`. Here an array with classes stands in for one: a
-# hill, trees on it (class 5), a house (6), as a scanner's records would have them.
+# Any LAS, LAZ or COPC file will do: `terrace.build('scan.laz', ...)`. This tutorial uses an array instead, with the fields
+# of a scanner's records: a hill with trees (class 5) and a house (class 6).
 
 # %%
 import numpy as np
@@ -27,7 +27,7 @@ print(scan, [a['name'] for a in scan.info['attributes']])
 print('near the house:', scan.query(near=(500_090, 5_200_090), k=5)['classification'])
 
 # %% [markdown]
-# The ground alone makes the terrain model: a condition reads no more of the store than it needs.
+# Build the terrain model from the ground points only. A condition reads only the parts of the store that it needs.
 
 # %%
 ground = scan.points(where='classification == 2')
@@ -37,7 +37,7 @@ print(terrain)
 mesh  # a notebook shows its picture
 
 # %% [markdown]
-# How high does vegetation stand above it? Heights of the ground below each tree's points:
+# How tall is the vegetation? Subtract the height of the ground below each tree's points.
 
 # %%
 vegetation = scan.points(where='classification == 5')

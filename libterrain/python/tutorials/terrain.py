@@ -2,8 +2,8 @@
 # %% [markdown]
 # # Terrain: from a GeoTIFF to a mesh with a verified error
 #
-# One pass over the raster makes a *store*: every sample once, in a hierarchy of clusters. The raster is a piece of the Alps
-# from this repository; the name of any other will do. (A notebook has no `__file__`: start it in this folder.)
+# One pass over the raster builds a *store*: every sample once, in a hierarchy of clusters. The raster is a part of the Alps
+# from this repository; any other file will do. (A notebook has no `__file__`, so start it in this folder.)
 
 # %%
 from pathlib import Path
@@ -16,7 +16,7 @@ print(store, store.info['crs']['name'], f'{store.info["bytes"] / len(store):.2f}
 # Later, or elsewhere: terrace.open('alps.store')
 
 # %% [markdown]
-# Which mesh keeps within 50 m of every sample? The bound is verified on each of them.
+# Make a mesh within 50 m of every sample. The bound is verified at each of them.
 
 # %%
 mesh = store.bounded_mesh(max_error=50)
@@ -25,7 +25,7 @@ mesh.save('alps.ply', replace=True)
 mesh  # a notebook shows its picture
 
 # %% [markdown]
-# Heights and slopes at places, a profile, contour lines, a shaded picture.
+# Compute heights and slopes at places, a profile, contour lines and a shaded picture.
 
 # %%
 places = np.column_stack((np.linspace(8.2, 8.8, 7), np.full(7, 46.4)))
@@ -42,14 +42,14 @@ with open('alps.png', 'wb') as file:
     file.write(shade._repr_png_())
 
 # %% [markdown]
-# A level of detail: coarse everywhere, every sample in one box.
+# Mix levels of detail: coarse everywhere, but every sample in one box.
 
 # %%
 detail = store.mesh(level=store.top, focus=[((8.45, 46.45, 8.5, 46.5), 0)])
 print(detail)
 
 # %% [markdown]
-# Live: a camera flies, the mesh follows by deltas. Positions are metres from the store's middle.
+# Fly a camera: the mesh follows by deltas. Positions are in metres from the store's centre.
 
 # %%
 view = terrace.View(store)

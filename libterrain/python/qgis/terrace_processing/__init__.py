@@ -2,6 +2,6 @@
 """A Processing provider for QGIS."""
 
 
-def classFactory(interface):  # what QGIS calls
+def classFactory(interface):  # called by QGIS
     from .provider import Plugin
     return Plugin()

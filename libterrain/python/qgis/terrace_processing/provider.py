@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Four algorithms, each one call of the module `terrace`."""
+"""Four Processing algorithms, each of which calls one function of the module `terrace`."""
 
 from qgis.core import (QgsApplication, QgsCoordinateReferenceSystem, QgsFeature, QgsFeatureSink, QgsField, QgsFields,
                        QgsGeometry, QgsPointXY, QgsProcessing, QgsProcessingAlgorithm, QgsProcessingException,
@@ -21,7 +21,7 @@ class Cancelled(Exception):
 
 
 class Algorithm(QgsProcessingAlgorithm):
-    """What all have in common. Subclasses say `title`, `help`, parameters() and work()."""
+    """Base class of the algorithms. Subclasses define `title`, `help`, parameters() and work()."""
 
     title = help = ''
 
@@ -64,12 +64,12 @@ def store_parameter():
 
 class Build(Algorithm):
     title = 'Build'
-    help = 'Streams rasters or point clouds once, in constant memory, into a store: a folder that the other algorithms read.'
+    help = 'Streams rasters or point clouds in one pass and constant memory into a store, the folder that the other algorithms read.'
 
     def parameters(self):
-        return [QgsProcessingParameterMultipleLayers('INPUT', 'Rasters, or files of points (LAS, LAZ, text)',
+        return [QgsProcessingParameterMultipleLayers('INPUT', 'Rasters or point clouds (LAS, LAZ, text)',
                                                      QgsProcessing.TypeFile),
-                QgsProcessingParameterCrs('CRS', 'Reference system, in place of what the files say', optional=True),
+                QgsProcessingParameterCrs('CRS', 'Reference system (overrides the one in the files)', optional=True),
                 QgsProcessingParameterString('WHERE', 'Condition on attributes, such as classification == 2', optional=True),
                 QgsProcessingParameterFolderDestination('OUTPUT', 'Store')]
 
@@ -88,7 +88,7 @@ class Build(Algorithm):
 
 class BoundedMesh(Algorithm):
     title = 'Bounded mesh'
-    help = 'The mesh with few triangles that is within an error of every sample, verified on each; QGIS shows it as a mesh layer.'
+    help = 'Makes a mesh with few triangles and a bounded error, verified at every sample. QGIS shows it as a mesh layer.'
 
     def parameters(self):
         return [store_parameter(), QgsProcessingParameterNumber('MAX_ERROR', 'Largest error in metres', REAL, 1.0, minValue=0),
@@ -103,10 +103,10 @@ class BoundedMesh(Algorithm):
 
 class Contours(Algorithm):
     title = 'Contours'
-    help = 'Lines of equal height of the surface through all samples, in the reference system of the store.'
+    help = 'Draws contour lines of the surface through all samples, in the reference system of the store.'
 
     def parameters(self):
-        return [store_parameter(), QgsProcessingParameterNumber('INTERVAL', 'Height between lines', REAL, 10.0, minValue=1e-9),
+        return [store_parameter(), QgsProcessingParameterNumber('INTERVAL', 'Height between contours', REAL, 10.0, minValue=1e-9),
                 QgsProcessingParameterExtent('EXTENT', 'Region', optional=True),
                 QgsProcessingParameterFeatureSink('OUTPUT', 'Contours', QgsProcessing.TypeVectorLine)]
 
@@ -130,11 +130,11 @@ class Contours(Algorithm):
 
 class Tiles(Algorithm):
     title = 'Tiles'
-    help = 'Quantized-mesh tiles for web globes such as Cesium, from zoom 0 to the one that shows every sample unless it is given.'
+    help = 'Writes quantized-mesh tiles for web globes such as Cesium, from zoom 0 to a given zoom or the one that shows every sample.'
 
     def parameters(self):
         return [store_parameter(), QgsProcessingParameterNumber('ZOOM', 'Deepest zoom', minValue=0, maxValue=24, optional=True),
-                QgsProcessingParameterEnum('VERTICAL', 'What heights refer to', VERTICAL, defaultValue=0),
+                QgsProcessingParameterEnum('VERTICAL', 'Vertical reference of the heights', VERTICAL, defaultValue=0),
                 QgsProcessingParameterFolderDestination('OUTPUT', 'Tiles')]
 
     def work(self, parameters, context, progress):
