@@ -5,9 +5,10 @@
 ``open(path)`` or ``Store(path)`` opens again. A ``Store`` provides points, meshes, heights, contours, tiles and live
 views at any level of detail.
 
-The methods behind it also work without a store: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
+Its building blocks also work without a store: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
 ``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and
-``TriangleTree``. So do ``read_points``, ``write_points`` and ``Transformation``.
+``TriangleTree``. So do ``read_points``,
+``write_points`` and ``Transformation``.
 
 Long calls release the interpreter's lock, use all cores unless ``threads`` limits them, and end soon after Ctrl-C.
 Results depend only on the input and the options, not on the number of threads or the machine.

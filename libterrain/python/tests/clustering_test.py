@@ -30,7 +30,7 @@ METHODS = ['single', 'complete', 'average', 'weighted', 'ward', 'centroid', 'med
 
 
 def combined(method, a, b, between, na, nb, n):
-    """The distances of others, of n points, to a cluster made of two: those to its parts are a and b (Lance, Williams)."""
+    """Returns the distances of clusters of n points to a merged cluster, from a and b to its parts (Lance, Williams)."""
     if method == 'single':
         return np.minimum(a, b)
     if method == 'complete':
@@ -49,8 +49,11 @@ def combined(method, a, b, between, na, nb, n):
 
 
 def runs(points, method):
-    """The distances of clusters at each merge of a run that the caller chooses: yields the matrix (infinite on the diagonal
-    and for clusters that are gone), takes the rows a and b that merge; b then stands for both."""
+    """Simulates a linkage whose merges the caller chooses.
+
+    Yields the matrix of distances between clusters (infinite on the diagonal and for merged clusters) and receives the
+    rows a and b to merge. Afterwards row b represents both.
+    """
     distances, sizes = cdist(points, points), np.ones(len(points))
     np.fill_diagonal(distances, np.inf)
     for _ in range(len(points) - 1):
@@ -65,7 +68,7 @@ def runs(points, method):
 
 
 def run_fault(rows, points, method):
-    """What is wrong with a linkage, or None: each row must merge the nearest two clusters."""
+    """Returns the first fault of a linkage, or None. Each row must merge two nearest clusters."""
     tolerance = 1e-9 * max(np.ptp(points), 1)
     place = list(range(len(points)))
     run = runs(points, method)
@@ -73,7 +76,7 @@ def run_fault(rows, points, method):
     for number, (a, b, height, _) in enumerate(rows):
         a, b = place[int(a)], place[int(b)]
         if abs(height - distances[a, b]) > tolerance:
-            return f'row {number}: height {height} is not {distances[a, b]}'
+            return f'row {number}: height {height} should be {distances[a, b]}'
         if height > distances.min() + tolerance:
             return f'row {number}: others are nearer'
         place.append(b)
@@ -83,11 +86,11 @@ def run_fault(rows, points, method):
 
 
 def one_way(points, method):
-    """Whether no two pairs are ever equally near, so that there is one linkage."""
+    """Returns whether the linkage is unique because no two pairs are ever equally near."""
     run = runs(points, method)
     distances = next(run)
     for left in range(len(points) - 1, 0, -1):
-        order = np.argsort(distances, axis=None)[:3]  # each pair is there twice
+        order = np.argsort(distances, axis=None)[:3]  # each pair occurs twice
         a, b = np.unravel_index(order[0], distances.shape)
         least, next_ = distances.flat[order[0]], distances.flat[order[2]]
         if next_ - least < 1e-6 * max(np.ptp(points), 1):
@@ -105,7 +108,7 @@ def some_points(most, width=2, least=2):
 class Linkage(unittest.TestCase):
     @settings(max_examples=200, deadline=None, derandomize=True)
     @given(some_points(60), st.sampled_from(METHODS))
-    def test_heights_are_scipys(self, points, method):
+    def test_heights_match_scipy(self, points, method):
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # points may look like a matrix of distances
             made, expected = terrace.linkage(points, method), hierarchy.linkage(points, method)
@@ -115,9 +118,9 @@ class Linkage(unittest.TestCase):
         elif method == 'single' or one_way(points, method):
             np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-9, atol=1e-9)
 
-    def test_ties_are_a_valid_choice(self):
-        # Which of several equally near pairs merges first is free, and later heights follow from it. So each row is
-        # judged by the distances of the clusters that there are at that moment.
+    def test_ties_merge_a_nearest_pair(self):
+        # Any of several equally near pairs may merge first, and later heights depend on the choice. So each row is
+        # compared with the distances of the clusters at that moment.
         grid = np.array(np.meshgrid(range(5), range(4), range(3)), float).reshape(3, -1).T
         for points in (grid, np.repeat(grid, 2, axis=0), np.zeros((40, 2)), np.arange(50.0)[:, None] * (1, 1),
                        np.random.default_rng(5).integers(0, 4, (90, 2)).astype(float)):
@@ -126,7 +129,7 @@ class Linkage(unittest.TestCase):
                     self.assertEqual(run_fault(terrace.linkage(points, method), points, method), None)
                     self.assertEqual(run_fault(terrace.linkage(pdist(points), method), points, method), None)
 
-    def test_rows_and_cuts_are_scipys(self):
+    def test_rows_and_cuts_match_scipy(self):
         points = np.random.default_rng(2).random((400, 3))
         for method in METHODS:
             made = terrace.linkage(points, method)
@@ -150,7 +153,7 @@ class Linkage(unittest.TestCase):
                 theirs = hierarchy.fcluster(expected, count, 'maxclust')
                 self.assertEqual(len({*zip(ours, theirs)}), count)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         self.assertEqual(terrace.linkage(np.zeros((1, 2))).shape, (0, 4))
         for wrong in ([[np.nan, 0], [0, 0]], [[1, 2, 3, 4]], [1, 2]):
             with self.assertRaises(ValueError):
@@ -168,7 +171,7 @@ class Linkage(unittest.TestCase):
                 terrace.flat_clusters(rows, **wrong)
 
 
-    def test_of_distances(self):
+    def test_linkage_of_distances_matches_scipy(self):
         points = np.random.default_rng(12).random((150, 3))
         for method in METHODS:
             made = terrace.linkage(pdist(points, 'cityblock'), method)
@@ -179,7 +182,7 @@ class Linkage(unittest.TestCase):
             with self.assertRaises(ValueError):
                 terrace.linkage(wrong, method)
 
-    def test_spanning_tree_is_scipys(self):
+    def test_spanning_tree_matches_scipy(self):
         points = np.random.default_rng(13).random((400, 2))
         edges, lengths = terrace.spanning_tree(points)
         np.testing.assert_allclose(lengths, np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1), rtol=1e-12)
@@ -188,7 +191,7 @@ class Linkage(unittest.TestCase):
                          {tuple(sorted(edge)) for edge in zip(expected.row.tolist(), expected.col.tolist())})
 
 
-    def test_of_edges_of_a_tree_and_of_candidates(self):
+    def test_linkage_of_tree_edges_and_candidate_edges(self):
         points = np.random.default_rng(16).random((300, 2))
         expected = hierarchy.linkage(points, 'single')
         edges, lengths = terrace.spanning_tree(points)
@@ -209,7 +212,7 @@ class Linkage(unittest.TestCase):
         with self.assertRaises(TypeError):
             terrace.tree_linkage([[0.0, 1.0]], [1])
 
-    def test_the_matrix(self):
+    def test_matrix_precision_and_memory_limit(self):
         points = np.random.default_rng(18).random((200, 3))
         for method in ('average', 'weighted', 'complete'):
             exact, rounded = (terrace.linkage(points, method, single_precision=single) for single in (False, True))
@@ -226,7 +229,7 @@ class Linkage(unittest.TestCase):
 
 
 class Streams(unittest.TestCase):
-    """The hierarchy of blocks, by its definition."""
+    """Checks the hierarchy of blocks against its definition."""
 
     def check(self, batches, **options):
         blocks = []
@@ -235,7 +238,7 @@ class Streams(unittest.TestCase):
         fields = [name for name in rows.dtype.names or () if name not in 'xyz']
         places = np.column_stack([rows[axis] for axis in 'xyz']) if rows.dtype.names else rows
         tops = {0: np.arange(len(rows))}
-        below, error = {}, {}  # what each cluster stands for
+        below, error = {}, {}  # the points that each cluster represents
         counts = [0] * (made['top'] + 1)
         by_place = {tuple(place): at for at, place in enumerate(places)}
         seen = []
@@ -260,11 +263,11 @@ class Streams(unittest.TestCase):
                     farthest = np.linalg.norm(places[stands] - places[ids[head]], axis=1).max()
                     self.assertLessEqual(farthest, block.errors[c] * (1 + 1e-12))
                 seen += [ids[member] for member in members if member != head]
-        self.assertEqual(sorted(seen), sorted(tops[0]))  # each point ends in one place
+        self.assertEqual(sorted(seen), sorted(tops[0]))  # each point is a non-representative member exactly once
         self.assertEqual((made['points'], made['level_clusters']), (len(rows), counts))
         return blocks
 
-    def test_is_a_hierarchy(self):
+    def test_blocks_form_a_hierarchy(self):
         random = np.random.default_rng(20)
         batches = [random.random((700, 3)) + [i % 4, i // 4, 0] for i in range(12)]
         blocks = self.check(batches, block_points=500)
@@ -276,14 +279,14 @@ class Streams(unittest.TestCase):
             np.testing.assert_array_equal(one.points, other.points)
         self.assertIn('clusters of', repr(blocks[0]))
 
-    def test_fields_travel(self):
+    def test_fields_stay_with_their_points(self):
         records = np.zeros(3000, [('x', 'f8'), ('y', 'f4'), ('z', 'i4'), ('class', 'u1'), ('name', 'S3')])
         random = np.random.default_rng(21)
         records['x'], records['y'], records['z'] = random.random(3000), random.random(3000), np.arange(3000)
         records['class'], records['name'] = np.arange(3000) % 7, b'abc'
         self.check(np.split(records, 3), block_points=400, facility_cost=1.0, effort='fast')
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         points = np.random.default_rng(22).random((900, 3))
         self.assertEqual(terrace.stream_clusters([], lambda block: None)['points'], 0)
 
@@ -311,7 +314,7 @@ class Streams(unittest.TestCase):
         with self.assertRaises(TypeError):
             terrace.stream_clusters([points], None)
 
-    def test_clusters_of_size(self):
+    def test_clusters_have_about_the_given_size(self):
         points = np.random.default_rng(23).random((30000, 2))
         seen = []
         labels = terrace.clusters_of_size(points, 80, progress=lambda *at: seen.append(at))
@@ -332,7 +335,7 @@ class Streams(unittest.TestCase):
 class KMeans(unittest.TestCase):
     @settings(max_examples=40, deadline=None, derandomize=True)
     @given(some_points(80, width=3, least=5), st.integers(1, 5))
-    def test_is_a_fixed_point_of_lloyd(self, points, clusters):
+    def test_result_is_a_fixed_point_of_lloyd(self, points, clusters):
         made = terrace.kmeans(points, clusters)
         self.assertTrue(made.converged)
         squares = cdist(points, made.centres, 'sqeuclidean')
@@ -342,7 +345,7 @@ class KMeans(unittest.TestCase):
         for label in np.unique(made.labels):
             np.testing.assert_allclose(made.centres[label], points[made.labels == label].mean(axis=0), rtol=0, atol=1e-6)
 
-    def test_from_centres_and_with_weights(self):
+    def test_given_centres_and_weights(self):
         points = np.random.default_rng(3).random((500, 2))
         weights = np.random.default_rng(4).random(500) + 0.5
         made = terrace.kmeans(points, points[:7], weights=weights)
@@ -373,7 +376,7 @@ class Facilities(unittest.TestCase):
                 self.assertLessEqual(cost, best * (1 + 1e-9 if method == 'interchange' else 1.9))
                 self.assertLessEqual(made.lower_bound, best + 1e-9)
 
-    def test_any_costs(self):
+    def test_arbitrary_costs(self):
         for seed in range(6):
             random = np.random.default_rng(seed)
             connection, opening = random.random((9, 14)), random.random(9)
@@ -401,7 +404,7 @@ class Facilities(unittest.TestCase):
             with self.assertRaises(ValueError):
                 wrong()
 
-    def test_bounds(self):
+    def test_lower_bounds(self):
         points = np.random.default_rng(6).random((300, 2))
         plain, bounded = terrace.cluster(points, 0.05), terrace.cluster(points, 0.05, bound_steps=100)
         self.assertEqual(plain.cost, bounded.cost)
@@ -462,7 +465,7 @@ class Facilities(unittest.TestCase):
             with self.assertRaisesRegex(ValueError, 'entity 2 has a coordinate'):
                 wrong()
 
-    def test_channels_are_axes(self):
+    def test_channels_count_as_axes(self):
         points = np.random.default_rng(25).random((200, 3))
         solid = terrace.cluster(points, 0.05, method='kd-tree')
         flat = terrace.cluster(points[:, :2], 0.05, method='kd-tree', channels=points[:, 2:])
@@ -475,7 +478,7 @@ class Facilities(unittest.TestCase):
         with self.assertRaises(ValueError):
             terrace.cluster(points, channels=points, method='fast')
 
-    def test_searches_go_on(self):
+    def test_searches_continue_from_a_solution(self):
         points = np.random.default_rng(26).random((400, 2))
         short = terrace.cluster(points, 0.05, method='kd-tree', steps=3)
         longer = terrace.cluster(points, 0.05, method='kd-tree', steps=300, start=short, seed=2, assign_nearest=True)
@@ -498,7 +501,7 @@ class Assignments(unittest.TestCase):
     @given(arrays.arrays(st.sampled_from([np.float64, np.float32, np.int32, np.int64, np.uint8]),
                          st.tuples(st.integers(1, 12), st.integers(1, 12)),
                          elements={'min_value': 0, 'max_value': 100}))
-    def test_is_scipys_optimum(self, costs):
+    def test_cost_matches_scipy(self, costs):
         made = terrace.assignment(costs)
         rows, columns = made
         best = costs[linear_sum_assignment(costs)].astype(float).sum()
@@ -518,7 +521,7 @@ class Assignments(unittest.TestCase):
         random = np.random.default_rng(14)
         for rows, columns in ((40, 60), (60, 40), (50, 50)):
             costs = np.where(random.random((rows, columns)) < 0.2, random.random((rows, columns)) + 0.1, 0)
-            costs[np.arange(min(rows, columns)), np.arange(min(rows, columns))] = 1  # so that there is an assignment
+            costs[np.arange(min(rows, columns)), np.arange(min(rows, columns))] = 1  # guarantees an assignment
             made = terrace.assignment(sparse.csc_matrix(costs))
             dear = np.where(costs > 0, costs, 1e6)
             self.assertAlmostEqual(made.cost, dear[linear_sum_assignment(dear)].sum(), places=6)
@@ -526,7 +529,7 @@ class Assignments(unittest.TestCase):
         with self.assertRaises(ValueError):
             terrace.assignment(sparse.csr_matrix(([1.0, 1.0], ([0, 1], [0, 0])), shape=(2, 2)))
 
-    def test_costs_of_rows(self):
+    def test_costs_from_a_function_of_rows(self):
         costs = np.random.default_rng(27).random((40, 60))
         made = terrace.assignment(lambda row: costs[row], shape=costs.shape)
         np.testing.assert_array_equal(made.columns, terrace.assignment(costs).columns)
@@ -544,7 +547,7 @@ class Assignments(unittest.TestCase):
             with self.assertRaises(kind):
                 terrace.assignment(function, shape=shape)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         for wrong, kind in (([[1, np.nan]], ValueError), ([1, 2], ValueError), ([['a']], TypeError),
                             (np.zeros((2, 2), complex), TypeError), ([[np.inf]], ValueError)):
             with self.assertRaises(kind):
@@ -564,7 +567,7 @@ class Matchings(unittest.TestCase):
 
     @settings(max_examples=40, deadline=None, derandomize=True)
     @given(st.integers(1, 4), st.sampled_from([2, 3]), st.integers(0, 10 ** 6))
-    def test_is_optimal(self, pairs, width, seed):
+    def test_matching_is_optimal(self, pairs, width, seed):
         points = np.random.default_rng(seed).random((2 * pairs, width))
         made = terrace.matching(points)
         self.assertAlmostEqual(made.cost, self.brute(cdist(points, points)), places=9)
@@ -573,7 +576,7 @@ class Matchings(unittest.TestCase):
         np.testing.assert_array_equal(made.mates[made.mates], np.arange(2 * pairs))
         self.assertEqual(made.pairs.shape, (pairs, 2))
 
-    def test_of_edges(self):
+    def test_matching_of_a_graph(self):
         random = np.random.default_rng(15)
         for _ in range(20):
             distances = np.round(random.normal(size=(8, 8)), 3)
@@ -590,7 +593,7 @@ class Matchings(unittest.TestCase):
             with self.assertRaises(ValueError):
                 terrace.edge_matching(*wrong)
 
-    def test_halving(self):
+    def test_halving_approximates_the_optimum(self):
         for width, count in ((2, 40), (3, 31)):
             points = np.random.default_rng(count).random((count, width))
             best = terrace.matching(points)
@@ -613,11 +616,11 @@ class Matchings(unittest.TestCase):
             with self.assertRaises(ValueError):
                 terrace.halving_matching(wrong, **options)
 
-    def test_clusters_first(self):
+    def test_labels_are_matched_first(self):
         points, labels = np.random.default_rng(28).random((90, 2)), np.repeat([5, -2, 10 ** 12], [31, 29, 30])
         made = terrace.matching(points, labels=labels, rounds=0)
         apart = sum(labels[a] != labels[b] for a, b in made.pairs)
-        self.assertEqual(apart, 1)  # the ones left over of the two odd clusters
+        self.assertEqual(apart, 1)  # the points left over from the two odd clusters
         self.assertLessEqual(terrace.matching(points, labels=labels).cost, made.cost)
         for wrong, options, kind in ((points, {'labels': labels[:3]}, ValueError), (points, {'labels': labels * 0.5}, TypeError),
                                      (points, {'tolerance': -1}, ValueError)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The module writes the bytes that the list of the command's golden results has."""
+"""The module writes the same bytes as the command, as listed in its golden results."""
 
 import json
 import os
@@ -20,7 +20,7 @@ import golden_test  # noqa: E402
 
 
 def golden_lines():
-    """The lines below each command of the list, without those that name other options."""
+    """Returns the lines below each command of the list, without commands of other programs."""
     lines, below = {}, None
     with open(os.path.join(GOLDEN, 'golden.txt'), encoding='utf-8') as file:
         for line in file:
@@ -46,7 +46,7 @@ class Golden(unittest.TestCase):
         cls.hills = terrace.build('hills.tif', 'hills.terrace', block_points=150)
 
     def check(self, command, *, summary=None):
-        """What lies in the folder is what the command's lines say; summary: of its keys."""
+        """Compares the output with the command's lines, or `summary` with its summary line."""
         expected = self.lines[command]
         name = shlex.split(command)[shlex.split(command).index('-o') + 1]
         if summary is not None:
@@ -58,7 +58,7 @@ class Golden(unittest.TestCase):
         kept = [line for line in expected if not line.startswith(('summary ', '~', '='))]
         self.assertEqual([line for line in found if not line.startswith('~')], kept, command)
 
-    def test_stores(self):
+    def test_stores_match(self):
         self.check('terrace build hills.tif -o hills.terrace --block 150')
         terrace.build('bands.tif', 'bands.terrace', band=2, block_points=300)
         self.check('terrace build bands.tif -o bands.terrace --band 2 --block 300')
@@ -75,14 +75,14 @@ class Golden(unittest.TestCase):
         terrace.build('hills.tif', 'hills-squared.terrace', metric='squared', z_weight=0, block_points=600)
         self.check('terrace build hills.tif -o hills-squared.terrace --metric squared --z-weight 0 --block 600')
 
-    def test_clouds(self):
+    def test_point_clouds_match(self):
         store = terrace.build('laser.csv', 'laser.terrace', crs='EPSG:32632', block_points=400)
         self.check('terrace build laser.csv -o laser.terrace --crs EPSG:32632 --block 400')
         mesh = store.bounded_mesh(5)
         self.check('terrace mesh laser.terrace --max-error 5 -o bound-laser.ply',
                    summary={'vertices': len(mesh.vertices), 'triangles': len(mesh.triangles), 'max_error': mesh.max_error})
 
-    def test_meshes(self):
+    def test_meshes_match(self):
         for more, quality, name in (('', 'removal', 'bound.ply'), (' --quality greedy', 'greedy', 'bound-greedy.obj'),
                                     (' --quality fitted', 'fitted', 'bound-fitted.glb')):
             self.hills.bounded_mesh(20, quality=quality, path=name)
@@ -91,7 +91,7 @@ class Golden(unittest.TestCase):
         self.check('terrace mesh hills.terrace --level 1 -o level.ply',
                    summary={'vertices': len(mesh.vertices), 'triangles': len(mesh.triangles)})
 
-    def test_rasters_contours_tiles(self):
+    def test_rasters_contours_and_tiles_match(self):
         self.hills.raster(path='same.tif')
         self.check('terrace raster hills.terrace -o same.tif')
         self.hills.raster('slope', cell=40, path='slope.tif')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Coordinates of one reference system in another, against PROJ as GDAL calls it."""
+"""Conversions between reference systems, compared with PROJ as called by GDAL."""
 
 import unittest
 
@@ -15,7 +15,7 @@ except ImportError:
 
 class Transformations(unittest.TestCase):
     @unittest.skipIf(osr is None, 'GDAL for Python is missing')
-    def test_is_projs(self):
+    def test_coordinates_match_proj(self):
         random = np.random.default_rng(1)
         lonlat = random.random((2000, 2)) * [6, 8] + [6, 44]
         for code in (32632, 3035, 3857, 2056, 25832, 5514):
@@ -27,11 +27,11 @@ class Transformations(unittest.TestCase):
                 system.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
             expected = np.array(osr.CoordinateTransformation(from_, to).TransformPoints(lonlat.tolist()))[:, :2]
             got = made.forward(lonlat)
-            # Operations of another datum may differ by their accuracy.
+            # Operations between datums may differ by their accuracy.
             np.testing.assert_allclose(got, expected, rtol=0, atol=1e-3 if code in (32632, 3035, 3857, 25832) else 3)
             np.testing.assert_allclose(made.reverse(got), lonlat, rtol=0, atol=5e-8)
 
-    def test_heights_stay_and_what_has_no_place_is_nan(self):
+    def test_heights_are_kept_and_places_out_of_range_are_nan(self):
         made = terrace.Transformation('EPSG:4326', 3857)
         got = made.forward([[10, 50, 7.5], [10, 90, 1], [np.nan, 0, 2]])
         self.assertEqual(got[:, 2].tolist(), [7.5, 1, 2])
@@ -41,7 +41,7 @@ class Transformations(unittest.TestCase):
         np.testing.assert_array_equal(terrace.Transformation(4326, 4326).forward([[1, 2]]), [[1, 2]])
         self.assertIn('WGS 84', repr(made))
 
-    def test_a_shift_of_datum(self):
+    def test_datum_shift_to_wgs84(self):
         class Wkt:
             def to_wkt(self):
                 return ('GEOGCS["none",DATUM["none",SPHEROID["Bessel 1841",6377397.155,299.1528128]],PRIMEM["Greenwich",0],'
@@ -55,7 +55,7 @@ class Transformations(unittest.TestCase):
         with self.assertRaises(terrace.Error):
             terrace.Transformation(Wkt(), 'EPSG:4326')
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         for wrong, kind in ((('EPSG:1', 'EPSG:4326'), ValueError), (('', 'EPSG:4326'), ValueError), ((None, 'EPSG:4326'), ValueError),
                             ((3.5, 'EPSG:4326'), TypeError)):
             with self.assertRaises(kind):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Triangulations: SciPy's, the law of empty circles, and removal as if never inserted."""
+"""Triangulations match SciPy's, have empty circumcircles, and are restored by removals."""
 
 import threading
 import unittest
@@ -21,13 +21,13 @@ def corner_sets(points, simplices):
 
 
 def few_places(width):
-    """Points on a small lattice, so that equal, collinear and cocircular ones are common."""
+    """Generates points on a small lattice, where equal, collinear and cocircular points are common."""
     return arrays.arrays(np.float64, st.tuples(st.integers(0, 40), st.just(width)),
                          elements=st.integers(0, 6).map(float))
 
 
 class Triangulations(unittest.TestCase):
-    def test_as_scipy(self):
+    def test_matches_scipy(self):
         for kind, width, count in ((terrace.Delaunay2, 2, 20000), (terrace.Delaunay3, 3, 3000)):
             points = np.random.default_rng(5).random((count, width))
             made = kind(points)
@@ -54,12 +54,12 @@ class Triangulations(unittest.TestCase):
 
     @settings(max_examples=60, deadline=None, derandomize=True)
     @given(few_places(2), st.integers(0, 40), st.randoms(use_true_random=False))
-    def test_removal_is_as_if_never_inserted_2(self, points, kept, random):
+    def test_removal_restores_triangles(self, points, kept, random):
         self.check_removal(terrace.Delaunay2, points, kept, random)
 
     @settings(max_examples=40, deadline=None, derandomize=True)
     @given(few_places(3), st.integers(0, 40), st.randoms(use_true_random=False))
-    def test_removal_is_as_if_never_inserted_3(self, points, kept, random):
+    def test_removal_restores_tetrahedra(self, points, kept, random):
         self.check_removal(terrace.Delaunay3, points, kept, random)
 
     def check_removal(self, kind, points, kept, random):
@@ -77,7 +77,7 @@ class Triangulations(unittest.TestCase):
         self.assertEqual(both.digest(), only.digest())
         self.assertEqual(len(both), kept)
 
-    def test_equal_points_are_one_vertex(self):
+    def test_equal_points_share_a_vertex(self):
         made = terrace.Delaunay2([[0, 0], [1, 0], [0, 0], [0, 1], [-0.0, 1]])
         self.assertEqual(len(made), 3)
         self.assertEqual(made.ids[0], made.ids[2])
@@ -95,7 +95,7 @@ class Triangulations(unittest.TestCase):
                 if kind is not terrace.DynamicSurface:
                     theirs = Delaunay(points).simplices
                     self.assertEqual({frozenset(row) for row in made.simplices.tolist()}, {frozenset(row) for row in theirs.tolist()})
-                # Later points follow; numbers that are free again come first.
+                # Later points get free numbers first, then the numbers that follow.
                 more = made.insert(points[:40] + 2)
                 np.testing.assert_array_equal(more, np.arange(500, 540))
                 made.remove(more[::2])
@@ -109,7 +109,7 @@ class Triangulations(unittest.TestCase):
                 np.testing.assert_array_equal(made.points[kept], points[kept])
                 self.assertEqual(len(made), len(made.vertices))
 
-    def test_copies_have_the_number_of_the_first(self):
+    def test_copies_refer_to_the_first_equal_point(self):
         points = np.array([[0, 0], [1, 0], [0, 0], [0, 1], [1, 0], [1, 1]], float)
         made = terrace.Delaunay2(points)
         self.assertEqual(made.ids.tolist(), [0, 1, 0, 3, 1, 5])
@@ -129,7 +129,7 @@ class Triangulations(unittest.TestCase):
         np.testing.assert_array_equal(made.points[number], (1, 0))
         self.assertEqual(made.insert(points).tolist(), [0, number, 0, 3, number, 5])
 
-    def test_values_are_by_number(self):
+    def test_values_are_ordered_by_number(self):
         points = np.random.default_rng(22).random((300, 2))
         made = terrace.Delaunay2(points)
         values = points @ (2, 3)
@@ -153,7 +153,7 @@ class Triangulations(unittest.TestCase):
         np.testing.assert_array_equal(made.nearest(asked), made.ids[closest])
         self.assertEqual(terrace.Delaunay2().nearest([[0, 0]])[0], -1)
 
-    def test_changes(self):
+    def test_changes_add_up(self):
         for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3), (terrace.DynamicSurface, 3)):
             random = np.random.default_rng(11)
             made = kind(random.random((200, width)))
@@ -184,11 +184,11 @@ class Triangulations(unittest.TestCase):
             self.assertEqual(len(made.changes().added_vertices), 0)  # inserted and removed
             self.assertIn('added', repr(changes))
 
-    def test_vertex_neighbours_are_scipys(self):
+    def test_vertex_neighbours_match_scipy(self):
         for kind, width in ((terrace.Delaunay2, 2), (terrace.Delaunay3, 3)):
             points = np.random.default_rng(12).random((400, width))
             made, expected = kind(points), Delaunay(points)
-            made.remove(made.insert(points[:3] + 7))  # numbers that are free
+            made.remove(made.insert(points[:3] + 7))  # leaves free numbers
             begins, joined = made.vertex_neighbor_vertices
             self.assertEqual(len(begins), len(made.points) + 1)
             theirs, other = expected.vertex_neighbor_vertices
@@ -197,7 +197,7 @@ class Triangulations(unittest.TestCase):
                                               np.sort(made.ids[other[theirs[i]:theirs[i + 1]]]))
         self.assertEqual(len(terrace.Delaunay2().vertex_neighbor_vertices[1]), 0)
 
-    def test_of_grid(self):
+    def test_grid_matches_its_points(self):
         made = terrace.Delaunay2.of_grid(30, 20, (-4, 8), 0.5)
         y, x = np.mgrid[0:20, 0:30]
         points = np.column_stack((x.ravel() * 0.5 - 4, y.ravel() * 0.5 + 8))
@@ -208,7 +208,7 @@ class Triangulations(unittest.TestCase):
             with self.assertRaises(ValueError):
                 terrace.Delaunay2.of_grid(*wrong)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         made = terrace.Delaunay2(np.random.default_rng(1).random((50, 2)))
         before = made.digest()
         for wrong, kind in (([[np.nan, 0]], ValueError), ([[np.inf, 0]], ValueError), ([[1, 2, 3]], ValueError),
@@ -226,7 +226,7 @@ class Triangulations(unittest.TestCase):
         self.assertEqual(terrace.Delaunay3().simplices.shape, (0, 4))
         self.assertEqual(made.find_simplex([[0, 0], [np.nan, 1]]).tolist(), [-1, -1])
 
-    def test_threads_share_one(self):
+    def test_threads_share_a_triangulation(self):
         made = terrace.Delaunay2(np.random.default_rng(1).random((5000, 2)))
         failures = []
 

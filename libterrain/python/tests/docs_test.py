@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples in docstrings do what they say."""
+"""Docstrings exist, and their examples are correct."""
 
 import doctest
 import importlib
@@ -10,7 +10,7 @@ import terrace
 
 
 class Docstrings(unittest.TestCase):
-    def test_examples(self):
+    def test_examples_are_correct(self):
         attempted = 0
         for name in ['terrace'] + [f'terrace.{module.name}' for module in pkgutil.iter_modules(terrace.__path__)]:
             result = doctest.testmod(importlib.import_module(name))
@@ -18,7 +18,7 @@ class Docstrings(unittest.TestCase):
             attempted += result.attempted
         self.assertGreater(attempted, 25)
 
-    def test_everything_public_is_described(self):
+    def test_everything_public_has_a_docstring(self):
         for name in terrace.__all__:
             item = getattr(terrace, name)
             self.assertTrue(item.__doc__, name)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Heights, gradients, rasters, profiles and contours, against SciPy, laws and the function sampled."""
+"""Heights, gradients, rasters, profiles and contours match SciPy, known properties and the sampled function."""
 
 import logging
 import math
@@ -27,14 +27,14 @@ def places(count, seed=3):
 
 
 class Heights(StoreCase):
-    def test_samples_have_their_heights(self):
+    def test_samples_keep_their_heights(self):
         centres = cell_centres(*self.samples.shape).reshape(-1, 2)
         for method in ('linear', 'natural', 'nearest'):
             np.testing.assert_allclose(self.raster.heights(centres, method), self.samples.ravel(), rtol=0, atol=1e-9)
         np.testing.assert_array_equal(self.scan.heights(self.points[:500, :2]), self.points[:500, 2])
 
     @unittest.skipIf(LinearNDInterpolator is None, 'SciPy is missing')
-    def test_linear_heights_of_points_are_scipys(self):
+    def test_linear_heights_of_points_match_scipy(self):
         random = np.random.default_rng(7)
         xy = random.random((5000, 2)) * [1100, 900] + [299950, 5199950]
         origin = self.points[:, :2].min(axis=0)  # SciPy loses digits far from the origin
@@ -42,17 +42,17 @@ class Heights(StoreCase):
         got = self.scan.heights(xy)
         both = ~np.isnan(expected) & ~np.isnan(got)
         self.assertGreater(both.sum(), 4000)
-        self.assertLess((np.isnan(expected) != np.isnan(got)).sum(), 5)  # places on the hull's rim
+        self.assertLess((np.isnan(expected) != np.isnan(got)).sum(), 5)  # places on the border of the hull
         np.testing.assert_allclose(got[both], expected[both], rtol=0, atol=1e-7)
 
     @unittest.skipIf(LinearNDInterpolator is None, 'SciPy is missing')
-    def test_nearest_is_scipys(self):
+    def test_nearest_heights_match_scipy(self):
         xy = places(500) + [-199700, 201700]
         origin = self.points[:, :2].min(axis=0)
         _, order = cKDTree(self.points[:, :2] - origin).query(xy - origin)
         np.testing.assert_array_equal(self.scan.heights(xy, 'nearest'), self.points[order, 2])
 
-    def test_a_plane_has_its_gradient(self):
+    def test_gradient_of_a_plane(self):
         rows, columns = 60, 70
         centres = cell_centres(rows, columns)
         plane = 0.25 * (centres[..., 0] - 500000) - 0.5 * (centres[..., 1] - 5000000)
@@ -62,21 +62,21 @@ class Heights(StoreCase):
         expected = 0.25 * (xy[:, 0] - 500000) - 0.5 * (xy[:, 1] - 5000000)
         np.testing.assert_allclose(store.heights(xy), expected, rtol=0, atol=1e-9)
 
-    def test_no_surface_is_nan(self):
+    def test_heights_outside_the_surface_are_nan(self):
         outside = [[0, 0], [math.nan, 5000000], [math.inf, 0]]
         for store in (self.raster, self.scan):
             self.assertTrue(np.isnan(store.heights(outside)).all())
             self.assertTrue(np.isnan(store.gradients(outside)).all())
             self.assertEqual(store.heights([]).shape, (0,))
 
-    def test_places_of_another_reference_system(self):
+    def test_places_in_another_reference_system(self):
         here = places(50)
         there = self.raster.points(crs='EPSG:4326')
         lonlat = np.column_stack((there['x'], there['y']))[:200]
         np.testing.assert_allclose(self.raster.heights(lonlat, crs='EPSG:4326'), there['z'][:200], rtol=0, atol=1e-4)
         self.assertFalse(np.isnan(self.raster.heights(here)).any())
 
-    def test_latitudes_beyond_a_pole_are_refused(self):
+    def test_latitudes_beyond_a_pole_are_rejected(self):
         for method in self.raster.heights, self.raster.gradients:
             with self.assertRaisesRegex(terrace.Error, 'the latitude 95 is beyond a pole'):
                 method([[9, 45], [9, 95]], crs='EPSG:4326')
@@ -100,17 +100,17 @@ class Heights(StoreCase):
                 for box, due in (((-179.99, -1.09, -179.51, 0.01), 55), ((180.01, -1.09, 180.49, 0.01), 55),
                                  ((-180, -90, 180, 90), 400), ((0, -1.09, 360, 0.01), 220), ((-540, -90, 540, 90), 400),
                                  ((0, -90, 90, 90), 0), ((-everywhere, -everywhere, everywhere, everywhere), 400),
-                                 ((-180, -everywhere, -179.51, everywhere), 100), ((180, -90, everywhere, 90), 200)):  # as it is written
+                                 ((-180, -everywhere, -179.51, everywhere), 100), ((180, -90, everywhere, 90), 200)):  # taken literally
                     self.assertEqual(fiji.count(box), due, box)
                     self.assertEqual(len(fiji.points(region=box)), due, box)
 
-    def test_threads_and_memory_change_nothing(self):
+    def test_results_do_not_depend_on_threads_and_memory(self):
         xy = places(2000)
         expected = self.raster.heights(xy)
         for threads in (1, 3):
             np.testing.assert_array_equal(self.raster.heights(xy, threads=threads, memory=1 << 26), expected)
 
-    def test_wrong_places(self):
+    def test_rejects_invalid_places(self):
         for wrong, kind in (([1, 2, 3], ValueError), ([[1, 2, 3]], ValueError), (['a'], TypeError),
                             (np.zeros((2, 2), complex), TypeError), ([[1, [2]]], ValueError)):
             with self.assertRaises(kind):
@@ -122,14 +122,14 @@ class Heights(StoreCase):
 
 
 class Rasters(StoreCase):
-    def test_a_rasters_own_grid_comes_back(self):
+    def test_raster_keeps_its_grid(self):
         got = self.raster.raster()
         np.testing.assert_array_equal(got.values, self.samples.astype(got.values.dtype))
         np.testing.assert_allclose(got.transform, TRANSFORM, rtol=0, atol=1e-6)
         self.assertEqual(got.crs, 'EPSG:32632')
         self.assertEqual(np.asarray(got).shape, self.samples.shape)
         self.assertTrue(got._repr_png_().startswith(b'\x89PNG'))
-        # And may be built again.
+        # A store can be built from it.
         again = terrace.build(got.values, self.path('again'), transform=got.transform, crs=got.crs)
         np.testing.assert_allclose(again.bounds, self.raster.bounds, rtol=1e-7)
 
@@ -145,7 +145,7 @@ class Rasters(StoreCase):
         with self.assertRaises(FileExistsError):
             self.scan.raster(cell=25, path=path)
         self.scan.raster(cell=25, path=path, replace=True)
-        # Rasters of one cell size align; `align` makes others do so.
+        # Rasters of equal cells align; `align` aligns others.
         part = self.scan.raster(cell=25, region=(300110, 5200110, 300290, 5200190))
         np.testing.assert_array_equal(np.array(part.transform)[[2, 5]], (300100, 5200200))
         same = self.scan.raster(align=path)
@@ -176,7 +176,7 @@ class Lines(StoreCase):
             with self.assertRaises(ValueError):
                 self.raster.profile([[0, 0], [far, 5]])
 
-    def test_contours_lie_at_their_height(self):
+    def test_contours_are_at_their_height(self):
         lines = self.raster.contours(20)
         self.assertEqual(lines.__geo_interface__['type'], 'FeatureCollection')
         self.assertLess(len(lines._repr_png_()), 400_000)
@@ -185,7 +185,7 @@ class Lines(StoreCase):
             elev = feature['properties']['elev']
             self.assertEqual(elev % 20, 0)
             heights = self.raster.heights(feature['geometry']['coordinates'], crs='EPSG:4326')
-            # On the rim rounding may lead outside.
+            # On the border rounding may move places outside.
             np.testing.assert_allclose(heights[~np.isnan(heights)], elev, rtol=0, atol=1e-3)
 
     def test_contours_in_the_stores_own_coordinates(self):
@@ -198,17 +198,17 @@ class Lines(StoreCase):
         heights_on(self.raster, known)
         unknown = terrace.build(self.samples, self.path('no-crs'), transform=TRANSFORM)
         with self.assertLogs('terrace', logging.INFO):
-            self.assertEqual(unknown.contours(20)['features'], known['features'])  # it names no CRS
+            self.assertEqual(unknown.contours(20)['features'], known['features'])  # GeoJSON without a CRS
         with self.assertRaisesRegex(terrace.Error, 'no CRS'):
             unknown.contours(20, lonlat=True)
-        # A datum from which nothing leads to WGS 84.
+        # A datum without an operation to WGS 84.
         datum = ('PROJCS["site",GEOGCS["site",DATUM["site",SPHEROID["ball",6370000,0]],PRIMEM["Greenwich",0],'
                  'UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],PARAMETER["central_meridian",9],'
                  'PARAMETER["scale_factor",0.9996],PARAMETER["false_easting",500000],UNIT["metre",1]]')
         apart = terrace.build(self.samples, self.path('apart'), transform=TRANSFORM, crs=datum)
         self.assertEqual(len(apart.contours(20)['features']), len(known['features']))
 
-    def test_contours_are_shapelys_too(self):
+    def test_shapely_reads_contours(self):
         try:
             from shapely.geometry import shape
         except ImportError:
@@ -221,7 +221,7 @@ class Lines(StoreCase):
         mesh = shape(self.scan.bounded_mesh(5))
         self.assertAlmostEqual(sum(triangle.area for triangle in mesh.geoms), area.area, delta=1000)
 
-    def test_points_in_polygons_are_shapelys(self):
+    def test_points_in_polygons_match_shapely(self):
         try:
             from hypothesis import given, settings, strategies as st
             from shapely.geometry import MultiPoint, Polygon
@@ -245,7 +245,7 @@ class Lines(StoreCase):
 
 
 class RealTerrain(unittest.TestCase):
-    def test_the_first_lines_of_the_readme(self):
+    def test_example_in_the_readme(self):
         with open(os.path.join(os.path.dirname(__file__), '..', 'README.md'), encoding='utf-8') as file:
             code = re.search(r'```python\n(.*?)```', file.read(), re.DOTALL)[1]
         with tempfile.TemporaryDirectory() as folder:

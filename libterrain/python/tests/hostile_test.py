@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random bad arguments give Python's exceptions and never a crash: alone, in threads and after a fork.
+"""Random invalid arguments raise Python's exceptions and never crash: alone, in threads and after a fork.
 
-Each seed has a process of its own; TERRACE_PYTHON_SECONDS: one seed after another until they have
-taken so much processor time.
+Each seed runs in a separate process. TERRACE_PYTHON_SECONDS: run seeds one after another for this
+much processor time.
 """
 
 import os
@@ -22,7 +22,7 @@ CALLS = 2500 if SECONDS else 250
 
 
 class Odd:
-    """Has a protocol without data. (More data than there are is what numpy believes and then reads.)"""
+    """An array interface without data. (numpy would read past the end of data that is too short.)"""
 
     __array_interface__ = {'shape': (3, 2), 'typestr': '<f8', 'version': 3}
 
@@ -32,7 +32,7 @@ class OddGeometry:
 
 
 def arrays(luck):
-    """An array of a random shape, type and layout, with odd numbers in it."""
+    """Returns an array of a random shape, type and layout, with unusual numbers in it."""
     shape = luck.choice([(0,), (3,), (0, 2), (0, 3), (1, 2), (1, 3), (5, 2), (40, 2), (40, 3), (40, 4), (7, 7), (2, 3, 4), ()])
     numbers = np.random.default_rng(luck.randrange(2 ** 32)).normal(scale=luck.choice([1, 1e3, 1e300, 1e-300]), size=shape)
     if numbers.size and luck.random() < 0.3:
@@ -48,7 +48,7 @@ def arrays(luck):
             numbers = np.nan_to_num(numbers, posinf=0, neginf=0).clip(-100, 100).astype(kind)
         else:
             numbers = numbers.astype(kind)
-    numbers = np.asarray(numbers)  # of no dimension it may be a number
+    numbers = np.asarray(numbers)  # operations on arrays without dimensions return scalars
     if numbers.ndim == 2 and luck.random() < 0.3:
         numbers = luck.choice([np.asfortranarray(numbers), numbers[::-1], numbers[::2], np.flipud(numbers).T.T,
                                numbers[:, ::-1]])
@@ -70,7 +70,7 @@ def anything(luck):
 
 
 def calls(luck, terrace, shared, folder):
-    """One call of something public with mostly senseless arguments: whether it went through."""
+    """Calls a random public function with mostly invalid arguments. Returns whether it succeeded."""
     stores, view, shape2, shape3, surface, model = shared
     store = luck.choice(stores)
     some = lambda: anything(luck)  # noqa: E731
@@ -81,7 +81,7 @@ def calls(luck, terrace, shared, folder):
     box = lambda: (0, 0, luck.random(), 1)  # noqa: E731
     place = lambda: tuple(luck.uniform(-300, 300) for _ in range(3))  # noqa: E731
     handles = lambda: np.arange(luck.randrange(5))  # noqa: E731
-    targets = [  # what is called, a fitting value of each argument, names of options
+    targets = [  # (function, a valid value of each argument, names of options)
         (lambda a, **k: terrace.build(a, os.path.join(folder, str(luck.randrange(10 ** 9))), **k), [solid],
          ['transform', 'crs', 'nodata', 'attributes', 'progress', 'threads', 'memory', 'where', 'region', 'effort',
           'block_points', 'facility_cost', 'channels', 'outlier_price', 'seed', 'keep', 'order', 'metric', 'entities']),
@@ -204,12 +204,12 @@ def calls(luck, terrace, shared, folder):
         return True
     except (ValueError, TypeError, OverflowError, OSError, MemoryError, ZeroDivisionError, KeyError, AttributeError,
             IndexError, terrace.Error, np.exceptions.AxisError if hasattr(np, 'exceptions') else ValueError) as error:
-        # Kinds that only an oversight of ours would raise are let through for objects that lie alone.
+        # These exceptions show a missing check in the module.
         if isinstance(error, (KeyError, AttributeError, IndexError)):
             traceback.print_exc()
             raise SystemExit(f'{call} with {arguments!r}, {given!r}') from error
         return False
-    except RuntimeError as error:  # of a build without a GPU
+    except RuntimeError as error:  # builds without a GPU
         if 'CUDA' not in str(error):
             raise
         return False
@@ -219,7 +219,7 @@ def main(seed, count):
     import terrace
     try:
         import tqdm
-        tqdm.tqdm.monitor_interval = 0  # no thread that a fork could meet in AddressSanitizer's memory
+        tqdm.tqdm.monitor_interval = 0  # its thread could hold AddressSanitizer's locks during a fork
     except ImportError:
         pass
     luck = random.Random(seed)
@@ -232,24 +232,24 @@ def main(seed, count):
                                 attributes={'class': np.arange(3000) % 5}, block_points=500)]
         closed = terrace.Store.open(os.path.join(folder, 'cloud'))
         closed.close()
-        # Without a reading thread: a fork would wait for ever for what that holds of AddressSanitizer's memory.
+        # Without a reading thread, which could hold AddressSanitizer's locks during a fork.
         shared = stores + [closed], terrace.View(stores[0], reader='frame'), terrace.Delaunay2(), terrace.Delaunay3(), \
             terrace.DynamicSurface(), terrace.Multiresolution(stores[1])
         worked = 0
         for _ in range(count):
             kind = luck.random()
-            if kind < 0.03:  # several at once on what they share
+            if kind < 0.03:  # several threads on shared objects
                 with ThreadPoolExecutor(3) as threads:
                     for _ in threads.map(lambda own: calls(random.Random(own), terrace, shared, folder),
                                          [luck.randrange(2 ** 32) for _ in range(3)]):
                         pass
-            elif kind < 0.06:  # in a fork of all this
+            elif kind < 0.06:  # a fork of this process
                 child = os.fork()
                 if child == 0:
                     calls(luck, terrace, shared, folder)
                     os._exit(0)
                 if os.waitpid(child, 0)[1] != 0:
-                    raise SystemExit('a fork has crashed')
+                    raise SystemExit('a fork crashed')
             else:
                 worked += calls(luck, terrace, shared, folder)
         print('done', worked)
@@ -263,16 +263,16 @@ class Hostile(unittest.TestCase):
         for seed, child in children:
             output = child.communicate()[0]
             self.assertEqual(child.returncode, 0, f'seed {seed}: {output[-8000:]}')
-            self.assertGreater(int(output.split('done')[1]), CALLS // 50, f'seed {seed}: hardly a call went through')
+            self.assertGreater(int(output.split('done')[1]), CALLS // 50, f'seed {seed}: hardly any call succeeded')
 
-    def test_nothing_crashes(self):
+    def test_random_calls_do_not_crash(self):
         if SECONDS == 0:
             return self.try_seeds(range(4))
         first = seed = random.randrange(2 ** 30)
         while sum(resource.getrusage(resource.RUSAGE_CHILDREN)[:2]) < SECONDS:
             self.try_seeds([seed])
             seed += 1
-        print(f'{seed - first} seeds from {first} on, {CALLS * (seed - first)} calls')
+        print(f'{seed - first} seeds from {first}, {CALLS * (seed - first)} calls')
 
 
 if __name__ == '__main__':

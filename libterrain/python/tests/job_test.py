@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Progress, Ctrl-C, threads: how long calls behave."""
+"""Progress, Ctrl-C and threads of long calls."""
 
 import logging
 import os
@@ -30,7 +30,7 @@ class Jobs(StoreCase):
         with self.assertRaises(TypeError):
             terrace.build(ALPS, self.path('alps2'), progress=3)
 
-    def test_what_progress_raises_ends_the_job(self):
+    def test_exception_from_progress_ends_the_job(self):
         class Enough(Exception):
             pass
 
@@ -41,7 +41,7 @@ class Jobs(StoreCase):
             terrace.build(ALPS, self.path('stopped'), progress=stop)
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('stopped')], [])
 
-    def test_ctrl_c_ends_a_build_soon_and_leaves_nothing(self):
+    def test_ctrl_c_ends_a_build_soon_without_leftovers(self):
         code = textwrap.dedent('''
             import sys, time, numpy as np, terrace
             def tell(*at):
@@ -62,7 +62,7 @@ class Jobs(StoreCase):
             self.assertLess(time.monotonic() - began, 10)
         self.assertEqual([name for name in os.listdir(self.folder) if 'interrupted' in name], [])
 
-    def test_ctrl_c_is_raised_by_other_calls(self):
+    def test_ctrl_c_ends_other_calls(self):
         code = textwrap.dedent('''
             import os, signal, sys, threading, numpy as np, terrace
             store = terrace.Store.open(sys.argv[1])
@@ -70,7 +70,7 @@ class Jobs(StoreCase):
             for call in (lambda: store.bounded_mesh(0.0), lambda: store.heights(points * 1e3 + [300000, 5200000], 'natural'),
                          lambda: store.tiles(sys.argv[2], (0, 20), vertical='ignore'), lambda: terrace.Delaunay3(np.c_[points, points[::-1, 0]]),
                          lambda: terrace.linkage(points), lambda: terrace.kmeans(points, 200), lambda: terrace.matching(points[:50_000]),
-                         # These would not end by themselves.
+                         # These would never end on their own.
                          lambda: terrace.halving_matching(points[:300], iterations=10 ** 12),
                          lambda: terrace.cluster(points[:2000], method='kd-tree', steps=10 ** 15),
                          lambda: terrace.stream_clusters((points for _ in iter(int, 1)), lambda block: None),
@@ -89,7 +89,7 @@ class Jobs(StoreCase):
         self.assertEqual(output.split(), ['interrupted'] * 12)
         self.assertFalse(os.path.exists(self.path('interrupted-tiles.laz')))
 
-    def test_ctrl_c_ends_work_in_memory_that_would_take_minutes(self):
+    def test_ctrl_c_ends_long_work_in_memory(self):
         code = textwrap.dedent('''
             import os, signal, threading, numpy as np, terrace
             random = np.random.default_rng(1)
@@ -111,7 +111,7 @@ class Jobs(StoreCase):
             output, _ = child.communicate(timeout=600)
         self.assertEqual(output.split(), ['interrupted'] * 11)
 
-    def test_other_threads_go_on(self):
+    def test_other_threads_keep_running(self):
         turns, stop = [0], threading.Event()
 
         def count():
@@ -135,14 +135,14 @@ class Jobs(StoreCase):
             turned.append((turns[0] - before) / (time.monotonic() - began))
         stop.set()
         thread.join()
-        self.assertGreater(min(turned), 10, turned)  # in a second
+        self.assertGreater(min(turned), 10, turned)  # within a second
 
     def test_notes_are_logged(self):
         with self.assertLogs('terrace', logging.INFO) as logs:
             terrace.build(np.random.default_rng(1).random((300_000, 3)), self.path('shuffled'))
         self.assertIn('spatial order', ' '.join(logs.output))
 
-    def test_threads_change_no_byte(self):
+    def test_stores_do_not_depend_on_threads(self):
         one = terrace.build(self.points, self.path('one'), threads=1)
         many = terrace.build(self.points, self.path('many'), threads=5)
         self.assertEqual(one.info['checksum'], many.info['checksum'])
@@ -158,14 +158,14 @@ class Jobs(StoreCase):
         self.assertTrue(output.endswith('\n'))
         return output
 
-    def test_a_line_of_progress(self):
+    def test_progress_line_without_tqdm(self):
         self.assertRegex(self.shown(hidden='tqdm'), r'\d+ % [\d,]+ points')
 
     @unittest.skipIf(find_spec('tqdm') is None, 'tqdm is missing')
-    def test_a_bar_of_tqdm(self):
+    def test_progress_bar_with_tqdm(self):
         self.assertRegex(self.shown(hidden='nothing'), r'%\|.*/1.\d+M \[.* points/s')
 
-    def test_import_is_quick_and_needs_numpy_alone(self):
+    def test_import_is_quick_and_needs_only_numpy(self):
         code = ('import sys, time, numpy; before = set(sys.modules); began = time.perf_counter(); import terrace; '
                 'print(time.perf_counter() - began, *{name.split(".")[0] for name in set(sys.modules) - before})')
         best = min((subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes: laws of triangulations, SciPy's, and verified bounds."""
+"""Meshes are triangulations, match SciPy's and keep verified bounds."""
 
 import os
 import unittest
@@ -20,7 +20,7 @@ def triangle_set(vertices, triangles):
 
 
 class Meshes(StoreCase):
-    def test_the_whole_of_a_cloud(self):
+    def test_mesh_of_all_points_matches_scipy(self):
         vertices, triangles = mesh = self.scan.mesh(level=0)
         np.testing.assert_array_equal(sorted_rows(vertices), sorted_rows(self.points))
         a, b, c = (vertices[triangles[:, i], :2] for i in range(3))
@@ -37,7 +37,7 @@ class Meshes(StoreCase):
         self.assertLess(len(mesh._repr_png_()), 400_000)
         self.assertEqual(len(mesh.__geo_interface__['coordinates']), len(triangles))
 
-    def test_levels_regions_focuses(self):
+    def test_levels_regions_and_focuses(self):
         coarse = self.scan.mesh(max_points=1000)
         self.assertLessEqual(len(coarse.vertices), 1000)
         box = (300300, 5200300, 300500, 5200500)
@@ -51,7 +51,7 @@ class Meshes(StoreCase):
         with self.assertRaises(ValueError):
             self.scan.mesh(level=0, max_points=10)
 
-    def test_a_cluster(self):
+    def test_mesh_of_a_cluster(self):
         below = terrace.xyz(self.scan.points(cluster=(1, 0), level=0))
         vertices, triangles = self.scan.mesh(level=0, cluster=(1, 0))
         np.testing.assert_array_equal(sorted_rows(vertices), sorted_rows(below))
@@ -72,7 +72,7 @@ class Meshes(StoreCase):
             self.assertTrue(moved.any())
             again = store.mesh(level=0, overlay=saved)
             np.testing.assert_array_equal(again.vertices, smooth.vertices)
-            # Delaunay2.smooth() on the same triangulation.
+            # Compare with Delaunay2.smooth() on the same triangulation.
             flat = plain.vertices[:, :2] if store is self.scan else (plain.vertices[:, :2] - plain.vertices[:, :2].min(axis=0)) / 10
             triangulation = terrace.Delaunay2(flat)
             expected = triangulation.smooth(triangulation.by_vertex(plain.vertices[:, 2]), 'taubin', iterations=4, strength=0.6)
@@ -87,21 +87,21 @@ class Meshes(StoreCase):
             with self.assertRaises(kind):
                 self.scan.mesh(level=0, **wrong)
 
-    def test_files_are_read(self):
+    def test_reads_mesh_files(self):
         mesh = self.scan.mesh(level=1)
         for ending in ('ply', 'obj', 'glb'):
             mesh.save(self.path('read.' + ending))
             back = terrace.Mesh.read(self.path('read.' + ending))
             np.testing.assert_array_equal(back.triangles, mesh.triangles)
-            # GLB has floats beside the middle of the mesh.
+            # GLB stores floats relative to the centre of the mesh.
             within = 2.0**-24 * np.ptp(mesh.vertices, axis=0).max() if ending == 'glb' else 0.0
             np.testing.assert_allclose(back.vertices, mesh.vertices, rtol=0, atol=within)
         with self.assertRaises(OSError):
             terrace.Mesh.read(self.path('none.ply'))
         with self.assertRaises(TypeError):
-            terrace.Mesh.read(1)  # no name, but a file of the process
+            terrace.Mesh.read(1)  # a file descriptor, not a file name
 
-    def test_bounds_are_kept(self):
+    def test_errors_stay_within_the_bound(self):
         for store, points in ((self.raster, None), (self.scan, self.points)):
             last = None
             for bound in (0.5, 2.0, 8.0):
@@ -122,12 +122,12 @@ class Meshes(StoreCase):
             self.raster.bounded_mesh(1, quality='superb')
 
     @unittest.skipIf(Delaunay is None, 'SciPy is missing')
-    def test_the_bound_holds_at_every_sample_as_scipy_interpolates(self):
+    def test_bound_holds_at_every_sample_interpolated_by_scipy(self):
         from scipy.interpolate import LinearNDInterpolator
         mesh = self.raster.bounded_mesh(1.0)
         samples = terrace.xyz(self.raster.points())
         error = np.full(len(samples), np.inf)
-        # Each triangle answers for the samples in it.
+        # Compare each triangle with the samples in it.
         a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
         for i in range(len(mesh.triangles)):
             corners = np.vstack((a[i], b[i], c[i]))
@@ -139,7 +139,7 @@ class Meshes(StoreCase):
             error[near[held]] = np.minimum(error[near[held]], abs(weights[held] @ corners[:, 2] - samples[near[held], 2]))
         self.assertLessEqual(error.max(), 1.0 + 1e-6)
 
-    def test_a_store_without_a_triangle_has_an_empty_mesh(self):
+    def test_store_without_triangles_has_an_empty_mesh(self):
         line = np.repeat(np.arange(5.0), 3).reshape(-1, 3)
         with terrace.build(line, self.path('line')) as store:
             for options in ({}, {'path': self.path('line.ply')}, {'path': self.path('line.glb')}):
@@ -147,7 +147,7 @@ class Meshes(StoreCase):
                 self.assertEqual((mesh.vertices.shape, mesh.triangles.shape), ((0, 3), (0, 3)))
                 self.assertEqual((mesh.samples, mesh.uncovered, mesh.max_error), (5, 5, 0))
 
-    def test_points_without_a_coordinate_do_not_count(self):
+    def test_points_with_a_nan_coordinate_are_ignored(self):
         points = np.random.default_rng(3).random((300, 3))
         holed = np.insert(points, [0, 7, 300], [[np.nan, 0, 0], [0, np.nan, 0], [0, 0, np.nan]], axis=0)
         mesh, expected = terrace.bounded_mesh(holed, 0.1), terrace.bounded_mesh(points, 0.1)
@@ -156,12 +156,12 @@ class Meshes(StoreCase):
         with self.assertRaises(ValueError):
             terrace.bounded_mesh(np.where(holed > 0.99, np.inf, holed), 0.1)
 
-    def test_the_surface_of_a_ball(self):
+    def test_surface_of_a_ball_is_closed(self):
         random = np.random.default_rng(4).normal(size=(5000, 3))
         ball = 100 * random / np.linalg.norm(random, axis=1)[:, None]
         surface = terrace.build(ball, self.path('ball')).surface()
         vertices, triangles = surface
-        self.assertEqual((len(vertices), len(triangles)), (5000, 2 * 5000 - 4))  # Euler's, of a closed surface
+        self.assertEqual((len(vertices), len(triangles)), (5000, 2 * 5000 - 4))  # Euler's formula for a closed surface
         self.assertAlmostEqual(surface.area(), 4 * np.pi * 100 ** 2, delta=300)
         a, b, c = (vertices[triangles[:, i]] for i in range(3))
         self.assertAlmostEqual(np.einsum('ij,ij', a, np.cross(b, c)) / 6, 4 / 3 * np.pi * 100 ** 3, delta=2e4)
@@ -189,9 +189,9 @@ class Meshes(StoreCase):
         with self.assertRaises(ValueError):
             terrace.Mesh(np.zeros((3, 3)), np.array([[0, 1, 3]])).save(self.path('wrong.ply'))
 
-    def test_glb_of_degrees_is_in_metres(self):
+    def test_glb_converts_degrees_to_metres(self):
         store = terrace.build(hills(), self.path('degrees'), transform=(0.001, 0, 8, 0, -0.001, 46.1), crs='EPSG:4326')
-        metres = np.array([77400, 111150])  # in a degree, at 46 degrees north
+        metres = np.array([77400, 111150])  # per degree at 46 degrees north
         path = self.path('degrees.glb')
         model = terrace.Multiresolution(store)
         model.set_detail(0)
@@ -207,7 +207,7 @@ class Meshes(StoreCase):
         self.assertIn('in metres', notes.output[0])
         self.assertIn('x and y are degrees', notes.output[1])
         self.check_metres(path, np.array([149, 119]) * 0.001 * metres, np.ptp(hills()), delta=4)
-        # In another CRS, with the bound there; and of a caller's own numbers, which stay.
+        # In another CRS the bound holds there; vertices set by the caller are not converted.
         there = store.bounded_mesh(2, crs='EPSG:32632')
         self.assertLessEqual(there.max_error, 2)
         samples = terrace.xyz(store.points(crs='EPSG:32632'))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a notebook shows: small PNGs, shaded as the ground is in metres, without noise and without holes."""
+"""Notebooks show small PNGs, with the shape that the ground has in metres."""
 
 import re
 import unittest
@@ -23,7 +23,7 @@ def grid_mesh(heights, x, y):
 
 
 class Pictures(StoreCase):
-    def test_a_plane_has_one_tone_that_follows_its_slope(self):
+    def test_tone_of_a_plane_follows_its_slope(self):
         x = np.linspace(0, 3000, 61)
         for east, north in ((0, 0), (0.5, 0), (-0.5, 0), (0, -0.5), (0.3, -0.4)):
             mesh = grid_mesh(east * x[None, :] + north * x[:, None], x, x)
@@ -32,8 +32,8 @@ class Pictures(StoreCase):
             light = (0.5 * east - 0.5 * north + 0.7071) / np.sqrt(1 + east ** 2 + north ** 2)
             self.assertLessEqual(np.abs(pixels - (30 + 215 * min(max(light, 0), 1))).max(), 1)
 
-    def test_degrees_are_not_metres(self):
-        # The same hill on the ground, in degrees at 60 degrees north and in metres.
+    def test_pictures_in_degrees_have_the_shape_of_the_ground(self):
+        # The same hill in degrees at 60 degrees north and in metres.
         metres = np.linspace(0, 40_000, 200)
         heights = 3000 * np.exp(-((metres[None, :] - 20_000) ** 2 + (metres[:, None] - 20_000) ** 2) / 1e8)
         lon, lat = 10 + metres / 55_800.0, 60 + metres / 111_412.0
@@ -47,8 +47,8 @@ class Pictures(StoreCase):
             lines = pixels_of(store.contours(500)._repr_png_())
             made.save(self.path('degrees.svg'))
         flat = pixels_of(grid_mesh(heights, metres, metres)._repr_png_())
-        for pixels, most in ((degrees, 4), (model, 4), (bounded, 15)):  # a mesh of few triangles shows their sides
-            self.assertLess(abs(pixels.shape[0] / pixels.shape[1] - 1), 0.02)  # not twice as wide
+        for pixels, most in ((degrees, 4), (model, 4), (bounded, 15)):  # the sides of few triangles are drawn
+            self.assertLess(abs(pixels.shape[0] / pixels.shape[1] - 1), 0.02)  # rather than twice as wide
             rows, columns = (min(sizes) for sizes in zip(pixels.shape, flat.shape))
             self.assertLess(np.abs(pixels[:rows, :columns] - flat[:rows, :columns]).mean(), most)
         self.assertLess(abs(lines.shape[0] / lines.shape[1] - 1), 0.02)
@@ -58,7 +58,7 @@ class Pictures(StoreCase):
             width, height = map(int, re.search(r'width="(\d+)" height="(\d+)"', file.read(300)).groups())
         self.assertLess(abs(width / height - 1), 0.02)
 
-    def test_many_triangles_are_neither_noise_nor_holes(self):
+    def test_many_triangles_give_smooth_pictures_without_holes(self):
         y, x = np.mgrid[0:900, 0:1200]
         mesh = grid_mesh(60 * np.sin(x / 90) * np.cos(y / 70), np.arange(1200.0) * 5, np.arange(900.0) * 5)
         png = mesh._repr_png_()
@@ -72,7 +72,7 @@ class Pictures(StoreCase):
     def test_sizes_are_bounded(self):
         random = np.random.default_rng(1)
         rough = terrace.Mesh(np.column_stack((random.random((60_000, 2)), random.random(60_000))),
-                             random.integers(0, 60_000, (50_000, 3)).astype(np.uint32))  # each across the whole picture
+                             random.integers(0, 60_000, (50_000, 3)).astype(np.uint32))  # each spans the whole picture
         flat = random.random((200_000, 2))
         for shown in (rough, terrace.Delaunay2(flat), terrace.Delaunay2(flat[:300]), terrace.Delaunay2(flat * (1, 1e-9)),
                       terrace.DynamicSurface(random.random((500, 3))), self.scan, self.raster, self.raster.contours(1)):
@@ -80,10 +80,10 @@ class Pictures(StoreCase):
             self.assertLess(len(png), MOST_BYTES)
             self.assertLessEqual(max(pixels_of(png).shape), 600)
 
-    def test_a_store_and_its_mesh_look_alike(self):
+    def test_store_and_its_mesh_look_alike(self):
         bounded, whole = (pixels_of(shown._repr_png_()) for shown in (self.raster.bounded_mesh(max_error=0.5), self.raster))
         self.assertEqual(bounded.shape, whole.shape)
-        self.assertLess(np.abs(bounded - whole).mean(), 40)  # the mesh shows its sides
+        self.assertLess(np.abs(bounded - whole).mean(), 40)  # the sides of the mesh are drawn
         expected = grid_mesh(hills()[::-1], np.arange(150.0) * 10, np.arange(120.0) * 10)
         self.assertLess(np.abs(pixels_of(expected._repr_png_()) - whole).mean(), 2)
 

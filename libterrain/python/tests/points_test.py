@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Points from files and to files, without a store."""
+"""Reading and writing points without a store."""
 
 import os
 import unittest
@@ -19,7 +19,7 @@ class Points(StoreCase):
         made['intensity'], made['classification'] = np.arange(count) % 4000, np.arange(count) % 5
         return made
 
-    def test_what_is_written_is_read(self):
+    def test_written_points_are_read_back(self):
         records = self.records()
         for ending in ('ply', 'csv', 'xyz', 'las', 'laz', 'copc.laz'):
             path = self.path('points.' + ending)
@@ -37,11 +37,11 @@ class Points(StoreCase):
                 terrace.write_points(path, records)
             terrace.write_points(path, records[:10], replace=True)
             self.assertEqual(len(terrace.read_points(path)), 10)
-        self.assertEqual(terrace.point_batches(self.path('points.laz')).crs['epsg'], 0)  # the ten points have none
+        self.assertEqual(terrace.point_batches(self.path('points.laz')).crs['epsg'], 0)  # these points have no CRS
         terrace.write_points(self.path('points.laz'), records, crs='EPSG:32632', replace=True)
         self.assertEqual(terrace.build(self.path('points.laz'), self.path('of-laz')).info['crs']['epsg'], 32632)
 
-    def test_undeclared_voids_and_lost_units_are_noted(self):
+    def test_notes_undeclared_voids_and_lost_units(self):
         path = self.path('voids.csv')
         with open(path, 'w', encoding='ascii') as file:
             file.write('x,y,z (ft)\n1,2,3\n2,3,-9999\n')
@@ -55,7 +55,7 @@ class Points(StoreCase):
         terrace.write_points(self.path('voids.las'), path)
         self.assertEqual(terrace.point_batches(self.path('voids.las')).crs['vertical_unit'], 'foot')
 
-    def test_a_part(self):
+    def test_reads_a_part(self):
         path = self.path('part.laz')
         records = self.records()
         terrace.write_points(path, records)
@@ -74,7 +74,7 @@ class Points(StoreCase):
             box = (8.3 + 2.5 / 1200 + turn, 46.5 - 9.5 / 1200, 8.3 + 9.5 / 1200 + turn, 46.5 - 2.5 / 1200)
             for polygon in (False, True):
                 region = box
-                if polygon:  # a little wider: of polygons nothing is rounded
+                if polygon:  # slightly wider, because polygons are not rounded
                     west, south, east, north = (side + off for side, off in zip(box, (-1e-9, -1e-9, 1e-9, 1e-9)))
                     region = {'type': 'Polygon', 'coordinates': [[(west, south), (east, south), (east, north), (west, north)]]}
                 self.assertEqual(len(whole.points(region=region)), 64)
@@ -83,7 +83,7 @@ class Points(StoreCase):
         inf = float('inf')
         self.assertEqual(len(whole.points(region=(-inf, -inf, 8.3 + 9.5 / 1200, inf))), 200)
 
-    def test_batches_are_blocks_of_constant_size(self):
+    def test_batches_have_a_constant_size(self):
         reader = terrace.point_batches(ALPS, block_points=3000)
         self.assertIn('x, y, z', repr(reader))
         self.assertEqual(reader.crs['epsg'], 4326)
@@ -98,14 +98,14 @@ class Points(StoreCase):
         self.assertLessEqual(max(sizes), 3000)
         np.testing.assert_array_equal(sorted(map(tuple, np.concatenate(points))), sorted(map(tuple, terrace.xyz(store.points()))))
 
-    def test_a_stream_of_clusters_of_a_file(self):
+    def test_streams_clusters_of_a_file(self):
         blocks = []
         made = terrace.stream_clusters(terrace.point_batches(self.records(20000)), blocks.append, block_points=2000)
         self.assertEqual(made['points'], 20000)
         total = sum(np.bincount(block.values['classification'], minlength=5) for block in blocks if block.level == 0)
         np.testing.assert_array_equal(total, [4000] * 5)
 
-    def test_progress_and_misuse(self):
+    def test_progress_and_invalid_arguments(self):
         seen = []
         terrace.write_points(self.path('seen.ply'), self.points, progress=lambda *at: seen.append(at))
         self.assertEqual(seen[-1], ('points', len(self.points), 1.0, True))

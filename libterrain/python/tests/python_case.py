@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores that several tests ask."""
+"""Stores shared by several tests."""
 
 import os
 import shutil
@@ -19,7 +19,7 @@ TRANSFORM = (10, 0, 500000, 0, -10, 5000000)  # corners of cells, UTM zone 32
 
 
 def hills(rows=120, columns=150):
-    """Samples of a smooth function; the place of sample (row, column) is that of cell_centres()."""
+    """Returns samples of a smooth function at the positions of cell_centres()."""
     y, x = np.mgrid[0:rows, 0:columns]
     return 400 + 60 * np.sin(x / 11) * np.cos(y / 13) + 0.2 * x
 
@@ -31,7 +31,7 @@ def cell_centres(rows, columns):
 
 
 def cloud(count=20000, seed=1):
-    """Points of a function of x and y, with classes: (x, y, z), class."""
+    """Returns points on the graph of a function, (x, y, z), and their classes."""
     random = np.random.default_rng(seed)
     xy = random.random((count, 2)) * [1000, 800] + [300000, 5200000]
     z = 50 + 10 * np.sin(xy[:, 0] / 90) + (xy[:, 1] - 5200000) / 40
@@ -39,7 +39,7 @@ def cloud(count=20000, seed=1):
 
 
 def pixels_of(png):
-    """The grey pixels of a PNG without interlacing or filters, shape (rows, columns)."""
+    """Returns the grey pixels of a PNG without interlacing or filters, shape (rows, columns)."""
     columns, rows = struct.unpack('>II', png[16:24])
     data, at = b'', 8
     while at < len(png):
@@ -52,7 +52,7 @@ def pixels_of(png):
 
 
 class StoreCase(unittest.TestCase):
-    """A folder, a store of hills() and one of cloud(), both in UTM zone 32."""
+    """Base class with a folder, a store of hills() and a store of cloud(), both in UTM zone 32."""
 
     @classmethod
     def setUpClass(cls):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""QGIS runs the provider's algorithms, without a screen."""
+"""QGIS runs the provider's algorithms without a display."""
 
 import os
 import sys
@@ -38,12 +38,12 @@ class Qgis(StoreCase):
         self.assertTrue(right, why)
         return algorithm.run(parameters, context, feedback or QgsProcessingFeedback(), {}, False)
 
-    def test_a_raster_becomes_a_store(self):
+    def test_builds_a_store_from_a_raster(self):
         results, done = self.run_algorithm('build', INPUT=[ALPS], OUTPUT=self.path('alps'))
         self.assertTrue(done)
         self.assertEqual(results['POINTS'], 1338658)
 
-    def test_a_mesh_that_qgis_reads(self):
+    def test_qgis_reads_the_mesh(self):
         path = self.path('hills.ply')
         _, done = self.run_algorithm('bounded_mesh', STORE=self.path('hills'), MAX_ERROR=2.0, OUTPUT=path)
         self.assertTrue(done)
@@ -51,7 +51,7 @@ class Qgis(StoreCase):
         self.assertTrue(layer.isValid())
         self.assertEqual(layer.dataProvider().faceCount(), len(self.raster.bounded_mesh(2.0).triangles))
 
-    def test_contours_that_qgis_reads(self):
+    def test_qgis_reads_the_contours(self):
         x0, y0, _, x1, y1, _ = self.raster.bounds
         for extent, region in ((None, None), (f'{x0},{(x0 + x1) / 2},{y0},{y1} [EPSG:32632]', (x0, y0, (x0 + x1) / 2, y1))):
             path = self.path(f'contours-{region is None}.gpkg')
@@ -67,12 +67,12 @@ class Qgis(StoreCase):
             np.testing.assert_allclose([box.xMinimum(), box.yMinimum(), box.xMaximum(), box.yMaximum()],
                                        [*corners.min(axis=0), *corners.max(axis=0)], rtol=0, atol=1e-5)
 
-    def test_tiles(self):
+    def test_writes_tiles(self):
         _, done = self.run_algorithm('tiles', STORE=self.path('hills'), ZOOM=9, VERTICAL=3, OUTPUT=self.path('tiles'))
         self.assertTrue(done)
         self.assertTrue(os.path.exists(self.path('tiles/layer.json')))
 
-    def test_faults_are_told_and_a_job_is_cancelled(self):
+    def test_reports_errors_and_cancels_jobs(self):
         with self.assertRaisesRegex(QgsProcessingException, 'there is no store here'):
             self.run_algorithm('tiles', STORE=self.path('nowhere'), OUTPUT=self.path('none'))
         feedback = QgsProcessingFeedback()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores: what goes in comes out, whole or in part."""
+"""Stores return the points they were built from, all or in part."""
 
 import errno
 import json
@@ -19,7 +19,7 @@ from python_case import ALPS, COMMAND, TRANSFORM, StoreCase, cell_centres, cloud
 
 
 class Stores(StoreCase):
-    def test_every_point_comes_back(self):
+    def test_returns_every_point(self):
         got = self.scan.points()
         self.assertEqual(got.dtype.names, ('x', 'y', 'z', 'class'))
         self.assertEqual(got.dtype['class'], np.uint8)
@@ -33,7 +33,7 @@ class Stores(StoreCase):
             with self.assertRaises(ValueError):
                 terrace.xyz(wrong)
 
-    def test_every_sample_comes_back_at_the_middle_of_its_cell(self):
+    def test_returns_every_sample_at_its_cell_centre(self):
         got = terrace.xyz(self.raster.points())
         expected = np.column_stack((cell_centres(*self.samples.shape).reshape(-1, 2), self.samples.ravel()))
         np.testing.assert_array_equal(sorted_rows(got), sorted_rows(expected))
@@ -62,9 +62,9 @@ class Stores(StoreCase):
             for opener in (terrace.Store, terrace.open):
                 with self.assertRaises(kind):
                     opener(wrong)
-        self.assertNotIn('open', terrace.__all__)  # `from terrace import *` would hide Python's own
+        self.assertNotIn('open', terrace.__all__)  # `from terrace import *` must not hide Python's
 
-    def test_typos_in_options_are_refused(self):
+    def test_rejects_misspelt_options(self):
         for wrong in (lambda: terrace.build(self.points, self.path('typo'), replce=True), lambda: self.raster.tiles(self.path('typo'), max_eror=1),
                       lambda: self.raster.heights([[0, 0]], level_=1), lambda: self.scan.mesh(smoothing={'methd': 'taubin'}),
                       lambda: self.raster.raster(cel=1)):
@@ -82,7 +82,7 @@ class Stores(StoreCase):
         self.assertEqual(len(self.scan.points(region=box, where='class == 3')), both.sum())
         for level in self.scan.info['levels']:
             self.assertEqual(len(self.scan.points(level=level['level'])), level['points'])
-        # A triangle, as GeoJSON says it.
+        # A triangle in GeoJSON.
         corners = [[300000, 5200000], [301000, 5200000], [300000, 5200800], [300000, 5200000]]
         got = self.scan.points(region={'type': 'Polygon', 'coordinates': [corners]})
         self.assertEqual(len(got), ((x - 300000) / 1000 + (y - 5200000) / 800 <= 1).sum())
@@ -95,7 +95,7 @@ class Stores(StoreCase):
         self.assertGreaterEqual(len(focused), inside.sum())
         self.assertLess(len(focused), len(self.points))
 
-    def test_a_view_answers_as_a_store_of_its_points_alone(self):
+    def test_view_with_a_condition_matches_a_store_of_its_points(self):
         condition, keeps = 'class == 3', self.classes == 3
         part = self.points[keeps]
         alone = terrace.build(part, self.path('alone'), crs=32632, block_points=500)
@@ -172,7 +172,7 @@ class Stores(StoreCase):
         with self.assertRaises(ValueError):
             self.scan.points(cluster=(1, 0), region=(0, 0, 1, 1))
 
-    def test_a_table_of_clusters(self):
+    def test_table_of_clusters(self):
         for level in range(self.scan.top + 1):
             told = self.scan.clusters(level)
             self.assertEqual(len(told), self.scan.info['levels'][level]['clusters'])
@@ -185,7 +185,7 @@ class Stores(StoreCase):
                 box = np.concatenate((below.min(axis=0), below.max(axis=0)))
                 grown = (told['bounds'][number] - box) * [-1, -1, -1, 1, 1, 1]
                 self.assertTrue((grown >= 0).all() and (grown < 0.05 * np.tile(np.ptp(self.points, axis=0), 2)).all())
-                # The representative comes last.
+                # The representative is last.
                 farthest = np.linalg.norm(below - terrace.xyz(self.scan.points(cluster=(level, number)))[-1], axis=1).max()
                 self.assertLessEqual(farthest, told['error'][number] * 1.001)
         with self.assertRaises(ValueError):
@@ -206,7 +206,7 @@ class Stores(StoreCase):
             with self.assertRaises(ValueError):
                 store.count(wrong)
 
-    def test_regions_of_other_reference_systems(self):
+    def test_regions_in_other_reference_systems(self):
         to_lonlat = terrace.Transformation(32632, 4326)
         corners = np.array([[300200, 5200100], [300800, 5200150], [300500, 5200700]], float)
         region = {'type': 'Polygon', 'coordinates': [to_lonlat.forward(corners).tolist()]}
@@ -226,7 +226,7 @@ class Stores(StoreCase):
             with self.assertRaises(ValueError):
                 wrong()
 
-    def test_geojson_is_in_its_own_crs_or_else_in_longitude_and_latitude(self):
+    def test_geojson_is_in_its_crs_or_in_longitude_and_latitude(self):
         corners = np.array([[300200, 5200100], [300800, 5200150], [300500, 5200700], [300200, 5200100]], float)
         metres = {'type': 'Polygon', 'coordinates': [corners.tolist()]}
         degrees = {'type': 'Polygon', 'coordinates': [terrace.Transformation(32632, 4326).forward(corners).tolist()]}
@@ -234,7 +234,7 @@ class Stores(StoreCase):
         self.assertGreater(expected, 1000)
 
         class Frame:
-            """As geopandas has it."""
+            """Imitates a geopandas object."""
             def __init__(self, geometry, crs):
                 self.__geo_interface__ = {'type': 'FeatureCollection', 'features': [
                     {'type': 'Feature', 'geometry': None}, {'type': 'Feature', 'geometry': geometry}]}
@@ -266,7 +266,7 @@ class Stores(StoreCase):
         order = np.argsort(distances)[:25]
         np.testing.assert_array_equal(terrace.xyz(got), self.points[order])
         np.testing.assert_array_equal(got['class'], self.classes[order])
-        # On the ground: the map's scale is within a thousandth.
+        # Distances are on the ground; the scale of the map differs by less than a thousandth.
         np.testing.assert_allclose(got['distance'], distances[order], rtol=1e-3)
         self.assertEqual(len(self.scan.query(near=place, k=10 ** 6)), len(self.points))
         with self.assertRaisesRegex(ValueError, '`k` must be at least 1'):
@@ -307,7 +307,7 @@ class Stores(StoreCase):
         with self.assertRaises(terrace.Error):
             terrace.Store.open(self.folder)
 
-    def test_damage_is_told(self):
+    def test_reports_damage(self):
         store = terrace.build(self.points, self.path('damaged'))
         files = [os.path.join(root, name) for root, _, names in os.walk(self.path('damaged')) for name in names]
         largest = max(files, key=os.path.getsize)
@@ -320,7 +320,7 @@ class Stores(StoreCase):
         with self.assertRaisesRegex(terrace.Error, os.path.basename(largest)):
             store.points()
 
-    def test_unknown_names_are_refused(self):
+    def test_rejects_unknown_names(self):
         with self.assertRaisesRegex(TypeError, 'no option .blok_points'):
             terrace.build(self.points, self.path('new'), blok_points=3)
         with self.assertRaisesRegex(ValueError, 'effort.*fast, default, fine, full'):
@@ -336,7 +336,7 @@ class Stores(StoreCase):
         with self.assertRaises(ValueError):
             terrace.build(self.points, self.path('new'), crs='EPSG:999999')
 
-    def test_numbers_that_are_too_large_are_told_by_name(self):
+    def test_names_the_argument_with_a_too_large_number(self):
         for name, call in (('level', lambda: self.scan.points(level=2 ** 32)), ('cluster', lambda: self.scan.points(cluster=(2 ** 32, 0))),
                            ('cluster', lambda: self.scan.points(cluster=(0, 2 ** 64))), ('k', lambda: self.scan.query(near=(0, 0), k=2 ** 64)),
                            ('threads', lambda: self.scan.verify(threads=2 ** 32)), ('memory', lambda: self.scan.surface(memory=2 ** 64)),
@@ -348,7 +348,7 @@ class Stores(StoreCase):
             with self.subTest(name), self.assertRaisesRegex(ValueError, f'`{name}` must be below 2\\^(32|64)'):
                 call()
 
-    def test_names_that_promise_another_format_are_refused(self):
+    def test_rejects_extensions_of_other_formats(self):
         corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
         with tempfile.TemporaryDirectory() as folder:
             for ending, call in (
@@ -365,13 +365,13 @@ class Stores(StoreCase):
             with self.assertRaisesRegex(ValueError, "`format` 'foo': a file of points can be xyz, csv"):
                 terrace.write_points(os.path.join(folder, 'x'), self.points, format='foo')
 
-    def test_a_region_that_is_nested_without_end_is_refused(self):
+    def test_rejects_endlessly_nested_regions(self):
         endless = {'type': 'GeometryCollection'}
         endless['geometries'] = [endless]
         with self.assertRaisesRegex(ValueError, 'not GeoJSON'):
             self.scan.points(endless)
 
-    def test_parameters_have_the_names_of_the_module(self):
+    def test_messages_use_the_modules_parameter_names(self):
         for name, kind, call in (('radius', ValueError, lambda: self.scan.query(near=(0, 0), radius=-1)),
                                  ('memory', terrace.Error, lambda: terrace.build(self.points, self.path('small'), memory=1000)),
                                  ('zooms', ValueError, lambda: self.raster.tiles(self.path('deep'), (0, 99), vertical='ignore')),
@@ -380,7 +380,7 @@ class Stores(StoreCase):
             with self.subTest(name), self.assertRaisesRegex(kind, f'`{name}`'):
                 call()
 
-    def test_a_store_may_be_closed_while_others_ask(self):
+    def test_store_may_be_closed_while_other_threads_query_it(self):
         failures = []
         for _ in range(10):
             store = terrace.Store.open(self.path('cloud'))
@@ -403,7 +403,7 @@ class Stores(StoreCase):
                 thread.join()
         self.assertEqual(failures, [])
 
-    def test_a_store_may_be_asked_by_many_threads_and_by_a_fork(self):
+    def test_threads_and_forks_share_a_store(self):
         expected = self.scan.query(near=(300500, 5200400), k=9)
         failures = []
 
@@ -425,7 +425,7 @@ class Stores(StoreCase):
 
 
 class Sources(StoreCase):
-    """The same points and samples in whatever form make the same store."""
+    """The same points and samples make the same store in every form."""
 
     def built(self, source, **options):
         self.count = getattr(self, 'count', 0) + 1
@@ -443,7 +443,7 @@ class Sources(StoreCase):
         columns = dict(zip('xyz', self.points.T), **{'class': self.classes})
         self.assert_same(columns, self.scan, **options)
 
-        class Frame:  # as pandas.DataFrame, which as an array is all its columns
+        class Frame:  # like pandas.DataFrame, whose array form has all columns
             columns = ('class', 'x', 'y', 'z')
 
             def __getitem__(self, name):
@@ -489,7 +489,7 @@ class Sources(StoreCase):
         class Format:
             dimension_names = property(lambda _: iter(['X', 'Y', 'Z', 'intensity', 'classification', 'rgb']))
 
-        class Points(dict):  # as laspy.ScaleAwarePointRecord: fields of bits have names of their own
+        class Points(dict):  # like laspy.ScaleAwarePointRecord, where bit fields have names
             def __init__(points, records):
                 super().__init__({name: records[name] for name in records.dtype.names}, classification=records['bits'] & 31)
                 points.scales, points.offsets, points.point_format = scales, offsets, Format()
@@ -497,7 +497,7 @@ class Sources(StoreCase):
         class Crs:
             to_wkt = lambda _: self.scan.info['crs']['wkt']  # noqa: E731
 
-        class Data:  # as laspy.LasData
+        class Data:  # like laspy.LasData
             points = Points(records)
 
             class header:
@@ -510,7 +510,7 @@ class Sources(StoreCase):
         self.assertEqual(got.dtype['intensity'], np.uint16)
         self.assertEqual(len(store.points(where='classification == 3')), (self.classes == 3).sum())
         self.assertEqual((store.info['format'], store.info['crs']['epsg']), ('array', 32632))
-        with self.assertLogs('terrace', logging.INFO):  # points alone have no header
+        with self.assertLogs('terrace', logging.INFO):  # points without a header
             self.assertEqual(len(self.built(Points(records[:100]))), 100)
 
     def test_rasters(self):
@@ -535,7 +535,7 @@ class Sources(StoreCase):
         masked = np.ma.masked_equal(with_holes, -9999)
         self.assertEqual(len(self.built(masked, **options)), self.samples.size - 600)
 
-    def test_points_without_a_coordinate_are_left_out_and_counted(self):
+    def test_points_with_a_nan_coordinate_are_skipped_and_counted(self):
         points = self.points.copy()
         points[3, 0] = points[[3, 17, 4000], 1] = points[len(points) - 1, 2] = np.nan
         store = self.built(points, attributes={'number': np.arange(len(points))})
@@ -544,7 +544,7 @@ class Sources(StoreCase):
         told = terrace.write_points(self.path('without.ply'), points)
         self.assertEqual((told['points'], told['nodata']), (len(points) - 4, 4))
 
-    def test_masks_are_not_overlooked(self):
+    def test_masks_are_respected(self):
         points = np.ma.array(self.points[:100])
         points[3, 2] = np.ma.masked
         store = self.built(points)
@@ -553,12 +553,12 @@ class Sources(StoreCase):
         with self.assertRaisesRegex(ValueError, 'masked'):
             self.built(self.points[:100], attributes={'number': numbers})
 
-    def test_no_source_is_said(self):
+    def test_rejects_an_empty_list_of_sources(self):
         for nothing in ([], ()):
             with self.assertRaisesRegex(ValueError, 'no source'):
                 self.built(nothing)
 
-    def test_beside_names_of_files_there_is_nothing_else(self):
+    def test_rejects_mixtures_of_files_and_arrays(self):
         for mixed in (['a.tif', 3], [self.points, 'a.tif'], ['a.tif', None]):
             with self.assertRaisesRegex(TypeError, 'source [01] is of type'):
                 self.built(mixed)
@@ -578,13 +578,13 @@ class Sources(StoreCase):
                     store = self.built(source)
                     self.assertEqual((len(store), store.info['crs']['epsg']), (len(expected), 4326))
                     np.testing.assert_allclose(store.bounds, expected.bounds, rtol=1e-12)
-        store = self.built(of_xarray, transform=TRANSFORM, crs='EPSG:32632', nodata=2000)  # what is given counts
+        store = self.built(of_xarray, transform=TRANSFORM, crs='EPSG:32632', nodata=2000)  # arguments override the source
         self.assertEqual(store.info['crs']['epsg'], 32632)
         self.assertAlmostEqual(store.bounds[0], 500005, delta=10000)
         self.assertEqual(store.info['nodata'], int((of_xarray.values == 2000).sum()))
 
     def test_datasets_have_the_heights_of_their_file(self):
-        """Also where it has a scale and offset, or a mask instead of a nodata value."""
+        """Includes files with a scale and offset, or with a mask instead of a nodata value."""
         try:
             import rasterio
             from osgeo import gdal
@@ -619,7 +619,7 @@ class Sources(StoreCase):
         described = xarray.DataArray(self.samples, dims=('y', 'x'), coords={'spatial_ref': grid})
         self.assertEqual(self.built(described).bounds, self.raster.bounds)
 
-    def test_types_of_samples(self):
+    def test_sample_types(self):
         for kind in ('i1', 'u1', 'i2', 'u2', 'i4', 'u4', 'i8', 'u8', 'f2', 'f4', 'f8', '>i2', '>f4', '?'):
             with self.subTest(kind):
                 samples = (np.arange(48 * 41).reshape(48, 41) % 100).astype(kind)
@@ -628,7 +628,7 @@ class Sources(StoreCase):
                 expected = np.column_stack((cell_centres(48, 41).reshape(-1, 2), samples.ravel().astype(float)))
                 np.testing.assert_array_equal(sorted_rows(got), sorted_rows(expected))
 
-    def test_what_cannot_be_a_source(self):
+    def test_rejects_invalid_sources(self):
         for wrong, kind in ((np.zeros((4, 3), complex), TypeError), (np.zeros((2, 2, 2)), ValueError),
                             (np.zeros(5), ValueError), (np.zeros((0, 3)), ValueError), (object(), TypeError),
                             (np.array([['a', 'b', 'c']]), TypeError), ({'x': [1.0], 'y': [2.0]}, ValueError),
@@ -659,7 +659,7 @@ class Sources(StoreCase):
 
 
 class Paths(StoreCase):
-    def test_an_empty_path_is_an_error_of_the_system(self):
+    def test_empty_paths_raise_os_errors(self):
         with self.assertRaises((OSError, ValueError, terrace.Error)):
             terrace.build(self.points, '')
         here = os.getcwd()
@@ -670,7 +670,7 @@ class Paths(StoreCase):
         finally:
             os.chdir(here)
 
-    def test_names_need_not_be_utf_8(self):
+    def test_file_names_need_not_be_utf_8(self):
         name = os.fsdecode(b'h\xf6he')
         path = self.path(name)
         with terrace.build(self.points, path) as store:
@@ -694,7 +694,7 @@ class Paths(StoreCase):
 
 
 class Lines(StoreCase):
-    def test_lines_come_back(self):
+    def test_returns_every_line(self):
         random = np.random.default_rng(21)
         given = [np.round(random.random((random.integers(2, 9), 3)).cumsum(axis=0) * 100, 2) for _ in range(60)]
         with open(self.path('lines.geojson'), 'w', encoding='ascii') as file:

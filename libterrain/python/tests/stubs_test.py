@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The type stubs say what there is, and a user's script is checked by them."""
+"""The type stubs match the module and check users' scripts."""
 
 import os
 import subprocess
@@ -34,7 +34,7 @@ print(delta.added_corners.shape, terrace.kmeans(inside, 3).centres, terrace.Dela
 
 def mypy(folder, *arguments):
     environment, found = dict(os.environ), os.path.dirname(terrace.__path__[0])
-    if not found.endswith('-packages'):  # those of the interpreter are found anyway
+    if not found.endswith('-packages'):  # the interpreter's own packages are found anyway
         environment.update(MYPYPATH=found, PYTHONPATH=found)
     return subprocess.run([sys.executable, '-m', *arguments], cwd=folder, stdout=subprocess.PIPE, text=True,
                           stderr=subprocess.STDOUT, env=environment)
@@ -48,7 +48,7 @@ class Stubs(unittest.TestCase):
         except ImportError:
             raise unittest.SkipTest('mypy is missing') from None
 
-    def test_scripts(self):
+    def test_mypy_checks_scripts(self):
         with tempfile.TemporaryDirectory() as folder:
             for name, text, faults in (('right.py', SCRIPT, 0),
                                        ('wrong.py', SCRIPT.replace("'natural'", "'cubic'"), 1),
@@ -58,7 +58,7 @@ class Stubs(unittest.TestCase):
                 result = mypy(folder, 'mypy', '--strict', '--no-error-summary', name)
                 self.assertEqual(result.returncode, faults, result.stdout)
 
-    def test_the_stubs_are_true(self):
+    def test_stubs_match_the_module(self):
         with tempfile.TemporaryDirectory() as folder:
             with open(os.path.join(folder, 'mypy.ini'), 'w', encoding='utf-8') as file:
                 file.write('[mypy]\nignore_missing_imports = True\n')

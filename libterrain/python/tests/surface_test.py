@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Meshes, interpolation, metrics and shapes of arrays: by their bounds, SciPy, mapped points and solids."""
+"""Meshes, interpolation, metrics and shapes of arrays, compared with bounds, SciPy, mapped points and solids."""
 
 import unittest
 
@@ -21,7 +21,7 @@ def corner_sets(points, simplices):
 
 class MeshesOfArrays(unittest.TestCase):
     def check_bound(self, mesh, samples, bound):
-        """SciPy's interpolation in our triangles is not used: they need not be Delaunay."""
+        """Checks the bound without SciPy, whose interpolation needs Delaunay triangles."""
         worst = 0.0
         for a, b, c in mesh.vertices[mesh.triangles]:
             to_ab = np.array([b[:2] - a[:2], c[:2] - a[:2]]).T
@@ -33,7 +33,7 @@ class MeshesOfArrays(unittest.TestCase):
         self.assertLessEqual(worst, bound + 1e-9)
         self.assertAlmostEqual(worst, mesh.max_error, delta=1e-6)
 
-    def test_points_within_the_bound(self):
+    def test_meshes_of_points_keep_the_bound(self):
         random = np.random.default_rng(3)
         xy = random.random((2000, 2)) * 100
         samples = np.column_stack((xy, 10 * np.sin(xy[:, 0] / 20) + xy[:, 1] / 9))
@@ -45,7 +45,7 @@ class MeshesOfArrays(unittest.TestCase):
         self.assertLessEqual(len(fewer.vertices), 30)
         self.check_bound(fewer, samples, np.inf)
 
-    def test_rasters_within_the_bound(self):
+    def test_meshes_of_rasters_keep_the_bound(self):
         y, x = np.mgrid[0:50, 0:60]
         heights = 20 * np.sin(x / 9) * np.cos(y / 7)
         transform = (10, 0, 500, 0, -5, 900)
@@ -57,7 +57,7 @@ class MeshesOfArrays(unittest.TestCase):
             self.check_bound(mesh, samples, 0.5)
         few = terrace.bounded_mesh(heights, max_points=40, transform=transform)
         self.assertLessEqual(len(few.vertices), 40)
-        # The raster class of the module, integers with a marker of missing data, and upside down.
+        # The module's Raster, integers with a nodata value, and a raster with rows to the north.
         raster = terrace.Raster(heights.astype(np.float32), transform, None)
         self.check_bound(terrace.bounded_mesh(raster, 0.5), samples, 0.5 + 1e-5)
         marked = np.round(heights).astype(np.int16)
@@ -69,7 +69,7 @@ class MeshesOfArrays(unittest.TestCase):
             u, v = np.linalg.solve((corners[1:] - corners[0]).T, middle - corners[0])
             self.assertFalse(u > 0 and v > 0 and u + v < 1, 'a triangle lies in the hole')
 
-    def test_a_frame_of_ones_own(self):
+    def test_given_frame_replaces_the_hull(self):
         samples = np.column_stack((np.random.default_rng(4).random((500, 2)), np.zeros(500)))
         frame = [[0.2, 0.2, 1], [0.8, 0.2, 1], [0.8, 0.8, 1], [0.2, 0.8, 1]]
         mesh = terrace.bounded_mesh(samples, 0.5, frame=frame)
@@ -100,7 +100,7 @@ class MeshesOfArrays(unittest.TestCase):
         with self.assertRaises(ValueError):
             terrace.Mesh(np.zeros((3, 3)), np.array([[0, 1, 3]])).errors(samples)
 
-    def test_lines(self):
+    def test_simplified_lines_keep_the_bound(self):
         random = np.random.default_rng(6)
         for count, bound in ((1, 0.1), (2, 0.1), (300, 0.3), (300, 0.0)):
             t, heights = np.sort(random.random(count)), np.cumsum(random.normal(size=count)) / 5
@@ -110,7 +110,7 @@ class MeshesOfArrays(unittest.TestCase):
             errors = np.abs(np.interp(t, t[kept], heights[kept]) - heights)
             self.assertAlmostEqual(errors.max(), error, places=12)
             self.assertLessEqual(error, bound)
-            # Greedily: of the samples in between none can be left out until the bound is reached.
+            # Reproduce the greedy algorithm: add the sample with the largest error until the bound holds.
             chain = [0, count - 1]
             while True:
                 errors = np.abs(np.interp(t, t[chain], heights[chain]) - heights)
@@ -124,7 +124,7 @@ class MeshesOfArrays(unittest.TestCase):
             with self.assertRaises(ValueError):
                 terrace.simplify_line(*wrong)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         flat = np.zeros((9, 9))
         for wrong, options in ((flat, {}), (flat, {'max_error': 1, 'max_points': 9}), (flat, {'max_error': -1}),
                                (flat, {'max_error': np.nan}), (flat, {'max_points': 3}),
@@ -143,7 +143,7 @@ class Interpolation(unittest.TestCase):
         self.z = np.sin(5 * self.xy[:, 0]) + self.xy[:, 1] ** 2
         self.samples = np.column_stack((self.xy, self.z))
 
-    def test_as_scipy(self):
+    def test_matches_scipy(self):
         linear = terrace.interpolate(self.samples, self.asked)
         np.testing.assert_allclose(linear, LinearNDInterpolator(self.xy, self.z)(self.asked), rtol=0, atol=1e-9)
         self.assertTrue(np.isnan(linear).any())
@@ -165,7 +165,7 @@ class Interpolation(unittest.TestCase):
         for threads in (1, 2):
             np.testing.assert_array_equal(mesh.heights(wavy, self.asked, threads=threads), mesh.heights(wavy, self.asked))
 
-    def test_weights_are_what_heights_are_made_of(self):
+    def test_heights_are_weighted_sums_of_values(self):
         mesh = terrace.Delaunay2(self.xy)
         wavy = mesh.by_vertex(self.z)
         for method in ('linear', 'natural', 'nearest'):
@@ -246,7 +246,7 @@ class Interpolation(unittest.TestCase):
         self.assertAlmostEqual(report['max_edge'], lengths.max(), places=12)
         self.assertAlmostEqual(report['min_edge'], lengths.min(), places=12)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         mesh = terrace.Delaunay2(self.xy)
         z = mesh.by_vertex(self.z)
         short, samples = z[:-5], np.zeros((1, 3))
@@ -265,7 +265,7 @@ class Interpolation(unittest.TestCase):
 
 
 class Metrics(unittest.TestCase):
-    def test_triangles_are_those_of_mapped_points(self):
+    def test_triangles_match_those_of_mapped_points(self):
         random = np.random.default_rng(11)
         for kind, metric, count in ((terrace.Delaunay2, terrace.ellipse(4, 1, 30), 2000),
                                     (terrace.Delaunay3, terrace.ellipsoid([3, 1, 2]), 600)):
@@ -279,7 +279,7 @@ class Metrics(unittest.TestCase):
             made.remove(made.insert(asked))
             self.assertEqual(made.digest(), kind(points, metric=metric).digest())
 
-    def test_one_region_is_one_metric(self):
+    def test_one_region_matches_one_metric(self):
         random = np.random.default_rng(12)
         for kind, metric, count in ((terrace.Delaunay2, terrace.ellipse(3, 1, 45), 1000),
                                     (terrace.Delaunay3, terrace.ellipsoid([2, 1, 1]), 300)):
@@ -292,7 +292,7 @@ class Metrics(unittest.TestCase):
                 self.assertEqual(stuck, 0)
             self.assertEqual(corner_sets(made.points, simplices), corner_sets(expected.points, expected.simplices))
 
-    def test_regions_leave_the_rest(self):
+    def test_triangles_outside_regions_do_not_change(self):
         points = np.random.default_rng(13).random((2000, 2))
         made = terrace.Delaunay2(points)
         before = corner_sets(made.points, made.simplices)
@@ -301,7 +301,7 @@ class Metrics(unittest.TestCase):
         self.assertGreater(len(changed), 100)
         self.assertGreaterEqual(min(x for x, _ in changed), 0.5)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         for wrong in (lambda: terrace.ellipse(0, 1), lambda: terrace.ellipse(1, np.inf), lambda: terrace.ellipsoid([1, 1]),
                       lambda: terrace.ellipsoid([1, 1, 1], np.ones((3, 3))),
                       lambda: terrace.Delaunay2(metric=np.zeros((2, 2))), lambda: terrace.Delaunay2(metric=np.eye(3)),
@@ -350,7 +350,7 @@ class Shapes(unittest.TestCase):
             with self.assertRaises(ValueError):
                 made.shape('flood', **wrong)
 
-    def test_surfaces_that_change(self):
+    def test_surface_follows_changes(self):
         random = np.random.default_rng(17)
         ball = random.normal(size=(2000, 3))
         ball /= np.linalg.norm(ball, axis=1)[:, None]

@@ -16,7 +16,7 @@ from python_case import COMMAND, TRANSFORM, StoreCase, sorted_rows
 
 
 class Tiles(StoreCase):
-    def test_a_set_of_tiles(self):
+    def test_writes_a_set_of_tiles(self):
         folder = self.path('tiles')
         report = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal')
         with open(os.path.join(folder, 'layer.json'), encoding='utf-8') as file:
@@ -39,7 +39,7 @@ class Tiles(StoreCase):
                 with open(tile, 'rb') as ours, open(os.path.join(other, os.path.relpath(tile, folder)), 'rb') as theirs:
                     self.assertEqual(ours.read(), theirs.read())
 
-    def test_the_check_of_a_set(self):
+    def test_verifies_a_set_of_tiles(self):
         folder = self.path('checked')
         report = self.raster.tiles(folder, zooms=(0, 12), vertical='ellipsoidal', max_error=2)
         sound = terrace.verify_tiles(folder, self.raster, vertical='ellipsoidal')
@@ -77,13 +77,13 @@ class Tiles(StoreCase):
             self.raster.tiles(self.path('none'), vertical='sideways')
         with self.assertRaises(TypeError):
             self.raster.tiles(self.path('none'), zoom=3)
-        with self.assertRaises((ValueError, terrace.Error)):  # nothing says what heights refer to
+        with self.assertRaises((ValueError, terrace.Error)):  # the vertical reference is unknown
             self.raster.tiles(self.path('none'), zooms=(0, 3))
 
 
 class Views(StoreCase):
     def fly(self, view, frames=3000):
-        """Applies deltas as a renderer does, until the view has settled."""
+        """Applies deltas like a renderer until the view has settled."""
         vertices, triangles = {}, {}
         for number in range(frames):
             delta = view.frame((0.0, -3000.0, 1500.0), (0.0, 1.0, -0.4), seconds=0.02, pixel_error=1.0)
@@ -116,23 +116,23 @@ class Views(StoreCase):
                 self.assertTrue(set(np.ravel(list(triangles.values()))) <= set(vertices))
                 self.assertGreater(view.traffic['points'], 0)
 
-    def test_points_alone(self):
+    def test_view_of_points(self):
         vertices, triangles, _ = self.fly(terrace.View(self.scan, 'points'))
         self.assertEqual(triangles, {})
         self.assertGreater(len(vertices), 100)
 
-    def test_everything_is_shown_where_no_error_is_allowed(self):
+    def test_zero_error_shows_everything(self):
         view = terrace.View(self.scan, reader='frame')
         delta = view.frame(ground_error=0.0, seconds=10)
         while not delta.settled:
             delta = view.frame(ground_error=0.0, seconds=10)
         self.assertEqual(delta.points, len(self.scan))
-        # Metres from the middle: as wide and as high as the cloud, within the map's scale.
+        # Metres from the centre: the size of the cloud, apart from the scale of the map.
         now = view.snapshot().added_positions
         np.testing.assert_allclose(np.ptp(now, axis=0), np.ptp(self.points, axis=0), rtol=1e-3)
 
     def test_matrix_cameras(self):
-        # Orthographic, 4 km wide and high, from above.
+        # Orthographic from above, 4 km wide and high.
         matrix = np.diag([1 / 2000, 1 / 2000, -1 / 5000, 1.0])
         view = terrace.View(self.scan, reader='frame')
         first = delta = view.frame(matrix=matrix, size=(1000, 1000), pixel_error=0.1, seconds=5)
@@ -146,7 +146,7 @@ class Views(StoreCase):
             delta = view.frame(seconds=10, **wish)
         return view.snapshot()
 
-    def test_focuses_regions_pins(self):
+    def test_focuses_regions_and_pins(self):
         box = np.array([300300, 5200300, 300500, 5200500])
         corners = terrace.View(self.scan).to_metres([[*box[:2], 0], [*box[2:], 0]])[:, :2]
         x, y = self.points[:, 0], self.points[:, 1]
@@ -178,7 +178,7 @@ class Views(StoreCase):
         places = view.to_metres(self.points)
         classes = {tuple(place): number for place, number in zip(np.round(places, 6), self.classes)}
         self.assertEqual([classes[tuple(place)] for place in np.round(delta.added_positions, 6)], report['class'].tolist())
-        # Metres from the middle, up by height.
+        # Metres from the centre, with the height upwards.
         np.testing.assert_allclose(places[:, 2], self.points[:, 2], rtol=0, atol=1e-9)
         np.testing.assert_allclose(np.ptp(places, axis=0), np.ptp(self.points, axis=0), rtol=1e-3)
         for wrong in ([10 ** 6], [-1], [2 ** 40]):
@@ -187,7 +187,7 @@ class Views(StoreCase):
         with self.assertRaises(ValueError):
             terrace.View(self.raster).attributes([0])
 
-    def test_the_surface_of_a_scan(self):
+    def test_view_of_a_scan_surface(self):
         random = np.random.default_rng(4)
         ball = random.normal(size=(3000, 3))
         ball *= 100 / np.linalg.norm(ball, axis=1)[:, None]
@@ -215,7 +215,7 @@ class Views(StoreCase):
         self.assertEqual((report['euler_characteristic'], report['closed']), (2, True))
         self.assertAlmostEqual(report['volume'] / (4 / 3 * np.pi * 1e6), 1, delta=0.02)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         view = terrace.View(self.scan)
         for wrong in ((self.scan.top + 1, 0), (0, 10 ** 9)):
             with self.assertRaises(ValueError):
@@ -231,11 +231,11 @@ class Views(StoreCase):
             with self.subTest(repr(wrong)):
                 with self.assertRaises(ValueError):
                     view.frame(**wrong)
-        for wrong in ({'kind': 'lines'}, {'reader': 'nobody'}, {'max_points': -1}):
+        for wrong in ({'kind': 'lines'}, {'reader': 'process'}, {'max_points': -1}):
             with self.assertRaises(ValueError):
                 terrace.View(self.scan, **wrong)
 
-    def test_a_fork_is_refused_and_ends(self):
+    def test_rejects_use_after_a_fork(self):
         view = terrace.View(self.scan)
         view.frame((0, -3000, 1500))
         child = os.fork()
@@ -269,7 +269,7 @@ class Views(StoreCase):
 
 
 class Models(StoreCase):
-    """Clusters expanded and collapsed, against the triangulation of the points that are there."""
+    """Compares expanded and collapsed clusters with the triangulation of the current points."""
 
     def check(self, model):
         vertices, triangles = model.mesh
@@ -283,7 +283,7 @@ class Models(StoreCase):
             return vertices[:, :2]
         return np.round((vertices[:, :2] - [TRANSFORM[2], TRANSFORM[5]]) / [10, -10] - 0.5)
 
-    def test_expanded_and_collapsed(self):
+    def test_expands_and_collapses_clusters(self):
         for store in (self.scan, terrace.build(self.samples, self.path('small-blocks'), transform=TRANSFORM, block_points=500, replace=True)):
             self.grid = store.info['grid']
             model = terrace.Multiresolution(store)
@@ -304,7 +304,7 @@ class Models(StoreCase):
                 whole.append(model.expand(cluster))
             self.check(model)
             self.assertEqual({*map(tuple, model.expanded.tolist())}, {*map(tuple, chosen.tolist())})
-            # The deltas add up.
+            # The deltas add up to the mesh.
             vertices, triangles = {}, {}
             for delta in whole:
                 for triangle in delta.removed_triangles:
@@ -331,7 +331,7 @@ class Models(StoreCase):
             self.assertIn('clusters expanded', repr(model))
             self.assertLess(len(model._repr_png_()), 400_000)
 
-    def test_boxes(self):
+    def test_refines_and_coarsens_boxes(self):
         box = (300300, 5200300, 300500, 5200500)
         x, y = self.points[:, 0], self.points[:, 1]
         inside = (x >= box[0]) & (x <= box[2]) & (y >= box[1]) & (y <= box[3])
@@ -351,7 +351,7 @@ class Models(StoreCase):
         np.testing.assert_array_equal(sorted_rows(model.mesh.vertices), sorted_rows(self.points))
         self.assertEqual(model.mesh.levels.max(), self.scan.top)
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         model = terrace.Multiresolution(self.scan)
         for wrong in (lambda: model.expand((0, 0)) if self.scan.top > 1 else 1 / 0, lambda: model.expand((9, 0)), lambda: model.expand((0, 10 ** 12)),
                       lambda: model.children((0, 0)), lambda: model.cluster_info((self.scan.top, 0)), lambda: model.refine((1, 1, 0, 0), 0),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trees of matchings against their definition, queries in bounding volumes against brute force."""
+"""Matching trees match their definition, queries in bounding volumes match brute force."""
 
 import unittest
 
@@ -29,7 +29,7 @@ class MatchingTrees(unittest.TestCase):
         self.assertEqual(len(set(made.rows[:, :2].ravel())), 2 * (n - 1))
         self.assertEqual(sizes[-1], n)
 
-    def test_is_repeated_matching(self):
+    def test_tree_is_repeated_matching(self):
         random = np.random.default_rng(1)
         for width in (2, 3):
             points = random.random((301, width))
@@ -37,11 +37,11 @@ class MatchingTrees(unittest.TestCase):
             self.check_tree(points, np.ones(301), made)
             first = made.rows[made.levels == 1][:, :2].astype(int)
             self.assertEqual({*map(tuple, first)}, {*map(tuple, terrace.matching(points).pairs)})
-            self.assertEqual(made.levels.max(), 9)  # the logarithm of 301, rounded up
+            self.assertEqual(made.levels.max(), 9)  # the binary logarithm of 301, rounded up
             weights = random.random(301) + 0.1
             self.check_tree(points, weights, terrace.matching_tree(points, weights=weights, threads=2))
 
-    def test_labels_are_trees(self):
+    def test_each_label_is_a_subtree(self):
         points, labels = np.random.default_rng(2).random((60, 2)), np.repeat([-7, 10 ** 12, 3], 20)
         made = terrace.matching_tree(points, labels=labels)
         below = [{label} for label in labels]
@@ -49,7 +49,7 @@ class MatchingTrees(unittest.TestCase):
             below.append(below[a] | below[b])
         self.assertEqual(sum(len(mixed) == 1 for mixed in below[60:]), 3 * 19)
 
-    def test_with_a_matcher(self):
+    def test_custom_matcher(self):
         points = np.random.default_rng(8).random((37, 2))
         sizes = []
 
@@ -74,14 +74,14 @@ class MatchingTrees(unittest.TestCase):
             with self.assertRaises(kind):
                 terrace.matching_tree(points, matcher=matcher)
 
-    def test_rotated(self):
+    def test_rotations_shrink_boxes(self):
         random = np.random.default_rng(9)
         for width in (2, 3):
             lower = random.random((400, width)) ** 3
             for boxes in ((lower,), (lower, lower + 0.02 * random.random((400, width)))):
                 tree = terrace.linkage(lower)
                 rows = terrace.rotate_tree(tree, *boxes)
-                self.assertEqual(sorted(rows.ravel()), [*range(798)])  # each node but the root has one parent
+                self.assertEqual(sorted(rows.ravel()), [*range(798)])  # each node except the root has one parent
                 self.assertTrue((rows.max(axis=1) < 400 + np.arange(399)).all())
 
                 def area_sum(children):
@@ -105,7 +105,7 @@ class MatchingTrees(unittest.TestCase):
             with self.assertRaises(ValueError):
                 wrong()
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         self.assertEqual(terrace.matching_tree(np.zeros((1, 2))).rows.shape, (0, 4))
         some = np.random.default_rng(3).random((5, 2))
         for wrong in (lambda: terrace.matching_tree([[np.nan, 0], [0, 0]]), lambda: terrace.matching_tree(some, labels=[1]),
@@ -117,7 +117,7 @@ class MatchingTrees(unittest.TestCase):
 
 
 class Queries(unittest.TestCase):
-    def test_nearest_points_are_scipys_on_any_tree(self):
+    def test_nearest_points_match_scipy_on_any_tree(self):
         random = np.random.default_rng(4)
         for width in (2, 3):
             points, asked = random.random((2000, width)), random.random((500, width)) * 2 - 0.5
@@ -132,7 +132,7 @@ class Queries(unittest.TestCase):
         self.assertEqual(few.nearest([[2, 0]], 3)[0].tolist(), [[1, 0, -1]])
         self.assertEqual(terrace.PointTree(np.empty((0, 2))).nearest([[0, 0]])[0].tolist(), [[-1]])
 
-    def test_balls_along_rays(self):
+    def test_first_balls_along_rays(self):
         random = np.random.default_rng(5)
         points, origins = random.random((300, 3)), random.random((200, 3)) * 3 - 1
         directions = random.random((200, 3)) - 0.3 * origins - 0.4
@@ -149,7 +149,7 @@ class Queries(unittest.TestCase):
         self.assertTrue(some.any() and not some.all())
         np.testing.assert_array_equal(found, np.where(some, meets.argmin(axis=1), -1))
 
-    def test_triangles_along_rays(self):
+    def test_first_triangles_along_rays(self):
         random = np.random.default_rng(6)
         vertices = random.random((300, 3))
         triangles = np.array([random.choice(300, 3, replace=False) for _ in range(200)])
@@ -178,7 +178,7 @@ class Queries(unittest.TestCase):
             self.assertLessEqual(distance, sampled.min() + 1e-12)
             self.assertAlmostEqual(distance, sampled[triangle], delta=0.03)
 
-    def test_a_mesh_is_taken(self):
+    def test_accepts_a_mesh(self):
         y, x = np.mgrid[0:20, 0:20]
         mesh = terrace.bounded_mesh(np.sin(x / 3.0) + y / 9, 0.1)
         tree = terrace.TriangleTree(*mesh)
@@ -188,7 +188,7 @@ class Queries(unittest.TestCase):
         self.assertAlmostEqual(100 - t[0], height[0], delta=0.2)
         self.assertIn('triangles', repr(tree))
 
-    def test_misuse(self):
+    def test_rejects_invalid_arguments(self):
         points = np.random.default_rng(7).random((5, 3))
         tree, triangles = terrace.PointTree(points), terrace.TriangleTree(points, [[0, 1, 2]])
         for wrong in (lambda: terrace.PointTree(points, [[0, 1]]), lambda: terrace.PointTree(points, [[0, 9], [1, 2], [3, 4], [5, 6]]),

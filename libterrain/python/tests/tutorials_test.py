@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tutorials run as they stand, cell by cell as in a notebook, and their objects have pictures; so do the examples."""
+"""The tutorials run cell by cell, as in a notebook, and show pictures. The examples run as scripts."""
 
 import contextlib
 import io
@@ -21,7 +21,7 @@ FOLDER = os.path.join(ROOT, 'libterrain', 'python', 'tutorials')
 
 
 def run(name):
-    """What the script prints, its names at the end, and how many cells end in an object with a picture."""
+    """Runs a tutorial. Returns (printed text, files written, number of cells that end in an object with a picture)."""
     with open(os.path.join(FOLDER, name), encoding='utf-8') as file:
         text = file.read()
     names, printed, pictures = {'__file__': os.path.join(FOLDER, name)}, io.StringIO(), 0
@@ -60,12 +60,12 @@ class Tutorials(unittest.TestCase):
         self.assertIn('optimal', printed)
         self.assertEqual(pictures, 1)
 
-    def test_all_are_here(self):
+    def test_all_tutorials_are_tested(self):
         scripts = {name for name in os.listdir(FOLDER) if name.endswith('.py')}
         self.assertEqual(scripts, {'terrain.py', 'lidar.py', 'clustering.py'})
 
 
-    def test_they_run_as_scripts_without_arguments(self):
+    def test_tutorials_run_as_scripts_without_arguments(self):
         for name in sorted(os.listdir(FOLDER)):
             if name.endswith('.py'):
                 with self.subTest(name), tempfile.TemporaryDirectory() as folder:
@@ -74,7 +74,7 @@ class Tutorials(unittest.TestCase):
 
 
 class Examples(StoreCase):
-    """Scripts of at most 15 lines."""
+    """The examples are scripts of at most 15 lines."""
 
     def run_script(self, name, *arguments):
         path = os.path.join(ROOT, 'libterrain', 'python', 'examples', name)
@@ -101,7 +101,7 @@ class Examples(StoreCase):
         scan = self.path('trees.laz')
         subprocess.run([COMMAND, 'points', self.path('trees'), '-o', scan, '-q'], check=True)
         lines = self.contours_of(scan, '5')
-        for line in lines:  # those of the ground, which is smooth
+        for line in lines:  # contours of the ground, which is smooth
             there = self.scan.heights(line['geometry']['coordinates'], crs='EPSG:4326')
             np.testing.assert_allclose(there[~np.isnan(there)], line['properties']['elev'], rtol=0, atol=0.3)
         self.assertGreater(len(lines), 4)
