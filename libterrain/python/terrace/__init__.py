@@ -7,8 +7,7 @@ views at any level of detail.
 
 Its building blocks also work without a store: ``Delaunay2`` and ``Delaunay3``, ``bounded_mesh``, ``interpolate``,
 ``linkage``, ``kmeans``, ``cluster``, ``stream_clusters``, ``assignment``, ``matching``, ``PointTree`` and
-``TriangleTree``. So do ``read_points``,
-``write_points`` and ``Transformation``.
+``TriangleTree``. So do ``read_points``, ``write_points`` and ``Transformation``.
 
 Long calls release the interpreter's lock, use all cores unless ``threads`` limits them, and end soon after Ctrl-C.
 Results depend only on the input and the options, not on the number of threads or the machine.

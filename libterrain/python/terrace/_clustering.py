@@ -62,7 +62,7 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
             raise ValueError('`edges` and `gpu` need points, not distances')
         count = (1 + math.isqrt(1 + 8 * array.size)) // 2
         if count * (count - 1) // 2 != array.size:
-            raise ValueError(f'{array.size} distances are not all pairs of any number of points')
+            raise ValueError(f'{array.size} distances do not match any number of points')
         return _core.linkage_of_distances(count, array, method, options)
     return _core.linkage(as_rows(array, 'points'), method, edges, options)
 

@@ -97,7 +97,8 @@ class View:
         fov: the vertical field of view in degrees.
         size: width and height of the picture in pixels.
         ground_height: the height of the picture in metres, for a camera without perspective.
-        matrix: shape (4, 4), from metres to clip coordinates, row-major; replaces the arguments above.
+        matrix: shape (4, 4), from metres to clip coordinates, row-major; replaces the arguments above except
+            ``size``.
         pixel_error: the largest error in the picture, in pixels.
         ground_error: the largest error anywhere, in metres.
         focus: pairs of a box (four or six numbers in metres, minima first) and the level required in it.

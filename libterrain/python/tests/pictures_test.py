@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Notebooks show small PNGs, with the shape that the ground has in metres."""
+"""Notebooks show small PNGs, with the shape of the ground in metres, without noise and without holes."""
 
 import re
 import unittest
