@@ -97,12 +97,12 @@ class Heights(StoreCase):
                 self.assertEqual(len(east), 50)
                 self.assertEqual(len(fiji.points(region=(180, -1, 180.5, 0))), 50)
                 everywhere = np.inf
-                for box, due in (((-179.99, -1.09, -179.51, 0.01), 55), ((180.01, -1.09, 180.49, 0.01), 55),
+                for box, expected in (((-179.99, -1.09, -179.51, 0.01), 55), ((180.01, -1.09, 180.49, 0.01), 55),
                                  ((-180, -90, 180, 90), 400), ((0, -1.09, 360, 0.01), 220), ((-540, -90, 540, 90), 400),
                                  ((0, -90, 90, 90), 0), ((-everywhere, -everywhere, everywhere, everywhere), 400),
                                  ((-180, -everywhere, -179.51, everywhere), 100), ((180, -90, everywhere, 90), 200)):  # taken literally
-                    self.assertEqual(fiji.count(box), due, box)
-                    self.assertEqual(len(fiji.points(region=box)), due, box)
+                    self.assertEqual(fiji.count(box), expected, box)
+                    self.assertEqual(len(fiji.points(region=box)), expected, box)
 
     def test_results_do_not_depend_on_threads_and_memory(self):
         xy = places(2000)

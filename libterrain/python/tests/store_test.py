@@ -143,12 +143,12 @@ class Stores(StoreCase):
 
         both = view.where('z > 60')
         self.assertEqual(len(both), (part[:, 2] > 60).sum())
-        for none in ('class == 77', 'class ==', 'colour == 1'):
+        for condition in ('class == 77', 'class ==', 'colour == 1'):
             with self.assertRaises(terrace.Error):
-                self.scan.where(none)
-        for whole in (terrace.View, terrace.Multiresolution):
+                self.scan.where(condition)
+        for kind in (terrace.View, terrace.Multiresolution):
             with self.assertRaisesRegex(ValueError, 'pass the store itself'):
-                whole(view)
+                kind(view)
         view.close()
         with self.assertRaises(ValueError):
             view.points()
