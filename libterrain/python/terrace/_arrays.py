@@ -35,7 +35,7 @@ def as_array(given, what):
 
 
 def as_numbers(given, what):
-    """Returns a contiguous float64 array, as as_array() otherwise. Raises: TypeError unless it holds real numbers."""
+    """Returns as_array() as contiguous float64. Raises: TypeError unless it holds real numbers."""
     array = as_array(filled(given), what)
     if array.dtype.kind not in 'iufb':
         raise TypeError(f'{what} has the type {array.dtype}; real numbers are needed')

@@ -21,7 +21,7 @@ def _weights(weights):
 
 
 def linkage(points, method='single', *, edges=None, single_precision=False, memory=None, gpu=False, threads=None):
-    """Hierarchical clustering with the methods of scipy.cluster.hierarchy.linkage.
+    """Clusters hierarchically with the methods of scipy.cluster.hierarchy.linkage.
 
     points: shape (n, 2) or (n, 3), finite, compared by Euclidean distance; or a one-dimensional array with the
         distances of all pairs, in the order of scipy.spatial.distance.pdist.
@@ -137,7 +137,7 @@ class KMeans:
 
 
 def kmeans(points, clusters, *, weights=None, seed=1, restarts=1, max_iterations=300, tolerance=0.0, threads=None):
-    """k-means by Lloyd's iteration, exact, starting from greedy k-means++ seeds or from given centres.
+    """Runs k-means by Lloyd's iteration, exact, starting from greedy k-means++ seeds or from given centres.
 
     points: shape (n, 2) or (n, 3).
     clusters: the number of clusters, or the centres to start from.

@@ -185,7 +185,7 @@ class _PointMesh:
         self._lock = threading.RLock()  # keeps the core and the numbers consistent
 
     def insert(self, points):
-        """Inserts points. Inserting many in one call is faster than one by one.
+        """Inserts points, many in one call faster than one by one.
 
         points: shape (n, 2) in the plane or (n, 3) in space.
 

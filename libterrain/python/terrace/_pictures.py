@@ -145,7 +145,7 @@ def _draw_lines(ends, shape):
 
 
 def _slopes(heights, axis):
-    """Returns the slope along an axis from the neighbours on both sides, or the one there is; 0 without neighbours."""
+    """Returns the slope along an axis from the neighbours on both sides or on one; 0 without neighbours."""
     ahead = np.full(heights.shape, np.nan)
     behind = ahead.copy()
     steps = np.diff(heights, axis=axis)

@@ -153,9 +153,7 @@ class View:
         return self._core.attributes(as_numbered(vertices, 'vertices', most=2 ** 31 - 1))
 
     def to_metres(self, points):
-        """Converts points, shape (n, 3), from the store's CRS to metres in the view's frame, in which cameras are
-        placed.
-        """
+        """Converts points, shape (n, 3), from the store's CRS to metres in the frame of the view and its cameras."""
         return self._core.to_metres(as_rows(points, 'points', (3,)))
 
     def snapshot(self):
