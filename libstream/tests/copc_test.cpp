@@ -193,7 +193,7 @@ TEST(CopcOctree, RejectsInvalidHierarchies) {
     return text.find(part) != text.npos;
   };
   EXPECT_EQ(refusal_of({{root}}, 1), "");
-  EXPECT_PRED2(has, refusal_of({{root}}, 2), "have 1 points, but the header promises 2");
+  EXPECT_PRED2(has, refusal_of({{root}}, 2), "have 1 point, but the header promises 2");
   EXPECT_PRED2(has, refusal_of({{root, {0, 0, 0, 0, 120, 10, 1}}}, 2), "is listed twice");
   EXPECT_PRED2(has, refusal_of({{root, {1, 0, 0, 0, 119, 10, 1}}}, 2), "share points");
   EXPECT_PRED2(has, refusal_of({{{-1, 0, 0, 0, 110, 10, 1}}}, 1), "has depth -1");
