@@ -321,7 +321,7 @@ class ClusterTest(unittest.TestCase):
             with self.subTest(options=options):
                 self.expect_error(2, 'cluster', self.blobs, '-o', none, *options)
                 self.assertFalse(os.path.exists(none))
-        self.assertIn('nothing to write', self.expect_error(2, 'cluster', self.blobs))
+        self.assertIn('no output given', self.expect_error(2, 'cluster', self.blobs))
 
     def test_bad_data_is_named(self):
         path = self.path('bad.csv')

@@ -319,7 +319,7 @@ class GeodesyTest(unittest.TestCase):
         with open(self.path('own.prj'), 'w', encoding='utf-8') as file:
             file.write(OWN_DATUM)
         own = self.raster({1025: 1}, name='own.tif')
-        self.assertIn('without a way to WGS 84', self.ok('info', own))
+        self.assertIn('without a transformation to WGS 84', self.ok('info', own))
         wrong = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9002})
         self.assertIn('contradict', self.ok('info', wrong))
 

@@ -140,7 +140,7 @@ class AnswerTest(OutputCase):
         self.refuse(2, ' is empty', 'info', '')
 
     def test_slips_are_answered_with_the_nearest_name(self):
-        self.refuse(2, "'--regoin' cannot be taken; did you mean --region?", 'points', self.store, '--regoin', '1,2',
+        self.refuse(2, "'--regoin': no such argument or option; did you mean --region?", 'points', self.store, '--regoin', '1,2',
                     '-o', '-')
         self.refuse(2, 'did you mean --max-error?', 'mesh', self.store, '--maxerror=5', '-o', '-')
         self.refuse(2, 'did you mean --interval?', 'contour', self.store, '--interv', '5', '-o', '-')

@@ -171,7 +171,7 @@ class ScanTest(unittest.TestCase):
         self.run_ok('build', self.path('sheet.xyz'), '-o', store, '--block', 1000)
         result = terrace('render', store, '-o', self.path('sheet.png'), '--wire', '--json')
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertNotIn('no height field', result.stderr)
+        self.assertNotIn('not a height field', result.stderr)
         self.assertEqual(json.loads(result.stdout)['vertices'], 3600)
 
 

@@ -489,7 +489,7 @@ class SelectionTest(unittest.TestCase):
                 (['points', self.path('all.st'), '-o', self.path('e.csv'), '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
                 (['info', self.path('all.st'), self.file], 2, 'is a store: name it alone'),
                 (['info', self.path('all.st'), '--input-format', 'ply'], 2, '--input-format do not apply'),
-                (['mesh', self.path('all.st'), 'a', 'b', 'c', '-o', 'e.ply'], 2, "'a' and 2 more cannot be taken"),
+                (['mesh', self.path('all.st'), 'a', 'b', 'c', '-o', 'e.ply'], 2, "'a' and 2 more: no such argument or option"),
                 (['render', self.file, '-o', self.path('e.png'), '--where', 'z > 1'], 2, 'is not a store')):
             with self.subTest(args=args):
                 result = self.terrace(*args)

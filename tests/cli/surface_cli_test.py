@@ -243,7 +243,7 @@ class SurfaceTest(unittest.TestCase):
         for name, options in (('plane.ply', []), ('plane.vtk', ['--tetrahedra'])):
             result = terrace('surface', store, '-o', self.path(name), *options)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertIn("the points enclose nothing, as if all were in one plane; 'terrace mesh'", result.stderr)
+            self.assertIn("the points enclose no volume, as if all were in one plane; 'terrace mesh'", result.stderr)
 
     def test_points_on_a_line_and_at_one_place_are_told(self):
         for name, place, message in (('line', lambda i: (i / 10, -i / 10, i / 3), 'all are on a line'),
@@ -255,7 +255,7 @@ class SurfaceTest(unittest.TestCase):
             for ending, options in (('.ply', []), ('.vtk', ['--tetrahedra'])):
                 result = terrace('surface', store, '-o', self.path(name + ending), *options)
                 self.assertEqual(result.returncode, 0, result.stderr)
-                self.assertIn('the points enclose nothing, ' + message, result.stderr)
+                self.assertIn('the points enclose no volume, ' + message, result.stderr)
 
     def test_an_empty_surface_is_not_called_closed_and_its_samples_are_counted(self):
         with open(self.path('pair.xyz'), 'w') as file:

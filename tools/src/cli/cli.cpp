@@ -36,14 +36,15 @@ constexpr int kInterrupted = 130;
 
 std::string general_help() {
   std::string text =
-      "terrace turns point sets too large for memory into a store, and serves from it any part at "
+      "terrace turns point sets too large for memory into a store, and serves any part of it at "
       "any\nresolution.\n\nUsage: terrace VERB [OPTIONS]\n\nVerbs:\n";
   for (const Verb& verb : verbs()) {
     text += "  " + verb.name + std::string(10 - std::min<std::size_t>(verb.name.size(), 9), ' ') +
             verb.brief + '\n';
   }
   return text +
-         "\n`terrace VERB --help` tells more; `terrace --version` names version, build and parts.\n"
+         "\n`terrace VERB --help` lists options; `terrace --version` shows version, build and "
+         "parts.\n"
          "\nExample:\n  terrace synth dem --size 1024x1024 -o dem.tif\n";
 }
 
@@ -53,19 +54,19 @@ std::string version_text() {
          "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : "no GPU") + "\n";
 }
 
-/// Verbs and options to come: promised by name, so that nobody takes them for misspelt.
-constexpr std::string_view kVerbToCome = "merge";
-constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kOptionsToCome{
+/// Planned verbs and options. Naming them here keeps users from taking them for typing errors.
+constexpr std::string_view kPlannedVerb = "merge";
+constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kPlannedOptions{
     {{"build", "--append"},
      {"build", "--part"},
      {"build", "--resume"},
      {"mesh", "--base"},
      {"points", "--max-points"}}};
 
-void refuse_options_to_come(const Verb& verb, std::span<const std::string> arguments) {
+void refuse_planned_options(const Verb& verb, std::span<const std::string> arguments) {
   for (const std::string& argument : arguments) {
     if (argument == "--") return;
-    for (const auto& [name, option] : kOptionsToCome) {
+    for (const auto& [name, option] : kPlannedOptions) {
       if (verb.name == name && argument.substr(0, argument.find('=')) == option) {
         throw UsageError(std::string(option) + " is not available yet");
       }
@@ -73,8 +74,9 @@ void refuse_options_to_come(const Verb& verb, std::span<const std::string> argum
   }
 }
 
-/// How many letters are to be added, left out, changed or swapped with the next one.
-std::size_t letters_apart(std::string_view a, std::string_view b) {
+/// Returns the edit distance of two words: letters inserted, deleted, replaced or swapped with the
+/// next.
+std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> before, last(b.size() + 1), now(b.size() + 1);
   std::iota(last.begin(), last.end(), std::size_t{0});
   for (std::size_t i = 1; i <= a.size(); ++i) {
@@ -91,16 +93,17 @@ std::size_t letters_apart(std::string_view a, std::string_view b) {
   return last[b.size()];
 }
 
-/// "did you mean NAME?" for the name that is most like a word, if one is; else empty.
-std::string meant(std::string_view word, std::span<const std::string> names) {
-  constexpr std::size_t kLongest = 40;  // no name of ours is longer
+/// Returns "did you mean NAME? " for the name most similar to `word`, or an empty string if none
+/// is.
+std::string suggestion(std::string_view word, std::span<const std::string> names) {
+  constexpr std::size_t kLongest = 40;  // no verb or option is longer
   if (word.size() > kLongest) return {};
   const std::string* nearest = nullptr;
-  std::size_t least = word.size() / 3 + 1;  // of short words almost any is one letter away
+  std::size_t least = word.size() / 3 + 1;  // almost all short words are one letter apart
   for (const std::string& name : names) {
-    // The beginning of a name counts as one letter away.
+    // A prefix of a name counts as one letter away.
     const std::size_t apart =
-        word.size() > 3 && name.starts_with(word) ? 1 : letters_apart(word, name);
+        word.size() > 3 && name.starts_with(word) ? 1 : edit_distance(word, name);
     if (apart >= least) continue;
     least = apart;
     nearest = &name;
@@ -108,18 +111,18 @@ std::string meant(std::string_view word, std::span<const std::string> names) {
   return nearest == nullptr ? std::string() : "did you mean " + *nearest + "? ";
 }
 
-/// "did you mean --NAME?" for an option that there is not.
-std::string meant_option(const CLI::App& app, const std::string& argument) {
+/// Returns "did you mean --NAME? " for an unknown option.
+std::string suggested_option(const CLI::App& app, const std::string& argument) {
   if (!argument.starts_with("--")) return {};
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options({})) {
     for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
   }
-  return meant(argument.substr(0, argument.find('=')), names);
+  return suggestion(argument.substr(0, argument.find('=')), names);
 }
 
-/// An empty value is a slip, such as a variable of the shell that is not set; as if the option were
-/// not given, the result would be another than asked for.
+/// Rejects empty values. They are mistakes, such as an unset shell variable; ignoring the option
+/// would silently produce a different result.
 void refuse_empty_values(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options({})) {
     const std::vector<std::string>& values = option->results();
@@ -129,8 +132,8 @@ void refuse_empty_values(const CLI::App& app) {
   }
 }
 
-/// Least memory of a verb in MiB: the process itself and the smallest buffers. A verb that needs
-/// more for its input refuses the input itself.
+/// Minimum --memory of a verb in MiB: the process itself and the smallest buffers. Verbs that need
+/// more for their input check that themselves.
 constexpr std::uint64_t kLeastMemory = 24;
 constexpr std::array<std::pair<std::string_view, std::uint64_t>, 6> kLeastMemoryOf{
     {{"cluster", 40},
@@ -153,17 +156,17 @@ void check_memory(const Verb& verb, const CommonOptions& common) {
 }
 
 const Verb& find_verb(const std::string& name) {
-  if (name == kVerbToCome) throw UsageError("the verb '" + name + "' is not available yet");
+  if (name == kPlannedVerb) throw UsageError("the verb '" + name + "' is not available yet");
   for (const Verb& verb : verbs()) {
     if (verb.name == name) return verb;
   }
   std::vector<std::string> names;
   for (const Verb& verb : verbs()) names.push_back(verb.name);
-  throw UsageError("there is no verb '" + name + "'; " + meant(name, names) +
+  throw UsageError("there is no verb '" + name + "'; " + suggestion(name, names) +
                    "`terrace --help` lists them");
 }
 
-/// parse(text), with the option's name in front of the message of an error.
+/// Returns parse(text). Puts the option's name in front of the message of a UsageError.
 template <class Parse>
 std::uint64_t value_of_option(const std::string& name, const std::string& text,
                               const Parse& parse) {
@@ -185,7 +188,7 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
          [&common](const std::string& text) {
            common.memory_bytes = value_of_option("--memory", text, parse_memory);
          },
-         "Most memory to use: 256M, 2G; never changes results")
+         "Memory limit, such as 256M or 2G; never changes results")
       ->group(group)
       ->type_name("SIZE");
   app.add_option_function<std::string>(
@@ -197,8 +200,8 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
   app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
       ->group(group);
   app.add_flag("--force", common.force,
-               "Replace an existing output that terrace wrote: its format's own mark says so, text "
-               "is unchanged since then, and a folder has no files of others")
+               "Replace an existing output if terrace wrote it: a file with its mark or unchanged "
+               "text, or a folder without files of other programs")
       ->group(group);
   app.add_option_function<std::string>(
          "--progress",
@@ -212,17 +215,17 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
       ->group(group)
       ->type_name("MODE");
   app.add_flag("-q,--quiet", common.quiet, "Print nothing but errors")->group(group);
-  app.add_flag("-v,--verbose", common.verbose, "Explain what is done")->group(group);
+  app.add_flag("-v,--verbose", common.verbose, "Explain each step")->group(group);
 }
 
-/// True if -o or what stands in its place is '-'.
+/// Returns true if -o, or its default, is '-'.
 bool writes_to_stdout(const CLI::App& app) {
   const CLI::Option* output = app.get_option_no_throw("--output");
   if (output == nullptr) return false;
   return (output->count() > 0 ? output->as<std::string>() : output->get_default_str()) == "-";
 }
 
-/// Runs one verb with its arguments, those after the verb's name.
+/// Runs one verb with the arguments that follow its name.
 int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   CLI::App app{verb.brief.empty() ? "" : "terrace " + verb.name + ": " + verb.brief + ".",
                "terrace " + verb.name};
@@ -235,31 +238,31 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   command->define(app);
   add_common_options(app, common);
 
-  refuse_options_to_come(verb, arguments);
+  refuse_planned_options(verb, arguments);
   try {
-    std::reverse(arguments.begin(), arguments.end());  // as CLI11 takes them
+    std::reverse(arguments.begin(), arguments.end());  // the order that CLI11 expects
     app.parse(std::move(arguments));
   } catch (const CLI::CallForHelp&) {
     print_result(app.help());
     return kDone;
   } catch (const CLI::ParseError& error) {
-    // What cannot be taken comes first: an option that is missing may be the one that is misspelt.
-    // CLI11 would list all of it: a pattern in the shell can stand for thousands of files.
+    // Report unknown arguments first: a missing option may be the misspelt one. Name only the
+    // first, where CLI11 would list all: a shell pattern can expand to thousands of files.
     const std::vector<std::string> extras = app.remaining();
     const bool option = !extras.empty() && extras.front().starts_with("--");
     if (!option && dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr) {
       throw UsageError(std::string(error.what()) + "; `terrace " + verb.name +
-                       " --help` tells more");
+                       " --help` lists the options");
     }
     const std::size_t more = option ? 0 : extras.size() - 1;
     throw UsageError("'" + extras.front() + "'" +
                      (more > 0 ? " and " + std::to_string(more) + " more" : "") +
-                     " cannot be taken; " + meant_option(app, extras.front()) + "`terrace " +
-                     verb.name + " --help` lists what can");
+                     ": no such argument or option; " + suggested_option(app, extras.front()) +
+                     "`terrace " + verb.name + " --help` lists them");
   }
   refuse_empty_values(app);
   if (common.json && writes_to_stdout(app)) {
-    throw UsageError("--json and the output both want standard output; give -o FILE");
+    throw UsageError("--json and the output both go to standard output; give -o FILE");
   }
   if (common.quiet && common.progress == ProgressMode::automatic) {
     common.progress = ProgressMode::none;
@@ -269,8 +272,8 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   const Summary summary = command->run(common);
   try {
     if (common.json) {
-      // File names and texts in files may not be UTF-8. Escaping all that is not ASCII also escapes
-      // what a terminal would obey.
+      // File names and texts in files may not be UTF-8. Escaping all non-ASCII characters also
+      // escapes those that a terminal would act on.
       constexpr auto kReplace = nlohmann::ordered_json::error_handler_t::replace;
       print_result(summary.json.dump(-1, ' ', true, kReplace) + '\n');
     } else if (summary.text_is_result) {
@@ -279,7 +282,7 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
       print_lines(summary.text);
     }
   } catch (const stream::ClosedPipe&) {
-    // Nobody reads the summary; the exit code still counts.
+    // The reader of the summary has gone; the exit code still counts.
   }
   return summary.exit_code;
 }
@@ -304,17 +307,17 @@ int dispatch(const std::vector<std::string>& arguments) {
   return run_verb(find_verb(first), {arguments.begin() + 1, arguments.end()});
 }
 
-/// How to go on after Ctrl-C.
+/// Returns the message after Ctrl-C, which says how to continue.
 std::string stopped_message(std::string_view verb_name) {
   for (const Verb& verb : verbs()) {
     if (verb.name == verb_name && !verb.resumed_by.empty()) {
-      return "interrupted; run the same command with " + verb.resumed_by + " to go on";
+      return "interrupted; run the same command with " + verb.resumed_by + " to continue";
     }
   }
   return kStopped;
 }
 
-/// The message for people; those of the standard library are of little use to them.
+/// Returns the message to show. Those of the standard library are of little use to users.
 std::string message_of(const std::exception& error) {
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
     return "out of memory; give a smaller --memory or a smaller input";
@@ -324,16 +327,16 @@ std::string message_of(const std::exception& error) {
     return (name.empty() ? "" : name + ": ") + file->code().message();
   }
   const std::string text = error.what();
-  // "vector::reserve", "cannot create std::vector larger than max_size()": a size beyond all
+  // "vector::reserve" or "cannot create std::vector larger than max_size()": a size beyond any
   // memory.
   if (dynamic_cast<const std::length_error*>(&error) != nullptr &&
       (text.find("::") != std::string::npos || text.find("max_size") != std::string::npos)) {
-    return "what is asked for does not fit into any memory; ask for less";
+    return "the result would not fit into any memory; request less";
   }
   return text;
 }
 
-/// Throws: UsageError naming the option.
+/// Returns the number. Throws UsageError, which names the option.
 double number_of_option(const std::string& name, const std::string& text,
                         const NumberRange& range) {
   const double value = parse_number(text, name);
@@ -382,14 +385,13 @@ CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& d
 
 void add_input_format(CLI::App& app, std::string& target) {
   app.add_option("--input-format", target,
-                 "Format of the input; else by its content, then its ending")
+                 "Format of the input (default: from its content, then its ending)")
       ->type_name("NAME");
 }
 
 void add_point_format(CLI::App& app, std::string& target) {
-  app.add_option(
-         "--format", target,
-         "Format of the output: xyz, csv, ply, ply-ascii, las, laz, copc; else by its ending")
+  app.add_option("--format", target,
+                 "xyz, csv, ply, ply-ascii, las, laz or copc (default: from the ending)")
       ->type_name("NAME");
 }
 
@@ -401,21 +403,20 @@ CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& targe
             target = name == "mapbox" ? stream::HeightsOfColour::mapbox
                                       : stream::HeightsOfColour::terrarium;
           },
-          "how the colours of a PNG mean heights: mapbox or terrarium")
+          "how the colours of a PNG encode heights: mapbox or terrarium")
       ->check(CLI::IsMember({"mapbox", "terrarium"}));
 }
 
 CLI::Option* add_skip_damaged(CLI::App& app, bool& target) {
-  return app.add_flag(
-      "--skip-damaged", target,
-      "leave damaged chunks and nodes of LAZ, COPC and EPT out, and what a LAS that "
-      "is cut off lacks; count the points");
+  return app.add_flag("--skip-damaged", target,
+                      "skip damaged chunks and nodes of LAZ, COPC and EPT, and missing points of a "
+                      "truncated LAS; count them");
 }
 
 CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target) {
   return add_number(app, "--cell", target,
-                    "side of the cells of rasters without georeferencing (PNG): the centre of the "
-                    "first is 0,0, rows go down",
+                    "cell size of rasters without georeferencing (PNG): the first cell's centre is "
+                    "0,0, rows go down",
                     kAboveZero);
 }
 
@@ -428,11 +429,11 @@ int run_command_line(int argc, const char* const* argv) {
   } catch (const UsageError& error) {
     print_message(with_option_names(error.what()));
     return kWrongUsage;
-  } catch (const std::invalid_argument& error) {  // what the libraries say of wrong parameters
+  } catch (const std::invalid_argument& error) {  // a library rejected a parameter
     print_message(with_option_names(error.what()));
     return kWrongUsage;
   } catch (const std::exception& error) {
-    // A wait, read or write that Ctrl-C cut short is not a failure.
+    // A wait, read or write that Ctrl-C interrupted is not a failure.
     if (interrupted()) {
       print_message(stopped_message(argc > 1 ? argv[1] : ""));
       return kInterrupted;

@@ -20,36 +20,36 @@ class App;
 class Option;
 }  // namespace CLI
 
-/// The frame of the command line: the table of verbs, their common options, and the reporting of
-/// errors. A verb is one file, verb_NAME.cpp, with one Command.
+/// The frame of the command line: the table of verbs, their common options, and error reporting.
+/// Each verb is one file, verb_NAME.cpp, with one Command.
 
 namespace terrace::tools {
 
 using namespace terrain;
 
-/// How a verb ends: one JSON object for programs (plain numbers, SI units, bytes, seconds) and a
-/// text for people. With --json the object goes to standard output; else the text to standard
-/// error, or to standard output where it is what was asked for (`info`).
+/// The outcome of a verb: one JSON object for programs (plain numbers, SI units, bytes, seconds)
+/// and a text for people. With --json the object goes to standard output. Otherwise the text goes
+/// to standard error, or to standard output if it is the result itself (`info`).
 struct Summary {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
   std::string text;  ///< lines, each ended by '\n'
   bool text_is_result = false;
-  int exit_code = 0;  ///< 1 where a check found a fault
+  int exit_code = 0;  ///< 1 if a check found a fault
 
-  /// Adds what the work cost: "seconds" and "peak_rss_bytes".
+  /// Adds the cost of the work: "seconds" and "peak_rss_bytes".
   void add_cost(const Stopwatch& watch);
 };
 
-/// null for nullopt.
+/// Returns the value as JSON, or null for nullopt.
 template <class T>
 nlohmann::ordered_json or_null(const std::optional<T>& value) {
   return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
 }
 
-/// Largest resident set of this process so far.
+/// Returns the peak resident set size of this process, in bytes.
 std::uint64_t peak_rss_bytes();
 
-/// The options that every verb has.
+/// Options common to all verbs.
 struct CommonOptions {
   unsigned threads = 1;                       ///< --threads; all cores unless given
   std::optional<std::uint64_t> memory_bytes;  ///< --memory, if given
@@ -60,49 +60,51 @@ struct CommonOptions {
   bool force = false;                         ///< --force
   ProgressMode progress = ProgressMode::automatic;
 
-  /// --memory, or else the verb's default `standard`; 0 stands for half of the available memory.
+  /// Returns --memory in bytes, or the verb's default `standard` if it is not given. A default of 0
+  /// means half of the available memory.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
-  /// What a source may hold, one part in `parts` of memory_or(0) without the program itself: 64 MiB
-  /// at least, from where on the order of a raster's cells does not depend on it.
+  /// Returns the bytes that a source may use: a `parts`-th of memory_or(0) less the program itself,
+  /// and at least 64 MiB. From 64 MiB on, the order of a raster's cells does not depend on it.
   [[nodiscard]] std::uint64_t reading_memory(std::uint64_t parts = 1) const;
-  /// A message to the user on standard error; not with -q.
+  /// Prints a message on standard error, unless -q is given.
   void say(const std::string& line) const;
-  /// An explanation; only with -v.
+  /// Prints an explanation on standard error, only with -v.
   void explain(const std::string& line) const;
-  /// The context for the libraries: progress and notes go to standard error, Ctrl-C asks to stop.
-  /// These options must outlive it.
+  /// Returns the context for the libraries: progress and notes go to standard error, and Ctrl-C
+  /// requests a stop. These options must outlive it.
   [[nodiscard]] terrain::Context context() const;
 };
 
-/// The memory of the program itself, of what PROJ reads to tell a CRS, and of the blocks in flight.
+/// Memory for the program itself, for what PROJ reads to identify a CRS, and for blocks in flight.
 inline constexpr std::uint64_t kProgramMemory = std::uint64_t{32} << 20;
-/// The memory that `synth` takes unless --memory says otherwise.
+/// Default --memory of `synth`.
 inline constexpr std::uint64_t kStreamingMemory = std::uint64_t{256} << 20;
 
-/// A verb. Life: constructed, define(), options parsed into its members, run().
+/// A verb. It is constructed, define() is called, the options are parsed into its members, then
+/// run() is called.
 class Command {
  public:
   virtual ~Command() = default;
   /// Adds the verb's own options and arguments.
   virtual void define(CLI::App& app) = 0;
-  /// Does the work. Throws: UsageError for values that make no sense (exit 2), stream::Error and
-  /// other exceptions for failed work (exit 1), stream::Stopped (exit 130).
+  /// Does the work. Throws UsageError for invalid values (exit 2), stream::Error and other
+  /// exceptions if the work fails (exit 1), and stream::Stopped on interruption (exit 130).
   virtual Summary run(const CommonOptions& common) = 0;
 };
 
-/// A row of the table of verbs.
+/// A row in the table of verbs.
 struct Verb {
   std::string name;
   std::string brief;    ///< one line for the list of verbs
-  std::string example;  ///< ends the verb's help
+  std::string example;  ///< shown at the end of the verb's help
   std::unique_ptr<Command> (*create)() = nullptr;
-  std::string resumed_by{};  ///< the option that goes on with an interrupted run
+  std::string resumed_by{};  ///< the option that resumes an interrupted run
 };
 
-/// In the order of use.
+/// Returns all verbs, in the order in which they are typically used.
 std::span<const Verb> verbs();
 
-/// The finite numbers that an option takes.
+/// The range of finite numbers that an option accepts.
 struct NumberRange {
   double least = -std::numeric_limits<double>::infinity();
   double most = std::numeric_limits<double>::infinity();
@@ -110,32 +112,32 @@ struct NumberRange {
 };
 inline constexpr NumberRange kAboveZero{.least = 0.0, .above_least = true};
 inline constexpr NumberRange kNotNegative{.least = 0.0};
-/// Range of factors of lengths and costs: products stay finite.
+/// Range of factors for lengths and costs, chosen so that products stay finite.
 inline constexpr NumberRange kFactor{.least = 1e-12, .most = 1e12};
 inline constexpr NumberRange kFactorOrZero{.least = 0.0, .most = 1e12};
 
-/// Adds an option that takes a real number. `value` is its default, shown in the help.
+/// Adds an option that takes a real number. The current `value` is its default, shown in the help.
 CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
                         const std::string& description, const NumberRange& range = {});
-/// Without a default.
+/// The same, without a default.
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
                         const std::string& description, const NumberRange& range = {});
 
-/// parse_count() for an option; its UsageError names the option.
+/// Calls parse_count() for an option; a UsageError names the option.
 std::uint64_t count_of_option(const std::string& name, const std::string& text);
 
-/// The option -o, --output: required, kept in `target`.
+/// Adds the required option -o, --output, stored in `target`.
 CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& description);
 
-/// --input-format.
+/// Adds --input-format.
 void add_input_format(CLI::App& app, std::string& target);
-/// --format, of a file of points.
+/// Adds --format, for point files.
 void add_point_format(CLI::App& app, std::string& target);
-/// The option --rgb, kept in `target`.
+/// Adds --rgb, stored in `target`.
 CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
-/// --skip-damaged, of laser data.
+/// Adds --skip-damaged, for laser data.
 CLI::Option* add_skip_damaged(CLI::App& app, bool& target);
-/// --cell, the cell size of rasters without georeferencing.
+/// Adds --cell, the cell size of rasters without georeferencing.
 CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target);
 
 /// Runs the command line and returns the exit code. Never throws.

@@ -11,11 +11,11 @@
 #include "cli/option_names.hpp"
 #include "cli/terminal.hpp"
 
-// Apart from cli.cpp, which needs all verbs.
+// Separate from cli.cpp, which depends on all verbs.
 namespace terrace::tools {
 
 std::uint64_t peak_rss_bytes() {
-  // ru_maxrss is the last resort: it survives exec and so includes the caller's.
+  // ru_maxrss is the last resort: it survives exec and so includes the parent program's peak.
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;) {
     std::uint64_t kibibytes = 0;

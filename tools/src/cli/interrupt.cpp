@@ -20,10 +20,11 @@
 namespace terrace::tools {
 namespace {
 
-/// Threads read it: a flag for the handler's own thread, std::sig_atomic_t, would not do.
+/// Atomic because other threads read it; std::sig_atomic_t would only suit the handler's own
+/// thread.
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
-/// A pipe: the signal handler writes, a thread reads and does what a handler may not.
+/// A pipe from the signal handler to a thread that does what a handler must not.
 std::array<int, 2> wake_pipe{-1, -1};
 
 extern "C" void on_stop_signal(int signal) {
@@ -38,15 +39,15 @@ extern "C" void on_stop_signal(int signal) {
   errno = error;
 }
 
-/// How long work may go on after a request to stop.
+/// How long work may continue after a stop request.
 constexpr std::chrono::seconds kGrace{2};
 
-/// Passes the signal on to `stop`, and ends the process if it does not end by itself, as in the
-/// middle of a large triangulation. That is as safe as to kill it: nothing partial has its final
-/// name. If no thread can be started, only loops that poll the flag end.
+/// Forwards signals to `stop`, and ends the process if the work does not end in time, for example
+/// in the middle of a large triangulation. That is as safe as killing it, because no partial file
+/// has its final name yet. If the thread cannot be started, only loops that poll the flag end.
 void watch_for_signals(const std::stop_source& stop) {
   if (wake_pipe[0] < 0) return;
-  // Signals are to interrupt system calls of the other threads, not of this one.
+  // Block signals in this thread, so that they interrupt system calls of the others.
   sigset_t all, before;
   sigfillset(&all);
   pthread_sigmask(SIG_SETMASK, &all, &before);
@@ -58,7 +59,7 @@ void watch_for_signals(const std::stop_source& stop) {
       stop.request_stop();
       std::this_thread::sleep_for(kGrace);
       print_message(kStopped);
-      // Not exit(): other threads would still run during the destructors.
+      // Not exit(): other threads would keep running during the destructors.
       std::_Exit(130);
     }).detach();
   } catch (const std::system_error&) {
@@ -75,13 +76,13 @@ void install_signal_handlers() {
   struct sigaction action {};
   action.sa_handler = on_stop_signal;
   sigemptyset(&action.sa_mask);
-  // No SA_RESTART: a read that waits for a terminal or a pipe must come back.
+  // No SA_RESTART: a read that waits for a terminal or a pipe must return.
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
-  // Beyond a file size limit, writes fail with an error that can be reported.
+  // Beyond a file size limit, writes then fail with an error that can be reported.
   std::signal(SIGXFSZ, SIG_IGN);
-  static_cast<void>(stop_token());  // from here on signals are watched for
+  static_cast<void>(stop_token());  // starts watching for signals
 }
 
 bool interrupted() noexcept { return stop_requested; }

@@ -10,30 +10,31 @@
 
 namespace terrace::tools {
 
-/// What the user is told who has asked to stop.
+/// The message shown after the user asked to stop.
 inline constexpr const char* kStopped = "interrupted; run the same command again to start over";
 
-/// From then on SIGINT and SIGTERM ask to stop, and a closed pipe is an error of the write instead
-/// of a signal. Work that does not end within two seconds is cut short with exit code 130; a second
-/// signal ends the process at once.
+/// Installs the handlers: SIGINT and SIGTERM request a stop, and a closed pipe is a write error
+/// rather than a signal. Work that does not end within two seconds of the request is cut short with
+/// exit code 130. A second signal ends the process at once.
 void install_signal_handlers();
 
-/// True once the user has asked to stop. Cheap; may be called from any thread.
+/// Returns true once the user has asked to stop. Cheap; may be called from any thread.
 [[nodiscard]] bool interrupted() noexcept;
 
 /// Throws stream::Stopped if the user has asked to stop. Loops call it once per block.
 void check_interrupt();
 
-/// A store whose reading throws stream::Stopped once the user has asked to stop, or the view of it
-/// that --where asks for. Throws: as stream::Store::open and where.
+/// Opens a store, restricted to the points that satisfy `where` unless it is empty. Reading from it
+/// throws stream::Stopped once the user has asked to stop. Throws what stream::Store::open and
+/// where throw.
 [[nodiscard]] stream::Store open_store(const std::filesystem::path& path,
                                        const std::string& where = {});
 
-/// The same request as a token: reading and writing pipes ends with stream::Stopped.
+/// Returns the stop request as a token, which ends reads and writes of pipes with stream::Stopped.
 [[nodiscard]] std::stop_token stop_token();
 
-/// Does work of a library on points in memory. Exceptions are rethrown, std::invalid_argument and
-/// std::bad_alloc as a stream::Error that names the file.
+/// Calls a library on points in memory. Rethrows exceptions; std::invalid_argument and
+/// std::bad_alloc become a stream::Error that names the file.
 void call_library(const std::string& file, const std::string& method,
                   const std::function<void()>& work);
 

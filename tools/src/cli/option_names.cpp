@@ -9,7 +9,8 @@
 namespace terrace::tools {
 namespace {
 
-/// Parameter and option. tests/layout checks that all parameters that libterrain names are here.
+/// Pairs of a parameter and its option. tests/layout checks that every parameter that libterrain
+/// names is listed.
 constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"align", "--align"},
     {"band", "--band"},

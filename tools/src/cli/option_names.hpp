@@ -6,9 +6,8 @@
 
 namespace terrace::tools {
 
-/// A message of libterrain for the user of the command: parameters, which the library names as its
-/// interface does, in backquotes (`memory_bytes`), become the options that set them (--memory).
-/// Other text in backquotes stays. O(length).
+/// Returns a libterrain message with parameter names in backquotes (`memory_bytes`) replaced by the
+/// options that set them (--memory). Other text in backquotes stays. O(length).
 std::string with_option_names(std::string_view message);
 
 }  // namespace terrace::tools

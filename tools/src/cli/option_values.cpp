@@ -25,13 +25,13 @@ unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
   return level.value_or(top);
 }
 
-/// depth guards against files made to exhaust the stack.
+/// `depth` guards against files crafted to exhaust the stack.
 void collect_line(const nlohmann::json& object, int depth,
                   std::vector<std::vector<Point2>>& lines) {
   if (depth > 8) return;
   const std::string type = object.value("type", "");
   if (type == "Feature") {
-    // A feature may have no place (RFC 7946, 3.2).
+    // A feature may have no geometry (RFC 7946, 3.2).
     const nlohmann::json& geometry = object.at("geometry");
     return geometry.is_null() ? void() : collect_line(geometry, depth + 1, lines);
   }
@@ -113,7 +113,7 @@ std::pair<std::string, double> channel_of(const std::string& text) {
   }
   const double weight = parse_number(text.substr(colon + 1), "the weight of --channel " + text);
   if (!(weight >= 0.0) || !std::isfinite(weight)) {
-    throw UsageError("--channel " + text + ": a weight is a number from 0 up");
+    throw UsageError("--channel " + text + ": the weight must not be negative");
   }
   return {text.substr(0, colon), weight};
 }
@@ -153,7 +153,7 @@ stream::ClusterId parse_cluster(const std::string& text) {
     }
   }
   throw UsageError("--cluster '" + text +
-                   "': write L:N, its level and its number there, as in 1:42");
+                   "': write L:N, its level and its number in that level, as in 1:42");
 }
 
 Focus parse_focus(const std::string& text) {
@@ -178,7 +178,7 @@ Line parse_line(const std::string& text) {
     const std::vector<double> v = parse_numbers(text, "--line");
     if (v.size() < 4 || v.size() % 2 != 0) {
       throw UsageError("--line has " + counted(v.size(), "number") +
-                       "; write x1,y1,x2,y2 and more pairs if wanted");
+                       "; write x1,y1,x2,y2 and any further pairs");
     }
     for (std::size_t i = 0; i < v.size(); i += 2) line.places.push_back({v[i], v[i + 1]});
     return line;

@@ -23,13 +23,13 @@
 #include "terrace/terrain/raster.hpp"
 #include "terrace/terrain/region.hpp"
 
-/// What the values of options mean. All parsers throw UsageError for a value that makes no sense.
+/// Parsers for option values. All of them throw UsageError for an invalid value.
 
 namespace terrace::tools {
 
 using namespace terrain;
 
-/// The value that `text` names; the error lists the names.
+/// Returns the value that `text` names. The error lists the valid names.
 template <class T>
 T choice(const std::string& text, const char* option,
          std::initializer_list<std::pair<std::string_view, T>> choices) {
@@ -41,55 +41,56 @@ T choice(const std::string& text, const char* option,
   throw UsageError(std::string(option) + " '" + text + "': one of " + names);
 }
 
-/// "none", "flat", "interpolate".
+/// Parses "none", "flat" or "interpolate".
 Fill parse_fill(const std::string& text);
-/// "ellipsoidal", "orthometric", "ignore", or empty: what the store records.
+/// Parses "ellipsoidal", "orthometric" or "ignore". An empty text means what the store records.
 HeightReference parse_height_reference(const std::string& text);
-/// "greedy", "removal", "fitted".
+/// Parses "greedy", "removal" or "fitted".
 tri::TinQuality parse_quality(const std::string& text);
-/// "all", "min", "max", "mean", "first", "error".
+/// Parses "all", "min", "max", "mean", "first" or "error".
 tri::PointDuplicates parse_duplicates(const std::string& text);
-/// "linear", "natural", "nearest".
+/// Parses "linear", "natural" or "nearest".
 tri::Interpolation parse_interpolation(const std::string& text);
-/// "height", "slope", "aspect", "hillshade".
+/// Parses "height", "slope", "aspect" or "hillshade".
 RasterValue parse_raster_value(const std::string& text);
-/// The searches over points: "automatic", "fast", "full-scan", "quadtree", "octree", "kd-tree",
-/// "facilities".
+/// Parses the name of a search over points: "automatic", "fast", "full-scan", "quadtree", "octree",
+/// "kd-tree" or "facilities".
 cluster::FacilityStrategy parse_strategy(const std::string& text);
 
-/// "L:N", a cluster's level and its number there.
+/// Parses "L:N", a cluster's level and its number within that level.
 stream::ClusterId parse_cluster(const std::string& text);
 
-/// "laplacian", "taubin" or "bilateral", and after a colon the number of steps (10 unless given, at
-/// most 10,000); nullopt for an empty text. The edge_height of "bilateral" stays 0: it depends on
-/// the data.
+/// Parses "laplacian", "taubin" or "bilateral", optionally followed by a colon and the number of
+/// steps (10 by default, at most 10,000). Returns nullopt for an empty text. For "bilateral",
+/// edge_height stays 0 because it depends on the data.
 std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text);
 
-/// NAME:WEIGHT of --channel; the name may hold colons, the weight is a number from 0 up.
+/// Parses the NAME:WEIGHT of --channel. The name may contain colons; the weight is a non-negative
+/// number.
 std::pair<std::string, double> channel_of(const std::string& text);
 
 struct Line {
   std::vector<Point2> places;      ///< at least two
-  std::optional<PlacesCrs> crs{};  ///< as of Region::crs()
+  std::optional<PlacesCrs> crs{};  ///< as Region::crs()
 };
-/// "x1,y1,x2,y2[,...]", or a GeoJSON file with one LineString (plain, in a Feature, or in a
-/// FeatureCollection of one). Throws: stream::Error for a bad file.
+/// Parses "x1,y1,x2,y2[,...]" or a GeoJSON file with one LineString (plain, in a Feature, or in a
+/// FeatureCollection with one feature). Throws stream::Error for an invalid file.
 Line parse_line(const std::string& text);
 
-/// A number from 0 to 255; nullopt for "top".
+/// Parses a level from 0 to 255. Returns nullopt for "top".
 std::optional<unsigned> parse_level(const std::string& text);
 
-/// A region and the level wanted there, nullopt for the top.
+/// A region and the level requested there; nullopt means the top.
 struct Focus {
   Region region;
   std::optional<unsigned> level;
 };
-/// "BOX:L" with L a number or "top". Throws: as Region::parse.
+/// Parses "BOX:L", where L is a number or "top". Throws as Region::parse does.
 Focus parse_focus(const std::string& text);
 
-/// The levels as asked for, checked against the store. An empty level is the top if there are
-/// focuses, else level 0. conversion: of regions that are given in another CRS.
-/// Throws: as Region::parse; UsageError for a level above the store's top.
+/// Parses the requested levels and checks them against the store. An empty level means the top if
+/// there are focuses, otherwise level 0. `conversion` applies to regions given in another CRS.
+/// Throws as Region::parse does, and UsageError for a level above the store's top.
 Detail parse_detail(const stream::Store& store, const std::string& level, const std::string& region,
                     const std::vector<std::string>& focuses,
                     const RegionConversion& conversion = {});

@@ -41,24 +41,23 @@ stream::Naming may_replace(const std::string& path, bool force) {
   }
   if (path == "-") return naming;
   std::error_code error;
-  const fs::file_status status = fs::status(path, error);  // of what a link leads to
+  const fs::file_status status = fs::status(path, error);  // follows links
   if (status.type() == fs::file_type::not_found) return naming;
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
     throw stream::Error({.file = path, .where = {}, .cause = cause, .remedy = remedy});
   };
-  if (error) throw stream::system_error(path, "cannot be looked at", error.value());
+  if (error) throw stream::system_error(path, "cannot be examined", error.value());
   if (!fs::is_regular_file(status)) {
     refuse("is not a regular file", "name another output; - is standard output");
   }
   if (!force) refuse("exists already", "name another output, or give --force to replace it");
   if (!written_by_terrace(path)) {
     const bool has_mark = marked_by_terrace(path).has_value();
-    refuse(
-        std::string("was not written by terrace, ") +
-            (has_mark ? "as far as its format tells"
-                      : "or was changed or copied since then (text has no mark that would stay)") +
-            ", so --force does not replace it",
-        "remove it yourself or name another output");
+    refuse(std::string("was not written by terrace, ") +
+               (has_mark ? "according to its format"
+                         : "or was changed or copied since (text files carry no mark)") +
+               ", so --force does not replace it",
+           "remove it yourself or name another output");
   }
   return naming;
 }

@@ -8,22 +8,23 @@
 namespace terrace::tools {
 
 enum class ProgressMode : std::uint8_t {
-  automatic,  ///< a line on a terminal, else nothing
+  automatic,  ///< a line on a terminal, otherwise nothing
   json,       ///< JSON lines on standard error
   none,
 };
 
-/// Shows progress on standard error, at most ten times a second: rate, share done and time left.
-/// The destructor removes the line.
+/// Shows progress on standard error, at most ten times a second: the rate, the share done and the
+/// time left. The destructor clears the line.
 class ProgressMeter {
  public:
-  /// what: what is counted, as in "points".
+  /// `what` is the plural noun that is counted, such as "points".
   ProgressMeter(ProgressMode mode, std::string what);
   ~ProgressMeter();
   ProgressMeter(const ProgressMeter&) = delete;
   ProgressMeter& operator=(const ProgressMeter&) = delete;
 
-  /// count: things done so far. fraction: share of the work done, 0 to 1; 0 if unknown.
+  /// `count` is the number done so far. `fraction` is the share of the work done, from 0 to 1, or 0
+  /// if unknown.
   void update(std::uint64_t count, double fraction);
 
  private:

@@ -16,7 +16,7 @@
 namespace terrace::tools {
 namespace {
 
-/// "a,b" to names, of which those in double quotes may hold commas; "none" to no name at all.
+/// Splits "a,b" into names. Names in double quotes may contain commas. "none" gives an empty list.
 std::vector<std::string> names_in(const std::string& text, const std::string& option) {
   std::vector<std::string> names;
   if (text == "none") return names;
@@ -40,9 +40,10 @@ std::vector<std::string> names_in(const std::string& text, const std::string& op
 }  // namespace
 
 void add_where(CLI::App& app, std::string& where) {
-  app.add_option("--where", where,
-                 "only points that meet this, as 'classification == 2 && return_number == last': "
-                 "attributes, x, y, z and numbers with ! * / + - < <= > >= == != && || ( )")
+  app.add_option(
+         "--where", where,
+         "only points that satisfy this, as 'classification == 2 && return_number == last': "
+         "attributes, x, y, z and numbers with ! * / + - < <= > >= == != && || ( )")
       ->type_name("CONDITION");
 }
 
@@ -51,19 +52,17 @@ void SelectionOptions::define(CLI::App& app) {
   app.add_option(
       "--region", region_,
       "only points inside: a box in the CRS of the input, minx,miny[,minz],maxx,maxy[,maxz], or "
-      "a GeoJSON file of polygons; of rasters, COPC and EPT little else is read");
+      "a GeoJSON file of polygons; little else is read of rasters, COPC and EPT");
   app.add_option("--region-crs", region_crs_,
-                 "the CRS of the region (EPSG:n or a WKT file; x,y is lon,lat), if it is not the "
-                 "input's or, of GeoJSON, the one that the file names, or else longitude and "
-                 "latitude")
+                 "CRS of the region: EPSG:n or a WKT file; x,y is lon,lat (default: the input's; "
+                 "for GeoJSON the one that the file names, or else longitude and latitude)")
       ->needs("--region");
   add_number(app, "--resolution", resolution_,
-             "of COPC and EPT only the points down to this spacing, in units of its CRS",
-             kAboveZero);
+             "COPC and EPT: only points down to this spacing, in units of the CRS", kAboveZero);
   app.add_option("--keep", keep_,
-                 "only these attributes, or none; a name with a comma in double quotes")
+                 "only these attributes, or none; put a name with a comma in double quotes")
       ->type_name("NAME,NAME");
-  app.add_option("--drop", drop_, "all attributes but these")->type_name("NAME,NAME");
+  app.add_option("--drop", drop_, "all attributes except these")->type_name("NAME,NAME");
 }
 
 terrain::RegionConversion SelectionOptions::conversion(

@@ -10,7 +10,7 @@
 
 #include "terrace/terrain/crs.hpp"
 
-/// --where, --region, --region-crs, --resolution, --keep and --drop of what reads files.
+/// --where, --region, --region-crs, --resolution, --keep and --drop of verbs that read files.
 
 namespace terrace::terrain {
 class Region;
@@ -23,10 +23,11 @@ struct CommonOptions;
 class SelectionOptions {
  public:
   void define(CLI::App& app);
-  /// Whether points may be left out.
+  /// Returns whether points may be left out.
   [[nodiscard]] bool selects() const { return !where_.empty() || !region_.empty(); }
-  /// inputs: what will be read, by `reading`; opened beforehand if their CRS may matter. shift: of
-  /// it. Throws: UsageError for a list or a region that makes no sense; stream::Error.
+  /// Returns the selection of points and attributes for reading `inputs` with `reading`. The inputs
+  /// are opened beforehand if their CRS may matter; `shift` is that CRS's datum shift. Throws
+  /// UsageError for an invalid list or region, and stream::Error.
   [[nodiscard]] stream::Selection selection(std::span<const std::string> inputs,
                                             const stream::SourceOptions& reading,
                                             const std::optional<terrain::DatumShift>& shift,
@@ -41,7 +42,7 @@ class SelectionOptions {
   std::optional<double> resolution_;
 };
 
-/// --where: the condition on attributes.
+/// Adds --where, a condition on attributes.
 void add_where(CLI::App& app, std::string& where);
 
 }  // namespace terrace::tools

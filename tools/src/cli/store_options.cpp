@@ -53,23 +53,23 @@ std::optional<Transformation> CrsOptions::to(const stream::Store& store,
 
 void CrsOptions::define(CLI::App& app, const std::string& name, const std::string& given) {
   define_given(app, name, given);
-  app.add_option("--to-crs", to_, "the CRS of what is written; heights stay as they are");
+  app.add_option("--to-crs", to_, "CRS of the output; heights stay as they are");
 }
 
 void CrsOptions::define_given(CLI::App& app, const std::string& name, const std::string& given) {
-  app.add_option(
-      name, given_,
-      "the CRS of " + given +
-          " (EPSG:n or a WKT file; x,y is lon,lat), if it is not the store's or, of GeoJSON, the "
-          "one that the file names, or else longitude and latitude");
+  app.add_option(name, given_,
+                 "CRS of " + given +
+                     ": EPSG:n or a WKT file; x,y is lon,lat (default: the store's; for GeoJSON "
+                     "the one that the file names, or else longitude and latitude)");
   app.add_option("--towgs84", shift_,
-                 "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of such a CRS, or of the store, "
-                 "if it is another");
+                 "dx,dy,dz[,rx,ry,rz,ds] to WGS 84 from the datum of that CRS, or of the store if "
+                 "only that is not WGS 84");
 }
 
 void PartOptions::define(CLI::App& app, const std::string& kept) {
-  app.add_option("STORE", path, "where the points come from")->required();
-  app.add_option("--level", level, "points of this level and above outside the focuses, or top")
+  app.add_option("STORE", path, "the store to read")->required();
+  app.add_option("--level", level,
+                 "points of this level and above, outside the focuses; a number or top")
       ->default_str("0; with --focus top");
   app.add_option("--region", region,
                  kept + ": a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
@@ -82,7 +82,7 @@ void PartOptions::define(CLI::App& app, const std::string& kept) {
 CLI::Option* PartOptions::define_cluster(CLI::App& app, const std::string& given) {
   return app
       .add_option("--cluster", cluster,
-                  "L:N, the cluster N of level L: " + given + ", itself included")
+                  "L:N, the cluster N of level L: " + given + ", including its own point")
       ->excludes("--region")
       ->excludes("--focus");
 }
@@ -106,13 +106,14 @@ void SurfaceOptions::define(CLI::App& app) {
 }
 
 void SurfaceOptions::define_triangles(CLI::App& app) {
-  app.add_option("STORE", path, "where the heights come from")->required();
+  app.add_option("STORE", path, "the store to read")->required();
   app.add_option("--level", level, "only points of this level and above: a number or top")
       ->capture_default_str();
-  add_number(app, "--max-edge", max_edge,
-             "of irregular points and coarser levels: triangles with a longer side (metres on the "
-             "ground) are no data, as over water and in shadows (default: none)",
-             kAboveZero)
+  add_number(
+      app, "--max-edge", max_edge,
+      "irregular points and coarser levels: triangles with a side longer than this, in metres on "
+      "the ground, count as no data, as over water and in shadows (default: no limit)",
+      kAboveZero)
       ->type_name("METRES");
   add_where(app, where);
 }

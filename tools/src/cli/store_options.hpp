@@ -17,7 +17,7 @@ class App;
 class Option;
 }  // namespace CLI
 
-/// Options that several verbs on stores have.
+/// Options shared by several verbs that read stores.
 
 namespace terrace::tools {
 
@@ -25,28 +25,33 @@ struct CommonOptions;
 
 using namespace terrain;
 
-/// The CRS of what is given (--region-crs unless named otherwise), --to-crs and --towgs84.
+/// The CRS of coordinates in the request (--region-crs unless the verb names it otherwise),
+/// --to-crs and --towgs84.
 class CrsOptions {
  public:
-  /// given: as in "the CRS of regions".
+  /// Adds all three. `given` completes "the CRS of ...".
   void define(CLI::App& app, const std::string& name = "--region-crs",
               const std::string& given = "regions and focuses");
-  /// Without --to-crs.
+  /// Adds all but --to-crs.
   void define_given(CLI::App& app, const std::string& name = "--region-crs",
                     const std::string& given = "regions and focuses");
-  /// Each reports the operation that it uses between datums. Throws: as transformation_to.
-  /// To the CRS of what is given; nullopt if none is named.
+  /// The functions below report the operation that they use between datums and throw what
+  /// transformation_to throws.
+  /// Returns the transformation from the store's CRS to that of the request; nullopt if none is
+  /// named.
   [[nodiscard]] std::optional<Transformation> given(const stream::Store& store,
                                                     const CommonOptions& common) const;
   [[nodiscard]] RegionConversion regions(const stream::Store& store,
                                          const CommonOptions& common) const;
   [[nodiscard]] PlaceConversion places(const stream::Store& store,
                                        const CommonOptions& common) const;
-  /// To --to-crs, from `given` or else from the store's CRS; nullopt without --to-crs.
+  /// Returns the transformation to --to-crs, from `given` or otherwise from the store's CRS;
+  /// nullopt without --to-crs.
   [[nodiscard]] std::optional<Transformation> written(
       const stream::Store& store, const CommonOptions& common,
       const std::optional<Transformation>& given = {}) const;
-  /// To --to-crs from the store's CRS; nullopt also if both are the same.
+  /// Returns the transformation from the store's CRS to --to-crs; nullopt also if both are the
+  /// same.
   [[nodiscard]] std::optional<Transformation> to(const stream::Store& store,
                                                  const CommonOptions& common) const;
 
@@ -54,30 +59,31 @@ class CrsOptions {
   std::string given_, to_, shift_;
 };
 
-/// Which part of a store at which detail: the store, --level, --region, --focus, --cluster, --where
-/// and CrsOptions.
+/// Selects a part of a store and its detail: the store, --level, --region, --focus, --cluster,
+/// --where and CrsOptions.
 struct PartOptions {
   std::string path, level, region, cluster, where;
   std::vector<std::string> focuses;
   CrsOptions crs;
 
-  /// kept: what a region keeps, as in "only points inside".
+  /// `kept` says what a region keeps, such as "only points inside".
   void define(CLI::App& app, const std::string& kept);
-  /// Adds --cluster. given: what a cluster gives.
+  /// Adds --cluster. `given` says what the option outputs for a cluster.
   CLI::Option* define_cluster(CLI::App& app, const std::string& given);
-  /// Throws: as parse_detail.
+  /// Throws as parse_detail does.
   [[nodiscard]] Detail detail(const stream::Store& store, const CommonOptions& common) const;
 };
 
-/// The surface between a store's samples: the store, --level, --max-edge, --where and --method.
+/// Selects the surface through a store's samples: the store, --level, --max-edge, --where and
+/// --method.
 struct SurfaceOptions {
   std::string path, level = "0", method = "linear", where;
   std::optional<double> max_edge;
 
   void define(CLI::App& app);
-  /// Without --method.
+  /// Adds all but --method.
   void define_triangles(CLI::App& app);
-  /// Checks the options, then opens the store. Throws: UsageError, stream::Error.
+  /// Checks the options, then opens the store. Throws UsageError and stream::Error.
   [[nodiscard]] stream::Store open(SamplerOptions& sampler) const;
 };
 

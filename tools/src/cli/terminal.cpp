@@ -19,7 +19,8 @@ unsigned char byte_at(std::string_view text, std::size_t i) {
   return i < text.size() ? static_cast<unsigned char>(text[i]) : 0;
 }
 
-/// The length of the UTF-8 character (RFC 3629) at the start of `text`; 0 if it is not valid.
+/// Returns the length of the UTF-8 character (RFC 3629) at the start of `text`, or 0 if it is
+/// invalid.
 std::size_t character_length(std::string_view text, std::uint32_t& code) {
   const unsigned char first = byte_at(text, 0);
   if (first < 0x80) {
@@ -38,7 +39,7 @@ std::size_t character_length(std::string_view text, std::uint32_t& code) {
   return length;
 }
 
-bool is_obeyed(std::uint32_t code) {
+bool acts_on_terminal(std::uint32_t code) {
   return code < 0x20 || (code >= 0x7F && code < 0xA0) || code == 0x200E || code == 0x200F ||
          (code >= 0x2028 && code <= 0x202E) || (code >= 0x2066 && code <= 0x2069);
 }
@@ -50,7 +51,7 @@ std::string escaped_controls(std::string_view text, bool keep_line_ends) {
     std::uint32_t code = 0;
     const std::size_t length = character_length(text, code);
     if (length == 0) code = 0;
-    if ((code == '\n' && keep_line_ends) || (length > 0 && !is_obeyed(code))) {
+    if ((code == '\n' && keep_line_ends) || (length > 0 && !acts_on_terminal(code))) {
       out.append(text.substr(0, length));
     } else if (code == '\n' || code == '\t') {
       out += code == '\n' ? "\\n" : "\\t";
@@ -90,7 +91,7 @@ void secure_standard_descriptors() noexcept {
   for (int descriptor = 0; descriptor < 3; ++descriptor) {
     if (::fcntl(descriptor, F_GETFD) >= 0 || errno != EBADF) continue;
     // open() returns the lowest free number, which is the missing one. Without /dev/null a folder
-    // serves: it cannot be read or written either.
+    // works: it cannot be read or written either.
     if (::open("/dev/null", kModes[static_cast<std::size_t>(descriptor)]) < 0 &&
         ::open("/", O_RDONLY | O_DIRECTORY) < 0) {
       ::_exit(1);

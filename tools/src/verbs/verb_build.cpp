@@ -30,12 +30,12 @@
 namespace terrace::tools {
 namespace {
 
-/// The trial run of --dry-run reads this many points and scales up.
+/// Points that the trial run of --dry-run reads before it extrapolates.
 constexpr std::uint64_t kTrialPoints = 1'000'000;
 
-/// From here on memory goes back to the system as soon as it is freed, where the C library can be
-/// told so. Else blocks of points that one thread freed stay with that thread, while others ask for
-/// more: a third of the peak resident set where points are put in order.
+/// Makes freed memory return to the system at once, if the C library supports it. Otherwise blocks
+/// of points that one thread freed stay with that thread while others allocate more: a third of the
+/// peak resident set where points are sorted.
 void return_freed_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
@@ -45,24 +45,21 @@ void return_freed_memory() {
 class BuildCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option(
-           "INPUT", request_.inputs,
-           "rasters (several form a mosaic) or point files; a folder of them, @FILE with a name a "
-           "line, or a pattern in quotes; - is standard input")
+    app.add_option("INPUT", request_.inputs,
+                   "rasters (several form a mosaic) or point files; a folder of them, @FILE with "
+                   "one name per line, or a quoted pattern; - is standard input")
         ->required();
     add_output(app, output_, "the store to write");
     add_input_format(app, request_.input_format);
-    app.add_option(
-           "--entities", entities_,
-           "what is read and clustered: points; the triangles of a mesh (OBJ, OFF, PLY, "
-           "STL), which 'terrace mesh' gives back; the segments of lines (GeoJSON) or their "
-           "polylines of up to 4 vertices, which 'terrace points -o x.geojson' does")
+    app.add_option("--entities", entities_,
+                   "what to read and cluster: points; triangles of a mesh (OBJ, OFF, PLY, STL), "
+                   "for 'terrace mesh'; segments of lines (GeoJSON) or their polylines of up to 4 "
+                   "vertices, for 'terrace points -o x.geojson'")
         ->check(CLI::IsMember({"points", "triangles", "segments", "polylines"}))
         ->capture_default_str();
-    app.add_option(
-        "--crs", crs_,
-        "EPSG:n, EPSG:n+m with the heights' system, or a file with WKT (.prj): in place of "
-        "what the source says");
+    app.add_option("--crs", crs_,
+                   "EPSG:n, EPSG:n+m with the vertical CRS, or a file with WKT (.prj); overrides "
+                   "the source's CRS");
     app.add_option("--towgs84", shift_,
                    "dx,dy,dz[,rx,ry,rz,ds]: metres, arc-seconds and ppm (position vector) from "
                    "the CRS's datum to WGS 84");
@@ -73,13 +70,14 @@ class BuildCommand final : public Command {
     add_skip_damaged(app, request_.skip_damaged);
     add_heights_of_colour(app, request_.heights_of_colour);
     add_cell_of_source(app, request_.cell);
-    app.add_option("--block", block_, "most points clustered together")->capture_default_str();
+    app.add_option("--block", block_, "maximum number of points clustered together")
+        ->capture_default_str();
     add_number(app, "--facility-cost", request_.facility_cost,
                "times the diagonal of a block: larger makes larger clusters", kFactor);
     app.add_option("--effort", effort_, "how long to search for good clusters")
         ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
         ->capture_default_str();
-    add_number(app, "--z-weight", request_.z_weight, "how much heights count in a distance",
+    add_number(app, "--z-weight", request_.z_weight, "weight of heights in distances",
                kFactorOrZero);
     app.add_option(
            "--metric", metric_,
@@ -87,24 +85,25 @@ class BuildCommand final : public Command {
         ->capture_default_str()
         ->type_name("METRIC");
     app.add_option("--channel", channels_,
-                   "ATTRIBUTE:WEIGHT, repeatable: the attribute counts in distances, one unit as "
+                   "ATTRIBUTE:WEIGHT, repeatable: adds the attribute to distances, one unit as "
                    "WEIGHT metres; much slower")
         ->type_name("NAME:W");
     add_number(app, "--outlier-price", outlier_price_,
-               "times the diagonal of a block: points that are cheaper to leave out do not shape "
-               "clusters; they are kept with outlier = 1",
+               "times the diagonal of a block: points that cost less to leave out do not shape "
+               "clusters; they stay in the store with outlier = 1",
                kFactor);
     app.add_option("--strategy", strategy_,
-                   "how clusters are searched: automatic, or a local search of the thesis, slower")
+                   "search for clusters: automatic, or one of the thesis's slower local searches")
         ->type_name("NAME")
         ->capture_default_str();
     app.add_option(
            "--order", order_,
-           "order of points: stream as they come, spatial sorts near ones together (through "
-           "a temporary file beside the store), auto does so where they are not")
+           "order of points: stream keeps the input order, spatial sorts nearby points together "
+           "(through a temporary file next to the store), auto sorts only if needed")
         ->check(CLI::IsMember({"auto", "stream", "spatial"}))
         ->capture_default_str();
-    app.add_flag("--dry-run", dry_run_, "only estimate points, disk and time, from a trial");
+    app.add_flag("--dry-run", dry_run_,
+                 "only estimate points, disk space and time from a trial run");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -112,7 +111,7 @@ class BuildCommand final : public Command {
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
-    request_.entities = *stream::entities_named(entities_);  // checked by the option
+    request_.entities = *stream::entities_named(entities_);  // validated by the option
     if (!crs_.empty()) request_.crs = crs_named(crs_);
     request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {
@@ -140,7 +139,7 @@ class BuildCommand final : public Command {
   }
 
  private:
-  /// What the store holds, one of it.
+  /// Returns the singular of the store's entities, such as "point".
   [[nodiscard]] std::string entity() const { return entities_.substr(0, entities_.size() - 1); }
   Summary build(const CommonOptions& common) {
     const Stopwatch watch;
@@ -187,7 +186,7 @@ class BuildCommand final : public Command {
     return summary;
   }
 
-  /// How files are opened that are looked at beforehand.
+  /// Returns the options for opening files that are examined before the build.
   [[nodiscard]] stream::SourceOptions reading() const {
     return {.format = request_.input_format,
             .entities = request_.entities,
@@ -202,7 +201,7 @@ class BuildCommand final : public Command {
   /// Builds a store of the first points, measures it and removes it.
   Summary estimate(const CommonOptions& common) {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
-      throw UsageError("--dry-run reads its input before the build does: name files, not -");
+      throw UsageError("--dry-run reads its input before the build does: name files instead of -");
     }
     stream::SourceOptions options = reading();
     options.memory_bytes = common.reading_memory();
@@ -217,7 +216,7 @@ class BuildCommand final : public Command {
     const BuildOutcome trial = build_store(request_, context);
     const double seconds = watch.seconds();
 
-    // The number of points with data is not known before they are read: the trial's share is taken.
+    // The number of points with data is unknown until they are read, so use the trial's share.
     const double valid =
         static_cast<double>(trial.points) /
         static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
@@ -231,9 +230,8 @@ class BuildCommand final : public Command {
                       {"store_bytes", nullptr},
                       {"seconds", nullptr},
                       {"temporary_bytes", nullptr}};
-      summary.text =
-          "the number of points is not known before the end of the input; a million take " +
-          readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
+      summary.text = "the number of points is unknown until the end of the input; a million take " +
+                     readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
     } else {
       const auto bytes = static_cast<std::uint64_t>(static_cast<double>(trial.store_bytes) * scale);
       const auto temporary =

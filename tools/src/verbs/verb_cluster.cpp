@@ -59,16 +59,16 @@ enum class ClusterMethod : std::uint8_t {
 struct ClusterRequest {
   ClusterMethod method = ClusterMethod::facility;
   cluster::LinkageMethod linkage = cluster::LinkageMethod::single;
-  std::string linkage_name;  ///< as the user writes it
-  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< of facility
-  std::string iterations;  ///< of facility: tenth, log10, log2, a number; empty: by effort
+  std::string linkage_name;  ///< as the user wrote it
+  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< for facility
+  std::string iterations;  ///< for facility: tenth, log10, log2 or a number; empty: by effort
   cluster::Effort effort = cluster::Effort::standard;
-  std::size_t batch = 1;  ///< gains judged at once
-  std::size_t k = 0;      ///< clusters wanted; 0: not given
+  std::size_t batch = 1;  ///< gains evaluated at once
+  std::size_t k = 0;      ///< requested clusters; 0: not given
   std::optional<double> height;
-  std::optional<std::uint32_t> bound_iterations;  ///< of the lower bound; 0: none
+  std::optional<std::uint32_t> bound_iterations;  ///< for the lower bound; 0: none
   std::size_t restarts = 1;
-  bool single_precision = false;  ///< of the matrix of linkage
+  bool single_precision = false;  ///< for the linkage matrix
   bool cuda = false;
   std::uint64_t seed = 1;
   unsigned threads = 1;
@@ -76,18 +76,18 @@ struct ClusterRequest {
 };
 
 struct ClusterOutcome {
-  std::vector<std::uint32_t> representatives;  ///< per cluster: a point
+  std::vector<std::uint32_t> representatives;  ///< per cluster: index of a point
   std::vector<std::uint32_t> labels;           ///< per point: its cluster, or cluster::kOutlier
-  /// Where the method minimises a cost; for k-means the connection cost is the sum of squares.
+  /// Set if the method minimises a cost. For k-means the connection cost is the sum of squares.
   std::optional<double> opening_cost, connection_cost, outlier_cost, lower_bound;
   std::optional<cluster::Dendrogram> dendrogram;
-  std::vector<std::string> notes;  ///< what the user should know
+  std::vector<std::string> notes;  ///< notes for the user
 };
 
-/// Called now and then with the share of the work that is done, if known; may throw to stop.
+/// Called from time to time with the share of the work done, if known; may throw to stop.
 using ClusterProgress = std::function<void(double fraction)>;
 
-/// Costs, facilities and assignment of a solution.
+/// Returns the costs, facilities and assignment of a solution.
 ClusterOutcome outcome_of(FacilitySolution&& solution) {
   ClusterOutcome outcome;
   outcome.opening_cost = solution.opening_cost;
@@ -107,8 +107,8 @@ void no_channels(const FacilityPoints& problem, const char* method) {
   }
 }
 
-/// Steps towards the lower bound: as many as requested, else some seconds' worth, as a step looks
-/// at a few clusters' worth of points around each point.
+/// Returns the number of steps for the lower bound: as requested, otherwise about some seconds'
+/// worth. Each step examines as many points around each point as a few clusters have.
 double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
                 const FacilitySolution& solution, const ClusterProgress& progress) {
   const auto points = static_cast<double>(problem.points.size());
@@ -131,7 +131,7 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
                                      const ClusterProgress& progress) {
   cluster::FacilityOptions options;
   options.strategy = request.strategy;
-  // In this command `fast` equals `default`: on one block it would save milliseconds.
+  // Here `fast` equals `default`: on one block it would only save milliseconds.
   options.effort = std::max(request.effort, cluster::Effort::standard);
   if (request.iterations == "tenth") {
     options.effort = cluster::Effort::standard;
@@ -151,7 +151,7 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
     return true;
   };
   options.check_stop = check_interrupt;
-  // The production path, unless an option asks for what it cannot do.
+  // Use the production engine, unless an option asks for something that it does not support.
   constexpr std::size_t kFastPoints = std::size_t{1} << 24;
   if (request.strategy == FacilityStrategy::automatic && request.iterations.empty() &&
       request.batch == 1 && problem.channels.size() == 0 && std::isinf(problem.outlier_price) &&
@@ -165,10 +165,10 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
   return outcome_of(std::move(solution));
 }
 
-/// The primal-dual method.
+/// Clusters by the primal-dual method.
 ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPoints& problem,
                                  const ClusterProgress& progress) {
-  // Besides the matrix, the growth keeps the clients sorted by facility: half as much again.
+  // Besides the matrix, the method keeps the clients sorted by facility: half as much again.
   FacilitySolution solution = cluster::solve(problem, {.strategy = FacilityStrategy::greedy_stars,
                                                        .memory_limit = request.memory_bytes / 3 * 2,
                                                        .check_stop = check_interrupt});
@@ -197,7 +197,7 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
   ClusterOutcome outcome;
   outcome.connection_cost = result.sse;
   outcome.labels = result.assignment;
-  // Clusters that stayed empty, for lack of distinct points, do not count.
+  // Clusters that stayed empty for lack of distinct points do not count.
   std::vector<std::uint32_t> number(request.k, cluster::kOutlier);
   std::uint32_t used = 0;
   for (std::uint32_t& label : outcome.labels) {
@@ -210,14 +210,14 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
   }
   if (!result.converged) {
     outcome.notes.push_back("k-means stopped after " + counted(result.iterations, "iteration") +
-                            ", before it had come to rest");
+                            ", before it converged");
   }
   outcome.representatives = cluster::nearest_to_means(points, outcome.labels, used);
   return outcome;
 }
 
 ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const FacilityPoints& problem) {
-  // Each step takes the distances of all pairs; fewer than a hundred steps give no useful bound.
+  // Each step computes the distances of all pairs. Fewer than a hundred steps give no useful bound.
   constexpr std::size_t kMostForBound = 10'000;
   const std::uint32_t steps =
       request.bound_iterations.value_or(problem.points.size() <= kMostForBound ? 100 : 0);
@@ -232,7 +232,7 @@ ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const Facility
   return outcome;
 }
 
-/// The whole tree, on the CPU.
+/// Returns the whole tree, computed on the CPU.
 cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints& problem,
                             const std::optional<std::vector<Point3>>& points) {
   const std::string method = "--method " + request.linkage_name;
@@ -250,8 +250,8 @@ cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints&
       break;
     case cluster::LinkageMethod::single:
       throw UsageError(method +
-                       " goes through the Euclidean minimum spanning tree: it takes --metric "
-                       "euclidean, or elliptical with one region for all points");
+                       " uses the Euclidean minimum spanning tree: it takes --metric euclidean, or "
+                       "elliptical with one region for all points");
     case cluster::LinkageMethod::ward:
     case cluster::LinkageMethod::centroid:
     case cluster::LinkageMethod::median:
@@ -262,7 +262,7 @@ cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints&
   if (!cluster::is_symmetric(problem.metric)) {
     throw UsageError(method +
                      " needs a symmetric metric: a field of ellipses is not symmetric (the points "
-                     "lie in several of its regions)");
+                     "are in several of its regions)");
   }
   return cluster::linkage(
       problem.points.size(),
@@ -275,7 +275,7 @@ cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints&
 ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityPoints& problem) {
   no_channels(problem, request.linkage_name.c_str());
   if (!problem.weights.empty())
-    throw UsageError("--weight is not for linkage: it counts no points");
+    throw UsageError("--weight does not apply to linkage, which counts no points");
   const std::optional<std::vector<Point3>> points =
       cluster::linear_points(problem.metric, problem.points);
   ClusterOutcome outcome;
@@ -304,11 +304,11 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
   return outcome;
 }
 
-/// Clusters points. Throws: UsageError where options do not go together, std::invalid_argument on
-/// bad data, std::runtime_error (too little memory, no device), what `progress` throws.
+/// Clusters points. Throws UsageError for options that do not go together, std::invalid_argument
+/// for invalid data, std::runtime_error (too little memory, no device), and what `progress` throws.
 ClusterOutcome run_clustering(const ClusterRequest& request, const cluster::FacilityPoints& problem,
                               const ClusterProgress& progress) {
-  // Checked here, so that the message names the point for every method.
+  // Checked here so that the message names the point for every method.
   cluster::check(problem);
   if (request.k > problem.points.size()) {
     throw UsageError("-k " + std::to_string(request.k) +
@@ -332,13 +332,14 @@ ClusterOutcome run_clustering(const ClusterRequest& request, const cluster::Faci
   return cluster_by_linkage(request, problem);
 }
 
-/// Columns that count in distances.
+/// Columns that contribute to distances.
 struct ChannelTable {
   std::vector<double> values;   ///< by point, then column
-  std::vector<double> weights;  ///< metres of a unit, by column
+  std::vector<double> weights;  ///< metres per unit, by column
 };
 
-/// options: "NAME:WEIGHT" of columns. Throws: UsageError; what PointTable::column() throws.
+/// Reads the columns that the "NAME:WEIGHT" options name. Throws UsageError and what
+/// PointTable::column() throws.
 ChannelTable read_channels(const PointTable& table, const std::vector<std::string>& options) {
   ChannelTable channels;
   std::vector<std::vector<double>> columns;
@@ -356,13 +357,13 @@ ChannelTable read_channels(const PointTable& table, const std::vector<std::strin
   return channels;
 }
 
-/// The table with two more columns, `cluster` and `representative` (the number of the point that
-/// stands for the cluster), both -1 for outliers; columns of these names are replaced.
-/// Throws: stream::Error, stream::Stopped.
+/// Writes the table with two more columns, `cluster` and `representative` (the index of the point
+/// that represents the cluster). Both are -1 for outliers. Existing columns of these names are
+/// replaced. Throws stream::Error and stream::Stopped.
 void write_clustered(const std::string& path, stream::WriterOptions writing,
                      const PointTable& table, const ClusterOutcome& outcome,
                      const CommonOptions& common) {
-  // Columns of an earlier clustering are replaced.
+  // Replace the columns of an earlier clustering.
   struct Kept {
     std::size_t offset = 0, size = 0;
   };
@@ -415,7 +416,7 @@ void write_clustered(const std::string& path, stream::WriterOptions writing,
   writer->finish();
 }
 
-/// Clusters, costs, and how far from the optimum.
+/// Returns the summary: clusters, costs, and the distance from the optimum.
 Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const Stopwatch& watch) {
   const auto rounded = [](double value) { return readable_number(value, 6); };
   const auto outliers = static_cast<std::size_t>(
@@ -470,10 +471,9 @@ class ClusterCommand final : public Command {
     app.add_option("input", input_, "File of points (or cells); - is standard input")
         ->required()
         ->type_name("FILE");
-    app.add_option(
-           "-o,--output", output_,
-           "The points with columns 'cluster' and 'representative' (the number of the point "
-           "that stands for the cluster; -1: outlier); - is standard output")
+    app.add_option("-o,--output", output_,
+                   "The points with columns 'cluster' and 'representative' (index of the point "
+                   "that represents the cluster; -1: outlier); - is standard output")
         ->type_name("FILE");
     app.add_option("--labels", labels_, "One cluster number per line, in the order of the input")
         ->type_name("FILE");
@@ -483,7 +483,7 @@ class ClusterCommand final : public Command {
     add_point_format(app, format_);
     add_input_format(app, input_format_);
     app.add_option("--method", method_,
-                   "facility, primal-dual, k-means, k-median, or of linkage: single, complete, "
+                   "facility, primal-dual, k-means, k-median, or linkage: single, complete, "
                    "average, weighted, ward, centroid, median")
         ->capture_default_str()
         ->type_name("NAME");
@@ -512,23 +512,22 @@ class ClusterCommand final : public Command {
         ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--restarts", request_.restarts,
-                   "k-means, k-median: number of runs; the best one counts")
+                   "k-means, k-median: number of runs; the best is kept")
         ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--bound-iterations", request_.bound_iterations,
-                   "Steps towards a lower bound of the cost; 0: none (default: some seconds)")
+                   "Steps for a lower bound of the cost; 0: none (default: a few seconds' worth)")
         ->type_name("N");
     app.add_option(
            "--metric", metric_,
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
         ->capture_default_str()
         ->type_name("METRIC");
-    app.add_option("--channel", channels_,
-                   "A column that counts in distances, one unit as WEIGHT metres")
+    app.add_option("--channel", channels_, "Add a column to distances, one unit as WEIGHT metres")
         ->allow_extra_args(false)
         ->type_name("NAME:WEIGHT");
-    app.add_option("--weight", weight_, "The column of the points' weights")->type_name("NAME");
-    add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
+    app.add_option("--weight", weight_, "Column with the points' weights")->type_name("NAME");
+    add_number(app, "--z-weight", z_weight_, "Weight of heights in distances", kFactorOrZero);
     app.add_flag("--single-precision", request_.single_precision,
                  "complete, average, weighted: a matrix of half the size");
     app.add_option("--device", device_, "single, complete: cpu or cuda")
@@ -599,16 +598,16 @@ class ClusterCommand final : public Command {
     }
     outputs.commit();
     Summary summary = summary_of(outcome, table.size(), watch);
-    // Costs are a result too, unless another one goes to standard output.
+    // Costs are a result too, unless another result goes to standard output.
     summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
     return summary;
   }
 
  private:
-  /// Leaves request_.memory_bytes what is left after the table. Throws: stream::Error if the method
-  /// needs more.
+  /// Sets request_.memory_bytes to the memory left after the table. Throws stream::Error if the
+  /// method needs more.
   void need_memory(const PointTable& table, const CommonOptions& common) {
-    // Peak bytes per point, measured; the methods on a matrix check theirs themselves.
+    // Measured peak bytes per point. Methods that use a matrix check it themselves.
     const std::uint64_t each = request_.method == ClusterMethod::k_means   ? 120
                                : request_.method == ClusterMethod::linkage ? 240
                                                                            : 300;
@@ -654,8 +653,7 @@ class ClusterCommand final : public Command {
     }
     const bool flat = !output_.empty() || !labels_.empty();
     if (!flat && dendrogram_.empty()) {
-      throw UsageError(
-          "there is nothing to write: name -o FILE, --labels FILE or --dendrogram FILE");
+      throw UsageError("no output given; pass -o FILE, --labels FILE or --dendrogram FILE");
     }
     if (!tree && (!dendrogram_.empty() || request_.height)) {
       throw UsageError(
@@ -667,9 +665,7 @@ class ClusterCommand final : public Command {
       throw UsageError("--device cuda is for the methods single and complete");
     }
     if (tree && flat && request_.k == 0 && !request_.height) {
-      throw UsageError("--method " + method_ +
-                       " gives a tree: say where to cut it, with -k K or "
-                       "--height H");
+      throw UsageError("--method " + method_ + " gives a tree; cut it with -k K or --height H");
     }
     if (request_.k != 0 && request_.height) throw UsageError("give either -k or --height");
     const bool counts = method == ClusterMethod::k_means || method == ClusterMethod::k_median;

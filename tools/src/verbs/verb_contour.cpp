@@ -26,15 +26,15 @@ class ContourCommand final : public Command {
         app, output_,
         "GeoJSON: lines in longitude and latitude, elev is the height; - is standard output");
     add_number(app, "--interval", interval_,
-               "height between lines, in the store's vertical unit; lines are at its multiples",
+               "contour interval in the store's vertical unit; lines are at its multiples",
                kAboveZero)
         ->required()
         ->type_name("HEIGHT");
     app.add_option("--region", region_,
-                   "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
+                   "only inside this area: minx,miny,maxx,maxy or a GeoJSON file");
     app.add_flag("--own-crs", request_.own_crs,
-                 "x and y of the store's own CRS, also of one that is not known, instead of "
-                 "longitude and latitude");
+                 "write x and y of the store's CRS, which may be unknown, instead of longitude and "
+                 "latitude");
     crs_.define_given(app);
   }
 

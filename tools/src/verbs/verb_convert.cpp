@@ -35,8 +35,8 @@ class ConvertCommand : public Command {
   void define(CLI::App& app) override {
     app.add_option(
            "INPUT", inputs_,
-           "files of points or cells, one after the other (rasters form a mosaic); a folder of "
-           "them, @FILE with a name a line, or a pattern in quotes; - is standard input")
+           "files of points or cells, one after another (rasters form a mosaic); a folder of them, "
+           "@FILE with one name per line, or a quoted pattern; - is standard input")
         ->required();
     add_output(app, output_, "The file to write; - is standard output");
     add_point_format(app, format_);
@@ -79,7 +79,7 @@ class ConvertCommand : public Command {
     if (!lost.empty()) common.say(lost);
     UndeclaredVoids voids(info);
     ProgressMeter meter(common.progress, "points");
-    // Each thread holds a block as it was read, and encoded; both have some room to grow.
+    // Each thread holds one block as read and one as encoded, both with some room to grow.
     const std::uint64_t of_thread = 5 * reading.block_points * (24 + info.payload_size());
     const std::uint64_t taken = kProgramMemory + held + writer->writing_bytes();
     const auto threads = static_cast<unsigned>(std::clamp<std::uint64_t>(
@@ -107,7 +107,7 @@ class ConvertCommand : public Command {
            .remedy = "give another --where or --region"});
     }
     writer->finish();
-    if (writer->points() == 0) common.say(inputs_.front() + ": there is not one point in it");
+    if (writer->points() == 0) common.say(inputs_.front() + ": contains no points");
     tell_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
     if (const std::string note = voids.note(); !note.empty()) common.say(note);
@@ -141,11 +141,11 @@ class ConvertCommand : public Command {
   }
 
  private:
-  /// "1,234 ": the points that were looked at; parts that the region does not meet were not.
+  /// Returns "1,234 ", the number of points examined. Parts outside the region were not read.
   static std::string selected_of(const stream::Progress& done) {
     return done.excluded > 0 ? with_commas(done.excluded) + ' ' : std::string();
   }
-  /// With the CRS of the file, or of the .prj beside it.
+  /// Returns the placement with the CRS of the file or of the .prj file next to it.
   static stream::Placement located(const stream::SourceInfo& info) {
     stream::Placement placement = info;
     try {
@@ -153,7 +153,7 @@ class ConvertCommand : public Command {
     } catch (const terrain::CrsDatabaseError&) {
       throw;
     } catch (const stream::Error&) {
-      // What the file says is repeated.
+      // The output repeats the file's own description.
     }
     return placement;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// info: what a store or a file holds.
+// info: describes a store or a file.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -36,7 +36,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// {"min": [x, y, z], "max": [x, y, z]}; null for an empty box.
+/// Returns {"min": [x, y, z], "max": [x, y, z]}, or null for an empty box.
 Json json_of(const stream::Box3& box) {
   if (box.empty()) return nullptr;
   Json json;
@@ -45,10 +45,10 @@ Json json_of(const stream::Box3& box) {
   return json;
 }
 
-/// null for an empty text.
+/// Returns the text, or null if it is empty.
 Json known(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-/// {"epsg": n, "name": ..., "wkt": ...}; null where nothing is known.
+/// Returns {"epsg": n, "name": ..., "wkt": ...}, with null for unknown values.
 Json json_of(const stream::Crs& crs) {
   if (crs == stream::Crs{}) return nullptr;
   Json json;
@@ -62,7 +62,7 @@ Json json_of(const stream::Crs& crs) {
   return json;
 }
 
-/// Where the points are, and the lattice of a raster.
+/// Adds the extent of the points, and the lattice of a raster.
 void add_placement(const stream::Schema& schema, const stream::Box3& bounds, const stream::Crs& crs,
                    const std::string& vertical, Json& json) {
   json["bounds"] = json_of(bounds);
@@ -89,8 +89,8 @@ Json channels_of(const stream::Schema& schema) {
   return list;
 }
 
-/// "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", with the operation that leads to WGS 84 where
-/// the data lie. bounds: in the CRS.
+/// Returns "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", with the operation to WGS 84 that
+/// applies to the data. `bounds` is in the CRS.
 std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
   std::string text = crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : "";
   if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
@@ -102,7 +102,7 @@ std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
     const CoordinateSystem system = CoordinateSystem(*known).over(bounds);
     const DatumChange& change = system.to_wgs84();
     if (!change.possible()) {
-      text += ", datum " + known->datum + " without a way to WGS 84";
+      text += ", datum " + known->datum + " without a transformation to WGS 84";
       if (!change.better().empty()) text += ": " + change.better();
     } else if (!change.identity()) {
       text += ", to WGS 84 by " + change.description();
@@ -116,18 +116,18 @@ std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
   return text;
 }
 
-/// "1.5 2 3  to  4 5 6" or "none".
+/// Returns "1.5 2 3  to  4 5 6" or "none".
 std::string text_of(const stream::Box3& box) {
   if (box.empty()) return "none";
   const auto corner = [](const stream::Point3& p) {
-    // A nanodegree, or a millimetre of projected coordinates.
+    // Precise to a nanodegree, or a millimetre of projected coordinates.
     return readable_number(p[0], 10) + ' ' + readable_number(p[1], 10) + ' ' +
            readable_number(p[2], 10);
   };
   return corner(box.min) + "  to  " + corner(box.max);
 }
 
-/// "height int16 (metre)", with scale and offset where they are not 1 and 0.
+/// Returns "height int16 (metre)", with scale and offset if they are not 1 and 0.
 std::string text_of(const stream::Channel& channel) {
   std::string text = channel.name + ' ' + std::string(stream::name_of(channel.type));
   if (channel.scale != 1) text += " x " + plain_number(channel.scale);
@@ -155,7 +155,7 @@ std::string channels_line(const stream::Schema& schema) {
   return text;
 }
 
-/// The sum of a long stream of doubles: without the compensation the mean of a billion heights
+/// Compensated sum of a long stream of doubles. Without compensation, the mean of a billion heights
 /// would be off in its last digits (A. Neumaier 1974, doi:10.1002/zamm.19740540106).
 class Sum {
  public:
@@ -174,13 +174,13 @@ struct Contents {
   std::uint64_t points = 0, nodata = 0, empty_values = 0, withheld = 0;
   stream::Box3 stored, world;
   double mean = 0;      ///< stored coordinate 2
-  std::string comment;  ///< on heights; empty: none
+  std::string comment;  ///< about heights; empty if there is none
 };
 
 Contents stream_through(stream::PointSource& source, const CommonOptions& common) {
   const stream::SourceInfo& info = source.info();
   const stream::Placement& placement = info;
-  // Without rotation the box in the CRS is that of the stored box: points need not be transformed.
+  // Without rotation the stored box maps to the box in the CRS, so points need not be transformed.
   const bool upright = info.world.xy[1] == 0 && info.world.xy[3] == 0;
   Contents contents;
   Sum heights;
@@ -203,7 +203,7 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
   return contents;
 }
 
-/// Those of EPT are all files of its folder. nullopt for pipes.
+/// Returns the size of the files; for EPT, of all files in its folder. nullopt for pipes.
 std::optional<std::uint64_t> bytes_of(const stream::SourceInfo& info) {
   namespace fs = std::filesystem;
   std::uint64_t bytes = 0;
@@ -222,14 +222,14 @@ std::optional<std::uint64_t> bytes_of(const stream::SourceInfo& info) {
   return bytes;
 }
 
-/// Sizes of a level's clusters, representative included: 0, 5, 50, 95 and 100 percentiles.
+/// Sizes of a level's clusters, including the representative: percentiles 0, 5, 50, 95 and 100.
 struct Sizes {
   std::array<std::uint64_t, 5> percentiles{};
   double mean = 0;
 };
 
 Sizes sizes_of(const stream::Store& store, const stream::LevelInfo& level) {
-  // Every n-th cluster is enough for a level with very many.
+  // For a level with very many clusters, every n-th one is enough.
   constexpr std::uint64_t kMost = 200000;
   const std::uint64_t stride = level.clusters / kMost + 1;
   const std::uint64_t representative = level.level == store.top() ? 0 : 1;
@@ -255,7 +255,7 @@ std::string padded(const std::string& text, std::size_t width) {
   return std::string(width - std::min(width, text.size()), ' ') + text;
 }
 
-/// What files of points or cells hold, found by streaming them once. Throws: stream::Error.
+/// Describes files of points or cells by streaming them once. Throws stream::Error.
 Summary info_of_files(std::span<const std::string> files, const std::string& format,
                       stream::HeightsOfColour colours, const CommonOptions& common) {
   const std::unique_ptr<stream::PointSource> source =
@@ -275,7 +275,7 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   } catch (const CrsDatabaseError&) {
     throw;
   } catch (const stream::Error& error) {
-    // Where a build would fail, the error is reported with the rest of the file.
+    // Report an error that would make a build fail along with the rest of the file.
     crs.crs = info.crs;
     crs.note = error.what();
   }
@@ -339,7 +339,7 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   }
   if (contents.empty_values > 0) {
     text += "empty:     " + counted(contents.empty_values, "attribute") +
-            " without a value, which are NaN\n";
+            " without a value, read as NaN\n";
   }
   if (contents.withheld > 0) {
     text += "withheld:  " + with_commas(contents.withheld) + " of them\n";
@@ -357,7 +357,7 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   return summary;
 }
 
-/// What a store holds; reads manifest and indices. Throws: stream::Error.
+/// Describes a store from its manifest and indices. Throws stream::Error.
 Summary info_of_store(const std::string& path) {
   const stream::Store store = open_store(path);
   const stream::StoreSchema& schema = store.schema();
@@ -427,8 +427,8 @@ class InfoCommand : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("input", inputs_,
-                   "a store; or files of points or cells, as one: also a folder, @FILE with a "
-                   "name a line, or a pattern in quotes; - is standard input")
+                   "a store; or files of points or cells, as one: also a folder, @FILE with one "
+                   "name per line, or a quoted pattern; - is standard input")
         ->required()
         ->type_name("STORE|FILE");
     add_input_format(app, format_);

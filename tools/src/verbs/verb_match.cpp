@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// match: pairs the points of one file at the least total distance, or makes the tree of repeated
-// matching, of triangles with their boxes.
+// match: pairs the points of one file at the least total distance, or builds the tree of repeated
+// matching, which for triangles includes their boxes.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -43,39 +43,40 @@ namespace {
 
 enum class MatchMethod : std::uint8_t { automatic, exact, monotone, monte_carlo };
 
-/// Called now and then with the work done and the total, in any unit; may throw to stop.
+/// Called from time to time with the work done and the total, in any unit; may throw to stop.
 using MatchProgress = std::function<bool(std::uint64_t done, std::uint64_t total, double)>;
 
 /// The request of `terrace match`, for points on the ground.
 struct MatchRequest {
   MatchMethod method = MatchMethod::automatic;
-  std::span<const std::uint32_t> labels{};  ///< the cluster of each point; empty: none given
-  std::uint64_t iterations = 0;             ///< of halving; 0: as many as points
-  double seconds = 0.0;                     ///< of halving; 0: no limit
+  std::span<const std::uint32_t> labels{};  ///< cluster of each point; empty if not given
+  std::uint64_t iterations = 0;             ///< for halving; 0: the number of points
+  double seconds = 0.0;                     ///< for halving; 0: no limit
   std::uint64_t seed = 1;
   unsigned threads = 1;
   std::uint64_t memory_bytes = 0;
 };
 
 struct MatchOutcome {
-  std::vector<std::uint32_t> mate;  ///< of each point; matching::kNobody for the one left over
+  std::vector<std::uint32_t>
+      mate;  ///< partner of each point; matching::kNobody for a point left over
   double cost = 0.0;
-  std::uint64_t iterations = 0;       ///< of halving, or rounds of windows
-  std::optional<double> lower_bound;  ///< where the method has one
+  std::uint64_t iterations = 0;       ///< iterations of halving, or rounds of windows
+  std::optional<double> lower_bound;  ///< if the method provides one
   bool optimal = false;
-  std::size_t clusters = 0;  ///< that were matched first; 0: none
+  std::size_t clusters = 0;  ///< clusters matched first; 0: none
 };
 
 struct TreeOutcome {
   matching::MatchingTree<matching::Point3> tree;
-  std::size_t clusters = 0;  ///< with a tree of their own; 0: none
+  std::size_t clusters = 0;  ///< clusters with separate trees; 0: none
 };
 
-/// Size of the clusters that are matched first in large sets.
+/// Size of the clusters that are matched first in large sets, in points.
 constexpr double kClusterSize = 10000;
-/// Memory of an exact matching per point, measured.
+/// Measured memory of an exact matching, in bytes per point.
 constexpr std::uint64_t kExactBytes = 800;
-/// Memory of windows per point, besides those at work.
+/// Memory of windows, in bytes per point, besides the windows being solved.
 constexpr std::uint64_t kWindowBytes = 150;
 
 void check_memory(std::uint64_t needed, const MatchRequest& request, std::size_t points,
@@ -109,8 +110,8 @@ bool halves(MatchMethod method) {
   return method == MatchMethod::monotone || method == MatchMethod::monte_carlo;
 }
 
-/// The clusters that are matched first: the caller's, or by facility location if there are too many
-/// points to match at once.
+/// Returns the clusters to match first: the caller's, or those of facility location if there are
+/// too many points to match at once.
 std::vector<std::uint32_t> clusters_of(const MatchRequest& request, std::span<const Point3> points,
                                        const MatchProgress& progress) {
   if (!request.labels.empty()) return {request.labels.begin(), request.labels.end()};
@@ -121,10 +122,9 @@ std::vector<std::uint32_t> clusters_of(const MatchRequest& request, std::span<co
                                    [&](std::uint64_t done) { progress(done, points.size(), 0); });
 }
 
-/// Pairs points. Sets too large to match exactly are first clustered by facility location
-/// (`automatic`), unless there are labels.
-/// Throws: std::invalid_argument on bad data, std::runtime_error if the memory does not suffice;
-/// what `progress` throws.
+/// Pairs points. Sets too large for an exact matching are first clustered by facility location
+/// (`automatic`), unless there are labels. Throws std::invalid_argument for invalid data,
+/// std::runtime_error if the memory does not suffice, and what `progress` throws.
 MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> points,
                           const MatchProgress& progress) {
   MatchOutcome outcome;
@@ -162,7 +162,8 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
   return outcome;
 }
 
-/// The tree of repeated matching, each level by the method of the request. Throws: as above.
+/// Returns the tree of repeated matching, with each level matched by the requested method. Throws
+/// as run_matching() does.
 TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point3> points,
                               const MatchProgress& progress) {
   const std::vector<std::uint32_t> labels = clusters_of(request, points, progress);
@@ -173,7 +174,7 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
   if (halves(request.method)) {
     options.matcher = [&](std::span<const Point3> nodes) {
       matching::HalvingOptions halving = halving_options(request);
-      // Clusters are matched in parallel already.
+      // The clusters already run in parallel.
       if (!labels.empty()) halving.threads = 1;
       return std::move(matching::match_by_halving(nodes, halving).mate);
     };
@@ -184,7 +185,7 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
       return std::move(matching::match_points(nodes, matching).mate);
     };
   }
-  // The tree, and the level being matched.
+  // Memory of the tree and of the level being matched.
   const std::uint64_t tree_bytes = 120 * points.size();
   check_memory(labels.empty() ? tree_bytes + kExactBytes * points.size() : tree_bytes, request,
                points.size(), "raise it, or name clusters with --labels");
@@ -200,31 +201,31 @@ class MatchCommand final : public Command {
         ->required()
         ->type_name("FILE");
     add_output(app, output_,
-               "The pairs, rows a,b,distance: numbers of points in the order of the input, from 0, "
-               "and metres; with --tree rows a,b,distance,size,level, of triangles with the box of "
-               "what is below: minx,miny,minz,maxx,maxy,maxz; - is standard output");
+               "The pairs, rows a,b,distance: indices of points in the input, from 0, and metres; "
+               "with --tree rows a,b,distance,size,level, for triangles also the box of all below: "
+               "minx,miny,minz,maxx,maxy,maxz; - is standard output");
     add_input_format(app, input_format_);
     app.add_option("--method", method_,
-                   "auto: the optimum up to half a million points, beyond it clusters first, then "
-                   "windows, with a proven bound; exact: the optimum; monotone: repeated halving, "
-                   "near it; monte-carlo: random halving, as in the thesis")
+                   "auto: the optimum up to half a million points, beyond that clusters first, "
+                   "then windows, with a proven bound; exact: the optimum; monotone: repeated "
+                   "halving, near the optimum; monte-carlo: random halving, as in the thesis")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option("--iterations", iterations_,
-                   "monotone, monte-carlo: most iterations (default: as many as points)")
+    app.add_option(
+           "--iterations", iterations_,
+           "monotone, monte-carlo: maximum number of iterations (default: the number of points)")
         ->type_name("N");
     add_number(app, "--seconds", seconds_,
-               "monotone, monte-carlo: begin no iteration after S seconds", kAboveZero)
+               "monotone, monte-carlo: start no iteration after S seconds", kAboveZero)
         ->type_name("S");
-    add_number(app, "--z-weight", z_weight_, "How much heights count in a distance", kFactorOrZero);
-    app.add_flag(
-        "--tree", tree_,
-        "Match the pairs again, and so on: the binary tree. Row k is node n + k of n points "
-        "and joins the nodes a and b; size: points below");
+    add_number(app, "--z-weight", z_weight_, "Weight of heights in distances", kFactorOrZero);
+    app.add_flag("--tree", tree_,
+                 "Match the pairs again, up to one root: a binary tree. With n points, row k is "
+                 "node n + k and joins the nodes a and b; size counts the points below");
     app.add_option(
            "--entities", entities_,
-           "triangles: those of a mesh (GLB, OBJ, OFF, PLY, STL) in place of its vertices, by "
-           "their centroids; with --tree, which is a bounding volume hierarchy then")
+           "triangles: match the triangles of a mesh (GLB, OBJ, OFF, PLY, STL) by their centroids "
+           "instead of its vertices; needs --tree, which becomes a bounding volume hierarchy")
         ->check(CLI::IsMember({"points", "triangles"}))
         ->capture_default_str();
     app.add_option("--labels", labels_,
@@ -314,7 +315,7 @@ class MatchCommand final : public Command {
     for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
       check_interrupt();
       const std::uint32_t b = outcome.mate[a];
-      // A point without a partner has a number above all.
+      // A point without a partner has a mate beyond all indices.
       if (b <= a || b >= outcome.mate.size()) continue;
       const stream::Point3 &p = positions_[a], &q = positions_[b];
       const double distance = base::hypot(base::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
@@ -324,7 +325,8 @@ class MatchCommand final : public Command {
     return text;
   }
 
-  /// The boxes of the triangles of a table; its positions (first corners) become centroids.
+  /// Returns the boxes of a table's triangles. Replaces its positions (first corners) with
+  /// centroids.
   [[nodiscard]] std::vector<matching::Box<3>> to_centroids(PointTable& table) const {
     const CornerReader read(table.info, stream::Entities::triangles, input_);
     const std::size_t record = table.info.payload_size();
@@ -344,7 +346,8 @@ class MatchCommand final : public Command {
     return boxes;
   }
 
-  /// boxes: of the entities, in the coordinates of the file; empty: rows without boxes.
+  /// Returns the rows of a tree. `boxes` are those of the entities, in the file's coordinates;
+  /// without any, rows have no boxes.
   static std::string rows_of(const TreeOutcome& outcome, std::vector<matching::Box<3>> boxes = {}) {
     const bool boxed = !boxes.empty();
     std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
@@ -417,7 +420,7 @@ class MatchCommand final : public Command {
     return summary;
   }
 
-  /// How good the matching is.
+  /// Returns a text on the quality of the matching.
   static std::string guarantee(const MatchOutcome& outcome) {
     if (outcome.optimal) return " (the optimum)";
     if (!outcome.lower_bound || !(*outcome.lower_bound > 0.0)) return " (no bound)";

@@ -32,14 +32,14 @@
 namespace terrace::tools {
 namespace {
 
-/// For work on several threads that allocates and frees blocks of similar sizes again and again:
-/// from then on freed memory stays with the process, if the C library allows. Otherwise the system
-/// takes large blocks back and clears each new page, which took 7 % of the time of meshing. The
-/// peak does not grow.
+/// Keeps freed memory in the process, if the C library supports it, for work on several threads
+/// that allocates and frees blocks of similar sizes again and again. Otherwise the system takes
+/// large blocks back and clears each new page, which took 7 % of the meshing time. The peak does
+/// not grow.
 void keep_freed_memory() {
 #ifdef __GLIBC__
   constexpr int kMegabyte = 1 << 20;
-  mallopt(M_MMAP_THRESHOLD, 32 * kMegabyte);  // the most that it takes
+  mallopt(M_MMAP_THRESHOLD, 32 * kMegabyte);  // the largest value it accepts
   mallopt(M_TRIM_THRESHOLD, 512 * kMegabyte);
   mallopt(M_TOP_PAD, kMegabyte);
 #endif
@@ -51,21 +51,20 @@ class MeshCommand final : public Command {
     part_.define(app, "only triangles that reach inside");
     add_output(app, output_,
                "the file to write: " + endings_of(outputs::kMeshFile) + " (GLB in metres)");
-    app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
-    part_.define_cluster(app, "the mesh of the points of --level (default: L) that it stands for");
-    app.add_option(
-           "--smooth", smooth_,
-           "laplacian, taubin (keeps what is wide) or bilateral (keeps steps), :STEPS behind "
-           "if wanted (10); with --region only inside it")
+    app.add_option("--format", format_, "ply, ply-ascii, obj or glb (default: from the ending)");
+    part_.define_cluster(app, "the mesh of the points of --level (default: L) that it represents");
+    app.add_option("--smooth", smooth_,
+                   "laplacian, taubin (keeps wide features) or bilateral (keeps steps), optionally "
+                   "followed by :STEPS (10); with --region only inside it")
         ->type_name("METHOD")
         ->excludes("--cluster");
     app.add_option("--overlay", overlay_,
-                   "a file of --save-overlay: its heights in place of the store's")
+                   "a file from --save-overlay: use its heights instead of the store's")
         ->type_name("FILE")
         ->excludes("--cluster");
-    app.add_option("--save-overlay", save_overlay_,
-                   "with --smooth: write the heights that changed to this file beside the store, "
-                   "which stays as it is")
+    app.add_option(
+           "--save-overlay", save_overlay_,
+           "with --smooth: write the changed heights to this file; the store stays unchanged")
         ->type_name("FILE");
     app.add_option(
            "--metric", metric_,
@@ -74,27 +73,27 @@ class MeshCommand final : public Command {
         ->capture_default_str()
         ->type_name("NAME");
     add_number(app, "--max-error", max_error_,
-               "the fewest triangles that are vertically within this many metres of every "
-               "sample, checked on the values written",
+               "few triangles within this vertical distance of every sample, in metres, verified "
+               "on the written values",
                kNotNegative)
         ->type_name("METRES");
     app.add_option("--max-points", max_points_,
-                   "the mesh of at most this many points with the smallest error")
+                   "the mesh with the smallest error that has at most this many points")
         ->type_name("N");
     app.add_option("--quality", quality_,
-                   "of an error-bounded mesh: greedy (Delaunay), removal (fewer triangles), fitted "
-                   "(fewer again; heights leave the samples)")
+                   "error-bounded mesh: greedy (Delaunay), removal (fewer triangles) or fitted "
+                   "(fewer still; heights differ from the samples)")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option("--duplicates", duplicates_,
-                   "which of several irregular samples at one x,y counts: all (each is kept within "
-                   "--max-error, or refused where they differ by more), min, max, mean, first, "
-                   "error (refuse them)")
+    app.add_option(
+           "--duplicates", duplicates_,
+           "which of several irregular samples at one x,y counts: all (keeps each within "
+           "--max-error, or fails if they differ by more), min, max, mean, first, error (fails)")
         ->default_str("all; with --max-points mean")
         ->type_name("NAME");
     app.add_option("--fill", fill_,
-                   "what a raster's cells without data become in an error-bounded mesh: none "
-                   "(holes), flat (at the lowest height), interpolate")
+                   "error-bounded mesh of a raster: cells without data become holes (none), flat "
+                   "at the lowest height (flat) or interpolated (interpolate)")
         ->capture_default_str()
         ->type_name("NAME");
   }
@@ -115,12 +114,12 @@ class MeshCommand final : public Command {
         !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty() ||
         !part_.cluster.empty()) {
       throw UsageError(
-          "--max-error and --max-points concern all samples: they exclude --level, --focus, "
+          "--max-error and --max-points apply to all samples: they exclude --level, --focus, "
           "--cluster, --smooth, --overlay and --metric");
     }
     BoundedMeshOptions options;
     if (max_error_ && !max_points_.empty()) {
-      throw UsageError("either --max-error or --max-points, not both");
+      throw UsageError("give either --max-error or --max-points, not both");
     }
     options.max_error = max_error_.value_or(0.0);
     if (!max_points_.empty()) {
@@ -133,7 +132,7 @@ class MeshCommand final : public Command {
                                                          : "mean";
     options.duplicates = parse_duplicates(duplicates);
     if (options.duplicates == tri::PointDuplicates::kAll && !max_points_.empty()) {
-      throw UsageError("--duplicates all needs the bound of --max-error to keep all within");
+      throw UsageError("--duplicates all needs the bound of --max-error");
     }
     options.fill = parse_fill(fill_);
     options.path = output_;
@@ -195,7 +194,7 @@ class MeshCommand final : public Command {
            (one ? "all points have the same x and y" : "all points are on one line over x and y");
   }
 
-  /// What has a reference system is none, and its way to the ground need not be found.
+  /// A store with a CRS is not a scan, so no ground map is needed.
   static bool looks_like_scan(const stream::Store& store) {
     const stream::Crs& crs = store.schema().crs;
     return !store.schema().grid && crs.epsg == 0 && crs.wkt.empty() &&

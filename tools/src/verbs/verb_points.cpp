@@ -41,11 +41,12 @@ class PointsCommand final : public Command {
     add_output(app, output_,
                "the file to write: .xyz, .csv, .ply, .las, .laz, .copc.laz, and .geojson for the "
                "lines of build --entities; - is standard output");
-    app.add_option("--format", format_,
-                   "xyz, csv, ply, ply-ascii, las, laz, copc, geojson; else by the file's ending");
+    app.add_option(
+        "--format", format_,
+        "xyz, csv, ply, ply-ascii, las, laz, copc or geojson (default: from the ending)");
     app.add_option("--near", near_,
-                   "X,Y[,Z] in the store's CRS: the points near a place, the nearest first, with "
-                   "their distance in metres on the ground; without Z heights do not count")
+                   "X,Y[,Z] in the store's CRS: the points near this place, nearest first, with "
+                   "their distance in metres on the ground; without Z, heights do not count")
         ->excludes("--region")
         ->excludes("--focus");
     app.add_option("-k", count_, "with --near: the number of points")
@@ -55,10 +56,10 @@ class PointsCommand final : public Command {
     app.add_option("--within", radius_, "with --near: all points up to this distance, in metres")
         ->needs("--near")
         ->excludes("-k");
-    part_.define_cluster(app, "the points of --level (default: L) that it stands for")
+    part_.define_cluster(app, "the points of --level (default: L) that it represents")
         ->excludes("--near");
     app.add_option("--overlay", overlay_,
-                   "a file of mesh --save-overlay: its heights in place of the store's")
+                   "a file from mesh --save-overlay: use its heights instead of the store's")
         ->type_name("FILE")
         ->excludes("--near")
         ->excludes("--cluster");
@@ -101,7 +102,7 @@ class PointsCommand final : public Command {
   }
 
  private:
-  /// Throws: stream::Error if the options left nothing of a store that has points.
+  /// Throws stream::Error if the options select no point of a store that has points.
   void need_some(const stream::Store& store, const Detail& detail) const {
     if (store.whole().points() == 0) return;
     if (detail.region) throw_none_inside(store);
@@ -122,7 +123,7 @@ class PointsCommand final : public Command {
     const std::string note = lost_height_unit(output_, writer, store.schema(), crs_of(to));
     if (!note.empty()) common.say(note);
   }
-  /// In another CRS the points have neither the store's lattice nor its bounds.
+  /// Returns the header. In another CRS the points have neither the store's lattice nor its bounds.
   static stream::PointHeader header(const stream::Store& store,
                                     std::vector<stream::Channel> attributes,
                                     const std::optional<Transformation>& to) {
@@ -171,7 +172,7 @@ class PointsCommand final : public Command {
     const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
     const auto& [x, y] = place.xy;
     if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
-      common.say(near_ + " lies outside the store: in its CRS X is from " +
+      common.say(near_ + " is outside the store: in its CRS X is from  " +
                  plain_number(box.min[0]) + " to " + plain_number(box.max[0]) + ", Y from " +
                  plain_number(box.min[1]) + " to " + plain_number(box.max[1]));
     }

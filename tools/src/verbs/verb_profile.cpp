@@ -26,14 +26,14 @@ class ProfileCommand final : public Command {
     add_output(app, output_,
                "CSV: distance (metres along the line), x, y, height; - is standard output");
     app.add_option("--line", line_,
-                   "x1,y1,x2,y2[,...] or a GeoJSON file with one LineString; between its places it "
-                   "is straight in the store's CRS")
+                   "x1,y1,x2,y2[,...] or a GeoJSON file with one LineString; straight in the "
+                   "store's CRS between its places")
         ->required()
         ->type_name("LINE");
     crs_.define_given(app, "--line-crs", "the line's places");
     add_number(app, "--step", step_,
-               "metres from row to row (default: a row wherever the line crosses the lattice "
-               "or a diagonal of it, or an edge of the triangulated points)",
+               "metres between rows (default: a row wherever the line crosses the lattice, one of "
+               "its diagonals, or an edge of the triangulated points)",
                kAboveZero)
         ->type_name("METRES");
   }

@@ -20,11 +20,11 @@ namespace {
 class PublishCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", stores_, "what to show; several may be named")->required();
-    add_output(app, output_, "the folder to write: viewer and copies of the stores");
+    app.add_option("STORE", stores_, "the stores to show")->required();
+    add_output(app, output_, "the folder to write: the viewer and copies of the stores");
     app.add_flag("--repack", repack_,
-                 "write the clusters of each level along a curve through them, for fewer requests: "
-                 "for stores of points that came in no order");
+                 "write the clusters of each level along a space-filling curve, for fewer "
+                 "requests; helps stores of unordered points");
   }
 
   Summary run(const CommonOptions& common) override {

@@ -31,17 +31,17 @@ class RasterCommand final : public Command {
         ->capture_default_str()
         ->type_name("NAME");
     add_number(app, "--cell", cell_,
-               "width and height of a cell in units of the output's CRS; cells begin at its "
-               "multiples, so that rasters of one cell size fit each other (default: the raster's "
-               "own cells; of points and of coarser levels, about as many cells as there are "
+               "width and height of a cell in units of the output's CRS; cells start at its "
+               "multiples, so that rasters with the same cell size align (default: the raster's "
+               "own cells; for points and coarser levels, about as many cells as there are "
                "points)",
                kAboveZero)
         ->type_name("SIZE");
-    app.add_option("--align", align_, "a raster: the cells are its cells, in its CRS, all of them")
+    app.add_option("--align", align_, "use all cells of this raster, in its CRS")
         ->type_name("FILE")
         ->excludes("--cell");
     app.add_option("--region", region_,
-                   "only what is inside: minx,miny,maxx,maxy or a GeoJSON file");
+                   "only inside this area: minx,miny,maxx,maxy or a GeoJSON file");
     crs_.define(app);
   }
 

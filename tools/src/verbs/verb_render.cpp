@@ -48,26 +48,26 @@ namespace {
 
 /// The part of an input that a picture shows.
 struct PictureSelection {
-  std::string level;   ///< empty: as much as a picture can show
+  std::string level;   ///< empty: as much detail as a picture can show
   std::string region;  ///< empty: everywhere
   std::string where;   ///< empty: all points
   std::vector<std::string> focuses;
   stream::HeightsOfColour colours = stream::HeightsOfColour::none;
-  bool triangles = false;  ///< triangles are wanted, not points or cells
+  bool triangles = false;  ///< read triangles, not points or cells
 };
 
-/// What is to be drawn, on the ground.
+/// The objects to draw, in ground coordinates.
 struct PictureInput {
-  TriangleMesh mesh;                 ///< positions in metres about the middle of the whole
+  TriangleMesh mesh;                 ///< positions in metres from the centre
   std::vector<double> heights;       ///< of the vertices, in the source's unit
-  std::vector<LineSet::Line> lines;  ///< of the vertices, in place of triangles
-  bool terrain = false;              ///< certainly a height field; else judged by the mesh
-  std::string guess;                 ///< a guess that the picture depends on
-  std::string assumption;            ///< an assumption about units
+  std::vector<LineSet::Line> lines;  ///< between vertices, instead of triangles
+  bool terrain = false;    ///< known to be a height field; otherwise decided from the mesh
+  std::string guess;       ///< a guess that the picture depends on
+  std::string assumption;  ///< an assumption about units
 };
 
-/// Moves positions in stored coordinates to metres on the ground about their middle, and keeps the
-/// heights as the source has them.
+/// Converts positions from stored coordinates to metres on the ground around their centre, and
+/// keeps the heights in the source's unit.
 void put_on_ground(PictureInput& input, const stream::Placement& placement, const Ground& ground) {
   stream::Box3 box;
   for (const stream::Point3& p : input.mesh.positions) box.include(p);
@@ -83,7 +83,7 @@ void put_on_ground(PictureInput& input, const stream::Placement& placement, cons
   input.assumption = ground.assumption();
 }
 
-/// Mesh files rarely name their CRS. x and y that could be degrees, beside heights that could not,
+/// Mesh files rarely name their CRS. If x and y could be degrees and the heights could not, x and y
 /// are taken for longitude and latitude.
 bool looks_geographic(const stream::MeshFile& file) {
   for (const std::string& comment : file.info.comments) {
@@ -109,16 +109,16 @@ PictureInput from_mesh(stream::MeshFile file) {
   return input;
 }
 
-/// Peak bytes of a pixel: the colours, depths and radii of its samples, two passes of smoothing,
-/// and itself.
+/// Peak bytes per pixel: colours, depths and radii of its samples, two smoothing passes, and the
+/// pixel itself.
 constexpr std::uint64_t kBytesPerPixel = 4 * (16 + 12) + 3;
-/// Peak bytes of a point of a cloud, or of a vertex with its two triangles, while it is drawn.
+/// Peak bytes per point of a cloud, or per vertex with its two triangles, while drawing.
 constexpr std::uint64_t kDrawnBytesPerPoint = 112;
-/// Memory for reading a file.
+/// Memory for reading a file, in bytes.
 constexpr std::uint64_t kReadingBytes = std::uint64_t{64} << 20;
 
-/// Memory left for the points of a picture after the program and the pixels. Throws: stream::Error
-/// that names the file if that is less than `bytes`.
+/// Returns the memory left for the points of a picture after the program and the pixels. Throws
+/// stream::Error, which names the file, if that is less than `bytes`.
 std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, std::uint64_t bytes,
                                 const CommonOptions& common) {
   const std::uint64_t fixed = kProgramMemory + size.width * size.height * kBytesPerPixel;
@@ -133,7 +133,7 @@ std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, 
                        .remedy = "give a smaller --size, a coarser --level, or more --memory"});
 }
 
-/// Cells of a raster that a picture shows at most.
+/// Returns the maximum number of raster cells in a picture.
 std::uint64_t cells_of(const ImageSize& size) { return 2 * size.width * size.height; }
 
 PictureInput from_source(const std::string& path, stream::HeightsOfColour colours,
@@ -183,8 +183,8 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
   return input;
 }
 
-/// The finest level with no more points, in clusters that reach into the region, than a picture
-/// needs.
+/// Returns the finest level that has no more points than a picture needs, counted in clusters that
+/// reach into the region.
 std::string finest_level(const stream::Store& store, const std::string& region) {
   const RegionConversion regions(store);
   constexpr std::uint64_t kMost = 4000000;
@@ -205,7 +205,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   PictureInput input;
   input.terrain = store.schema().grid || store.schema().crs.epsg != 0;
 
-  // Reading more than this for one picture takes too long to be a default.
+  // Reading more than this for one picture takes too long by default.
   constexpr std::uint64_t kMostCells = std::uint64_t{1} << 27;
   const bool all_cells =
       selection.level == "0" || (selection.level.empty() && store.points() <= kMostCells);
@@ -224,7 +224,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   const Detail detail = parse_detail(store, level, selection.region, selection.focuses, regions);
   note_idle_focuses(store, detail, common.context());
   memory_for_points(path, size, wanted_points(store, detail) * kDrawnBytesPerPoint, common);
-  // These positions are in the CRS already.
+  // These positions are already in the CRS.
   stream::Placement world;
   world.crs = stored.crs;
   world.coordinates[0].unit = stored.coordinates[0].unit;
@@ -237,7 +237,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
     put_on_ground(input, world, ground);
     return input;
   }
-  // Those of a mesh are drawn as they are.
+  // Triangles of a mesh are drawn unchanged.
   const bool stored_triangles = entities_of(store.schema()) == stream::Entities::triangles;
   if (!store.schema().grid && !selection.triangles && !stored_triangles) {
     input.mesh = detail_points(store, detail);
@@ -249,7 +249,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   if (input.terrain || stored_triangles || !mostly_steep(input.mesh)) return input;
   input = {};
   input.mesh = scan_surface(store, detail, {}, common.context()).mesh;
-  input.guess = "no height field: the surface is that of 'terrace surface'";
+  input.guess = "not a height field: drawn as by 'terrace surface'";
   put_on_ground(input, world, ground);
   return input;
 }
@@ -257,15 +257,16 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
 /// Adds --level, --region, --focus and --rgb.
 void define_picture_input(CLI::App& app, PictureSelection& selection) {
   app.add_option("--level", selection.level,
-                 "store: detail, a number or top (default: all cells, or about 4 M points); tree: "
+                 "store: level, a number or top (default: all cells, or about 4 M points); tree: "
                  "lines up to level L (default: all)")
       ->type_name("L");
   app.add_option("--region", selection.region,
-                 "store: only what is inside (triangles: what reaches inside): a box, "
+                 "store: only inside this area (all triangles that reach inside): a box, "
                  "minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file")
       ->type_name("BOX");
-  app.add_option("--focus", selection.focuses,
-                 "store: BOX:L, all points of level L inside the box; repeatable (the rest: top)")
+  app.add_option(
+         "--focus", selection.focuses,
+         "store: BOX:L, all points of level L inside the box, the top level elsewhere; repeatable")
       ->allow_extra_args(false)
       ->type_name("BOX:L");
   add_where(app, selection.where);
@@ -303,7 +304,7 @@ PictureInput read_picture_input(const std::string& path, const PictureSelection&
   return from_source(path, selection.colours, size, common);
 }
 
-/// Degrees of slope at a vertex with that normal.
+/// Returns the slope in degrees at a vertex with that normal.
 double slope_degrees(const std::array<float, 3>& normal) {
   const double up = std::abs(static_cast<double>(normal[2]));
   if (up == 0.0) return normal[0] == 0.0f && normal[1] == 0.0f ? 0.0 : 90.0;
@@ -320,7 +321,7 @@ class RenderCommand : public Command {
            "tree of 'match' (CSV)")
         ->required()
         ->type_name("FILE");
-    add_output(app, output_, "The picture (PNG); - is standard output");
+    add_output(app, output_, "The PNG file to write; - is standard output");
     app.add_option("--size", size_, "Size of the picture in pixels")
         ->capture_default_str()
         ->type_name("WxH");
@@ -328,15 +329,14 @@ class RenderCommand : public Command {
         ->check(CLI::IsMember({"height", "slope", "level", "rgb", "class", "cluster", "grey"}))
         ->type_name("WHAT");
     app.add_flag("--wire", wire_, "Draw the edges of the triangles");
-    app.add_option("--view", view_, "top, or where the viewer stands: AZIMUTH,ELEVATION in degrees")
+    app.add_option("--view", view_, "top, or the viewer's position: AZIMUTH,ELEVATION in degrees")
         ->capture_default_str()
         ->type_name("VIEW");
     add_number(app, "--exaggerate", exaggerate_,
-               "Multiply heights (default: as much as the relief needs to be seen)", kFactor)
+               "Multiply heights by this factor (default: enough to show the relief)", kFactor)
         ->type_name("FACTOR");
     define_picture_input(app, selection_);
-    app.add_option("--points", points_file_,
-                   "pairs, tree: the file of points that they were made from")
+    app.add_option("--points", points_file_, "pairs, tree: the point file that they were made from")
         ->type_name("FILE");
   }
 
@@ -345,7 +345,7 @@ class RenderCommand : public Command {
     const Stopwatch watch;
     const ImageSize size = parse_size(size_);
     if (size.width > 20000 || size.height > 20000) {
-      throw UsageError("pictures of more than 20000 pixels on a side are not drawn");
+      throw UsageError("--size: at most 20000 pixels on a side");
     }
     const ViewDirection view = parse_view(view_);
     const stream::Naming replace = may_replace(output_, common.force);
@@ -353,7 +353,7 @@ class RenderCommand : public Command {
     memory_for_points(input_, size, 0, common);
     if (is_matching_result(input_)) return render_matching(size, view, replace, common, watch);
     if (!points_file_.empty()) {
-      throw UsageError("--points is for what 'terrace match' wrote; '" + input_ +
+      throw UsageError("--points applies to results of 'terrace match'; '" + input_ +
                        "' is something else");
     }
     if (const auto tree = read_dendrogram(input_)) return render_tree(*tree, size, replace, watch);
@@ -409,7 +409,7 @@ class RenderCommand : public Command {
   }
 
  private:
-  /// Writes the picture. The summary begins with its size.
+  /// Writes the picture. Returns a summary that starts with its size.
   [[nodiscard]] Summary write(const Canvas& canvas, const ImageSize& size,
                               const stream::Naming& replace) const {
     check_interrupt();
@@ -438,13 +438,13 @@ class RenderCommand : public Command {
                           const stream::Naming& replace, const CommonOptions& common,
                           const Stopwatch& watch) {
     if (points_file_.empty()) {
-      throw UsageError("'" + input_ +
-                       "' says which points belong together, not where they are: "
-                       "name the file that it was made from with --points FILE");
+      throw UsageError(
+          "'" + input_ +
+          "' has no positions; pass the file that it was made from with --points FILE");
     }
     if (wire_ || !color_.empty() || !selection_.region.empty() || !selection_.focuses.empty()) {
       throw UsageError(
-          "--wire, --color, --region and --focus do not apply to what 'terrace match' wrote");
+          "--wire, --color, --region and --focus do not apply to results of 'terrace match'");
     }
     MatchingPicture picture = read_matching_picture(input_, points_file_, common);
     if (!picture.assumption.empty()) common.explain(points_file_ + ": " + picture.assumption);
@@ -474,7 +474,7 @@ class RenderCommand : public Command {
     for (const auto& colour : mesh.colours) {
       brightest = std::max({brightest, colour[0], colour[1], colour[2]});
     }
-    // Else all would be black.
+    // Otherwise everything would be black.
     const int full = brightest <= 255 ? 1 : 257;
     std::vector<Rgb> colours;
     colours.reserve(mesh.colours.size());
@@ -485,13 +485,13 @@ class RenderCommand : public Command {
     return colours;
   }
 
-  /// One colour per vertex. heights: in the source's own unit.
+  /// Returns one colour per vertex. `heights` are in the source's unit.
   [[nodiscard]] std::vector<Rgb> colours_of(const TriangleMesh& mesh,
                                             const std::vector<double>& heights,
                                             bool terrain) const {
     std::string by = color_;
     if (by.empty()) {
-      // Formats with fields for colours are often written without any.
+      // Formats with colour fields are often written without colours.
       using Colour = std::array<std::uint16_t, 3>;
       const bool coloured = std::any_of(mesh.colours.begin(), mesh.colours.end(),
                                         [](const Colour& c) { return c != Colour{}; });
@@ -529,7 +529,7 @@ class RenderCommand : public Command {
 
   /// Multiplies the heights and chooses the relief of the light. Returns the factor for heights.
   double exaggerate(TriangleMesh& mesh, bool terrain, const ViewDirection& view) {
-    // An RMS slope that gives clear light and shadow.
+    // RMS slope that gives clear light and shadow.
     constexpr double kPleasant = 0.45;
     const double slope = terrain ? rms_slope(mesh) : 0;
     const double wanted = slope > 0 ? std::clamp(kPleasant / slope, 1.0, 25.0) : 1.0;
@@ -537,7 +537,7 @@ class RenderCommand : public Command {
     if (exaggerate_) {
       factor = *exaggerate_;
     } else if (std::abs(view.elevation) < 89) {
-      // Seen from the side the shape itself is stretched, but not as far as the light.
+      // Seen from the side, the shape itself is stretched too, but less than the light.
       factor = std::round(10 * std::sqrt(wanted)) / 10;
     }
     relief_ = exaggerate_ ? 1.0 : std::max(1.0, wanted / factor);

@@ -26,14 +26,15 @@ class SampleCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     surface_.define(app);
-    app.add_option("--points", points_,
-                   "CSV of places, one a line; columns by name (x,y; lon,lat; longitude,latitude; "
-                   "easting,northing) or else the first two; - is standard input")
+    app.add_option(
+           "--points", points_,
+           "CSV of places, one per line; columns by name (x,y; lon,lat; longitude,latitude; "
+           "easting,northing), otherwise the first two; - is standard input")
         ->capture_default_str()
         ->type_name("FILE");
     app.add_option("-o,--output", output_,
-                   "the lines again, with height, gradient (rise per run), slope and aspect "
-                   "(degrees; aspect clockwise from north, downhill) behind; empty where there is "
+                   "the lines, each followed by height, gradient (rise per run), slope and aspect "
+                   "(degrees; aspect clockwise from north, downhill); empty where there is "
                    "no data")
         ->capture_default_str()
         ->type_name("FILE");

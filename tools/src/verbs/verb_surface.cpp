@@ -30,23 +30,22 @@ class SurfaceCommand final : public Command {
     add_output(app, output_,
                "the file to write: " + endings_of(outputs::kMeshFile) +
                    " (GLB in metres); with --tetrahedra " + endings_of(outputs::kTetrahedraFile));
-    app.add_option("--format", format_, "ply, ply-ascii, obj, glb; else by the file's ending");
-    app.add_option(
-           "--criterion", criterion_,
-           "how the inside is told: poles, by the angles between circumspheres; gabriel and "
-           "edge[:FACTOR] (0.5), which peel tetrahedra off the hull as J. Skala's thesis "
-           "does: gabriel may leave bridges and bury samples, edge leaves slivers many times "
-           "the surface's area; or CGAL's advancing-front, alpha-wrap[:METRES]")
+    app.add_option("--format", format_, "ply, ply-ascii, obj or glb (default: from the ending)");
+    app.add_option("--criterion", criterion_,
+                   "how to find the inside: poles uses the angles between circumspheres; gabriel "
+                   "and edge[:FACTOR] (0.5) peel tetrahedra off the hull as in J. Skala's thesis: "
+                   "gabriel may leave bridges and bury samples, edge leaves slivers with many "
+                   "times the surface's area; advancing-front and alpha-wrap[:METRES] are CGAL's")
         ->capture_default_str()
         ->type_name("NAME");
     app.add_option(
            "--metric", metric_,
-           "of --criterion poles, gabriel and edge: euclidean or elliptical:FILE, an ellipsoid for "
-           "samples that are denser in some directions than in others; see 'terrace cluster "
+           "for --criterion poles, gabriel and edge: euclidean or elliptical:FILE, an ellipsoid "
+           "for samples that are denser in some directions than in others; see 'terrace cluster "
            "--help'")
         ->capture_default_str()
         ->type_name("METRIC");
-    app.add_flag("--tetrahedra", tetrahedra_, "write the tetrahedra inside instead");
+    app.add_flag("--tetrahedra", tetrahedra_, "write the tetrahedra of the inside instead");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -67,7 +66,7 @@ class SurfaceCommand final : public Command {
                  [&] { surface = scan_surface(store, detail, options, common.context()); });
     if (surface.mesh.triangles.empty() && surface.tetrahedra.empty()) {
       common.say(
-          part_.path + ": the points enclose nothing, " +
+          part_.path + ": the points enclose no volume,  " +
           (surface.spanned == 0   ? "all are at one place"
            : surface.spanned == 1 ? "all are on a line"
            : surface.spanned == 3 && options.restore.shape.rule == tri::ShapeRule::kPublished
@@ -83,7 +82,7 @@ class SurfaceCommand final : public Command {
       write_vtk(output_, surface.mesh.positions, surface.mesh.levels, surface.tetrahedra, writer);
       stream::Box3 bounds;
       for (const stream::Point3& p : surface.mesh.positions) bounds.include(p);
-      // Like PLY, VTK has the coordinates as they are.
+      // VTK stores coordinates unchanged, as PLY does.
       coordinates = mesh_coordinates(output_, {.format = "ply"}, units, bounds);
     } else {
       coordinates = write_mesh(output_, surface.mesh, writer, units);

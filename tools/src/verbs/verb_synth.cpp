@@ -35,7 +35,7 @@ class SynthCommand : public Command {
         ->required()
         ->check(CLI::IsMember({"dem", "surface", "uniform", "clusters"}))
         ->type_name("KIND");
-    add_output(app, output_, "The file; of points its ending tells the format");
+    add_output(app, output_, "The file to write; for points its ending selects the format");
     size_option_ = app.add_option("--size", size_, "dem: columns x rows")
                        ->capture_default_str()
                        ->type_name("WxH");
@@ -49,7 +49,7 @@ class SynthCommand : public Command {
     app.add_option("--type", type_, "dem: int16 or float32")
         ->capture_default_str()
         ->check(CLI::IsMember({"int16", "float32"}));
-    app.add_option("--crs", crs_, "dem: EPSG code that is written")
+    app.add_option("--crs", crs_, "dem: EPSG code to write")
         ->capture_default_str()
         ->type_name("EPSG:n");
     app.add_option("--compress", dem_.compression, "dem: none, deflate or zstd")
@@ -57,7 +57,7 @@ class SynthCommand : public Command {
         ->check(CLI::IsMember({"none", "deflate", "zstd"}));
     shuffle_option_ = app.add_option("--shuffle", shuffle_,
                                      "Order of points: all (every point anywhere) or "
-                                     "pieces:MIN-MAX (runs of so many points)")
+                                     "pieces:MIN-MAX (runs of that many points)")
                           ->type_name("HOW");
   }
 
@@ -78,7 +78,7 @@ class SynthCommand : public Command {
     const Stopwatch watch;
     dem_.size = parse_size(size_);
     dem_.crs = crs_named(crs_);
-    dem_.crs.name.clear();  // the code says it all
+    dem_.crs.name.clear();  // the code is enough
     dem_.floats = type_ == "float32";
     dem_.seed = common.seed;
     dem_.threads = common.threads;

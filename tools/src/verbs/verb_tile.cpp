@@ -22,7 +22,7 @@
 namespace terrace::tools {
 namespace {
 
-/// "LAST" or "FIRST-LAST"; empty leaves the request's own.
+/// Parses "LAST" or "FIRST-LAST". An empty text leaves the request unchanged.
 void set_zooms(const std::string& text, TilesRequest& request) {
   if (text.empty()) return;
   const auto number = [&](std::string_view part) {
@@ -38,7 +38,7 @@ void set_zooms(const std::string& text, TilesRequest& request) {
       number(std::string_view(text).substr(dash == std::string::npos ? 0 : dash + 1));
 }
 
-/// "interpolate", "flat" or "flat:METRES".
+/// Parses "interpolate", "flat" or "flat:METRES".
 void set_fill(const std::string& text, TilesRequest& request) {
   if (text.starts_with("flat:")) {
     request.flat_height = parse_number(text.substr(5), "--fill flat");
@@ -51,42 +51,40 @@ void set_fill(const std::string& text, TilesRequest& request) {
 class TileCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", store_, "where the samples come from: a raster, or irregular points")
-        ->required();
+    app.add_option("STORE", store_, "the store to read: a raster, or irregular points")->required();
     add_output(app, output_, "the folder to write");
     app.add_option("--format", format_, "quantized-mesh")->capture_default_str();
-    app.add_option("--zoom", zoom_, "FIRST-LAST; else from 0 to where tiles show every sample");
+    app.add_option("--zoom", zoom_,
+                   "FIRST-LAST (default: from 0 to the zoom that shows every sample)");
     add_number(app, "--max-error", max_error_,
-               "error bound of the deepest zoom in metres, twice as much at each zoom above; else "
-               "what globes expect: 77067 / 2^zoom",
+               "error bound of the deepest zoom in metres, doubled at each zoom above (default: "
+               "what globes expect, 77067 / 2^zoom)",
                kAboveZero)
         ->type_name("METRES");
     app.add_option("--quality", quality_, "greedy, removal (fewer triangles) or fitted")
         ->capture_default_str();
-    app.add_option(
-           "--fill", fill_,
-           "heights where there is no data: interpolate (0 beyond the outline of the data), "
-           "or everywhere flat (the store's lowest) or flat:METRES")
+    app.add_option("--fill", fill_,
+                   "heights where there is no data: interpolate (0 beyond the outline of the "
+                   "data), flat (the store's lowest height) or flat:METRES")
         ->capture_default_str();
     app.add_flag("--gzip", gzip_,
-                 "compressed tiles: the server must send Content-Encoding: gzip with them");
-    app.add_flag("--normals", normals_, "with normals at the vertices, for lighting");
-    app.add_option("--water", water_,
-                   "with a mask of what is water: nodata (what a raster has no data for), or a "
-                   "height of the store")
+                 "compress the tiles; the server must send Content-Encoding: gzip with them");
+    app.add_flag("--normals", normals_, "add normals at the vertices, for lighting");
+    app.add_option(
+           "--water", water_,
+           "add a water mask: nodata (cells of a raster without data), or a height of the store")
         ->type_name("nodata|HEIGHT");
-    app.add_flag("--metadata", metadata_, "with the list of the tiles below in each tile");
+    app.add_flag("--metadata", metadata_, "list in each tile the tiles below it");
     app.add_option("--vertical", vertical_,
-                   "ellipsoidal: heights are above the ellipsoid; ignore: take them as if; "
-                   "orthometric: above the sea, and go to the ellipsoid from the store's vertical "
-                   "CRS, or from EGM96 if it has none");
+                   "ellipsoidal: heights are above the ellipsoid; ignore: treat them as if they "
+                   "were; orthometric: heights are above sea level, and are converted from the "
+                   "store's vertical CRS, or from EGM96 if it has none");
     app.add_option("--geoid", geoid_, "a geoid grid of GeographicLib, added to the heights")
         ->type_name("FILE");
-    app.add_flag(
-        "--resume", resume_,
-        "go on with a run that was interrupted, or mend a finished set: what is whole is kept");
+    app.add_flag("--resume", resume_,
+                 "continue an interrupted run, or repair a finished set; intact tiles are kept");
     add_where(app, where_);
-    app.add_option("--name", name_, "of the tile set, in layer.json");
+    app.add_option("--name", name_, "name of the tile set, for layer.json");
   }
 
   Summary run(const CommonOptions& common) override {
@@ -108,7 +106,7 @@ class TileCommand final : public Command {
     summary.text += output_ + ": " + counted(result.tiles, "tile") + ", " +
                     readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
     if (result.made < result.tiles) {
-      summary.text += "; " + with_commas(result.tiles - result.made) + " were there already";
+      summary.text += "; " + with_commas(result.tiles - result.made) + " already existed";
     }
     summary.text += "\n";
     return summary;
@@ -117,7 +115,7 @@ class TileCommand final : public Command {
  private:
   [[nodiscard]] TilesRequest request(const CommonOptions& common) const {
     if (format_ != "quantized-mesh") {
-      throw UsageError("--format '" + format_ + "': quantized-mesh is the one that works");
+      throw UsageError("--format '" + format_ + "': only quantized-mesh is supported");
     }
     TilesRequest request{.folder = output_, .name = name_};
     set_zooms(zoom_, request);

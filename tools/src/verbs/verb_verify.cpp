@@ -32,17 +32,18 @@ class VerifyCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("PATH", path_, "the store, or the folder of tiles, to check")->required();
-    app.add_option("--store", store_,
-                   "where the tiles' samples come from: heights are checked against all of them");
+    app.add_option(
+        "--store", store_,
+        "the store that the tiles were made from: heights are checked against all its samples");
     add_where(app, where_);
     add_number(app, "--max-error", max_error_,
-               "error bound of the deepest zoom in metres, twice as much at each zoom above; else "
-               "what layer.json states",
+               "error bound of the deepest zoom in metres, doubled at each zoom above (default: "
+               "from layer.json)",
                kAboveZero)
         ->type_name("METRES");
     app.add_option("--vertical", vertical_,
                    "what the store's heights refer to: ellipsoidal; orthometric, as for `terrace "
-                   "tile`; ignore takes them as ellipsoidal");
+                   "tile`; ignore treats them as ellipsoidal");
     app.add_option("--geoid", geoid_, "the geoid grid that the tiles were made with")
         ->type_name("FILE");
   }
@@ -82,8 +83,7 @@ class VerifyCommand final : public Command {
   [[nodiscard]] Summary tiles(const CommonOptions& common) const {
     const Stopwatch watch;
     if (store_.empty() && has_store_options()) {
-      throw UsageError(
-          "--where, --max-error, --vertical and --geoid have a meaning with --store alone");
+      throw UsageError("--where, --max-error, --vertical and --geoid need --store");
     }
     std::optional<stream::Store> store;
     if (!store_.empty()) store.emplace(open_store(store_, where_));
@@ -123,8 +123,8 @@ class VerifyCommand final : public Command {
     const bool ok = result.problems.empty();
     if (result.torn > 0) {
       summary.text += counted(result.torn, "file") +
-                      " left over from a run that was killed, no part of the set: the next "
-                      "`terrace tile` into the folder removes them\n";
+                      " left over from a killed run and not part of the set: the next `terrace "
+                      "tile` into the folder removes them\n";
     }
     summary.json = {{"ok", ok},
                     {"problems", problems},

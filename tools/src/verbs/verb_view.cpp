@@ -23,7 +23,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// False if there is no xdg-open. It ends by itself; whether a browser came nobody can tell.
+/// Returns false if there is no xdg-open. It exits on its own; whether a browser opened is unknown.
 bool open_browser(const std::string& address) {
   std::string program = "xdg-open", argument = address;
   char* const arguments[] = {program.data(), argument.data(), nullptr};
@@ -41,8 +41,8 @@ bool open_browser(const std::string& address) {
 class ViewCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("STORE", stores_, "what to show; several may be named")->required();
-    app.add_option("--port", port_, "of 127.0.0.1 (default: any that is free)")
+    app.add_option("STORE", stores_, "the stores to show")->required();
+    app.add_option("--port", port_, "port on 127.0.0.1 (default: any free one)")
         ->check(CLI::Range(0, 65535))
         ->type_name("PORT");
     app.add_flag("--no-open", no_open_, "do not open a browser");
@@ -58,7 +58,7 @@ class ViewCommand final : public Command {
                (stores_.size() == 1 ? "the store" : counted(stores_.size(), "store")) +
                " until Ctrl-C");
     if (!no_open_ && !open_browser(address)) {
-      common.say("there is no xdg-open to open a browser: open the address yourself");
+      common.say("xdg-open not found; open the address in a browser yourself");
     }
     const Stopwatch watch;
     server.run([] { return interrupted(); });

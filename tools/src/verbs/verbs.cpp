@@ -9,7 +9,7 @@ std::span<const Verb> verbs() {
   static const std::array<Verb, 18> kVerbs{{
       {"build", "stream the inputs once and write a store", "terrace build dem.tif -o dem.terrace",
        make_build},
-      {"info", "tell what a store or a file holds", "terrace info dem.tif --json", make_info},
+      {"info", "describe a store or a file", "terrace info dem.tif --json", make_info},
       {"verify", "check every checksum and invariant", "terrace verify dem.terrace", make_verify},
       {"points", "write the points of a level, a region, or mixed levels",
        "terrace points dem.terrace --level 2 -o coarse.ply", make_points},
@@ -19,7 +19,7 @@ std::span<const Verb> verbs() {
       {"surface", "write a 3D surface", "terrace surface scan.terrace -o scan.ply", make_surface},
       {"tile", "write terrain tiles for web globes",
        "terrace tile dem.terrace --vertical ellipsoidal -o tiles", make_tile, "--resume"},
-      {"sample", "answer heights and slopes at points",
+      {"sample", "look up heights and slopes at points",
        "terrace sample dem.terrace --points places.csv", make_sample},
       {"raster", "interpolate a GeoTIFF", "terrace raster dem.terrace --cell 90 -o coarse.tif",
        make_raster},
