@@ -8,17 +8,17 @@
 
 namespace terrace::tools {
 
-/// From where a picture is seen: the compass direction in which the viewer stands, and how high
-/// above the horizon, both in degrees. From above, north is up.
+/// Where a picture is seen from: the compass direction of the viewer and the elevation above the
+/// horizon, both in degrees. Seen from above, north is up.
 struct ViewDirection {
   double azimuth = 180.0;
   double elevation = 90.0;
 };
 
-/// "top" or "AZIMUTH,ELEVATION" (elevation from -90 to 90). Throws: UsageError.
+/// Parses "top" or "AZIMUTH,ELEVATION" (elevation from -90 to 90). Throws UsageError.
 ViewDirection parse_view(const std::string& text);
 
-/// A parallel projection: every direction right-handed and of unit length.
+/// A parallel projection. The directions have unit length and form a right-handed system.
 struct Camera {
   stream::Point3 right{1, 0, 0}, up{0, 1, 0}, toward{0, 0, 1};  ///< toward the viewer
   double scale = 1.0;                                           ///< pixels per metre
@@ -27,7 +27,7 @@ struct Camera {
 
   explicit Camera(const ViewDirection& view);
 
-  /// Pixels from the left and from the top, and the depth (metres toward the viewer).
+  /// Returns pixels from the left, pixels from the top, and the depth in metres toward the viewer.
   [[nodiscard]] std::array<double, 3> project(const stream::Point3& p) const;
 };
 

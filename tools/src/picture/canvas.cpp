@@ -12,7 +12,7 @@
 namespace terrace::tools {
 namespace {
 
-/// Neither snow nor shadow.
+/// Distinct from both snow and shadow.
 constexpr std::array<float, 3> kBackground{0.90F, 0.92F, 0.94F};
 
 }  // namespace
@@ -67,7 +67,7 @@ float Light::shade(stream::Point3 normal, const stream::Point3& toward) const {
   normal[0] *= relief;
   normal[1] *= relief;
   normal = unit(normal);
-  // Flat ground keeps its tint; slopes toward the light grow paler, the others darker.
+  // Flat ground keeps its tint. Slopes toward the light become paler, others darker.
   const double lit = std::max(dot(normal, direction), 0.0) / flat;
   constexpr double kAmbient = 0.28;
   return static_cast<float>(kAmbient + (1 - kAmbient) * 0.92 * lit);

@@ -14,18 +14,19 @@ namespace terrace::tools {
 
 using namespace terrain;
 
-/// What is drawn on: colour and depth of samples, 2 x 2 to a pixel.
+/// The drawing surface: colour and depth of samples, with 2 x 2 samples per pixel.
 class Canvas {
  public:
   static constexpr std::uint32_t kOversampling = 2;
 
-  /// width, height: of the final picture.
+  /// `width` and `height` are those of the final picture, in pixels.
   Canvas(std::uint32_t width, std::uint32_t height);
 
   [[nodiscard]] std::uint32_t width() const { return width_; }    ///< in samples
   [[nodiscard]] std::uint32_t height() const { return height_; }  ///< in samples
 
-  /// Colour (red, green, blue in 0 to 1) and depth of a sample; depth -infinity where nothing is.
+  /// Returns the colour of a sample (red, green and blue from 0 to 1). The depth below is -infinity
+  /// for an empty sample.
   [[nodiscard]] std::array<float, 3>& colour(std::uint32_t x, std::uint32_t y) {
     return colours_[std::size_t{y} * width_ + x];
   }
@@ -33,7 +34,7 @@ class Canvas {
     return depths_[std::size_t{y} * width_ + x];
   }
 
-  /// The picture: samples averaged, RGB, rows from the top.
+  /// Returns the picture: averaged samples as RGB bytes, rows from the top.
   [[nodiscard]] std::vector<std::uint8_t> resolve() const;
 
  private:
@@ -42,19 +43,19 @@ class Canvas {
   std::vector<float> depths_;
 };
 
-/// How surfaces are lit.
+/// Lighting of surfaces.
 struct Light {
   stream::Point3 direction{};  ///< toward the light, unit length
-  double relief = 1.0;         ///< slopes are multiplied by this before they are lit
-  double flat = 0.0;           ///< the light on flat ground, which is shown as 1
+  double relief = 1.0;         ///< factor applied to slopes before lighting
+  double flat = 0.0;           ///< brightness of flat ground, displayed as 1
 
-  /// Cartographic light from the north-west, 45 degrees high, turned with the viewer.
+  /// Returns cartographic light from the north-west, 45 degrees high, that turns with the viewer.
   static Light for_terrain(const ViewDirection& view, double relief);
-  /// A light beside the viewer, for bodies seen from any side.
+  /// Returns a light next to the viewer, for bodies seen from any side.
   static Light beside(const Camera& camera);
 
-  /// Brightness from 0 to 1 of a surface with that unit normal, seen from `toward` (the normal is
-  /// turned to the viewer first: surfaces have two sides).
+  /// Returns the brightness, from 0 to 1, of a surface with that unit normal seen from `toward`.
+  /// The normal is first turned to the viewer, because surfaces have two sides.
   [[nodiscard]] float shade(stream::Point3 normal, const stream::Point3& toward) const;
 };
 

@@ -68,7 +68,8 @@ Rgb store_level_colour(unsigned level, unsigned top) {
 }
 
 Rgb category_colour(std::int64_t category) {
-  // P. Green-Armytage's idea of many distinct colours, in twelve of middle lightness.
+  // Based on P. Green-Armytage's set of many distinct colours, reduced to twelve of medium
+  // lightness.
   static constexpr std::array<Rgb, 12> kCategories{{{68, 119, 170},
                                                     {238, 153, 51},
                                                     {51, 153, 85},
@@ -121,7 +122,7 @@ Rgb cluster_colour(std::int64_t cluster) {
   if (cluster < 0) return {200, 200, 200};
   const std::uint64_t scattered = base::splitmix64(static_cast<std::uint64_t>(cluster));
   Rgb colour = category_colour(static_cast<std::int64_t>(scattered >> 8));
-  // In five shades, so that two clusters side by side are rarely alike.
+  // Use five shades, so that adjacent clusters rarely look alike.
   const double shade = 0.7 + 0.12 * static_cast<double>(scattered % 5);
   for (std::uint8_t& c : colour) c = static_cast<std::uint8_t>(std::min(255.0, shade * c));
   return colour;
@@ -135,7 +136,7 @@ HeightTint HeightTint::of(std::vector<double> heights) {
   const std::size_t outer = heights.size() / 200;
   tint.low = heights[outer];
   tint.high = heights[heights.size() - 1 - outer];
-  // A shore only where the sea is a good part of what is seen: beaches and polders lie below 0 too.
+  // Show a shore only if much of the picture is sea: beaches and polders are below 0 too.
   tint.shore = tint.low < 0 && tint.high > 0 && -tint.low > 0.05 * tint.high;
   return tint;
 }

@@ -7,40 +7,42 @@
 
 namespace terrace::tools {
 
-/// Red, green and blue of 255.
+/// Red, green and blue from 0 to 255.
 using Rgb = std::array<std::uint8_t, 3>;
 
-/// Red, green and blue of 1.
+/// Returns red, green and blue from 0 to 1.
 inline std::array<float, 3> as_floats(const Rgb& colour) {
   return {static_cast<float>(colour[0]) / 255.0F, static_cast<float>(colour[1]) / 255.0F,
           static_cast<float>(colour[2]) / 255.0F};
 }
 
-/// Hypsometric tint: deep to high land as green, straw, brown, grey, white. share: 0 lowest, 1
-/// highest; clamped.
+/// Returns the hypsometric tint of land, from low to high: green, straw, brown, grey, white.
+/// `share` is 0 for the lowest and 1 for the highest land, and is clamped.
 Rgb land_colour(double share);
-/// Sea floor: dark to light blue. share: 0 deepest, 1 at the surface.
+/// Returns the tint of the sea floor, from dark to light blue. `share` is 0 for the deepest point
+/// and 1 at the surface.
 Rgb sea_colour(double share);
-/// Slope: white, yellow, red, dark red at 0, 15, 35 and 60 degrees and above.
+/// Returns the colour of a slope: white, yellow, red and dark red at 0, 15, 35 and from 60 degrees.
 Rgb slope_colour(double degrees);
-/// Levels of a store: dark blue for the coarsest, `top`, to yellow for level 0.
+/// Returns the colour of a store's level, from dark blue for the coarsest, `top`, to yellow for
+/// level 0.
 Rgb store_level_colour(unsigned level, unsigned top);
-/// Colours that differ well for small numbers: groups, clusters.
+/// Returns colours that are easy to tell apart for small numbers, such as groups or clusters.
 Rgb category_colour(std::int64_t category);
-/// The classes of ASPRS LAS 1.4 as is customary: ground brown, vegetation green, buildings red,
-/// water blue, noise magenta. Those that it does not define have the colours of categories.
+/// Returns the customary colours of ASPRS LAS 1.4 classes: ground brown, vegetation green,
+/// buildings red, water blue, noise magenta. Undefined classes use category_colour().
 Rgb class_colour(std::int64_t number);
-/// The same for clusters, scattered, because consecutive numbers are not neighbours. Negative
-/// numbers, points without a cluster, are light grey.
+/// Returns category colours for clusters, in scattered order because consecutive numbers are not
+/// neighbours. Negative numbers, points without a cluster, are light grey.
 Rgb cluster_colour(std::int64_t cluster);
 
-/// The range of heights that the tints span: without the outermost 0.5 % of what is shown on either
-/// side, and with a shore at 0 where there is land and sea.
+/// The height range of the tints. It leaves out the outermost 0.5 % of the picture at either end,
+/// and has a shore at 0 if there is both land and sea.
 struct HeightTint {
   double low = 0.0, high = 1.0;
   bool shore = false;
 
-  /// heights: each stands for an equal part of what is shown. Those that are not finite are
+  /// Each of the `heights` represents an equal part of the picture. Heights that are not finite are
   /// ignored. O(n log n).
   static HeightTint of(std::vector<double> heights);
   [[nodiscard]] Rgb colour(double height) const;

@@ -15,8 +15,8 @@ namespace {
 using cluster::Dendrogram;
 using cluster::Merge;
 
-/// The points in the order of the tree's leaves, from a stack: trees may be as deep as they are
-/// wide.
+/// Returns the points in the order of the tree's leaves. Uses a stack, because a tree may be as
+/// deep as it is wide.
 std::vector<double> leaf_places(const Dendrogram& tree) {
   std::vector<double> place(tree.points, 0.0);
   const auto points = static_cast<std::uint32_t>(tree.points);
@@ -38,7 +38,7 @@ std::vector<double> leaf_places(const Dendrogram& tree) {
   return place;
 }
 
-/// Colour number of each merge: one per subtree that lies below the threshold, -1 above.
+/// Returns the colour number of each merge: one per subtree below the threshold, -1 above it.
 std::vector<std::int64_t> groups_below(const Dendrogram& tree, double threshold) {
   std::vector<std::int64_t> group(tree.merges.size(), -1);
   std::int64_t next = 0;
@@ -72,18 +72,18 @@ void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
   if (tree.merges.empty()) return;
   const double margin = 0.03 * std::min(canvas.width(), canvas.height());
   const double wide = canvas.width() - 2 * margin, high = canvas.height() - 2 * margin;
-  // An inversion may be lower than its parts, the last one too.
+  // An inversion may be lower than its parts, even the last merge.
   double top = 0.0;
   for (const Merge& merge : tree.merges) top = std::max(top, merge.height);
-  // All merges of equal points lie at 0.
+  // All merges of equal points are at 0.
   const double scale = top > 0 ? high / top : 0.0;
   const double step = wide / static_cast<double>(tree.points);
-  // Two samples make a pixel; crowded lines are one sample wide.
+  // A pixel has two samples across; crowded lines are one sample wide.
   const double half = step >= 8 ? 1.0 : 0.5;
   const auto row = [&](double height) { return canvas.height() - margin - scale * height; };
 
   const std::vector<double> leaf = leaf_places(tree);
-  // The share of the height below which SciPy colours its clusters too.
+  // SciPy colours clusters below the same share of the height.
   const std::vector<std::int64_t> group = groups_below(tree, 0.7 * top);
   std::vector<double> middle(tree.merges.size());
   const auto points = static_cast<std::uint32_t>(tree.points);

@@ -18,23 +18,24 @@ using Colour = std::array<float, 3>;
 
 constexpr Colour kPaper{1.0F, 1.0F, 1.0F}, kDot{0.13F, 0.15F, 0.2F};
 
-/// A rectangle of samples with edges that fade over one sample.
+/// Draws shapes whose edges fade over one sample, within a rectangle of samples.
 class Brush {
  public:
   Brush(Canvas& canvas, std::uint32_t first_row, std::uint32_t last_row)
       : canvas_(canvas), first_(first_row), last_(last_row) {}
 
-  /// All samples within `radius` of the line from a to b (samples from the left and the top).
+  /// Paints all samples within `radius` of the line from a to b (in samples from the left and the
+  /// top).
   void stroke(const std::array<double, 3>& a, const std::array<double, 3>& b, double radius,
               const Colour& colour) {
     const double reach = radius + 0.5;
     const double dx = b[0] - a[0], dy = b[1] - a[1], square = dx * dx + dy * dy;
-    // NaN and places far beyond the picture are not drawn.
+    // Skip NaN and places far outside the picture.
     if (!(square < 1e18 && std::abs(a[0]) + std::abs(a[1]) < 1e9)) return;
     const double top = std::max(std::floor(std::min(a[1], b[1]) - reach), double{0.0} + first_);
     const double bottom = std::min(std::ceil(std::max(a[1], b[1]) + reach), double{0.0} + last_);
     for (double y = top; y < bottom; ++y) {
-      // The part of the line that is near this row.
+      // The part of the line near this row.
       double from = 0, to = 1;
       if (dy != 0) {
         const double s = (y + 0.5 - reach - a[1]) / dy, t = (y + 0.5 + reach - a[1]) / dy;
@@ -75,15 +76,15 @@ void fill_with_paper(Canvas& canvas, std::uint32_t first_row, std::uint32_t last
   }
 }
 
-/// Red at the bottom, black at the top.
+/// Returns the colour of a level: red at the bottom, black at the top.
 Colour level_colour(std::uint32_t level, std::uint32_t top) {
   const float share = top > 1 ? static_cast<float>(level - 1) / static_cast<float>(top - 1) : 0.0F;
   const float light = 1.0F - share;
   return {0.87F * light, 0.11F * light * light, 0.10F * light * light};
 }
 
-/// Half the width of a line. Higher levels have fewer lines, and room for wider ones: distances
-/// grow by the square root of 2 from level to level.
+/// Returns half the width of a line. Higher levels have fewer lines and room for wider ones:
+/// distances grow by a factor of sqrt(2) per level.
 double width_of_level(std::uint32_t level, double thin) {
   const double thick = std::max(4.6, 1.8 * thin);
   double width = thin;
@@ -91,7 +92,7 @@ double width_of_level(std::uint32_t level, double thin) {
   return std::min(width, thick);
 }
 
-/// Lines of higher levels first, or last.
+/// Returns the lines in drawing order, with higher levels first or last.
 std::vector<std::uint32_t> by_level(const std::vector<MatchingLine>& lines, bool higher_first) {
   std::vector<std::uint32_t> order(lines.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -101,8 +102,8 @@ std::vector<std::uint32_t> by_level(const std::vector<MatchingLine>& lines, bool
   return order;
 }
 
-/// The usual distance between neighbours in samples: the median length of pairs, or what evenly
-/// spread points would have if that is less.
+/// Returns the usual distance between neighbours in samples: the median length of pairs, or the
+/// spacing of evenly spread points if that is less.
 double usual_distance(const std::vector<MatchingLine>& lines,
                       const std::vector<std::array<double, 3>>& places, std::size_t points,
                       const Canvas& canvas) {
@@ -160,9 +161,9 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
     if (line.b < points) reached[line.b] = true;
   }
   const double usual = usual_distance(lines, places, points, canvas);
-  // Pairs stand alone; the lowest lines of a crowded tree leave room for the others.
+  // Pairs do not overlap; the lowest lines of a crowded tree leave room for the others.
   const double thin = std::clamp(0.055 * usual, picture.result.top > 1 ? 0.75 : 1.0, 4.0);
-  // In a crowd dots would hide the lines, and small lines the large ones.
+  // In a crowded picture, dots would hide the lines, and small lines the large ones.
   const bool crowded = usual < 14;
   const std::vector<std::uint32_t> order = by_level(lines, !crowded);
   const double dot = std::max(2.1 * thin, 1.5);

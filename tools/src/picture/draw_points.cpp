@@ -24,16 +24,16 @@ struct Splat {
   float x, y, depth, radius;
 };
 
-/// Per sample, beside the canvas: the radius of the disc, 0 where there is none.
+/// Radius of the disc at each sample of the canvas, 0 where there is none.
 using Radii = std::vector<float>;
 
-/// A surface steeper than this, from sample to sample, is taken for two surfaces.
+/// Returns the depth step between samples above which a surface counts as two surfaces.
 float jump(float radius, const Camera& camera) {
   return 4 * (radius + 1) / static_cast<float>(camera.scale);
 }
 
-/// Samples that the cloud covers, as if it had no gaps: cells of a grid coarse enough that a cell
-/// of the cloud holds several points are counted.
+/// Returns the number of samples that the cloud covers, ignoring its gaps. Counts the cells of a
+/// grid so coarse that a covered cell holds several points.
 double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   double area = 1;
   for (std::uint32_t cell = 2; cell <= 256; cell *= 2) {
@@ -68,25 +68,26 @@ std::vector<Splat> projected(const std::vector<stream::Point3>& positions, const
   return splats;
 }
 
-/// Discs of radius r cover all but exp(-points * pi * r^2 / area) of an area over which so many
-/// points are scattered evenly. Of a closed body half of the points lie behind the other half, so
-/// half a percent of it stays uncovered, and nothing of a terrain.
+/// Returns the radius for points scattered evenly over an area, of which discs of radius r leave
+/// exp(-points * pi * r^2 / area) uncovered. Half of a closed body's points are on its back, so
+/// half a percent of it stays uncovered, but nothing of a terrain.
 double usual_radius(const std::vector<Splat>& splats, const Canvas& canvas) {
   constexpr double kCover = 1.9;
   const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
   return std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0);
 }
 
-/// Where a cloud is coarse in parts, discs as large as the part needs: by the distances to a few
-/// neighbours among the points that are as coarse, but not much above what is usual among them.
+/// Sets radii for a cloud with coarser parts, large enough for each part: from the distances to a
+/// few neighbours among points of the same coarseness, but not much above the usual distance among
+/// them.
 void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& canvas,
                const DrawOptions& options, std::vector<Splat>& splats) {
   constexpr unsigned kRank = 8;
-  // Points of one side: for scattered ones the same cover as below, for representatives, which keep
-  // apart, less.
+  // Points of one side. Scattered points get the same cover as below; representatives, which keep
+  // apart, need less.
   const double scattered = 1.34 * std::sqrt(std::numbers::pi / kRank);
   const double apart = 0.8 * std::sqrt(std::numbers::pi / kRank);
-  // Discs that cover a tenth of the picture show no shape.
+  // Discs as large as a tenth of the picture show no shape.
   const double most = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
   std::array<std::vector<std::uint32_t>, 256> groups;
   for (std::size_t i = 0; i < splats.size(); ++i) {
@@ -112,14 +113,15 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
   }
 }
 
-/// Averages depths over a square somewhat larger than the disc, only over neighbours whose depth is
-/// not a jump away: else the normals would be those of the discs. Rows, then columns.
+/// Averages depths over a square somewhat larger than the disc, first along rows, then along
+/// columns. Neighbours beyond a jump are left out. Without smoothing, the normals would be those of
+/// the discs.
 void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, unsigned threads) {
   using Floats __attribute__((vector_size(16))) = float;
   constexpr int kLanes = 4;
   const std::uint32_t width = canvas.width(), height = canvas.height();
-  // Rows and columns as lines, each with some samples without depth behind it, so that all lanes
-  // can be read.
+  // Rows and columns as lines, each followed by some samples without depth, so that all lanes can
+  // be read.
   const std::size_t row_size = width + kLanes, column_size = height + kLanes;
   std::vector<float> rows(row_size * height, -HUGE_VALF), columns(column_size * width, -HUGE_VALF);
   const auto smooth = [&](const float* line, std::uint32_t size, std::uint32_t index, float disc) {
@@ -163,7 +165,7 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
   });
 }
 
-/// The slope of the depths at a sample along one axis, from the side without a jump.
+/// Returns the slope of the depths at a sample along one axis, from the side without a jump.
 float slope(float before, float here, float after, float step) {
   const float back = here - before, ahead = after - here;
   const bool back_good = std::abs(back) <= step, ahead_good = std::abs(ahead) <= step;
@@ -173,7 +175,7 @@ float slope(float before, float here, float after, float step) {
   return 0;
 }
 
-/// Lights every sample by the normal that its depth and its neighbours' tell.
+/// Lights every sample by the normal computed from the depths of it and its neighbours.
 void light_by_depth(const Camera& camera, const Light& light, const Radii& radii, unsigned threads,
                     Canvas& canvas) {
   for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
@@ -203,8 +205,8 @@ void light_by_depth(const Camera& camera, const Light& light, const Radii& radii
   });
 }
 
-/// Whether all of a disc is behind what has been drawn. One sample that is not will do: on a steep
-/// slope most of the disc is.
+/// Returns whether the whole disc is behind the drawn samples. A single visible sample is enough:
+/// on a steep slope most of the disc is hidden.
 bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth) {
   const auto inside = [](double value, std::uint32_t size) {
     return static_cast<std::uint32_t>(std::clamp(value, 0.0, size - 1.0));
@@ -213,7 +215,7 @@ bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth
        y <= inside(cy + radius, canvas.height()); ++y) {
     for (std::uint32_t x = inside(cx - radius, canvas.width());
          x <= inside(cx + radius, canvas.width()); ++x) {
-      // Beside the outline there is nothing.
+      // There is nothing outside the outline.
       if (std::isfinite(canvas.depth(x, y)) && canvas.depth(x, y) <= depth) return false;
     }
   }
@@ -224,7 +226,7 @@ bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth
 
 void fit_discs(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas) {
   if (positions.empty()) return;
-  // The radius may grow a little as the area is measured in coarse cells.
+  // The radius may grow a little, because the area is measured in coarse cells.
   constexpr double kMargin = 0.02, kGrowth = 1.3;
   const double side = std::min(canvas.width(), canvas.height());
   const double beyond =
@@ -266,8 +268,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
           const float dy = static_cast<float>(y) + 0.5F - s.y;
           const float square = (dx * dx + dy * dy) / (radius * radius);
           if (square > 1) continue;
-          // Discs are a little vaulted, so that overlapping ones meet halfway between their
-          // centres.
+          // Discs are slightly domed, so that overlapping ones meet halfway between their centres.
           const float depth = s.depth - square * radius * 0.1F / static_cast<float>(camera.scale);
           if (!(depth > canvas.depth(x, y))) continue;
           canvas.depth(x, y) = depth;
@@ -278,7 +279,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
     }
   });
   if (own_normals) return;
-  // Twice: the second pass takes away what the edges of the first one's squares leave.
+  // Smooth twice: the second pass removes the edges that the squares of the first leave.
   smooth_depths(canvas, radii, camera, options.threads);
   smooth_depths(canvas, radii, camera, options.threads);
   light_by_depth(camera, light, radii, options.threads, canvas);
@@ -287,7 +288,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
 void draw_marks(const std::vector<stream::Point3>& positions, const Camera& camera,
                 const DrawOptions& options, Canvas& canvas) {
   if (positions.empty()) return;
-  // As large as they can be without merging, up to a few pixels.
+  // As large as possible without merging, up to a few pixels.
   const double share =
       static_cast<double>(canvas.width()) * canvas.height() / static_cast<double>(positions.size());
   const double radius = std::clamp(0.14 * std::sqrt(share), 1.0, 8.0);
@@ -299,8 +300,8 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
     nearest = std::max(nearest, depth);
     farthest = std::min(farthest, depth);
   }
-  // What lies just in front is the disc of the point itself or of its neighbours. A share of the
-  // whole, as heights may be in another unit than what the scale is for.
+  // A surface just in front is the disc of the point itself or of a neighbour. The margin is a
+  // share of the whole, as heights may be in another unit than the scale.
   const double behind = std::max(12.0 / camera.scale, 0.02 * (nearest - farthest));
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (const stream::Point3& position : positions) {

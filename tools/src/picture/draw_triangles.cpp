@@ -10,15 +10,15 @@
 namespace terrace::tools {
 namespace {
 
-/// A vertex as drawn: place in samples, depth, brightness.
+/// A projected vertex: position in samples, depth, brightness.
 struct Projected {
   float x, y, depth, shade;
 };
 
-/// Half the width of an edge, and over how much it fades out, in samples.
+/// Half the width of an edge, and the distance over which it fades out, in samples.
 constexpr float kEdge = 0.55F * Canvas::kOversampling;
 constexpr float kEdgeFade = 0.7F * Canvas::kOversampling;
-/// Triangles whose height is below this many samples get no edges: they would be all edge.
+/// Triangles lower than this, in samples, get no edges: nothing but edges would show.
 constexpr float kSmallestTriangle = 3.0F * Canvas::kOversampling;
 constexpr std::array<float, 3> kEdgeColour{0.10F, 0.12F, 0.16F};
 
@@ -35,7 +35,7 @@ void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_r
   if (area == 0 || !std::isfinite(area)) return;
   const float top = std::min({a.y, b.y, c.y}), bottom = std::max({a.y, b.y, c.y});
   const float left = std::min({a.x, b.x, c.x}), right = std::max({a.x, b.x, c.x});
-  // Samples lie at half numbers.
+  // Sample centres have half-integer coordinates.
   const float width = static_cast<float>(canvas.width());
   const auto x0 = static_cast<std::uint32_t>(std::clamp(std::ceil(left - 0.5F), 0.0F, width));
   const auto x1 = static_cast<std::uint32_t>(std::clamp(std::floor(right - 0.5F) + 1, 0.0F, width));
@@ -45,7 +45,7 @@ void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_r
       std::floor(bottom - 0.5F) + 1, static_cast<float>(first_row), static_cast<float>(last_row)));
   if (x0 >= x1 || y0 >= y1) return;
 
-  // Heights over the three edges turn barycentric coordinates into distances.
+  // The heights over the three edges convert barycentric coordinates into distances.
   const auto length = [](const Projected& p, const Projected& q) {
     const float x = q.x - p.x, y = q.y - p.y;
     return std::sqrt(x * x + y * y);
@@ -74,7 +74,7 @@ void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_r
       std::array<float, 3>& out = canvas.colour(x, y);
       for (std::size_t i = 0; i < 3; ++i) {
         const float base = u * t[0].colour[i] + v * t[1].colour[i] + w * t[2].colour[i];
-        // Above 1 a slope is brighter than flat ground: the tint goes towards white.
+        // Above 1 a slope is brighter than flat ground, so blend the tint towards white.
         out[i] = shade <= 1 ? base * shade : base + (1 - base) * std::min(shade - 1, 1.0F);
       }
       if (edge_strength > 0) {

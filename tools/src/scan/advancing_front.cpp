@@ -11,7 +11,7 @@ namespace terrace::tools {
 
 namespace {
 
-/// CGAL's own priority of a facet, after a check.
+/// CGAL's default priority of a facet, after a stop check.
 struct CheckedPriority {
   const base::StopCheck* check_stop;
 

@@ -9,16 +9,16 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/tri/shape.hpp>
 
-/// CGAL's functions, each in a translation unit of its own: they take long to compile.
+/// CGAL's functions, each in a separate translation unit because they take long to compile.
 
 namespace terrace::tools {
 
-/// Faces between distinct points that are not all in one plane, with CGAL's defaults: a radius
-/// ratio bound of 5 and a beta of 0.52 radians. Calls check_stop for each candidate facet.
+/// Returns faces between distinct points that are not all in one plane, with CGAL's defaults: a
+/// radius ratio bound of 5 and a beta of 0.52 radians. Calls check_stop for each candidate facet.
 std::vector<std::array<std::uint32_t, 3>> advancing_front(std::span<const tri::Point3> points,
                                                           const base::StopCheck& check_stop);
 
-/// alpha, offset > 0; at least one point.
+/// Requires alpha > 0, offset > 0 and at least one point.
 tri::Surface alpha_wrap(std::span<const tri::Point3> points, double alpha, double offset);
 
 }  // namespace terrace::tools

@@ -21,7 +21,8 @@ namespace {
 
 using Sides = std::array<double, 3>;
 
-/// The sides of the points' box. Throws for coordinates that CGAL's constructions cannot handle.
+/// Returns the side lengths of the points' bounding box. Throws for coordinates that CGAL's
+/// constructions cannot handle.
 Sides checked_box(std::span<const tri::Point3> points) {
   constexpr double kLargest = 1e100, kSmallest = 1e-100;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -46,7 +47,8 @@ Sides checked_box(std::span<const tri::Point3> points) {
   const double longest = *std::max_element(sides.begin(), sides.end());
   if (longest > 0.0 && longest < kSmallest) {
     throw std::invalid_argument(
-        "the points' box is smaller than 1e-100, too small for this method; scale the points");
+        "the points' bounding box is smaller than 1e-100, too small for this method; scale the "
+        "points");
   }
   return sides;
 }
@@ -75,13 +77,13 @@ tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points
 
   tri::RestoredSurface result;
   result.surface.faces = advancing_front(different, check_stop);
-  // The order and the first corners that CGAL gives depend on addresses in memory.
+  // Normalise the order of faces and corners, which in CGAL depends on memory addresses.
   for (auto& face : result.surface.faces) {
     std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
   }
   std::sort(result.surface.faces.begin(), result.surface.faces.end());
 
-  // Points that are in no face are left out.
+  // Leave out points that are in no face.
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> number(different.size(), kUnused);
   for (const auto& face : result.surface.faces) {

@@ -12,7 +12,7 @@
 namespace terrace::tools {
 namespace {
 
-/// Memory of CGAL's triangulation.
+/// Memory of CGAL's triangulation, in bytes per point.
 constexpr std::uint64_t kCgalBytesPerPoint = 1200;
 
 }  // namespace
@@ -58,9 +58,9 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
 void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options) {
   if (metric.kind == MetricChoice::Kind::euclidean) return;
   if (metric.kind != MetricChoice::Kind::elliptical) {
-    throw UsageError("a surface has the metric euclidean or elliptical:FILE, not " + metric.text);
+    throw UsageError("--metric: a surface takes euclidean or elliptical:FILE, not  " + metric.text);
   }
-  if (options.method) throw UsageError("--metric is for --criterion poles, gabriel and edge");
+  if (options.method) throw UsageError("--metric needs --criterion poles, gabriel or edge");
   if (metric.has_boxes()) {
     throw UsageError("--metric: a surface has one ellipsoid, so its region has no \"box\"");
   }

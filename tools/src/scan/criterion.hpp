@@ -10,12 +10,12 @@ namespace terrace::tools {
 
 using namespace terrain;
 
-/// The method that --criterion names: poles, gabriel, edge[:FACTOR], advancing-front or
-/// alpha-wrap[:METRES]. Throws: UsageError.
+/// Parses --criterion: poles, gabriel, edge[:FACTOR], advancing-front or alpha-wrap[:METRES].
+/// Throws UsageError.
 ScanSurfaceOptions parse_criterion(const std::string& text);
 
-/// Sets the elliptical metric between positions in metres; a Euclidean one changes nothing.
-/// Throws: UsageError for another kind of metric, one with boxes, or beside a method of CGAL's.
+/// Sets the elliptical metric between positions in metres; a Euclidean one changes nothing. Throws
+/// UsageError for another kind of metric, for one with boxes, or together with a CGAL method.
 void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options);
 
 }  // namespace terrace::tools

@@ -14,7 +14,7 @@ std::optional<unsigned> hexadecimal_digit(char c) {
   return {};
 }
 
-/// Digits alone; too large ones become the largest.
+/// Parses digits only. Numbers that are too large become the largest.
 std::optional<std::uint64_t> number(std::string_view text) {
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
   std::uint64_t value = 0;
@@ -28,7 +28,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Whether a list of entity tags has this one, by the weak comparison.
+/// Returns whether a list of entity tags contains this one, by weak comparison.
 bool lists(std::string_view tags, std::string_view tag) {
   if (trimmed(tags) == "*") return true;
   while (!tags.empty()) {
@@ -41,12 +41,12 @@ bool lists(std::string_view tags, std::string_view tag) {
   return false;
 }
 
-/// Whether a header Host names the loopback interface at this port.
+/// Returns whether a Host header names the loopback interface at this port.
 bool names_this_server(std::string_view host, std::uint16_t port) {
   const std::string ending = ':' + std::to_string(port);
   if (host.ends_with(ending)) {
     host.remove_suffix(ending.size());
-  } else if (port != 80) {  // the only one that browsers leave out
+  } else if (port != 80) {  // the only port that browsers omit
     return false;
   }
   std::string name(host);
@@ -56,7 +56,7 @@ bool names_this_server(std::string_view host, std::uint16_t port) {
   return name == "127.0.0.1" || name == "localhost" || name == "[::1]";
 }
 
-/// In a time that does not depend on where they differ.
+/// Compares in constant time, whatever the position of the first difference.
 bool same(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   unsigned difference = 0;
@@ -126,7 +126,7 @@ RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span)
   const std::string_view before = trimmed(text.substr(0, dash)),
                          behind = trimmed(text.substr(dash + 1));
   if (before.empty()) {
-    const auto last = number(behind);  // so many of the last bytes
+    const auto last = number(behind);  // the number of final bytes
     if (!last) return RangeKind::none;
     if (*last == 0 || size == 0) return RangeKind::unsatisfiable;
     span.length = std::min(*last, size);
@@ -158,23 +158,23 @@ std::string_view query_value(std::string_view target, std::string_view name) {
 
 Answer answer_to(const Request& request, const Site& site, const Access& access) {
   if (request.hosts > 1) {
-    return {.status = 400, .close = true, .reason = "there are several headers Host"};
+    return {.status = 400, .close = true, .reason = "several Host headers"};
   }
   if (!names_this_server(request.host, access.port)) {
-    return {.status = 403, .close = true, .reason = "the header Host names another server"};
+    return {.status = 403, .close = true, .reason = "the Host header names another server"};
   }
   if (request.method != "GET" && request.method != "HEAD") {
-    return {.status = 405, .close = true, .reason = "only GET and HEAD"};
+    return {.status = 405, .close = true, .reason = "only GET and HEAD are supported"};
   }
   auto path = decoded_path(request.target);
-  if (!path) return {.status = 400, .reason = "this is not a path"};
+  if (!path) return {.status = 400, .reason = "invalid path"};
   if (path->empty()) path = "index.html";
   const auto at = site.find(*path);
   if (at == site.end() || !at->second.open_to_all) {
     if (!request.trusted && !same(query_value(request.target, "token"), access.token)) {
       return {.status = 403, .reason = "no token"};
     }
-    if (at == site.end()) return {.status = 404, .reason = "there is nothing here"};
+    if (at == site.end()) return {.status = 404, .reason = "not found"};
   }
   const Resource& resource = at->second;
   const std::uint64_t size = resource.bytes->size();
@@ -196,7 +196,7 @@ Answer answer_to(const Request& request, const Site& site, const Access& access)
   } else if (kind == RangeKind::unsatisfiable) {
     answer.status = 416;
     answer.bytes = nullptr;
-    answer.reason = "the file ends before";
+    answer.reason = "the file ends before this range";
   }
   return answer;
 }
@@ -222,7 +222,8 @@ std::string header_of(const Answer& a) {
   if (a.status == 405) field("Allow", "GET, HEAD");
   field("Accept-Ranges", "bytes");
   field("Cache-Control", "no-cache");
-  // Pages of other origins may neither read nor use the stores, and the token stays on this page.
+  // Pages of other origins must neither read nor use the stores, and the token must stay on this
+  // page.
   field("Content-Security-Policy", kContentPolicy);
   field("Cross-Origin-Resource-Policy", "same-origin");
   field("Referrer-Policy", "no-referrer");

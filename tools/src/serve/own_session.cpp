@@ -18,14 +18,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// An end of a connection as /proc/net/tcp has it.
+/// Returns an endpoint in the notation of /proc/net/tcp.
 std::string end_text(std::uint32_t address, std::uint16_t port) {
   char text[16];
   std::snprintf(text, sizeof text, "%08X:%04X", address, port);
   return text;
 }
 
-/// The number of the client's socket if it is this user's, else empty.
+/// Returns the number of the client's socket if it belongs to this user, otherwise an empty string.
 std::string socket_of_client(const std::string& client, std::uint16_t server_port) {
   std::ifstream table("/proc/net/tcp");
   std::string line, skipped, local, remote, user, socket;

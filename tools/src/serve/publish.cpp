@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// It is written last.
+/// The file that marks a published folder; it is written last.
 constexpr const char* kMark = "stores.json";
 constexpr std::size_t kCopied = std::size_t{1} << 20;
 
@@ -26,7 +26,7 @@ stream::Error refused(const fs::path& path, const std::string& cause, const std:
   return stream::Error({.file = path.string(), .where = {}, .cause = cause, .remedy = remedy});
 }
 
-/// What stores.json lists: null unless the folder was published by terrace.
+/// Returns the contents of stores.json; null unless terrace published the folder.
 nlohmann::json list_of(const fs::path& folder) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20;
   try {
@@ -41,8 +41,8 @@ nlohmann::json list_of(const fs::path& folder) {
   return nullptr;
 }
 
-/// A published folder has the files of the viewer, stores.json, and of each store that this lists
-/// its folder and its start file.
+/// Returns which files of a published folder are ours: those of the viewer, stores.json, and the
+/// folder and start file of each store that it lists.
 stream::Ownership ownership_of_site(const fs::path& folder) {
   const nlohmann::json list = list_of(folder);
   if (list.is_null()) return false;
@@ -51,7 +51,7 @@ stream::Ownership ownership_of_site(const fs::path& folder) {
   const auto take = [](const nlohmann::json& name, auto& names) {
     if (name.is_string()) names.insert(name.get<std::string>());
   };
-  // Another version may have had other files.
+  // Another version may have had different files.
   for (const auto& name : list.value("viewer", nlohmann::json::array())) take(name, files);
   for (const auto& store : list.value("stores", nlohmann::json::array())) {
     if (store.is_object()) take(store.value("name", nlohmann::json()), stores);
@@ -125,7 +125,7 @@ Published publish(std::span<const stream::Store> stores, const fs::path& folder,
   stream::AtomicFolder site_folder(folder, kMark,
                                    replace ? stream::Naming(ownership_of_site) : stream::Naming());
   const fs::path &staged = site_folder.folder(), &target = site_folder.target();
-  // Before the work; commit() looks again.
+  // Check before the work; commit() checks again.
   if (std::error_code error; fs::symlink_status(target, error).type() != fs::file_type::not_found) {
     if (!replace) throw refused(target, "exists already", "name another folder, or give --force");
     if (const stream::Ownership found = ownership_of_site(target); !found.ours) {
@@ -133,7 +133,7 @@ Published publish(std::span<const stream::Store> stores, const fs::path& folder,
     }
   }
   Published published;
-  // Messages have the folder's name, not those of files under its temporary one.
+  // Messages name the folder, not files under its temporary name.
   const auto is_ours = [&](const std::string& file) { return file.starts_with(staged.string()); };
   try {
     published = fill(stores, staged, repack_threads);

@@ -36,7 +36,7 @@ using boost::system::error_code;
 
 constexpr std::size_t kPiece = std::size_t{64} * 1024;
 
-/// 128 bits from the operating system, in hexadecimal digits.
+/// Returns 128 random bits from the operating system as hexadecimal digits.
 std::string random_token() {
   std::array<unsigned char, 16> bytes{};
   if (::getentropy(bytes.data(), bytes.size()) != 0) {
@@ -54,15 +54,15 @@ class Session;
 /// The connections of a server.
 struct Connections {
   std::size_t open = 0;
-  /// Those of which no request is complete, by how long they have waited for one.
+  /// Connections without a complete request, ordered by how long they have waited for one.
   std::list<Session*> waiting;
 
-  /// Ends the one that has waited longest, so that idle ones never keep others out. False if none
-  /// waits.
+  /// Ends the connection that has waited longest, so that idle ones never block others. Returns
+  /// false if none waits.
   bool end_oldest();
 };
 
-/// One connection: a request, its answer, and so on.
+/// One connection: it reads a request, sends the answer, and repeats.
 class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(tcp::socket socket, const std::function<const Site&()>& site, const Access& access,
@@ -109,19 +109,21 @@ class Session : public std::enable_shared_from_this<Session> {
   void received(error_code error) {
     stop_waiting();
     if (error == http::error::header_limit) {
-      return answer({.status = 431, .close = true, .reason = "the header is too large"}, false);
+      return answer({.status = 431, .close = true, .reason = "the request header is too large"},
+                    false);
     }
     if (error == http::error::body_limit) {
-      return answer({.status = 413, .close = true, .reason = "a request has no body here"}, false);
+      return answer({.status = 413, .close = true, .reason = "request bodies are not supported"},
+                    false);
     }
     if (error) {
-      // Closed, reset or too slow: nobody listens. Anything else is not HTTP.
+      // If closed, reset or too slow, there is no one to answer. Anything else is not HTTP.
       const bool spoken =
           error.category() == http::make_error_code(http::error::bad_method).category();
       if (!spoken || error == http::error::end_of_stream || error == http::error::partial_message) {
         return close();
       }
-      return answer({.status = 400, .close = true, .reason = "this is not HTTP"}, false);
+      return answer({.status = 400, .close = true, .reason = "not an HTTP request"}, false);
     }
     const auto& request = parser_->get();
     const auto text = [](beast::string_view view) {
@@ -140,8 +142,8 @@ class Session : public std::enable_shared_from_this<Session> {
     reply.close = reply.close || !request.keep_alive();
     answer(std::move(reply), request.method() == http::verb::head);
   }
-  /// Whether a request without a token comes from a program that was started like this one. A
-  /// browser is none: it acts for the pages that it shows.
+  /// Returns whether a request without a token comes from a program of this session. A browser does
+  /// not count, because it acts for the pages that it shows.
   bool is_trusted() {
     const auto& request = parser_->get();
     const beast::string_view target = request.target();
@@ -173,7 +175,7 @@ class Session : public std::enable_shared_from_this<Session> {
       piece_.resize(size);
       if (size > 0) reply_.bytes->read(at_, piece_);
     } catch (const stream::Error&) {
-      return close();  // the file was cut off: the client sees a short body
+      return close();  // the file was truncated: the client sees a short body
     }
     at_ += size;
     left_ -= size;
@@ -192,14 +194,14 @@ class Session : public std::enable_shared_from_this<Session> {
   const Access& access_;
   const ServerLimits& limits_;
   Connections& all_;
-  std::optional<std::list<Session*>::iterator> place_;  ///< among those that wait
+  std::optional<std::list<Session*>::iterator> place_;  ///< position in the waiting list
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   Answer reply_;
   std::string header_;
   std::vector<std::byte> piece_;
   std::uint64_t at_ = 0, left_ = 0;
-  std::optional<bool> own_session_;  ///< of the client, once it was asked
+  std::optional<bool> own_session_;  ///< whether the client is trusted, once known
 };
 
 bool Connections::end_oldest() {
@@ -225,7 +227,7 @@ struct Server::Impl {
             ->start(full);
         return accept();
       }
-      // Without descriptors for another connection: as soon as one may have ended.
+      // Out of descriptors: free one for another connection.
       connections.end_oldest();
       pause.expires_after(std::chrono::milliseconds(50));
       pause.async_wait([this](error_code again) {

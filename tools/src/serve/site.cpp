@@ -25,9 +25,9 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kManifest = "manifest.json";
-/// How long a look at all files, and a failed attempt to serve them, counts.
+/// How long a check of all files, or a failed attempt to serve them, stays valid.
 constexpr std::chrono::milliseconds kLook{100};
-/// To serve stores whose files change meanwhile, at the start.
+/// Attempts at the start to serve stores whose files are changing.
 constexpr int kAttempts = 20;
 
 std::string type_of(const std::string& name) {
@@ -69,7 +69,7 @@ Resource& add_text(Site& site, const std::string& name, std::string_view text) {
                        '"' + hexadecimal(hash_of(text)) + '"'};
 }
 
-/// The manifest and the files that it lists.
+/// Returns the manifest and the files that it lists.
 std::vector<std::string> files_of(const stream::Store& store) {
   const auto source = stream::open_file(store.path() / kManifest);
   std::string text(source->size(), '\0');
@@ -90,7 +90,7 @@ std::string name_of(const stream::Store& store, const std::vector<std::string>& 
   fs::path path = fs::absolute(store.path()).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   std::string name = path.filename().string();
-  // All of them, so that a copy under this name gets it again.
+  // Cut all endings, so that a copy under this name gets the same name again.
   const auto cut = [&](std::string_view ending) {
     if (name.size() <= ending.size() || !name.ends_with(ending)) return false;
     name.resize(name.size() - ending.size());
@@ -98,14 +98,14 @@ std::string name_of(const stream::Store& store, const std::vector<std::string>& 
   };
   while (cut(".store") || cut(".terrace")) {
   }
-  // Names that every web server serves as they are.
+  // Keep to names that every web server serves unchanged.
   for (char& c : name) {
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
                        c == '-' || c == '_' || (c == '.' && &c != name.data());
     if (!plain) c = '_';
   }
   std::string unique = name;
-  // A store is a folder of that name and a file next to it.
+  // A store takes a folder of that name and a file next to it.
   const auto is_taken = [&] {
     return std::any_of(taken.begin(), taken.end(), [&](const std::string& other) {
       return unique == other || unique == other + kStartEnding || other == unique + kStartEnding;
@@ -115,7 +115,7 @@ std::string name_of(const stream::Store& store, const std::vector<std::string>& 
   return unique;
 }
 
-/// Notes what is read of a store's files.
+/// Records the ranges read from a store's files.
 struct Readings {
   std::mutex mutex;
   std::map<std::string, std::map<std::uint64_t, std::uint64_t>> ends;  // by offset
@@ -127,7 +127,7 @@ struct Readings {
   }
 };
 
-/// In the format of zlib (RFC 1950), which browsers unpack.
+/// Returns the bytes compressed in zlib format (RFC 1950), which browsers decompress.
 std::string packed(const std::string& bytes) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::string result(size, '\0');
@@ -144,8 +144,8 @@ std::uint8_t class_in(double value) {
   return value > 0 ? static_cast<std::uint8_t>(std::min(value, 255.0)) : 0;
 }
 
-/// The classes that the points of a cloud have, for a legend; nothing if there are none, or where
-/// it takes too long to look for them. Reads the clusters that may have one that is not yet known.
+/// Returns the classes of a cloud's points, for a legend; nullopt if there are none or finding them
+/// takes too long. Reads only clusters that may have a class not found yet.
 std::optional<std::vector<int>> classes_of(const stream::Store& store) {
   constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 26;
   const stream::StoreSchema& schema = store.schema();
@@ -158,7 +158,8 @@ std::optional<std::vector<int>> classes_of(const stream::Store& store) {
         schema.attributes.begin());
     return number < schema.attributes.size();
   };
-  if (!find("classification") && !find("class")) return std::nullopt;  // as the viewer looks
+  if (!find("classification") && !find("class"))
+    return std::nullopt;  // the names that the viewer looks for
   const stream::ScalarType type = schema.attributes[number].type;
   const std::size_t offset = schema.attribute_offset(number), bytes = schema.payload_size();
   std::array<bool, 256> seen{};
@@ -205,7 +206,7 @@ std::string start_file(const stream::Store& store) {
         });
   };
   const stream::Store noted = stream::Store::open(store.path().string(), files);
-  // A view begins with the root and the records of the clusters below it.
+  // A view starts with the root and the records of the clusters below it.
   const Json ground =
       store.schema().grid ? ground_of<std::int32_t>(noted) : ground_of<tri::PointCloud>(noted);
 
@@ -253,8 +254,8 @@ Site make_site(std::span<const stream::Store> stores) {
       if (!fs::is_regular_file(fs::symlink_status(path, error))) {
         throw stream::Error({.file = path.string(),
                              .where = {},
-                             .cause = "is not a regular file: links are not served",
-                             .remedy = "put the file itself there"});
+                             .cause = "is not a regular file (links are not served)",
+                             .remedy = "replace it with the file itself"});
       }
       std::shared_ptr<const stream::ByteSource> bytes = stream::open_file(path);
       const std::string tag = '"' + checksum + "-" + hexadecimal(bytes->size()) + '"';
@@ -279,7 +280,7 @@ LiveSite::LiveSite(std::vector<std::string> paths,
     if (attempts < kAttempts) continue;
     throw stream::Error({.file = paths_.front(),
                          .where = {},
-                         .cause = "the files of a store change all the time",
+                         .cause = "the files of a store keep changing",
                          .remedy = "wait until they have been copied"});
   }
 }

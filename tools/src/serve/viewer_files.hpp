@@ -6,7 +6,7 @@
 
 namespace terrace::tools {
 
-/// A file of the viewer (tools/viewer/dist), which the command carries within itself.
+/// A file of the viewer (tools/viewer/dist), embedded in the command.
 struct ViewerFile {
   std::string_view name;
   std::string_view bytes;

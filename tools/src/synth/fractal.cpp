@@ -15,15 +15,15 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// The noise of a lattice point is the sum of two 16-bit numbers about 0, in units of 2^-16: a
-/// triangular density on (-1, 1) of variance 1/6 (to 1e-9).
+/// The noise of a lattice point is the sum of two 16-bit numbers around 0, in units of 2^-16. Its
+/// density is triangular on (-1, 1) with variance 1/6 (to 1e-9).
 constexpr double kNoiseVariance = 1.0 / 6.0;
-/// Rounding to whole numbers adds 1/12 to the variance of each of two neighbours.
+/// Rounding to integers adds 1/12 to the variance of each of two neighbours.
 constexpr double kRoundingStepVariance = 2.0 / 12.0;
 
-/// Adds the noise of lattice points first, first + 1, ... of one lattice row. 32-bit arithmetic, so
-/// that the compiler can vectorise it; the mixing is C. Wellons' `lowbias32`, with the upper half
-/// of the key mixed in between, so that rows are not shifted copies of one another.
+/// Adds the noise of lattice points first, first + 1, ... of one lattice row. It uses 32-bit
+/// arithmetic, which the compiler can vectorise. The mixing is C. Wellons' `lowbias32`, with the
+/// upper half of the key mixed in between so that rows are not shifted copies of one another.
 void add_noise(std::uint64_t key, std::int64_t first, float amplitude, float* values,
                std::size_t count) {
   const auto low = static_cast<std::uint32_t>(key);
@@ -43,9 +43,9 @@ void add_noise(std::uint64_t key, std::int64_t first, float amplitude, float* va
   }
 }
 
-/// One step of cubic B-spline subdivision: coefficient n of the finer lattice is
-/// (c[m-1] + 6 c[m] + c[m+1]) / 8 for n = 2m and (c[m] + c[m+1]) / 2 for n = 2m + 1.
-/// coarse[0] has lattice column coarse_first <= floor(first / 2) - 1.
+/// Performs one step of cubic B-spline subdivision: coefficient n of the finer lattice is (c[m-1] +
+/// 6 c[m] + c[m+1]) / 8 for n = 2m and (c[m] + c[m+1]) / 2 for n = 2m + 1. coarse[0] has lattice
+/// column coarse_first <= floor(first / 2) - 1.
 void double_columns(const float* coarse, std::int64_t coarse_first, std::int64_t first, float* fine,
                     std::size_t count) {
   std::size_t n = 0;
@@ -70,8 +70,8 @@ void double_columns(const float* coarse, std::int64_t coarse_first, std::int64_t
   }
 }
 
-/// The kernel of spacing 2^octave as sampled on the cells: what `octave` subdivisions make of a
-/// single 1.
+/// Returns the kernel of spacing 2^octave sampled at the cells, that is, the result of `octave`
+/// subdivisions of a single 1.
 std::vector<double> kernel(unsigned octave) {
   std::vector<double> fine{1.0};
   for (unsigned step = 0; step < octave; ++step) {
@@ -85,8 +85,9 @@ std::vector<double> kernel(unsigned octave) {
   return fine;
 }
 
-/// Variance of a lattice's field, averaged over all cells, and of its steps, for noise of variance
-/// 1. The field is separable: both follow from the autocorrelation of the kernel at lags 0 and 1.
+/// Variances of a lattice's field and of its steps, averaged over all cells, for noise of variance
+/// 1. The field is separable, so both follow from the autocorrelation of the kernel at lags 0 and
+/// 1.
 struct Variances {
   double field = 0.0, step = 0.0;
 };
@@ -108,7 +109,8 @@ Variances variances(unsigned octave) {
 
 Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
   assert(options.hurst > 0 && options.hurst < 1 && options.roughness >= 0);
-  // The step's variance is the sum of the lattices'; the amplitudes' common factor follows.
+  // The variance of the step is the sum over the lattices, which gives the common factor of the
+  // amplitudes.
   const double growth = base::exp2(options.hurst);
   std::array<double, kOctaves> weight{};
   double step = 0, field = 0, largest = 0;

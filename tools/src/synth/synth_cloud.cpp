@@ -20,15 +20,15 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// The k-th random number in [0, 1) that belongs to `n`.
+/// Returns the k-th random number in [0, 1) of `n`.
 double random_unit(std::uint64_t seed, std::uint64_t n, std::uint64_t k) {
   return base::unit_interval(base::splitmix64(base::splitmix64(seed ^ (k << 48)) + n));
 }
 
-/// The nearest multiple of 1/units.
+/// Returns the nearest multiple of 1/units.
 double rounded(double value, double units) { return std::nearbyint(value * units) / units; }
 
-/// A uniformly random direction, by rejection from the cube.
+/// Returns a uniformly random direction, by rejection from the cube.
 stream::Point3 random_direction(std::uint64_t seed, std::uint64_t n) {
   stream::Point3 v{};
   double square = 0;
@@ -47,7 +47,7 @@ class CloudSurface {
  public:
   CloudSurface(std::uint64_t points, std::uint64_t seed) : seed_(seed) {
     for (std::size_t i = 0; i < waves_.size(); ++i) {
-      // From broad lobes to fine bumps, the finer the flatter.
+      // From broad lobes to fine bumps, which are flatter.
       const double cycles = 1.0 + 0.8 * static_cast<double>(i * i) / 4;
       waves_[i].direction = random_direction(base::splitmix64(seed), i);
       waves_[i].degrees = 57.3 * cycles;
@@ -99,7 +99,7 @@ class CloudSurface {
     double south = 0, north = 0;  ///< latitudes, degrees
   };
 
-  /// Lays swaths from pole to pole; returns the number of points they have.
+  /// Lays swaths from pole to pole. Returns their number of points.
   std::uint64_t lay_swaths() {
     constexpr double kAcross = 500;
     const double spacing_degrees = spacing_ / base::kRadiansPerDegree;
@@ -112,7 +112,7 @@ class CloudSurface {
       s.south = -90 + 180 * static_cast<double>(i) / static_cast<double>(count);
       s.north = -90 + 180 * static_cast<double>(i + 1) / static_cast<double>(count);
       s.across = static_cast<std::uint64_t>(std::ceil((s.north - s.south) / spacing_degrees));
-      // The mean circumference of the swath, by the height of its zone.
+      // The mean circumference of the swath, from the height of its zone.
       const double circle = 2 * std::numbers::pi *
                             (base::sin_degrees(s.north) - base::sin_degrees(s.south)) /
                             ((s.north - s.south) * base::kRadiansPerDegree);
@@ -151,8 +151,8 @@ Cloud cluster_cloud(std::uint64_t points, std::uint64_t seed) {
     const double deviation = 0.002 + 0.02 * random_unit(base::splitmix64(seed), blob, 3);
     stream::Point3 p{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      // The sum of twelve uniform numbers less 6: variance 1, and within 1 % of the normal density
-      // where that matters.
+      // The sum of twelve uniform numbers minus 6 has variance 1 and is within 1 % of the normal
+      // density where that matters.
       double sum = -6;
       for (std::uint64_t k = 0; k < 12; ++k) sum += random_unit(seed, n, axis * 12 + k);
       p[axis] =
@@ -203,7 +203,7 @@ DeliveryOrder::DeliveryOrder(const std::string& shuffle, std::uint64_t points, s
     throw stream::Error(
         {.file = {},
          .where = {},
-         .cause = "the table of so many pieces does not fit into " + readable_bytes(memory_bytes),
+         .cause = "the table of that many pieces does not fit into " + readable_bytes(memory_bytes),
          .remedy = "make the pieces longer or raise --memory"});
   }
   std::vector<std::uint64_t> starts;

@@ -22,8 +22,8 @@ namespace {
 
 constexpr std::uint32_t kSynthTile = 256;
 
-/// Sums over the steps between neighbouring cells, and the range of heights. Integer samples are
-/// summed as doubles all the same: squares below 2^53 are exact.
+/// Sums over the steps between neighbouring cells, and the height range. Integer samples are summed
+/// as doubles too: squares below 2^53 are exact.
 struct Statistics {
   double squares = 0;
   std::uint64_t steps = 0;
@@ -41,14 +41,14 @@ struct Statistics {
   }
 };
 
-/// Makes one row's heights into samples.
+/// Converts one row of heights to samples.
 template <class Sample>
 void to_samples(std::span<const float> heights, float base, Sample* samples) {
   for (std::size_t i = 0; i < heights.size(); ++i) {
     if constexpr (std::is_same_v<Sample, float>) {
       samples[i] = base + heights[i];
     } else {
-      // Rounded by truncating a positive number, which can be vectorised.
+      // Round by truncating a positive number, which can be vectorised.
       const float shifted = base + heights[i] + 32768.5F;
       samples[i] = static_cast<Sample>(static_cast<std::int32_t>(shifted) - 32768);
     }
@@ -58,7 +58,7 @@ void to_samples(std::span<const float> heights, float base, Sample* samples) {
 template <class Sample>
 void measure(const Sample* row, const Sample* row_above, std::size_t width,
              Statistics& statistics) {
-  // Eight sums side by side, so that the compiler can vectorise them in a fixed order.
+  // Use eight separate sums, so that the compiler can vectorise them in a fixed order.
   std::array<double, 8> sums{};
   Sample low = row[0], high = row[0];
   const auto square = [](Sample a, Sample b) {
@@ -77,9 +77,9 @@ void measure(const Sample* row, const Sample* row_above, std::size_t width,
   statistics.maximum = std::max(statistics.maximum, static_cast<double>(high));
 }
 
-/// A piece of the raster: some tiles side by side.
+/// A piece of the raster: several adjacent tiles.
 struct Piece {
-  std::uint32_t first_column, first_row, columns, rows;  ///< cells that exist
+  std::uint32_t first_column, first_row, columns, rows;  ///< without cells beyond the raster
   std::uint32_t tiles;
 };
 
@@ -95,8 +95,8 @@ class Maker {
         columns_(static_cast<std::uint32_t>(options.size.width)),
         rows_(static_cast<std::uint32_t>(options.size.height)),
         writer_(path, checked(writer_options(options), options.memory_bytes)) {
-    // Each thread holds a piece as samples and some rows of lattices, about 48 bytes a column; two
-    // pieces more wait until they are written.
+    // Each thread holds a piece of samples and some rows of lattices, about 48 bytes per column.
+    // Two more pieces wait to be written.
     const std::uint64_t per_column = 3 * kSynthTile * sizeof(Sample) + 48;
     constexpr std::uint64_t kOverhead = 48u << 20;
     const std::uint64_t share =
@@ -130,7 +130,7 @@ class Maker {
     Statistics statistics;
   };
 
-  /// Throws: stream::Error if the table of the file's tiles does not fit.
+  /// Returns `tiff`. Throws stream::Error if the file's tile table does not fit into memory.
   static stream::GeoTiffOptions checked(stream::GeoTiffOptions tiff, std::uint64_t memory_bytes) {
     const std::uint64_t table = stream::geotiff_table_bytes(tiff);
     if (table <= memory_bytes / 4) return tiff;
@@ -147,7 +147,7 @@ class Maker {
     tiff.sample.name = "height";
     tiff.sample.type =
         std::is_same_v<Sample, float> ? stream::ScalarType::f32 : stream::ScalarType::i16;
-    // In the Alps, whether in UTM zone 32 or in degrees.
+    // A place in the Alps, in UTM zone 32 or in degrees.
     const double x = options.crs.geographic ? 8.0 : 400000.0;
     const double y = options.crs.geographic ? 47.0 : 5200000.0;
     const double c = options.cell;
@@ -208,7 +208,7 @@ class Maker {
   std::uint64_t pieces_ = 0;
 };
 
-/// The RMS step of a small piece at the corner, before rounding.
+/// Returns the RMS step of a small piece at the corner, before rounding.
 double measured_step(const Fractal& fractal, const ImageSize& size) {
   const auto width = static_cast<std::uint32_t>(size.width);
   Fractal::Rows rows(fractal, 0, width);

@@ -19,7 +19,7 @@ struct SynthDemOptions {
   double cell = 30.0;  ///< side of a cell, in units of the CRS
   double hurst = 0.8;
   double roughness = 2.65;
-  bool floats = false;  ///< float32 samples; else int16
+  bool floats = false;  ///< float32 samples instead of int16
   std::string compression = "none";
   stream::Crs crs;
   std::uint64_t seed = 1;
@@ -31,16 +31,16 @@ struct SynthDemOptions {
 /// Measurements of a fractal DEM.
 struct SynthDemResult {
   std::uint64_t bytes = 0;
-  double base = 0.0;  ///< mean height of the endless plane it is cut from
+  double base = 0.0;                                    ///< mean height of the infinite plane
   double minimum = 0.0, maximum = 0.0, rms_step = 0.0;  ///< as written
 };
 
-/// Writes a fractal DEM (see Fractal) as a tiled GeoTIFF, tile row by tile row. Heights lie about
-/// four standard deviations of the endless plane above 0, which is where all but the rarest of them
-/// stay; int16 heights never overflow: a roughness that could make them is refused.
-/// A raster of at most 2^22 cells is measured first and its roughness set right; larger ones have
-/// it within 1 % by the law of large numbers. progress(cells done) is called now and then, by any
-/// thread, one at a time. Throws: UsageError, stream::Error, stream::Stopped.
+/// Writes a fractal DEM (see Fractal) as a tiled GeoTIFF, one row of tiles at a time. The mean
+/// height is about four standard deviations of the infinite plane, so nearly all heights are above
+/// 0. A roughness that could overflow int16 is refused. Rasters of at most 2^22 cells are measured
+/// first and their roughness is corrected; larger ones have it within 1 % by the law of large
+/// numbers. Calls progress(cells done) from time to time from any thread, one call at a time.
+/// Throws UsageError, stream::Error and stream::Stopped.
 SynthDemResult write_synth_dem(const std::string& path, const SynthDemOptions& options,
                                const std::function<void(std::uint64_t)>& progress);
 

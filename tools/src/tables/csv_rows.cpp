@@ -10,7 +10,7 @@
 namespace terrace::tools {
 namespace {
 
-/// A binary file may be one line of gigabytes.
+/// A binary file may be a single line of gigabytes.
 constexpr std::size_t kLongestLine = 1000;
 
 }  // namespace
@@ -18,7 +18,7 @@ constexpr std::size_t kLongestLine = 1000;
 std::optional<CsvRows> CsvRows::open(const std::string& path, std::string_view header) {
   if (!std::filesystem::is_regular_file(path)) return std::nullopt;
   CsvRows rows(path, std::ifstream(path));
-  // One byte more, for a carriage return.
+  // One more byte, for a carriage return.
   std::array<char, 100> first{};
   rows.stream_.getline(first.data(), static_cast<std::streamsize>(header.size() + 2));
   const auto taken = static_cast<std::size_t>(rows.stream_.gcount());
@@ -42,7 +42,7 @@ bool CsvRows::next(std::string_view& line) {
                            .cause = "is longer than any row",
                            .remedy = "rows are a few numbers with commas"});
     }
-    // The line's end is counted too, where there is one.
+    // The count includes the line end, if there is one.
     line_.resize(stream_.eof() ? taken : taken - 1);
     if (line_.ends_with('\r')) line_.pop_back();
   } while (line_.empty());

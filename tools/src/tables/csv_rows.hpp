@@ -13,13 +13,13 @@ namespace terrace::tools {
 /// The lines of a text file after a header that identifies it.
 class CsvRows {
  public:
-  /// nullopt if the first line is another, or if it is not a regular file.
+  /// Opens the file. Returns nullopt if the first line differs or it is not a regular file.
   static std::optional<CsvRows> open(const std::string& path, std::string_view header);
 
-  /// The next line that is not empty, without its end; false at the end of the file.
-  /// Throws: stream::Error on a line too long to be a row.
+  /// Sets `line` to the next non-empty line, without its end. Returns false at the end of the file.
+  /// Throws stream::Error if a line is too long to be a row.
   bool next(std::string_view& line);
-  /// The place of the line that next() gave: "line 3".
+  /// Returns the position of the line that next() returned, such as "line 3".
   [[nodiscard]] std::string where() const { return "line " + std::to_string(number_); }
 
  private:
@@ -32,7 +32,8 @@ class CsvRows {
   std::uint64_t number_ = 0;
 };
 
-/// Takes the number at the beginning of `text`, and the comma after it unless it is the last.
+/// Removes the number at the start of `text`, and the comma after it unless it is the last. Returns
+/// false if there is no such number.
 template <class T>
 bool take_cell(std::string_view& text, T& value, bool last = false) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -43,8 +43,8 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
     throw stream::Error({.file = path,
                          .where = where,
                          .cause = cause,
-                         .remedy = "rows are a,b,height,size as 'terrace cluster --dendrogram' "
-                                   "and SciPy's linkage() give them"});
+                         .remedy = "rows must be a,b,height,size as written by 'terrace cluster "
+                                   "--dendrogram' and SciPy's linkage()"});
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};

@@ -10,14 +10,14 @@
 
 namespace terrace::tools {
 
-/// Writes rows "a,b,height,size" as text, SciPy's linkage matrix; "-" is standard output. Heights
-/// are the shortest decimals that read back as the same double. Throws: stream::Error.
+/// Writes SciPy's linkage matrix as text rows "a,b,height,size"; "-" is standard output. Heights
+/// are the shortest decimals that read back as the same double. Throws stream::Error.
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
                       const stream::Naming& replace);
 
-/// The dendrogram in a file that begins with the line "a,b,height,size"; nullopt for any other
-/// file. Throws: stream::Error, naming the line, if a row is malformed or the rows do not form a
-/// dendrogram.
+/// Reads the dendrogram from a file that starts with the line "a,b,height,size"; returns nullopt
+/// for any other file. Throws stream::Error, which names the line, if a row is malformed or the
+/// rows do not form a dendrogram.
 std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path);
 
 }  // namespace terrace::tools

@@ -18,7 +18,7 @@ constexpr std::uint32_t kNoCluster = 0xFFFFFFFFu;
 }  // namespace
 
 std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t points) {
-  constexpr std::streamsize kLongestLine = 4096;  // also of a file that is not text
+  constexpr std::streamsize kLongestLine = 4096;  // bounds non-text files too
   std::ifstream file(path);
   if (!file) {
     throw stream::Error({.file = path,
@@ -30,7 +30,7 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
   std::vector<char> buffer(kLongestLine);
   while (file.getline(buffer.data(), kLongestLine) || file.gcount() > 0) {
     if (labels.size() % 65536 == 0) check_interrupt();
-    const bool ended = !file.eof() && !file.fail();  // by '\n', which gcount() counts
+    const bool ended = !file.eof() && !file.fail();  // by '\n', included in gcount()
     std::string line(buffer.data(), static_cast<std::size_t>(file.gcount()) - (ended ? 1 : 0));
     if (!line.empty() && line.back() == '\r') line.pop_back();
     const std::string where = "line " + std::to_string(labels.size() + 1);
@@ -40,7 +40,7 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
                            .where = where,
                            .cause = "'" + line.substr(0, 40) + "' is not a cluster number",
                            .remedy = "write one whole number from 0 to 4294967294 per line, or -1 "
-                                     "for a point in no cluster"});
+                                     "for a point without a cluster"});
     }
     labels.push_back(label);
     if (labels.size() > points) {

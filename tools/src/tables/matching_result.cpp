@@ -15,7 +15,7 @@
 namespace terrace::tools {
 namespace {
 
-/// A row of the file.
+/// One row of the file.
 struct Row {
   std::uint32_t a = 0, b = 0;
   double distance = 0;
@@ -40,7 +40,7 @@ class Checker {
     for (const std::uint32_t node : {row.a, row.b}) {
       if (node < nodes) continue;
       if (tree_ && node >= points_ && node < 2 * points_ - 1) {
-        return "names node " + std::to_string(node) + " before the row that makes it";
+        return "names node " + std::to_string(node) + " before the row that creates it";
       }
       return "names " + std::string(tree_ ? "node " : "point ") + std::to_string(node) +
              ", but there are " + counted(points_, "point");
@@ -61,7 +61,7 @@ class Checker {
              std::to_string(a.size + b.size);
     }
     if (row.level <= std::max(a.level, b.level)) {
-      return "is of level " + std::to_string(row.level) + ", no higher than what it joins";
+      return "is of level " + std::to_string(row.level) + ", not above the nodes that it joins";
     }
     nodes_[nodes] = {row.size, row.level};
     return {};
@@ -88,14 +88,14 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
     throw stream::Error({.file = path,
                          .where = where,
                          .cause = cause,
-                         .remedy = "give the result of 'terrace match' as it was written, and with "
+                         .remedy = "pass the unchanged result of 'terrace match', and with "
                                    "--points the file that it was made from"});
   };
   std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
   if (result.tree) rows = CsvRows::open(path, kTreeHead);
   if (!rows) fail("", "is not a result of 'terrace match'");
-  // Nodes of a tree are numbered in 32 bits.
+  // Tree nodes have 32-bit numbers.
   if (points > std::numeric_limits<std::uint32_t>::max() / 2) fail("", "has too many points");
   const std::size_t most = result.tree ? points - std::min<std::size_t>(points, 1) : points / 2;
   Checker checker(points, result.tree);
@@ -125,7 +125,7 @@ void MatchingPicture::keep_levels(const std::string& level) {
   std::string_view text = level;
   if (!take_cell(text, highest, true) || highest > result.top) {
     throw UsageError("'--level " + level + "': the lines are of the levels 1 to " +
-                     std::to_string(result.top) + " (0: the points alone)");
+                     std::to_string(result.top) + " (0: points only)");
   }
   std::erase_if(result.lines, [&](const MatchingLine& line) { return line.level > highest; });
 }

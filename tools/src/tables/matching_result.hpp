@@ -11,14 +11,15 @@
 
 namespace terrace::tools {
 
-/// A line of what `match` found: between two nodes, which are points (0 to n - 1) or what an
-/// earlier row joined (row r is node n + r). A pair is a row of level 1.
+/// A line of a matching between two nodes. A node is a point (0 to n - 1) or an earlier row (row r
+/// is node n + r). A pair is a row of level 1.
 struct MatchingLine {
   std::uint32_t a = 0, b = 0;
   std::uint32_t level = 1;
 };
 
-/// What `match` writes: pairs (rows a,b,distance) or a tree (rows a,b,distance,size,level).
+/// The result that `match` writes: pairs (rows a,b,distance) or a tree (rows
+/// a,b,distance,size,level).
 struct MatchingResult {
   std::size_t points = 0;
   bool tree = false;
@@ -26,27 +27,27 @@ struct MatchingResult {
   std::uint32_t top = 0;            ///< the highest level; 0 without lines
 };
 
-/// Whether a file begins as one that `match` writes.
+/// Returns whether a file starts like one written by `match`.
 bool is_matching_result(const std::string& path);
 
-/// Reads such a file for `points` points. Throws: stream::Error, naming the line, if a row is
-/// malformed, names a node that does not exist (yet) or that another row has taken, or contradicts
-/// itself; and if the number of rows does not fit the points. Memory: 12 bytes a row.
+/// Reads such a file for `points` points. Throws stream::Error, which names the line, if a row is
+/// malformed, contradicts itself, or names a node that does not exist yet or that another row has
+/// joined. Also throws if the number of rows does not match the points. Memory: 12 bytes per row.
 MatchingResult read_matching_result(const std::string& path, std::size_t points);
 
-/// Such a result with the places of its nodes, ready to be drawn.
+/// A result with the positions of its nodes, ready to be drawn.
 struct MatchingPicture {
   MatchingResult result;
-  /// Metres on the ground about the middle: the points, then the nodes of a tree's rows, each at
+  /// Metres on the ground around the centre: the points, then the nodes of a tree's rows, each at
   /// the mean of all points below it.
   std::vector<stream::Point3> positions;
-  std::string assumption;  ///< of units, empty if none
+  std::string assumption;  ///< an assumption about units; may be empty
 
-  /// Leaves out the lines above a level. Throws: UsageError if there is no such level.
+  /// Removes the lines above a level. Throws UsageError if there is no such level.
   void keep_levels(const std::string& level);
 };
 
-/// Reads the result and its points' file. Throws: stream::Error, stream::Stopped.
+/// Reads the result and the file of its points. Throws stream::Error and stream::Stopped.
 MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
                                       const CommonOptions& common);
 

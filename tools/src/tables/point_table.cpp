@@ -30,7 +30,7 @@ std::vector<double> PointTable::column(const std::string& name) const {
     return values;
   }
   throw UsageError("the points have no column '" + name + "'" +
-                   (known.empty() ? ": they have none but x, y and z" : "; there are: " + known));
+                   (known.empty() ? ": they have only x, y and z" : "; there are: " + known));
 }
 
 void writing_within_memory(const stream::PointWriter& writer, const std::string& file,
@@ -86,7 +86,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   const std::size_t bytes_per_point = sizeof(stream::Point3) + table.info.payload_size();
   const std::uint64_t fixed = kProgramMemory + reading;
   const std::uint64_t most = (memory_bytes - std::min(memory_bytes, fixed)) / bytes_per_point;
-  // Rasters, PLY and meshes may have fewer.
+  // Rasters, PLY and meshes may have fewer points than announced.
   if (!table.info.grid && table.info.points && *table.info.points <= most) {
     table.positions.reserve(*table.info.points);
     table.payload.reserve(*table.info.points * table.info.payload_size());
@@ -95,7 +95,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   for_each_block(*source, common, [&](stream::PointBlock& block) {
     voids.add(block);
     stream::to_world(table.info, block);
-    // A growing vector exists twice for a moment.
+    // A growing vector briefly exists twice.
     const std::size_t count = table.size() + block.size();
     const bool grows = count > table.positions.capacity();
     if (count > (grows ? most / 2 : most)) {
@@ -113,14 +113,11 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   if (const std::string note = voids.note(); !note.empty()) common.say(note);
   if (table.nodata > 0 && !table.info.grid) {
     common.context().say(counted(table.nodata, "point") +
-                         " without a coordinate are left out: "
-                         "numbers of points do not count them");
+                         " without a coordinate are left out: point numbers do not count them");
   }
   if (table.positions.empty()) {
-    throw stream::Error({.file = file,
-                         .where = {},
-                         .cause = "there is not one point in it",
-                         .remedy = "check the file"});
+    throw stream::Error(
+        {.file = file, .where = {}, .cause = "it contains no points", .remedy = "check the file"});
   }
   return table;
 }
@@ -128,7 +125,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
 GroundFrame GroundFrame::of(const PointTable& table, double z_weight) {
   stream::Box3 box;
   for (const stream::Point3& p : table.positions) box.include(p);
-  // The positions are in the CRS already.
+  // The positions are already in the CRS.
   stream::Placement placement;
   placement.crs = table.info.crs;
   placement.coordinates[0].unit = table.info.coordinates[0].unit;
