@@ -169,7 +169,7 @@ class AnswerTest(OutputCase):
         process.send_signal(signal.SIGCONT)
         _, error = process.communicate()
         self.assertEqual(process.returncode, 130, error)
-        self.assertIn('with --resume to go on', error)
+        self.assertIn('with --resume to continue', error)
 
 
 if __name__ == '__main__':

@@ -756,7 +756,7 @@ describe('pages side by side', {concurrency: 3}, () => {
   });
 
   for (const [fault, expected] of Object.entries({
-         whole: /whole files/, short: /breaks off|bytes came/, packed: /compresses parts/, missing: /no such file/, replaced: /replaced/, damaged: /checksum|damaged/,
+         whole: /whole file/, short: /connection was lost|bytes received/, packed: /compresses parts/, missing: /not found/, replaced: /replaced/, damaged: /checksum|damaged/,
          error: /HTTP 500/, dead: /does not answer/
        })) {
     test(`a server that misbehaves (${fault}): a message, and a retry that helps`, async () => {
@@ -794,7 +794,7 @@ describe('pages side by side', {concurrency: 3}, () => {
       // Without the token of the address a page says what to do.
       const stranger = await open('', {url: new URL(url).origin + '/', settle: false});
       await stranger.page.waitForSelector('#message:not([hidden])');
-      assert.match(await stranger.page.textContent('#message-text'), /whole address .* token/);
+      assert.match(await stranger.page.textContent('#message-text'), /full address .* token/);
       await stranger.close();
     } finally {
       server.kill('SIGINT');

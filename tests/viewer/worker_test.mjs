@@ -707,13 +707,13 @@ const CLOSE = {eye: [2000, -9000, 9000], direction: [0, 0.7071067811865476, -0.7
 
 /// The part of the message, and how the n-th range of a store is spoiled.
 const FAULTS = {
-  'a whole file instead of a part': [/whole files.*200/, request => ({status: 200, headers: {}, body: request.body})],
-  'a missing file': [/no such file.*404/, () => ({status: 404, headers: {}, body: Buffer.alloc(0)})],
+  'a whole file instead of a part': [/whole file.*200/, request => ({status: 200, headers: {}, body: request.body})],
+  'a missing file': [/not found.*404/, () => ({status: 404, headers: {}, body: Buffer.alloc(0)})],
   'a shorter file': [/smaller.*416/, () => ({status: 416, headers: {}, body: Buffer.alloc(0)})],
-  'a short body': [/bytes came where/, response => ({...response, body: response.body.subarray(1)})],
-  'a body that breaks off': [/breaks off/, response => ({...response, body: null})],
+  'a short body': [/bytes received/, response => ({...response, body: response.body.subarray(1)})],
+  'a body that breaks off': [/connection was lost/, response => ({...response, body: null})],
   'compressed parts': [/compresses parts.*Turn/, (response, {method}) => method === 'HEAD' ? response : null],
-  'another part': [/another part/, response => ({...response, headers: {'Content-Range': 'bytes 0-1/2'}})],
+  'another part': [/wrong part/, response => ({...response, headers: {'Content-Range': 'bytes 0-1/2'}})],
   'a replaced file': [
     /replaced/,
     response => ({...response, headers: {'Content-Range': response.headers['Content-Range'].replace(/\d+$/, '99999999')}})

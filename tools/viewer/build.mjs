@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// build.mjs [FOLDER]: bundles the viewer's TypeScript into FOLDER (dist) beside the page and the core.
+// build.mjs [FOLDER]: bundles the viewer's TypeScript into FOLDER (default: dist), next to the page and the core.
 import {copyFileSync, mkdirSync} from 'node:fs';
 import {dirname, join} from 'node:path';
 import {fileURLToPath} from 'node:url';

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""embed.py OUT.cpp FILES...: the files as strings in a C++ source, for the command to carry them within itself."""
+"""embed.py OUT.cpp FILES...: writes the files as strings to a C++ source, to embed them in the command."""
 
 import os
 import sys
 
 
 def literal(data):
-    """Octal escapes of three digits, so that no digit behind one belongs to it; letters as they are."""
+    """Returns a string literal. Octal escapes have three digits, so that no following digit is part of one."""
     lines = []
     for start in range(0, len(data), 64):
         piece = data[start:start + 64]

@@ -10,12 +10,12 @@
 
 namespace terrace::viewer {
 
-/// An array of which blocks of slots are marked as changed.
+/// An array that tracks which blocks of slots have changed.
 template <class Value>
 class Blocks {
  public:
   void reserve(std::size_t slots) { values_.reserve(slots); }
-  /// Blocks that are added count as changed.
+  /// Grows to at least `slots`. Added blocks count as changed.
   void grow(std::size_t slots) {
     const std::size_t blocks = (slots + SceneChanges::kBlock - 1) / SceneChanges::kBlock;
     if (blocks * SceneChanges::kBlock <= values_.size()) return;

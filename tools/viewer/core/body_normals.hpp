@@ -9,10 +9,10 @@
 
 namespace terrace::viewer {
 
-/// Normals at the vertices of a surface whose triangles come and go: the sum of the area vectors of
-/// the triangles at each. Sums are of integers, so what a triangle has added it takes away again to
-/// the last bit, and normals do not depend on the order of changes. O(1) per triangle; 36 bytes per
-/// vertex.
+/// Normals at the vertices of a surface whose triangles are added and removed. A normal is the sum
+/// of the area vectors of its triangles. Sums are integers, so removing a triangle subtracts
+/// exactly what it added, and normals do not depend on the order of changes. O(1) per triangle; 36
+/// bytes per vertex.
 class BodyNormals {
  public:
   using Node = std::array<std::int32_t, 3>;
@@ -22,12 +22,13 @@ class BodyNormals {
     nodes_.resize(slots);
     sums_.resize(slots);
   }
-  /// A vertex in [0, 2^30) that no triangle has yet, or where it was already.
+  /// Sets the position of a vertex, in [0, 2^30). It must be unchanged, or the vertex must have no
+  /// triangle yet.
   void place(std::uint32_t slot, const Node& node) { nodes_[slot] = node; }
   void add(const Corners& corners) { change(corners, 1); }
-  /// Requires that its corners are where they were when it was added.
+  /// Requires that its corners have not moved since it was added.
   void remove(const Corners& corners) { change(corners, -1); }
-  /// The unit normal times 127; up if there is none.
+  /// Returns the unit normal times 127, or up if there is none.
   [[nodiscard]] std::array<std::int8_t, 3> operator[](std::uint32_t slot) const {
     std::array<double, 3> sum{};
     for (std::size_t k = 0; k < 3; ++k) sum[k] = static_cast<double>(sums_[slot][k]);
@@ -47,7 +48,7 @@ class BodyNormals {
     const Sum u{b[0] - a[0], b[1] - a[1], b[2] - a[2]}, v{c[0] - a[0], c[1] - a[1], c[2] - a[2]};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
-      // Up to 2^61; there is room for 256 of the largest triangles at a vertex.
+      // Up to 2^61. The sum has room for 256 of the largest triangles per vertex.
       const std::int64_t area = (u[i] * v[j] - u[j] * v[i]) / 1024 * sign;
       for (const std::uint32_t corner : corners) sums_[corner][k] += area;
     }

@@ -34,7 +34,7 @@ CloudColours::CloudColours(const stream::Schema& schema, std::span<const std::by
     for_each_record([&](auto record) {
       for (const auto& channel : rgb_) most = std::max(most, channel->value(record));
     });
-    // Formats with fields for colours are often written without any.
+    // Formats with colour fields are often written without colours.
     if (most == 0) rgb_ = {};
     for (auto& channel : rgb_) {
       if (channel) channel->scale = most > 255 ? 1.0 / 257 : 1;

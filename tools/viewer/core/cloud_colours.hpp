@@ -12,32 +12,32 @@
 
 namespace terrace::viewer {
 
-/// What a point is drawn by besides its place.
+/// How a point is drawn, apart from its position.
 struct CloudColour {
   std::array<std::uint8_t, 3> rgb{};
   std::uint8_t group = 0;      ///< its class
-  std::uint8_t intensity = 0;  ///< stretched over what the store holds
+  std::uint8_t intensity = 0;  ///< stretched over the store's range
 };
 
-/// Colours, classes and intensities among the attributes of a cloud, in 8 bits each.
+/// Colours, classes and intensities from the attributes of a cloud, in 8 bits each.
 class CloudColours {
  public:
   CloudColours() = default;
-  /// records: of points from all over the store, as its root's; how far values reach is told by
-  /// them. Colours of 16 bits of which none exceeds 255 are taken for colours of 8 bits, as many
-  /// files have them; intensities are stretched between the 2nd and the 98th percentile.
+  /// `records` are those of points from the whole store, such as its root's; they determine the
+  /// range of the values. 16-bit colours that never exceed 255 are taken for 8-bit colours, as in
+  /// many files. Intensities are stretched between the 2nd and the 98th percentile.
   CloudColours(const stream::Schema& schema, std::span<const std::byte> records);
 
   [[nodiscard]] bool has_rgb() const { return rgb_[0] && rgb_[1] && rgb_[2]; }
   [[nodiscard]] bool has_group() const { return group_.has_value(); }
   [[nodiscard]] bool has_intensity() const { return intensity_.has_value(); }
-  /// The classes of `records`, ascending.
+  /// Returns the classes of `records`, ascending.
   [[nodiscard]] const std::vector<std::uint8_t>& groups() const { return groups_; }
 
   [[nodiscard]] CloudColour operator()(std::span<const std::byte> record) const;
 
  private:
-  /// A column of records and its map to 0 ... 255.
+  /// A column of the records, with its mapping to 0 ... 255.
   struct Column {
     stream::ScalarType type{};
     std::size_t offset = 0;

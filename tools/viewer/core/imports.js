@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the page gives to the module beside Emscripten's own (src/core.ts): the linker wants to know the names.
+// Imports that the page provides besides Emscripten's own (src/core.ts), so that the linker knows
+// their names.
 const {library} = LibraryManager;
 mergeInto(library, {number: () => {}});

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The functions of the WebAssembly module: one store under one camera. JavaScript brings the
+/// The functions of the WebAssembly module: one store under one camera. JavaScript supplies the
 /// bytes.
 ///
-/// A call takes what is longer than a number from input(), where JavaScript has written it, and
-/// leaves what is longer at output().
+/// A call reads arguments longer than a number from input(), where JavaScript has written them. It
+/// leaves longer results for text() and numbers().
 
 #include <cstdint>
 #include <cstring>
@@ -29,17 +29,17 @@ using namespace terrace;
 
 enum Status : int { kDone = 0, kMissing = 1, kFailed = 2 };
 
-/// Ranges told at once; there is no sense in more requests than that.
+/// Maximum number of ranges reported at once; more requests would not help.
 constexpr std::size_t kMostRanges = 1024;
 
 struct Module {
-  std::vector<double> input;  // of doubles, so that it is aligned for them
+  std::vector<double> input;  // doubles, for their alignment
   stream::GivenBytes given;
   std::optional<stream::Store> store;
   std::unique_ptr<viewer::Scene> scene;
   viewer::SceneState state;
   std::vector<double> numbers;
-  std::string text, told;  // told: what the last frame lacked
+  std::string text, lacking;  // lacking: bytes missing in the last frame
   std::optional<viewer::SceneHit> hit;
   std::optional<terrain::StoreProbe> probe;
 };
@@ -72,8 +72,8 @@ int guarded(const Work& work) {
   }
 }
 
-/// What a scene needs at most beside its points, and what each of these takes: caches of clusters
-/// and bytes; triangulation, heights and the arrays to draw.
+/// Maximum memory of a scene besides its points, and per point: caches of clusters and bytes;
+/// triangulation, heights and the arrays to draw.
 constexpr std::size_t kMemory = std::size_t{128} << 20;
 #ifdef TERRACE_VIEWER_BODY
 constexpr std::size_t kPointMemory = 700;
@@ -81,10 +81,10 @@ constexpr std::size_t kPointMemory = 700;
 constexpr std::size_t kPointMemory = 200;
 #endif
 
-/// Growing the memory takes the browser many milliseconds, however little it is, and malloc would
-/// ask for a page at a time. Pages that are not touched cost nothing.
+/// Growing the memory by any amount takes the browser many milliseconds, and malloc would request
+/// one page at a time. Untouched pages cost nothing.
 constexpr std::size_t kWasmPage = 65536;
-/// A frame that finds less than this free has more of it reserved.
+/// A frame reserves more memory if less than this is free.
 constexpr std::size_t kLeastMemory = std::size_t{8} << 20;
 
 std::size_t memory_left() {
@@ -95,7 +95,7 @@ void reserve_memory(std::size_t bytes) {
   if (left < bytes) __builtin_wasm_memory_grow(0, (bytes - left + kWasmPage - 1) / kWasmPage);
 }
 
-/// Whether the module for bodies should go on with the store.
+/// Returns whether the module for bodies should take over the store.
 bool is_body(const stream::Store& store, const stream::LinearMap& ground) {
 #ifdef TERRACE_VIEWER_BODY
   static_cast<void>(store);
@@ -112,25 +112,26 @@ stream::Point3 point_of(const double* at) { return {at[0], at[1], at[2]}; }
 
 #define TERRACE_EXPORT(name) extern "C" __attribute__((export_name(#name), visibility("default")))
 
-/// Room for this many bytes of input; valid until the next call of it.
+/// Returns room for this many bytes of input, valid until the next call.
 TERRACE_EXPORT(input) void* terrace_input(std::size_t bytes) {
   module().input.resize(bytes / sizeof(double) + 1);
   return module().input.data();
 }
-/// Text after kMissing (lines of file, offset, bytes), after kFailed (what is wrong).
+/// Returns the text of the last call: after kMissing, lines of file, offset and bytes; after
+/// kFailed, the error.
 TERRACE_EXPORT(text) const char* terrace_text() { return module().text.data(); }
 TERRACE_EXPORT(text_size) std::size_t terrace_text_size() { return module().text.size(); }
-/// Numbers that a call has left.
+/// Returns the numbers of the last call.
 TERRACE_EXPORT(numbers) const double* terrace_numbers() { return module().numbers.data(); }
 
-/// input: a name. A file of the store and its size.
+/// input: a name. Adds a file of the store with its size.
 TERRACE_EXPORT(add_file) int terrace_add_file(std::size_t name, double bytes) {
   return guarded([&] {
     module().given.add_file({input_text(), name}, static_cast<std::uint64_t>(bytes));
     return kDone;
   });
 }
-/// input: a name and behind it the bytes from `offset` on.
+/// input: a name, followed by the bytes from `offset` on.
 TERRACE_EXPORT(give) int terrace_give(std::size_t name, double offset, std::size_t bytes) {
   return guarded([&] {
     module().given.give({input_text(), name}, static_cast<std::uint64_t>(offset),
@@ -138,7 +139,7 @@ TERRACE_EXPORT(give) int terrace_give(std::size_t name, double offset, std::size
     return kDone;
   });
 }
-/// input: a name. Its bytes were damaged and will be brought again.
+/// input: a name. Discards its bytes, which were damaged and will be fetched again.
 TERRACE_EXPORT(forget) int terrace_forget(std::size_t name) {
   return guarded([&] {
     module().given.forget({input_text(), name});
@@ -147,8 +148,8 @@ TERRACE_EXPORT(forget) int terrace_forget(std::size_t name) {
 }
 
 /// input: the nine numbers of the map from stored coordinates to metres. numbers: the box of the
-/// scene; 1 for a raster; 1 for the scan of a body; of points whether they have colours, classes,
-/// intensities; how many classes, and these.
+/// scene; 1 for a raster; 1 for the scan of a body; for points whether they have colours, classes,
+/// intensities; the number of classes, and the classes.
 TERRACE_EXPORT(open) int terrace_open(double max_points) {
   return guarded([&] {
     Module& m = module();
@@ -179,11 +180,11 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
   });
 }
 
-/// input: eye, direction, up; field of view in degrees, aspect, height in pixels; pixels of error;
-/// seconds to spend; the time; the level that is wanted everywhere, whatever the error (255: none).
-/// numbers: points, triangles, expanded clusters, slots of vertices and
-/// of triangles, whether it is settled, the worst demand, clusters and bytes read, whether what has
-/// gone is still drawn, whether the same is missing as after the last frame. text: what is missing.
+/// input: eye, direction, up; field of view in degrees, aspect, height in pixels; error in pixels;
+/// seconds to spend; the time; the minimum level everywhere, whatever the error (255: none).
+/// numbers: points, triangles, expanded clusters, slots of vertices and of triangles, whether it is
+/// settled, the worst demand, clusters and bytes read, whether removed parts are still drawn,
+/// whether the same bytes are missing as after the last frame. text: the missing bytes.
 TERRACE_EXPORT(frame) int terrace_frame() {
   return guarded([&] {
     Module& m = module();
@@ -209,13 +210,14 @@ TERRACE_EXPORT(frame) int terrace_frame() {
                  static_cast<double>(s.stored_bytes),
                  s.waiting ? 1.0 : 0.0};
     tell(m.scene->missing());
-    m.numbers.push_back(m.text == m.told ? 1.0 : 0.0);
-    m.told = m.text;
+    m.numbers.push_back(m.text == m.lacking ? 1.0 : 0.0);
+    m.lacking = m.text;
     return kDone;
   });
 }
 
-/// numbers: blocks of vertices, their addresses, that of the vertices; the same of triangles.
+/// numbers: the number of vertex blocks, their address, the address of the vertices; the same for
+/// triangles.
 TERRACE_EXPORT(changes) int terrace_changes() {
   return guarded([&] {
     const viewer::SceneChanges& c = module().scene->take_changes();
@@ -232,7 +234,7 @@ TERRACE_EXPORT(changes) int terrace_changes() {
   });
 }
 
-/// Computes the surface of a scan from scratch; what that changes is among the next changes().
+/// Recomputes the surface of a scan; the next changes() include the result.
 TERRACE_EXPORT(restore) int terrace_restore(double time) {
   return guarded([&] {
     module().scene->restore(time);
@@ -250,9 +252,9 @@ TERRACE_EXPORT(hash) int terrace_hash() {
   });
 }
 
-/// input: origin, direction, the angle. numbers: nothing met (0) or 1; stored place; place in the
-/// view frame; level; level and ordinal of the cluster; reach; how many attributes are known, and
-/// these.
+/// input: origin, direction, angle. numbers: 1 for a hit or 0; stored place; place in the view
+/// frame; level; level and ordinal of the cluster; reach; the number of known attributes, and their
+/// values.
 TERRACE_EXPORT(pick) int terrace_pick() {
   return guarded([&] {
     Module& m = module();
@@ -279,9 +281,9 @@ TERRACE_EXPORT(pick) int terrace_pick() {
 }
 
 #ifndef TERRACE_VIEWER_BODY
-/// input: a stored place, the reach. What the store holds there at full resolution, which depends
-/// on nothing that is drawn: of a raster its surface, else the nearest point within reach. numbers:
-/// nothing (0) or 1; stored place; place in the view frame; level; how many attributes, and these.
+/// input: a stored place, the reach. Reads the store there at full resolution, independent of what
+/// is drawn: a raster's surface, or the nearest point within reach. numbers: 1 if found or 0;
+/// stored place; place in the view frame; level; the number of attributes, and their values.
 TERRACE_EXPORT(probe) int terrace_probe() {
   return guarded([&] {
     Module& m = module();
@@ -305,8 +307,8 @@ TERRACE_EXPORT(probe) int terrace_probe() {
   });
 }
 
-/// input: two stored places, the axis upward. numbers: metres over ground; level; 1 if a raster is
-/// sampled; how many points the profile has, and share of the way and height of each.
+/// input: two stored places, the upward axis. numbers: metres over ground; level; 1 if a raster is
+/// sampled; the number of points of the profile, and share of the distance and height of each.
 TERRACE_EXPORT(profile) int terrace_profile() {
   return guarded([&] {
     Module& m = module();
@@ -323,7 +325,8 @@ TERRACE_EXPORT(profile) int terrace_profile() {
 }
 #endif
 
-/// Level and ordinal of a cluster. numbers: how many lines its outline has, and both ends of each.
+/// Takes level and ordinal of a cluster. numbers: the number of lines of its outline, and both ends
+/// of each.
 TERRACE_EXPORT(outline) int terrace_outline(unsigned level, double ordinal) {
   return guarded([&] {
     Module& m = module();

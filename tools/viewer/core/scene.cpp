@@ -32,10 +32,10 @@ Point3 cross(const Point3& a, const Point3& b) {
 
 template <class Shown>
 class SceneOf final : public Scene {
-  /// The bits of SceneBodyPoint::start without the sign; one is left for rounding.
+  /// Bits of SceneBodyPoint::start without the sign; one is left for rounding.
   static constexpr int kStartBits = 14;
-  /// What the page takes for a slide, and for how long what has gone is drawn on: a little longer.
-  /// What is drawn on and changes again and again ends in time, too.
+  /// Seconds of a slide on the page, seconds for which removed parts stay drawn (a little longer),
+  /// and the limit for parts that change again and again.
   static constexpr double kSlide = 0.45, kWait = 0.5, kLongestWait = 3.0;
 
  public:
@@ -105,7 +105,7 @@ class SceneOf final : public Scene {
     vertices_.take(changes_.vertex_blocks, changed_vertices_);
     changes_.vertices = std::as_bytes(std::span(changed_vertices_));
     triangles_.take(changes_.triangle_blocks, changes_.triangles);
-    // Copying the result costs as much again as taking it.
+    // Copying the result costs as much again as collecting it.
     learn_after(after_ + 2 * (now() - begin));
     came_ = went_ = after_ = 0;
     return changes_;
@@ -156,9 +156,9 @@ class SceneOf final : public Scene {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
         .count();
   }
-  /// Normalised least mean squares on the cost of a point that came and of one that went; the
-  /// estimates rise fast and fall slowly, and a measurement disturbed from outside counts as at
-  /// most twice the expected one.
+  /// Learns the cost of an added and of a removed point by normalised least mean squares. Estimates
+  /// rise fast and fall slowly. A measurement disturbed from outside counts as at most twice the
+  /// expected cost.
   void learn_after(double measured) {
     const double size = came_ * came_ + went_ * went_;
     if (size < 64 * 64) return;
@@ -182,7 +182,7 @@ class SceneOf final : public Scene {
     if constexpr (kRaster) spans_gap_.resize(has_gaps_ ? mesh().triangle_slots() : 0);
     if constexpr (kTriangles && !kRaster) normals_.grow(mesh().vertex_slots());
   }
-  /// Without sliding.
+  /// Places a vertex without sliding.
   void place(tri::VertexId vertex) {
     const Point3 p = difference(view_.in_view_frame(vertex), base_);
     Vertex& v = vertices_.change(drawn(vertex));
@@ -201,7 +201,7 @@ class SceneOf final : public Scene {
   }
   template <class Delta>
   void apply(const Delta& delta, double time);
-  /// How it is drawn.
+  /// Returns the triangle as it is drawn.
   SceneTriangle add(tri::TriangleId triangle) {
     const auto corners = mesh().vertices(triangle);
     for (const tri::VertexId corner : corners) list(corner);
@@ -216,7 +216,7 @@ class SceneOf final : public Scene {
   void renew_normals();
   template <class Visit>
   void for_triangles_around(tri::VertexId vertex, const Visit& visit) const {
-    // Counter-clockwise, and from the hull the other way as well.
+    // Go counter-clockwise, and from the hull the other way as well.
     const tri::TriangleId first = mesh().triangle_at(vertex);
     for (const std::size_t turn : {std::size_t{1}, std::size_t{2}}) {
       for (tri::TriangleId at = first; at != tri::kNoTriangle;) {
@@ -228,7 +228,7 @@ class SceneOf final : public Scene {
       }
     }
   }
-  /// Where a vertex is drawn at a time, as the page has it.
+  /// Returns where the page draws a vertex at a time.
   [[nodiscard]] static Point3 place_at(const Vertex& v, double time) {
     const double t = std::clamp((time - v.start_time) / kSlide, 0.0, 1.0);
     const double left = 1 - t * t * (3 - 2 * t);
@@ -241,7 +241,7 @@ class SceneOf final : public Scene {
     }
     return place;
   }
-  /// Lets a vertex slide.
+  /// Starts a vertex's slide.
   static void move(Vertex& v, const Point3& from, const Point3& to, double time) {
     v.x = static_cast<float>(to[0]);
     v.y = static_cast<float>(to[1]);
@@ -277,7 +277,7 @@ class SceneOf final : public Scene {
     return {v.x + base_[0], v.y + base_[1], v.z + base_[2]};
   }
 
-  /// The triangle as it is drawn: not at all where a raster has no data.
+  /// Returns the triangle as it is drawn: empty where a raster has no data.
   [[nodiscard]] SceneTriangle look_at(tri::TriangleId triangle) {
     if (has_gaps_) set_gap(triangle, view_.spans_gap(triangle));
     return is_gap(triangle) ? SceneTriangle{} : drawn(mesh().vertices(triangle));
@@ -294,7 +294,8 @@ class SceneOf final : public Scene {
   stream::Store store_;
   View view_;
   stream::Box3 bounds_;
-  /// What is drawn counts from here: the middle of the heights, for floats far from 0 are coarse.
+  /// Origin of the drawn coordinates: the middle of the heights, because floats far from 0 are
+  /// coarse.
   Point3 base_{};
   CloudColours colours_;
   Blocks<Vertex> vertices_;
@@ -305,35 +306,36 @@ class SceneOf final : public Scene {
   std::vector<tri::VertexId> without_normal_, ring_;
   std::vector<tri::ClusterId> pinned_;
   bool has_gaps_ = view_.has_gaps();
-  std::vector<bool> spans_gap_;  ///< if so, by slot of a triangle
-  std::size_t gaps_ = 0;         ///< the triangles that span one
-  /// The slots of triangles that are to be looked at from next_unsure_ on, see renew_gaps().
+  std::vector<bool> spans_gap_;  ///< whether a triangle spans a gap, by slot
+  std::size_t gaps_ = 0;         ///< number of triangles that span one
+  /// Triangle slots to check from next_unsure_ on, see renew_gaps().
   std::uint32_t unsure_ = 0, next_unsure_ = 0;
   mutable tri::VertexId picked_ = tri::kNoVertex;
-  /// Seconds that the changes of a point that came, or went, cost after a step.
+  /// Seconds that the changes of an added, or removed, point cost after a step.
   std::array<double, 2> after_rate_{};
-  double after_ = 0, came_ = 0, went_ = 0;  ///< since the changes were last taken
-  /// Nothing for points.
+  double after_ = 0, came_ = 0, went_ = 0;  ///< since changes were last taken
+  /// Unused for points.
   std::conditional_t<kTriangles, tri::Geomorph<typename Triangulation::type>, std::monostate>
       morph_;
-  BodyNormals normals_;  // of surfaces in space
+  BodyNormals normals_;  // for surfaces in space
   Waiting<Vertex> waiting_{vertices_, triangles_};
   /// A connected part of the last step.
   struct Part {
-    std::uint32_t vertices = 0, triangles = 0;  ///< that go
+    std::uint32_t vertices = 0, triangles = 0;  ///< removed ones
     bool waits = true;
     std::uint32_t group = 0;
   };
   std::vector<Part> parts_;
-  /// By drawn slot, none between calls: the part in which a vertex goes; then where it is drawn on.
+  /// By drawn slot, unset between calls: the part that removes a vertex, then the slot where it
+  /// stays drawn.
   std::vector<std::uint32_t> leaving_;
-  /// Triangles that are drawn on with such a vertex, and their groups.
+  /// Removed triangles that are still drawn with such a vertex, and their groups.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> leaving_kept_;
 };
 
-/// What is known of clusters changes whether a triangle far from them spans a gap, so all are
-/// looked at in turn: a thousand in a frame, and once nothing else is to be done as many as half of
-/// the time allows.
+/// Newly read clusters can change whether a triangle far from them spans a gap, so all triangles
+/// are checked in turn: a thousand per frame, and more if nothing else is left to do, for up to
+/// half of the time.
 template <class Shown>
 void SceneOf<Shown>::renew_gaps(double until) {
   constexpr std::uint32_t kAtOnce = 1024;
@@ -357,8 +359,9 @@ void SceneOf<Shown>::renew_gaps(double until) {
   }
 }
 
-/// The connected parts of a step in which vertices go and none come wait: collapses. Where a
-/// part changes what is hidden, it joins the group that does, or ends it if it does not wait.
+/// Makes the connected parts of a step that only remove vertices (collapses) wait. A part that
+/// changes hidden triangles joins the group that hides them, or ends that group if the part itself
+/// does not wait.
 template <class Shown>
 template <class Delta>
 void SceneOf<Shown>::wait(const Delta& delta, double time) {
@@ -382,20 +385,20 @@ void SceneOf<Shown>::wait(const Delta& delta, double time) {
   for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
     leaving_[drawn(morph_.removed.vertices[i])] = numbers.removed[i];
   }
-  const auto for_touched = [&](const auto& told) {
+  const auto for_touched = [&](const auto& visit) {
     if (waiting_.empty()) return;
     for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
       const std::uint32_t group = waiting_.hiding(drawn(changes.removed_triangles[i]));
-      if (group != kNone) told(parts_[numbers.removed_triangles[i]], group);
+      if (group != kNone) visit(parts_[numbers.removed_triangles[i]], group);
     }
     for (const auto& [kept, group] : leaving_kept_) {
       for (const std::uint32_t corner : triangles_[kept]) {
-        if (leaving_[corner] != kNone) told(parts_[leaving_[corner]], group);
+        if (leaving_[corner] != kNone) visit(parts_[leaving_[corner]], group);
       }
     }
   };
-  // On the hull a vertex may have lost all its triangles without new ones, so that those which are
-  // drawn on are looked at, too.
+  // On the hull a vertex may have lost all its triangles without new ones, so check the removed
+  // triangles that are still drawn too.
   const auto find_kept = [&] {
     leaving_kept_.clear();
     if (numbers.removed.empty()) return;
@@ -523,7 +526,7 @@ void SceneOf<Shown>::renew_normals() {
         const auto c = mesh().vertices(triangle);
         const Point3 a = position(c[0]);
         const Point3 normal = cross(difference(position(c[1]), a), difference(position(c[2]), a));
-        // Rows grow downward: in the view frame the same triangle turns the other way.
+        // Rows grow downward, so the same triangle has the opposite orientation in the view frame.
         const double sign = normal[2] < 0 ? -1 : 1;
         for (std::size_t k = 0; k < 3; ++k) sum[k] += sign * normal[k];
       });
@@ -545,7 +548,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
   const Point3 way{direction[0] / length, direction[1] / length, direction[2] / length};
   double best = std::numeric_limits<double>::infinity();
   std::optional<SceneHit> hit;
-  const auto told = [&](tri::VertexId vertex, const Point3& stored, const Point3& place) {
+  const auto hit_at = [&](tri::VertexId vertex, const Point3& stored, const Point3& place) {
     picked_ = vertex;
     const tri::PointId id = view_.model().point_id(vertex);
     hit = {.stored = stored,
@@ -560,7 +563,7 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     }
   };
   if constexpr (kTriangles) {
-    // Points on one line have no triangles, and are drawn as points.
+    // Points on one line have no triangles and are drawn as points.
     if (mesh().triangle_count() > gaps_) {
       // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
       // doi:10.1080/10867651.1997.10487468.
@@ -595,10 +598,10 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
         for (std::size_t k = 0; k < 3; ++k) stored[k] += weights[i] * corner[k];
         if (weights[i] > weights[nearest]) nearest = i;
       }
-      told(vertices[nearest], stored,
-           {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
+      hit_at(vertices[nearest], stored,
+             {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
       const Point3 aside = difference(position(vertices[nearest]), hit->place);
-      // Positions are rounded to floats.
+      // Positions were rounded to floats.
       const Point3 size = difference(box().max, box().min);
       hit->reach = 1.001 * std::sqrt(dot(aside, aside)) + 1e-6 * std::sqrt(dot(size, size));
       return hit;
@@ -609,10 +612,11 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     const double along = dot(to, way);
     if (along <= 0) continue;
     const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
-    // Among points about as near to the line, the nearest to the eye hides the others.
+    // Among points that are about equally near to the line, the one nearest to the eye hides the
+    // others.
     if (aside > angle || along * (1 + aside / angle) >= best) continue;
     best = along * (1 + aside / angle);
-    told(vertex, view_.stored(vertex), place);
+    hit_at(vertex, view_.stored(vertex), place);
   }
   return hit;
 }
@@ -641,7 +645,7 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
       if (belongs[i]) lines.push_back({i, i});
     }
   } else {
-    // An edge between two triangles inside comes twice, once each way.
+    // An edge between two triangles inside appears twice, once in each direction.
     std::vector<std::array<std::uint32_t, 2>> edges;
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
       const SceneTriangle c = drawn(mesh().vertices(triangle));

@@ -19,108 +19,110 @@
 
 namespace terrace::viewer {
 
-/// A vertex as a graphics processor takes it: metres in the view frame of terrain::StoreView, but
-/// heights count from the middle of Scene::box().
+/// A vertex in the layout for the GPU: metres in the view frame of terrain::StoreView, with heights
+/// relative to the middle of Scene::box().
 struct SceneVertex {
   static constexpr std::uint8_t kNone = 255;  ///< the level of a slot without a vertex
 
   float x = 0, y = 0, z = 0;
   std::array<std::int8_t, 3> normal{};  ///< upward, times 127
-  std::uint8_t level = kNone;           ///< the highest of the point
-  float start_z = 0;                    ///< where z slides from
-  float start_time = -1e9F;             ///< and when it began, in the seconds of Scene::frame()
+  std::uint8_t level = kNone;           ///< the point's highest level
+  float start_z = 0;                    ///< the z at which the slide starts
+  float start_time = -1e9F;             ///< when the slide started, in the time of Scene::frame()
 };
 static_assert(sizeof(SceneVertex) == 24);
 
-/// The same of a cloud, whose points do not slide.
+/// A vertex of a cloud, whose points do not slide.
 struct ScenePoint {
   float x = 0, y = 0, z = 0;
-  std::array<std::int8_t, 3> normal{};  ///< of a surface: outward, times 127; else 0
+  std::array<std::int8_t, 3> normal{};  ///< of a surface: outward, times 127; otherwise 0
   std::uint8_t level = SceneVertex::kNone;
   std::array<std::uint8_t, 3> rgb{};
   std::uint8_t group = 0, intensity = 0;
 };
 static_assert(sizeof(ScenePoint) == 24);
 
-/// The same of the surface of a scan. What follows has a place in the bytes that the point leaves.
+/// A vertex of the surface of a scan. Its members fill the padding of ScenePoint.
 struct SceneBodyPoint : ScenePoint {
-  std::int8_t start_exponent = 0;       ///< a power of two metres
-  std::array<std::int16_t, 3> start{};  ///< so many of these from x, y, z the slide begins
-  float start_time = -1e9F;             ///< and when
+  std::int8_t start_exponent = 0;       ///< exponent of start's unit: 2^n metres
+  std::array<std::int16_t, 3> start{};  ///< start of the slide, relative to x, y, z
+  float start_time = -1e9F;             ///< when the slide started
 };
 static_assert(sizeof(SceneBodyPoint) == 32);
 
 using SceneTriangle = std::array<std::uint32_t, 3>;  ///< slots of vertices; all 0: none
 
-/// What a frame has changed of what is drawn: what has gone may be drawn on for a while, in slots
-/// of its own before those of the model. In blocks of 64 slots: block b is slots 64 b ... 64 b
-/// + 63.
+/// The changes of a frame to the drawn arrays. Removed parts may be drawn for a while, in separate
+/// slots before those of the model. Changes are listed in blocks of 64 slots: block b is slots 64 b
+/// ... 64 b + 63.
 struct SceneChanges {
   static constexpr std::size_t kBlock = 64;
   std::vector<std::uint32_t> vertex_blocks, triangle_blocks;
   std::span<const std::byte>
       vertices;  ///< kBlock SceneVertex, ScenePoint or SceneBodyPoint for each of vertex_blocks
-  std::vector<SceneTriangle> triangles;  ///< likewise
+  std::vector<SceneTriangle> triangles;  ///< kBlock for each of triangle_blocks
 };
 
 struct SceneState {
   std::size_t points = 0, triangles = 0, expanded = 0;
   std::size_t vertex_slots = 0, triangle_slots = 0;
   bool settled = false;
-  bool waiting = false;  ///< what has gone is drawn on; a later frame will exchange it
+  bool waiting = false;  ///< removed parts are still drawn until a later frame
   double worst = 0.0;    ///< as in tri::ViewControl::Step
   std::size_t clusters = 0, stored_bytes = 0;  ///< read so far
 };
 
 struct SceneHit {
-  stream::Point3 stored{};           ///< on the surface, or the point itself, in stored coordinates
-  stream::Point3 place{};            ///< the same in the view frame
-  unsigned level = 0;                ///< of the nearest corner
-  tri::ClusterId cluster{};          ///< whose member that corner is
-  double reach = 0;                  ///< on a surface: metres to that corner at most; of points 0
-  std::vector<double> attributes{};  ///< of that corner, stored values; empty if no longer kept
+  stream::Point3 stored{};   ///< on the surface, or the point itself, in stored coordinates
+  stream::Point3 place{};    ///< the same in the view frame
+  unsigned level = 0;        ///< level of the nearest corner
+  tri::ClusterId cluster{};  ///< the cluster that has that corner as a member
+  double reach = 0;  ///< on a surface: upper bound of the metres to that corner; for points 0
+  std::vector<double> attributes{};  ///< stored values of that corner; empty if no longer kept
 };
 
-/// A store under a camera as arrays to draw: triangles of rasters, of other stores the points; in
-/// the module for bodies (TERRACE_VIEWER_BODY) the surface that points of any store were scanned
-/// from. Bytes of the store may be missing.
+/// A store under a camera as arrays to draw: triangles for rasters, points for other stores. In the
+/// module for bodies (TERRACE_VIEWER_BODY) it is the surface that the points were scanned from.
+/// Bytes of the store may be missing.
 class Scene {
  public:
-  /// Throws: stream::MissingBytes; stream::Error; std::invalid_argument for a store without points.
-  /// given: as in terrain::StoreView.
+  /// Opens a store; `given` is as in terrain::StoreView. Throws stream::MissingBytes,
+  /// stream::Error, and std::invalid_argument for a store without points.
   static std::unique_ptr<Scene> open(
       const stream::Store& store, const stream::LinearMap& ground, std::size_t max_points,
       const std::function<bool(const stream::ByteRange&)>& given = {});
   virtual ~Scene() = default;
 
-  /// As terrain::StoreView::frame(); what the changes cost, here and in take_changes(), is part of
-  /// the seconds. time: of this frame, from which new vertices slide into place.
+  /// Works as terrain::StoreView::frame() does. The cost of the changes, here and in
+  /// take_changes(), counts towards `seconds`. `time` is the time of this frame, at which new
+  /// vertices start to slide into place.
   virtual SceneState frame(const tri::View& view, double seconds, double time) = 0;
-  /// The changes since the last call; all there is at first. To be called after each frame.
+  /// Returns the changes since the last call; the first call returns everything. Call it after each
+  /// frame.
   virtual const SceneChanges& take_changes() = 0;
   [[nodiscard]] virtual std::span<const stream::ByteRange> missing() const = 0;
-  /// Computes a surface in space from scratch, which frames only follow: then it depends on the
-  /// points alone. 3 us per point natively. Nothing to do for others. time: as in frame().
+  /// Recomputes a surface in space from scratch, so that it depends only on the points; frames only
+  /// update it. 3 us per point natively. Does nothing for other scenes. `time` is as in frame().
   virtual void restore(double time) = 0;
-  /// The hash of the triangulation, or of the set of points.
+  /// Returns a hash of the triangulation, or of the set of points.
   [[nodiscard]] virtual std::uint64_t hash() const = 0;
-  /// Where a ray meets the surface first; of points, the one nearest to the ray's line as seen from
-  /// its origin, within `angle` (radians). O(what is drawn).
+  /// Returns where a ray first meets the surface; for points, the point nearest to the ray's line
+  /// as seen from its origin, within `angle` radians. O(drawn vertices and triangles).
   [[nodiscard]] virtual std::optional<SceneHit> pick(const stream::Point3& origin,
                                                      const stream::Point3& direction,
                                                      double angle) const = 0;
-  /// Expands the clusters that the vertex nearest to a hit heads, one level down; or collapses the
+  /// Expands the clusters headed by the vertex nearest to a hit, one level down, or collapses the
   /// cluster that it is a member of. They stay so until release().
   virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
   virtual void release() = 0;
-  /// The lines, as slots of their ends, around the triangles whose corners all belong to a cluster:
-  /// its head and what lies below it. Of points these themselves, each as both ends. Empty for
-  /// clusters that are not expanded. O(what is drawn).
+  /// Returns the lines, as slots of their ends, around the triangles whose corners all belong to a
+  /// cluster, that is, to its head or below it. For points, returns the points themselves, each as
+  /// both ends. Empty for clusters that are not expanded. O(drawn vertices and triangles).
   [[nodiscard]] virtual std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const = 0;
-  /// What points can be drawn by; nothing for rasters.
+  /// Returns the attributes that can colour points; none for rasters.
   [[nodiscard]] virtual const CloudColours& colours() const = 0;
-  /// The box of all points in the view frame.
+  /// Returns the bounding box of all points in the view frame.
   [[nodiscard]] virtual stream::Box3 box() const = 0;
 };
 

@@ -13,12 +13,12 @@
 
 namespace terrace::viewer {
 
-/// Triangles that have gone and are drawn on while their vertices slide onto what replaces them,
-/// and which is hidden until then. What is exchanged at once is a group.
+/// Removed triangles that are still drawn while their vertices slide onto their replacements, which
+/// stay hidden until then. Triangles that are exchanged together form a group.
 ///
-/// What has gone is copied to spare slots, which are before those of the model: slot s of the model
-/// is drawn at kVertices + s and kTriangles + s. What waits lies in plain lists: a step looks
-/// through all of it, some tens of nanoseconds per triangle.
+/// Removed triangles are copied to spare slots before those of the model: slot s of the model is
+/// drawn at kVertices + s and kTriangles + s. Waiting items are in plain lists, which each step
+/// scans completely, at some tens of nanoseconds per triangle.
 template <class Vertex>
 class Waiting {
  public:
@@ -45,14 +45,14 @@ class Waiting {
     other.into = a;
   }
   [[nodiscard]] double begin(std::uint32_t group) { return groups_[root(group)].begin; }
-  /// At the next sweep().
+  /// Ends a group at the next sweep().
   void end(std::uint32_t group) { groups_[root(group)].over = any_over_ = true; }
   void end_until(double time) {
     for (std::uint32_t g = 0; g < groups_.size(); ++g) {
       if (groups_[g].into == g && groups_[g].end <= time) end(g);
     }
   }
-  /// Draws what was hidden in the groups that have ended; false if none has.
+  /// Shows the hidden triangles of groups that have ended. Returns false if none has.
   bool sweep() {
     if (!any_over_) return false;
     any_over_ = false;
@@ -109,7 +109,7 @@ class Waiting {
 
   // ---- What waits
 
-  /// The group that hides a triangle; kNone if none does.
+  /// Returns the group that hides a triangle, or kNone.
   [[nodiscard]] std::uint32_t hiding(std::uint32_t triangle) const {
     if (triangle >= index_.size() || index_[triangle] == kNone) return kNone;
     return hidden_[index_[triangle]].group;
@@ -119,12 +119,12 @@ class Waiting {
     index_[triangle] = static_cast<std::uint32_t>(hidden_.size());
     hidden_.push_back({triangle, group, corners});
   }
-  /// A hidden triangle has gone, too.
+  /// Forgets a hidden triangle that has been removed as well.
   void forget(std::uint32_t triangle) {
     hidden_[index_[triangle]].slot = kNone;
     index_[triangle] = kNone;
   }
-  /// Draws on a vertex; the slot that it is drawn at. Requires room.
+  /// Keeps drawing a removed vertex. Returns the slot at which it is drawn. Requires room.
   std::uint32_t keep(std::uint32_t group, const Vertex& vertex, const tri::Anchor& anchor) {
     const std::uint32_t slot = free_vertices_.take();
     vertices_.change(slot) = vertex;
@@ -132,18 +132,18 @@ class Waiting {
     kept_vertices_.push_back({slot, group});
     return slot;
   }
-  /// Draws on a triangle. Requires room.
+  /// Keeps drawing a removed triangle. Requires room.
   void keep(std::uint32_t group, const SceneTriangle& corners) {
     const std::uint32_t slot = free_triangles_.take();
     triangles_.change(slot) = corners;
     kept_.push_back({slot, group});
   }
-  /// told(slot, group) for the triangles that are drawn on.
-  template <class Told>
-  void for_kept(const Told& told) {
-    for (const Kept& kept : kept_) told(kept.slot, kept.group);
+  /// Calls visit(slot, group) for each removed triangle that is still drawn.
+  template <class Visit>
+  void for_kept(const Visit& visit) {
+    for (const Kept& kept : kept_) visit(kept.slot, kept.group);
   }
-  /// Where the vertices that are drawn on slide to, and the slots that they are drawn at.
+  /// The targets of the removed vertices that are still drawn; slot_of_anchor() gives their slots.
   [[nodiscard]] std::vector<tri::Anchor>& anchors() { return anchors_; }
   [[nodiscard]] std::uint32_t slot_of_anchor(std::size_t i) const { return kept_vertices_[i].slot; }
 
@@ -166,8 +166,8 @@ class Waiting {
     }
     return group;
   }
-  /// Slots in the order in which they became free: what waits together lies together, so that few
-  /// blocks change.
+  /// Free slots in the order in which they became free. Items that wait together are then close
+  /// together, so that few blocks change.
   class FreeSlots {
    public:
     explicit FreeSlots(std::uint32_t count) : ring_(count) {
@@ -184,10 +184,10 @@ class Waiting {
   Blocks<Vertex>& vertices_;
   Blocks<SceneTriangle>& triangles_;
   std::vector<Group> groups_;
-  std::vector<Kept> kept_, kept_vertices_;  ///< triangles; vertices, beside anchors_
+  std::vector<Kept> kept_, kept_vertices_;  ///< kept triangles; kept vertices, parallel to anchors_
   std::vector<tri::Anchor> anchors_;
   std::vector<Hidden> hidden_;
-  std::vector<std::uint32_t> index_;  ///< in hidden_, by drawn slot of a triangle
+  std::vector<std::uint32_t> index_;  ///< index in hidden_, by drawn slot of a triangle
   FreeSlots free_vertices_{kVertices}, free_triangles_{kTriangles};
   bool any_over_ = false;
 };

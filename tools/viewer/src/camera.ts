@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// A camera that turns about a place on the ground, or about a body from any side: metres east, north and up, angles in
-/// degrees.
+/// A camera that orbits a place on the ground, or a body from any side. Metres east, north and up; angles in degrees.
 
 export type Vec3 = [number, number, number];
 
@@ -20,13 +19,13 @@ export const unit = (a: Vec3): Vec3 => {
 
 export class OrbitCamera {
   target: Vec3 = [0, 0, 0];
-  azimuth = 0;   ///< where it looks, from north to the east
+  azimuth = 0;   ///< direction of view, clockwise from north
   tilt = 40;     ///< below the horizon
   distance = 1;
-  least = 1;     ///< distances
+  least = 1;     ///< range of distances
   most = 1e9;
-  body = false;  ///< no ground: it turns below, too, and moves in the plane of the picture
-  yUp = false;   ///< of a body: north is up, and east stays
+  body = false;  ///< no ground: it also turns below, and moves in the picture's plane
+  yUp = false;   ///< body: north is up, and east stays
 
   private turned(v: Vec3): Vec3 {
     return this.body && this.yUp ? [v[0], v[2], -v[1]] : v;
@@ -47,9 +46,10 @@ export class OrbitCamera {
     return cross(this.right, this.direction);
   }
 
-  /// From the south, as near as all of the box is seen between these edges of the picture, from -1 to 1, right and up.
+  /// Looks from the south, from the nearest distance that shows the whole box between these edges of the picture (from -1 to
+  /// 1, right and up).
   fit(box: number[], aspect: number, left = -1, right = 1, bottom = -1, top = 1): void {
-    // One point is looked at from a metre.
+    // A single point is viewed from a metre away.
     const extent = length([box[3] - box[0], box[4] - box[1], box[5] - box[2]]) || 1;
     const middle: Vec3 = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2, (box[2] + box[5]) / 2];
     this.azimuth = 0;
@@ -59,15 +59,15 @@ export class OrbitCamera {
     const t = Math.tan(FOV / 2 * RADIANS);
     const corners = Array.from({length: 8}, (_, i) => add([box[i & 1 ? 3 : 0], box[i & 2 ? 4 : 1], box[i & 4 ? 5 : 2]], middle, -1));
     const axes: Array<[Vec3, number, number]> = [[this.right, left * t * aspect, right * t * aspect], [this.up, bottom * t, top * t]];
-    // How far back no corner lies beyond either edge: edges are lines from the eye, and the corners that touch them are the
-    // same wherever it is along the axis.
+    // Find the distance at which no corner is outside either edge. Edges are lines from the eye, and the corners that touch
+    // them stay the same along the axis.
     this.distance = extent / 2;
     for (const [axis, low, high] of axes) {
       const beyondHigh = Math.max(...corners.map(c => dot(c, axis) - high * dot(c, this.direction)));
       const beyondLow = Math.max(...corners.map(c => low * dot(c, this.direction) - dot(c, axis)));
       this.distance = Math.max(this.distance, (beyondHigh + beyondLow) / (high - low));
     }
-    // And there the eye goes along each axis until as much is left at one edge as at the other.
+    // Then move the eye along each axis until the margins at both edges are equal.
     this.target = middle;
     for (const [axis, low, high] of axes) {
       let at = 0;
@@ -77,18 +77,18 @@ export class OrbitCamera {
       }
       this.target = add(this.target, axis, at);
     }
-    // A ground is turned about the place of its mean height in the middle of the picture.
+    // On a ground, orbit the point of mean height in the middle of the picture.
     if (!this.body) this.retarget(this.distance + (middle[2] - this.target[2]) / this.direction[2]);
   }
   orbit(turn: number, tilt: number): void {
     this.azimuth = (this.azimuth + turn + 360) % 360;
     this.tilt = this.within(this.tilt + tilt);
   }
-  /// The nearest tilt that there is.
+  /// Returns the nearest valid tilt.
   within(tilt: number): number {
     return Math.min(MOST_TILT, Math.max(this.body ? -MOST_TILT : LEAST_TILT, tilt));
   }
-  /// By pixels of a picture of this height; the ground follows the pointer.
+  /// Moves by pixels of a picture of this height; the ground follows the pointer.
   pan(right: number, down: number, height: number): void {
     const metres = 2 * this.distance * Math.tan(FOV / 2 * RADIANS) / height;
     if (this.body) {
@@ -100,32 +100,32 @@ export class OrbitCamera {
     const steep = Math.max(0.25, Math.sin(this.tilt * RADIANS));
     this.target = add(add(this.target, this.right, -right * metres), forward, down * metres / steep);
   }
-  /// The ray through a place of the picture, x and y from -1 to 1, right and up.
+  /// Returns the ray through a place of the picture; x and y are from -1 to 1, right and up.
   ray(x: number, y: number, aspect: number): Vec3 {
     const t = Math.tan(FOV / 2 * RADIANS);
     return unit(add(add(this.direction, this.right, x * t * aspect), this.up, y * t));
   }
-  /// Nearer by the factor, with what lies under x, y staying there.
+  /// Zooms by the factor, with the point under x, y staying there.
   zoom(factor: number, x: number, y: number, aspect: number): void {
     const before = this.distance;
     this.distance = Math.min(this.most, Math.max(this.least, this.distance * factor));
     const share = 1 - this.distance / before;
     const ray = this.ray(x, y, aspect);
     const old = add(this.target, this.direction, -before);
-    // Where the ray meets the level of the target, or the plane through it; at the horizon only straight ahead.
+    // Where the ray meets the level of the target, or for a body the plane through it; at the horizon, straight ahead.
     const drop = this.body ? before / dot(ray, this.direction) : (this.target[2] - old[2]) / ray[2];
     if (!(drop > 0) || drop > 6 * before) return;
     const place = add(old, ray, drop);
     this.target = add(this.target, add(place, this.target, -1), share);
   }
-  /// The same picture, with the target at this distance: what is turned about is what is seen.
+  /// Sets the target at this distance without changing the picture, so that the camera orbits the visible place.
   retarget(distance: number): void {
     const eye = this.eye;
     this.distance = Math.min(this.most, Math.max(this.least, distance));
     this.target = add(eye, this.direction, this.distance);
   }
 
-  /// View and projection from an eye, column by column as WebGL takes them.
+  /// Returns view and projection from an eye, column by column as WebGL expects.
   matrix(aspect: number, near: number, far: number, e: Vec3): Float32Array {
     const f = 1 / Math.tan(FOV / 2 * RADIANS);
     const r = this.right, u = this.up, d = this.direction;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The C++ core in WebAssembly (core/module.cpp): one store under one camera. It waits for nothing: what it
-/// lacks it names, and it goes on once that was given.
+/// The C++ core in WebAssembly (core/module.cpp): one store under one camera. It never waits: it names the bytes that it
+/// lacks, and continues once it has been given them.
 
 export interface ByteRange {
   file: string;
@@ -18,10 +18,10 @@ export interface State {
   worst: number;
   clusters: number;
   storedBytes: number;
-  waiting: boolean;  ///< what has gone is drawn on; a later frame will exchange it
+  waiting: boolean;  ///< removed parts are still drawn until a later frame
 }
 
-/// Blocks of 64 slots that changed: VERTEX_BYTES a vertex, three numbers a triangle. All are parts of `buffer`.
+/// Changed blocks of 64 slots: VERTEX_BYTES per vertex, three numbers per triangle. All are parts of `buffer`.
 export interface Changes {
   buffer: ArrayBuffer;
   vertexBlocks: Uint32Array;
@@ -38,10 +38,10 @@ export interface Camera {
   aspect: number;
   height: number;  ///< pixels
   error: number;   ///< pixels
-  level?: number;  ///< wanted everywhere, whatever the error
+  level?: number;  ///< minimum detail everywhere, whatever the error
 }
 
-/// The part of the picture that a ray meets first.
+/// The first part of the picture on a ray.
 export interface Hit {
   stored: number[];
   place: number[];
@@ -52,34 +52,34 @@ export interface Hit {
   attributes: number[];  ///< stored values, in the manifest's order; empty if unknown
 }
 
-/// A place of the store, whatever detail is drawn.
+/// A place of the store, independent of the detail drawn.
 export interface Found {
   stored: number[];
   place: number[];
-  level: number;  ///< 0: of all points; else of this level and above
+  level: number;  ///< read from points of this level and above; 0: from all
   attributes: number[];
 }
 
-/// A profile of the store, whatever detail is drawn, see StoreProbe::Profile.
+/// A profile of the store, independent of the detail drawn, see StoreProbe::Profile.
 export interface Profile {
   metres: number;
   level: number;
   sampled: boolean;
-  points: Array<[number, number]>;  ///< share of the way, height in the unit of the store
+  points: Array<[number, number]>;  ///< share of the distance, height in the store's unit
 }
 
-/// An answer, or what it lacks.
+/// An answer, or the bytes needed for it.
 export type Answer<T> = {missing: ByteRange[]}|{answer: T};
 
-/// What a store is shown as.
+/// How a store is shown.
 export type Kind = 'raster'|'points'|'surface';
 
 /// The scene as a whole.
 export interface Opened {
   box: number[];
   kind: Kind;
-  scan: boolean;  ///< of a body, so that it can be shown by its surface
-  /// What points can be drawn by, and the classes that occur.
+  scan: boolean;  ///< scan of a body, which can be shown by its surface
+  /// The attributes that can colour points, and the classes that occur.
   colours: {rgb: boolean, intensity: boolean, classes: number[]};
 }
 
@@ -92,7 +92,7 @@ export const VERTEX_BYTES: Record<Kind, number> = {
 
 export class CoreError extends Error {}
 
-/// Buffers of changes that are kept for use again, and the bytes that one has at least.
+/// Maximum number of change buffers kept for reuse, and minimum bytes of each.
 const MOST_BUFFERS = 8, LEAST_BUFFER = 1 << 20;
 
 const MISSING = 1;
@@ -123,12 +123,12 @@ interface Exports {
 export class Core {
   private readonly encoder = new TextEncoder();
   private readonly decoder = new TextDecoder();
-  private lacking: ByteRange[] = [];  ///< by the last frame
-  private readonly buffers: ArrayBuffer[] = [];  ///< for changes to come
+  private lacking: ByteRange[] = [];  ///< bytes missing in the last frame
+  private readonly buffers: ArrayBuffer[] = [];  ///< for later changes
 
   private constructor(private readonly wasm: Exports, private readonly kind?: Kind) {}
 
-  /// kind: what the module shows, if it shows but one.
+  /// `kind` is what the module shows, if it supports only one kind.
   static async load(bytes: BufferSource, kind?: Kind): Promise<Core> {
     let memory: WebAssembly.Memory;
     const imports = {
@@ -142,7 +142,7 @@ export class Core {
           return 0;
         },
         proc_exit: (code: number) => {
-          throw new CoreError(`the core ended with ${code}`);
+          throw new CoreError(`the core exited with ${code}`);
         }
       }
     };
@@ -162,7 +162,7 @@ export class Core {
   forget(name: string): void {
     this.check(this.wasm.forget(this.write(name)));
   }
-  /// What is missing, or the box of the scene.
+  /// Opens the store. Returns the missing bytes, or the scene.
   open(ground: number[], maxPoints: number): {missing: ByteRange[]}|Opened {
     this.writeNumbers(ground);
     if (this.check(this.wasm.open(maxPoints)) === MISSING) return {missing: this.missing()};
@@ -174,7 +174,7 @@ export class Core {
       colours: {rgb: n[8] === 1, intensity: n[10] === 1, classes: this.numbers(12 + n[11]).slice(12)}
     };
   }
-  /// Works for about `seconds`; `time` is that of the picture.
+  /// Works for about `seconds`; `time` is the time of the picture.
   frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[]} {
     this.writeNumbers([
       ...camera.eye, ...camera.direction, ...camera.up, camera.fov, camera.aspect, camera.height, camera.error, seconds,
@@ -199,7 +199,7 @@ export class Core {
       missing: this.lacking
     };
   }
-  /// Copies of what has changed since the last call.
+  /// Returns copies of the changes since the last call.
   changes(): Changes {
     this.check(this.wasm.changes());
     const [vertexBlocks, vertexBlocksAt, verticesAt, triangleBlocks, triangleBlocksAt, trianglesAt] = this.numbers(6);
@@ -221,11 +221,11 @@ export class Core {
       triangles: new Uint32Array(buffer, copy(trianglesAt, triangleBytes), triangleBytes / 4)
     };
   }
-  /// Takes the buffer of changes back that are done with: new ones are slow to come by.
+  /// Takes back a buffer of processed changes, because allocating new ones is slow.
   recycle(buffer: ArrayBuffer): void {
     if (this.buffers.length < MOST_BUFFERS) this.buffers.push(buffer);
   }
-  /// Computes the surface of a scan from scratch; what that changes is among the next changes.
+  /// Recomputes the surface of a scan; the next changes include the result.
   restore(time: number): void {
     this.check(this.wasm.restore(time));
   }
@@ -248,7 +248,7 @@ export class Core {
       attributes: this.numbers(12 + n[11]).slice(12)
     };
   }
-  /// Not in the module for surfaces, as profile().
+  /// Not available in the module for surfaces, nor is profile().
   probe(stored: number[], reach: number): Answer<Found|null> {
     this.writeNumbers([...stored, reach]);
     if (this.check(this.wasm.probe()) === MISSING) return {missing: this.missing()};
@@ -256,7 +256,7 @@ export class Core {
     const n = this.numbers(9);
     return {answer: {stored: n.slice(1, 4), place: n.slice(4, 7), level: n[7], attributes: this.numbers(9 + n[8]).slice(9)}};
   }
-  /// Between two stored places; axis: the coordinate that is upward.
+  /// Returns the profile between two stored places. `axis` is the upward coordinate.
   profile(from: number[], to: number[], axis: number): Answer<Profile> {
     this.writeNumbers([...from, ...to, axis]);
     if (this.check(this.wasm.profile()) === MISSING) return {missing: this.missing()};
@@ -264,12 +264,12 @@ export class Core {
     const points = Array.from({length: count}, (_, i): [number, number] => [n[4 + 2 * i], n[5 + 2 * i]]);
     return {answer: {metres, level, sampled: sampled === 1, points}};
   }
-  /// The ends, as slots, of the lines around a cluster.
+  /// Returns the end slots of the lines around a cluster.
   outline(level: number, ordinal: number): Uint32Array {
     this.check(this.wasm.outline(level, ordinal));
     return Uint32Array.from(this.numbers(1 + 2 * this.numbers(1)[0]).slice(1));
   }
-  /// Acts on what was picked last: 1 expands, 0 collapses, -1 leaves all to the view again.
+  /// Pins the last pick: 1 expands, 0 collapses, -1 releases all pins.
   pin(how: number): void {
     this.check(this.wasm.pin(how));
   }

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Colours and light. ramps.json has those of `terrace render`, and a test compares them with it.
+/// Colours and light. ramps.json matches `terrace render`, which a test checks.
 
 import ramps from './ramps.json';
 
-/// A place and the red, green and blue there, 0 to 255.
+/// A position, and red, green and blue from 0 to 255.
 export type Stop = number[];
 
 export const SLOPE: Stop[] = ramps.slope;
-/// From the coarsest level to level 0.
+/// Colours from the coarsest level to level 0.
 export const LEVELS: Stop[] = ramps.levels;
 export const GREYS: Stop[] = [[0, 28, 30, 34], [1, 245, 245, 240]];
-/// Surfaces without other colours, as `terrace render` draws them.
+/// Surfaces without other colours, as in `terrace render`.
 export const PLAIN: Stop[] = [[0, 205, 205, 200], [1, 205, 205, 200]];
-/// The colour of a class: of the standard ones of ASPRS LAS 1.4 the customary one.
+/// Returns the colour of a class, the customary one for the standard classes of ASPRS LAS 1.4.
 export function classColour(group: number): number[] {
   return ramps.classes[group] ?? ramps.categories[group % ramps.categories.length];
 }
 export const LIGHT = ramps.light;
 
-/// The tint of heights from low to high as shares of these: with a shore at 0 where there is land and sea.
+/// Returns the tint of heights as shares from low to high, with a shore at 0 if there is both land and sea.
 export function heightStops(low: number, high: number): Stop[] {
   if (!(low < 0 && high > 0 && -low > 0.05 * high)) return ramps.land;
   const shore = -low / (high - low);
@@ -28,7 +28,7 @@ export function heightStops(low: number, high: number): Stop[] {
   ];
 }
 
-/// `count` colours from the first stop to the last, as bytes of RGBA.
+/// Returns `count` colours from the first stop to the last, as RGBA bytes.
 export function texels(stops: Stop[], count: number): Uint8Array {
   const result = new Uint8Array(4 * count), last = stops[stops.length - 1][0];
   for (let i = 0; i < count; ++i) {
@@ -41,7 +41,7 @@ export function texels(stops: Stop[], count: number): Uint8Array {
   return result;
 }
 
-/// The same for a style sheet.
+/// Returns the same gradient for a style sheet.
 export function gradient(stops: Stop[]): string {
   const last = stops[stops.length - 1][0];
   return `linear-gradient(90deg,${stops.map(([place, ...rgb]) => `rgb(${rgb.join(' ')}) ${(100 * place / last).toFixed(1)}%`).join(',')})`;

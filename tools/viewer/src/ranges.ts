@@ -1,28 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Brings byte ranges of a store from a static web server, and never wrong ones.
+/// Fetches byte ranges of a store from a static web server, and never delivers wrong ones.
 
 import type {ByteRange} from './core';
 
-/// Between ranges nearer than this fetching the gap is cheaper than another request.
+/// Fetching a gap smaller than this is cheaper than another request.
 const GAP = 1200;
-/// And this near even if some of the gap is known.
+/// The same if part of the gap has been requested already.
 const SMALL_GAP = 200;
 const MOST_BYTES = 256 * 1024;
-/// An index is fetched in aligned blocks of so many bytes: its pages are smaller than the head of a request, and those of
-/// neighbours are wanted next.
+/// An index is fetched in aligned blocks of this many bytes: its pages are smaller than a request header, and neighbouring
+/// pages are usually needed next.
 const INDEX_BLOCK = 1024;
-/// Ranges of fewer bytes wait for the requests under way, and for so many milliseconds after the last was begun: by then
-/// more is known of what lies near, to come along.
+/// Smaller ranges wait for the requests in progress, and for PAUSE milliseconds after the last request started. By then more
+/// nearby ranges are known and can share a request.
 const SMALL = 4096, PAUSE = 20;
 const MOST_REQUESTS = 4;
 const TRIES = 4;
-const FORBIDDEN = 'the server refuses it (HTTP 403). Open the whole address that "terrace view" printed, with its token.';
-/// Milliseconds for which a server may be silent, before its answer begins and until the bytes are there; this is tried twice.
+const FORBIDDEN = 'access denied (HTTP 403). Open the full address that "terrace view" printed, with its token.';
+/// Milliseconds a server may be silent, before its answer starts and until the bytes arrive; tried twice.
 const SILENCE = 10_000;
-/// A request that another view does not want is given up after this time.
+/// Milliseconds until a request that the current view no longer needs is cancelled.
 const PATIENCE = 700;
 
-/// What went wrong, in words for people. `fatal`: the same request would end the same way.
+/// A fault described for the user. `fatal`: the same request would fail again.
 export class FetchFault extends Error {
   constructor(message: string, readonly fatal: boolean) {
     super(message);
@@ -31,7 +31,7 @@ export class FetchFault extends Error {
 
 class SilentFault extends FetchFault {}
 
-/// Gives a request up when nothing comes for too long.
+/// Cancels a request if nothing arrives for too long.
 class Watch {
   private readonly abort = new AbortController();
   private timer: ReturnType<typeof setTimeout>|undefined;
@@ -54,21 +54,21 @@ class Watch {
   end(): void {
     clearTimeout(this.timer);
   }
-  /// What is to be said of an error of fetch() or of what reads its answer.
+  /// Returns the fault to report for an error of fetch() or of reading its answer.
   fault(what: string, error: unknown): unknown {
     if (this.silent) return new SilentFault(`${what}: the server has been silent for ${SILENCE / 1000} seconds.`, false);
     return error instanceof FetchFault ? error : new FetchFault(`${what}: the server does not answer.`, false);
   }
 }
 
-/// The bytes at a URL, which is `what` in words.
+/// Returns the bytes at a URL, which messages call `what`.
 export async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
   const watch = new Watch();
   try {
     const response = await fetch(url, {signal: watch.signal});
     watch.heard();
     if (response.status === 403) throw new FetchFault(`${what}: ${FORBIDDEN}`, false);
-    if (!response.ok) throw new FetchFault(`${what}: the server answers with HTTP ${response.status}.`, false);
+    if (!response.ok) throw new FetchFault(`${what}: the server returned HTTP ${response.status}.`, false);
     return new Uint8Array(await response.arrayBuffer());
   } catch (error) {
     throw watch.fault(what, error);
@@ -84,11 +84,11 @@ export interface Stats {
 
 interface Flight extends ByteRange {
   abort: AbortController;
-  wanted: number;  ///< when it was wanted last
-  view: number;    ///< and for which view
+  wanted: number;  ///< when it was last needed
+  view: number;    ///< the view that needed it
 }
 
-/// Which bytes of files have been asked for.
+/// The bytes of files that have been requested.
 export class Asked {
   private readonly extents = new Map<string, Array<[number, number]>>();  ///< ascending, apart
 
@@ -99,19 +99,19 @@ export class Asked {
     list.splice(first, last - first, merged);
     this.extents.set(file, list);
   }
-  /// Whether any of the bytes between are among them.
+  /// Returns whether any of the bytes in between have been requested.
   meets(file: string, from: number, to: number): boolean {
     const list = this.extents.get(file) ?? [], at = Asked.after(list, from + 1);
     return at < list.length && list[at][0] < to;
   }
-  /// How far one can go from here both ways without meeting any.
+  /// Returns the widest range around this one without requested bytes.
   around(file: string, from: number, to: number): [number, number] {
     const list = this.extents.get(file) ?? [];
     return [
       Math.min(from, list[Asked.after(list, from, 0) - 1]?.[1] ?? 0), Math.max(to, list[Asked.after(list, to + 1)]?.[0] ?? Infinity)
     ];
   }
-  /// The first extent that ends (1) or begins (0) at `place` or behind it.
+  /// Returns the first extent that ends (1) or begins (0) at or after `place`.
   private static after(list: Array<[number, number]>, place: number, side = 1): number {
     let low = 0, high = list.length;
     while (low < high) {
@@ -123,8 +123,8 @@ export class Asked {
   }
 }
 
-/// Ranges joined where they are near, in the order of their first parts; across more than a little not if some of it has
-/// been asked for.
+/// Joins nearby ranges, in the order of their first parts. Across more than a small gap, joins only if none of it has been
+/// requested.
 export function joined(ranges: ByteRange[], asked = new Asked(), gap = GAP, most = MOST_BYTES): ByteRange[] {
   const rank = new Map(ranges.map((range, i) => [range, i]));
   const sorted =
@@ -151,11 +151,11 @@ export class Ranges {
   private readonly tags = new Map<string, string>();
   private readonly asked = new Asked();
   private fresh = false;
-  private begun = -PAUSE;  ///< when the last request was
+  private begun = -PAUSE;  ///< start of the last request
   private pause: ReturnType<typeof setTimeout>|undefined;
 
-  /// query: of each URL. sizes: of the files, by name. `give`: takes what has come. `failed`: what cannot be had. `ended`:
-  /// after each request, however it went.
+  /// query: appended to each URL. sizes: of the files, by name. `give`: receives the bytes. `failed`: receives faults.
+  /// `ended`: called after each request, successful or not.
   constructor(
       private readonly base: string, private readonly query: string, private readonly sizes: Map<string, number>,
       private readonly give: (range: ByteRange, bytes: Uint8Array) => void,
@@ -164,13 +164,13 @@ export class Ranges {
   get waiting(): boolean {
     return this.flights.length > 0 || this.pause !== undefined;
   }
-  /// From now on no cache is to be believed: what came was damaged.
+  /// Bypasses caches from now on, because the received bytes were damaged.
   distrust(): void {
     this.fresh = true;
     this.tags.clear();
   }
-  /// The most important ranges first, as a view lacks them. Those of an earlier view that are not among them are given
-  /// up after a while.
+  /// Sets the ranges that a view lacks, most important first. Others requested for an earlier view are cancelled after a
+  /// while.
   want(ranges: ByteRange[], view: number, now: number): void {
     const left: ByteRange[] = [];
     for (const range of ranges) {
@@ -244,12 +244,12 @@ export class Ranges {
     try {
       return await this.answer(range, watch);
     } catch (error) {
-      // Browsers do not say why they read nothing, and a part that is compressed they do not read.
+      // Browsers do not say why reading failed, and they do not read a part that is compressed.
       if (!(error instanceof FetchFault) &&
           await fetch(this.url(range), {method: 'HEAD', signal: watch.signal}).then(() => true, () => false)) {
         throw new FetchFault(
-            `${range.file}: the server answers, but a part of the file cannot be read: the connection breaks off, or the server ` +
-                'compresses parts (Content-Encoding). Turn its compression off for the files of stores.',
+            `${range.file}: the server answers, but part of the file cannot be read: the connection was lost, or the server ` +
+                'compresses parts (Content-Encoding). Turn off compression for the stores' files.',
             false);
       }
       throw watch.fault(range.file, error);
@@ -275,38 +275,38 @@ export class Ranges {
     };
     if (response.status === 200) {
       throw fault(
-          'the server sends whole files where a part was asked for (HTTP 200 instead of 206). ' +
+          'the server sent the whole file instead of a part (HTTP 200, not 206).  ' +
               'It must support range requests, as "terrace view" and most web servers do.',
           true);
     }
     if (response.status === 403) throw fault(FORBIDDEN, true);
-    if (response.status === 404) throw fault('the server has no such file (HTTP 404).', true);
+    if (response.status === 404) throw fault('file not found (HTTP 404).', true);
     if (response.status === 416) throw fault('the file on the server is smaller than the store says (HTTP 416).', true);
     if (response.status !== 206) {
-      throw fault(`the server answers with HTTP ${response.status}.`, response.status < 500 && response.status !== 429);
+      throw fault(`the server returned HTTP ${response.status}.`, response.status < 500 && response.status !== 429);
     }
     const placed = response.headers.get('Content-Range');
-    if (placed !== null) {  // servers elsewhere may hide it
+    if (placed !== null) {  // servers of another origin may hide it
       const [, first, end, size] = /^bytes (\d+)-(\d+)\/(\d+|\*)$/.exec(placed) ?? [];
       if (Number(first) !== range.offset || Number(end) !== last) {
-        throw fault('the server sends another part than the one asked for.', true);
+        throw fault('the server sent the wrong part.', true);
       }
       if (size !== '*' && Number(size) !== this.sizes.get(range.file)) {
-        throw fault('the store on the server has been replaced. Load it anew.', true);
+        throw fault('the store on the server has been replaced. Reload it.', true);
       }
     }
     const tag = response.headers.get('ETag');
     if (tag !== null) {
       const known = this.tags.get(range.file);
       if (known !== undefined && known !== tag) {
-        throw fault('the store on the server has been replaced. Load it anew.', true);
+        throw fault('the store on the server has been replaced. Reload it.', true);
       }
       this.tags.set(range.file, tag);
     }
     const bytes = new Uint8Array(await response.arrayBuffer());
     this.stats.bytes += bytes.length;
     if (bytes.length !== range.bytes) {
-      throw fault(`${bytes.length} bytes came where ${range.bytes} were asked for.`, false);
+      throw fault(`${bytes.length} bytes received instead of ${range.bytes}.`, false);
     }
     return bytes;
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// Draws the scene by WebGL 2 from buffers that are indexed by the core's slots.
+/// Draws the scene with WebGL 2 from buffers indexed by the core's slots.
 
 import {BLOCK, type Changes, type Kind, type State, VERTEX_BYTES} from './core';
 import {add, dot, type OrbitCamera, unit, type Vec3} from './camera';
@@ -15,7 +15,7 @@ export interface Look {
   pointSize: number;
 }
 
-/// The lines around the cluster of a place.
+/// Colour of the lines around the cluster of a place.
 const OUTLINE = [214, 40, 110];
 
 const SLIDE_SECONDS = 0.45;
@@ -106,7 +106,7 @@ class GrowingBuffer {
       private readonly gl: WebGL2RenderingContext, private readonly target: number, private readonly bytes: number) {
     this.buffer = gl.createBuffer()!;
   }
-  /// Blocks of BLOCK items; neighbours go up together.
+  /// Uploads blocks of BLOCK items; adjacent blocks are uploaded together.
   put(blocks: Uint32Array, data: Uint8Array, slots: number): void {
     const size = BLOCK * this.bytes, needed = Math.ceil(slots / BLOCK) * size;
     const grown = needed > this.mirror.length;
@@ -154,9 +154,9 @@ export class Renderer {
   private slidingUntil = 0;
 
   constructor(private readonly canvas: HTMLCanvasElement) {
-    this.resize();  // once there is a context, each change of size takes long
+    this.resize();  // first, because resizing is slow once there is a context
     const gl = canvas.getContext('webgl2', {antialias: true, alpha: false, preserveDrawingBuffer: true});
-    if (!gl) throw new Error('This browser has no WebGL 2, which the viewer draws with.');
+    if (!gl) throw new Error('This browser has no WebGL 2, which the viewer needs.');
     this.gl = gl;
     this.program = gl.createProgram()!;
     for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]] as const) {
@@ -167,7 +167,7 @@ export class Renderer {
     }
     gl.linkProgram(this.program);
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
-      throw new Error(`The graphics driver refuses the viewer's shaders: ${gl.getProgramInfoLog(this.program)}`);
+      throw new Error(`The graphics driver rejects the shaders:  ${gl.getProgramInfoLog(this.program)}`);
     }
     this.ramps = {
       height: gl.createTexture()!,
@@ -182,7 +182,7 @@ export class Renderer {
     this.clear();
   }
 
-  /// Forgets the scene.
+  /// Discards the scene.
   clear(): void {
     const gl = this.gl;
     this.vertices = new GrowingBuffer(gl, gl.ARRAY_BUFFER, VERTEX_BYTES[this.kind]);
@@ -218,7 +218,7 @@ export class Renderer {
   get outlined(): number {
     return this.rimCount / 2;
   }
-  /// The lines around a cluster, as slots of their ends.
+  /// Sets the lines around a cluster, as slots of their ends.
   outline(lines: Uint32Array): void {
     const gl = this.gl;
     this.rimCount = lines.length;
@@ -226,7 +226,7 @@ export class Renderer {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.rim);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, lines, gl.DYNAMIC_DRAW);
   }
-  /// Whether vertices are on their way.
+  /// Returns whether any vertices are still sliding.
   sliding(time: number): boolean {
     return time < this.slidingUntil;
   }
@@ -248,7 +248,7 @@ export class Renderer {
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (!this.state) return;
     const aspect = this.canvas.width / this.canvas.height;
-    // Heights count from the middle of the box, as those of the vertices.
+    // Heights are relative to the middle of the box, like those of the vertices.
     const middleHeight = (this.box[2] + this.box[5]) / 2;
     const eye = add(camera.eye, [0, 0, middleHeight], -1), box = this.box.map((c, i) => i % 3 === 2 ? c - middleHeight : c);
     const extent = Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]) || 1;
@@ -266,13 +266,13 @@ export class Renderer {
     gl.uniform1f(this.uniform('pointSize'), pointSize);
     const yUp = camera.body && camera.yUp;
     gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
-    // What is flat has the middle colour: differences from rounding are none.
+    // A flat scene has the middle colour; differences from rounding are ignored.
     const low = yUp ? box[1] : box[2], high = yUp ? box[4] : box[5], middle = (low + high) / 2;
     const reach = Math.max((high - low) / 2, 1e-9 * Math.abs(yUp ? middle : middleHeight));
     gl.uniform2f(this.uniform('heights'), middle - reach, middle + reach);
     gl.uniform1f(this.uniform('top'), this.top);
     gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);
-    // Cartographic light from the upper left, turned with the viewer; on a body from beside the eye.
+    // Cartographic light from the upper left that turns with the viewer; for a body, from next to the eye.
     const turn = (camera.azimuth + LIGHT.turn) * Math.PI / 180, elevation = LIGHT.elevation * Math.PI / 180;
     const toward = add([0, 0, 0], camera.direction, -1), surface = this.kind === 'surface';
     const sun: Vec3 = surface ? unit(add(add(toward, camera.up, 0.45), camera.right, -0.45)) :
@@ -286,7 +286,7 @@ export class Renderer {
     gl.uniform1i(this.uniform('slides'), {points: 0, raster: 1, surface: 2}[this.kind]);
     gl.uniform1i(this.uniform('mode'), COLOURS.indexOf(look.colour));
     gl.bindTexture(gl.TEXTURE_2D, this.ramps[look.colour]);
-    // All on one line there are no triangles.
+    // Points on one line have no triangles.
     if (this.kind === 'points' || this.state.triangles === 0) {
       gl.uniform1i(this.uniform('lit'), 0);
       gl.bindVertexArray(this.surface);
@@ -307,7 +307,7 @@ export class Renderer {
     gl.uniform1i(this.uniform('mode'), -1);
     if (look.wire) {
       if (this.linesStale) this.makeLines();
-      // Lines have the colours of the levels where the surface shows something else.
+      // Colour lines by level if the surface shows something else.
       if (look.colour !== 'level') {
         gl.uniform1i(this.uniform('mode'), -2);
         gl.bindTexture(gl.TEXTURE_2D, this.ramps.level);
@@ -331,7 +331,7 @@ export class Renderer {
     gl.drawElements(what, this.rimCount, gl.UNSIGNED_INT, 0);
   }
   private lineCount = 0;
-  /// Each edge once: of the two triangles that have it the one that goes upward in slots, or the only one.
+  /// Lists each edge once: from the triangle whose edge has ascending slots, or the only triangle.
   private makeLines(): void {
     const gl = this.gl;
     const corners = new Uint32Array(this.triangles.mirror.buffer, 0, (this.state?.triangleSlots ?? 0) * 3);
@@ -340,7 +340,7 @@ export class Renderer {
     for (let i = 0; i < corners.length; i += 3) {
       const a = corners[i], b = corners[i + 1], c = corners[i + 2];
       if (a === b) continue;
-      // On the hull an edge may go the other way; the picture lacks nothing by it that one would miss.
+      // This omits hull edges with descending slots, which is not noticeable.
       if (a < b) lines[count++] = a, lines[count++] = b;
       if (b < c) lines[count++] = b, lines[count++] = c;
       if (c < a) lines[count++] = c, lines[count++] = a;
@@ -356,7 +356,7 @@ export class Renderer {
     gl.bindVertexArray(array);
     gl.bindBuffer(gl.ARRAY_BUFFER, this.vertices.buffer);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, elements);
-    // Numbers of an attribute, their type, whether they are shares of its range, their first byte.
+    // Per attribute: number of components, their type, whether they are normalised, and their first byte.
     const attributes: Array<[number, number, number, boolean, number]> =
         [[0, 3, gl.FLOAT, false, 0], [1, 3, gl.BYTE, true, 12], [2, 1, gl.UNSIGNED_BYTE, true, 15]];
     if (this.kind === 'raster') {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// What the viewer knows of a store before the core reads it: its manifest, and the start file that `terrace
-/// publish` and `terrace view` lay beside it.
+/// What the viewer knows of a store before the core reads it: its manifest, and the start file that `terrace publish` and
+/// `terrace view` put next to the store.
 
 import type {ByteRange} from './core';
 
@@ -33,7 +33,7 @@ export interface Manifest {
 
 export function parseManifest(bytes: Uint8Array): Manifest {
   const json = JSON.parse(new TextDecoder().decode(bytes));
-  if (json.format !== 'terrace-store') throw new Error('manifest.json: it does not say that this is a store');
+  if (json.format !== 'terrace-store') throw new Error('manifest.json: not a store manifest');
   const files = new Map<string, number>([['manifest.json', bytes.length]]);
   for (const level of json.levels) {
     for (const segment of level.segments) {
@@ -43,18 +43,18 @@ export function parseManifest(bytes: Uint8Array): Manifest {
   return {...json, files};
 }
 
-/// The parts of a store that the first picture needs, in one file: a line of JSON, and then the bytes of the parts in
-/// turn, packed as zlib does it.
+/// The parts of a store that the first picture needs, in one file: a line of JSON, then the bytes of the parts in order,
+/// compressed in zlib format.
 export interface Start {
   ground: number[];    ///< from stored coordinates to metres
-  classes?: number[];  ///< of all points, where that is known
+  classes?: number[];  ///< of all points, if known
   parts: Array<ByteRange&{data: Uint8Array}>;
 }
 
 export async function parseStart(bytes: Uint8Array<ArrayBuffer>): Promise<Start> {
   const end = bytes.indexOf(10);
   const head = end < 0 ? {} : JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
-  if (head.format !== 'terrace-start' || head.version !== 2) throw new Error('it is not a start file of this version');
+  if (head.format !== 'terrace-start' || head.version !== 2) throw new Error('not a start file of this version');
   const unpacked = new Blob([bytes.subarray(end + 1)]).stream().pipeThrough(new DecompressionStream('deflate'));
   const body = new Uint8Array(await new Response(unpacked).arrayBuffer());
   const parts: Start['parts'] = [];
@@ -63,11 +63,11 @@ export async function parseStart(bytes: Uint8Array<ArrayBuffer>): Promise<Start>
     parts.push({file, offset, bytes: size, data: body.subarray(at, at + size)});
     at += size;
   }
-  if (at !== body.length) throw new Error(`${body.length} bytes came where ${at} were expected`);
+  if (at !== body.length) throw new Error(`${body.length} bytes received instead of ${at}`);
   return {ground: head.ground, classes: head.classes, parts};
 }
 
-/// Coordinates of the CRS for a point in stored coordinates.
+/// Converts stored coordinates to CRS coordinates.
 export function worldPoint(manifest: Manifest, stored: number[]): number[] {
   const w = manifest.world, z = manifest.coordinates[2];
   return [
@@ -76,11 +76,11 @@ export function worldPoint(manifest: Manifest, stored: number[]): number[] {
   ];
 }
 
-/// Metres along the line that is straight in longitude and latitude between two places of the CRS, on the ellipsoid of WGS 84;
-/// null where coordinates are not degrees.
+/// Returns the length in metres, on the WGS 84 ellipsoid, of the line between two places of the CRS that is straight in
+/// longitude and latitude; null if coordinates are not degrees.
 export function wayOnEarth(manifest: Manifest, from: number[], to: number[]): number|null {
   if (!manifest.crs.geographic || manifest.crs.horizontal_unit !== 'degree') return null;
-  const PIECES = 256, RADIUS = 6378137, SQUARE = 0.00669437999014;  // of the eccentricity
+  const PIECES = 256, RADIUS = 6378137, SQUARE = 0.00669437999014;  // squared eccentricity
   const degree = Math.PI / 180, east = (to[0] - from[0]) * degree / PIECES, north = (to[1] - from[1]) * degree / PIECES;
   let metres = 0;
   for (let i = 0; i < PIECES; ++i) {

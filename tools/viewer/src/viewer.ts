@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The page: what the user does goes to the camera and the worker, what comes back to the renderer.
+/// The page: passes user input to the camera and the worker, and the worker's results to the renderer.
 
 import {add, FOV, length, OrbitCamera, type Vec3} from './camera';
 import {type Hit, type Kind, type Opened, type Profile, VERTEX_BYTES} from './core';
@@ -10,7 +10,7 @@ import {type Listed, type Manifest, wayOnEarth, worldPoint} from './store';
 
 const phone = matchMedia('(max-width: 640px)');
 const touch = matchMedia('(pointer: coarse)').matches;
-/// Points at once: what phones draw without effort is less.
+/// Maximum number of points drawn. Phones can draw fewer without effort.
 const MOST_POINTS = phone.matches ? 400_000 : 1_500_000;
 /// The standard classes of ASPRS LAS 1.4.
 const CLASSES = ['never classified', 'unclassified', 'ground', 'low vegetation', 'medium vegetation', 'high vegetation',
@@ -28,7 +28,7 @@ const readable = (bytes: number) =>
     bytes < 1e6 ? `${Math.max(1, Math.round(bytes / 1e3))} KB` : `${(bytes / 1e6).toFixed(1)} MB`;
 const rounded = (n: number) => n.toFixed(Math.abs(n) < 10 ? 2 : Math.abs(n) < 1000 ? 1 : 0);
 const metres = (n: number) => Math.abs(n) < 10_000 ? `${rounded(n)} m` : `${(n / 1000).toFixed(2)} km`;
-/// Words of a store go into the page as text, never as markup.
+/// Inserts texts from a store as text, never as markup.
 function make(tag: string, kind: string, ...content: Array<Node|string>): HTMLElement {
   const made = document.createElement(tag);
   if (kind) made.className = kind;
@@ -40,11 +40,11 @@ const counted = (n: number, what: string) => [bold(count(n)), ` ${what}${n === 1
 /// Short names of units.
 const UNITS: Record<string, string> = {metre: 'm', foot: 'ft', 'US survey foot': 'ft'};
 
-/// What lies over the picture: at first it waits, as a browser that draws in software takes longer to begin with it
-/// than to show the picture. The style sheet lets it wait for a moment only.
+/// Shows the panels over the picture. They wait at first, because a browser that renders in software needs longer to start
+/// with them than to show the picture. The style sheet limits the wait.
 const showPanels = () => document.body.classList.remove('starting');
 
-const NO_WORKER = 'The viewer\'s worker cannot be loaded. Load the page anew.';
+const NO_WORKER = 'The viewer\'s worker cannot be loaded. Reload the page.';
 function fail(message: string, again = true): void {
   showPanels();
   element('progress').hidden = true;
@@ -53,13 +53,13 @@ function fail(message: string, again = true): void {
   element('retry').hidden = !again;
 }
 
-/// A clicked place: that of the picture, until the store has answered.
+/// A clicked place, taken from the picture until the store has answered.
 interface Place extends Hit {
   state: 'asked'|'known'|'none';
-  of: number;  ///< it is that of the points of this level and above
+  of: number;  ///< read from points of this level and above
 }
 
-/// Starts a worker, which begins to fetch a store. choose: as in ToWorker.
+/// Starts a worker, which starts fetching a store. `choose` is as in ToWorker.
 function launch(name: string, choose: boolean, asPoints: boolean): Worker {
   const worker = new Worker('worker.js'), base = new URL('.', document.baseURI).href;
   const query = TOKEN === null ? '' : `?token=${encodeURIComponent(TOKEN)}`;
@@ -79,20 +79,20 @@ class Viewer {
   private manifest: Manifest|null = null;
   private box: number[] = [];
   private kind: Kind = 'raster';
-  private heightUnit = 1;   ///< metres
-  private lost = false;     ///< by the graphics driver
-  private scan = false;     ///< of a body
-  private asPoints = false; ///< how a scan is to be shown
+  private heightUnit = 1;   ///< in metres
+  private lost = false;     ///< the WebGL context is lost
+  private scan = false;     ///< the store is the scan of a body
+  private asPoints = false; ///< show a scan as points
   private colours: Opened['colours'] = {rgb: false, intensity: false, classes: []};
   private picks = new Map<number, (hit: Hit|null) => void>();
   private hashes = new Map<number, (hash: string) => void>();
-  private probes = new Map<number, Place>();  ///< that the store is asked for
-  private profile = 0;  ///< the last that was asked for
-  private level = 255;  ///< shown everywhere; 255: none
-  private size = 0;     ///< of points, in pixels, that the user or the link chose
-  private outlineTimer = 0;  ///< the outline follows the surface
+  private probes = new Map<number, Place>();  ///< waiting for answers from the store
+  private profile = 0;  ///< the last one requested
+  private level = 255;  ///< minimum level everywhere; 255: none
+  private size = 0;     ///< point size in pixels set by the user or the link
+  private outlineTimer = 0;  ///< delays the outline until the surface is drawn
   private next = 0;
-  private serial = 0;  ///< of the last view
+  private serial = 0;  ///< number of the last view
   private redraw = true;
   private moved = true;
   private status: FromWorker&{type: 'frame'}|null = null;
@@ -100,13 +100,13 @@ class Viewer {
   private lastDrawn = 0;
   private hit: Place|null = null;
   private before: Place|null = null;
-  private pointer: [number, number] = [0, 0];  ///< over the picture; the middle if it is not
+  private pointer: [number, number] = [0, 0];  ///< position over the picture, or its middle
   private linkTimer = 0;
   private pivotTimer = 0;
-  private fitted = false;    ///< all is shown: so it stays when the window changes
-  private pivoting = false;  ///< the ground in the middle of the picture is being looked for
+  private fitted = false;    ///< everything is visible, and stays so when the window changes
+  private pivoting = false;  ///< waiting for the ground in the middle of the picture
 
-  /// first: a worker that has been launched for what the link names.
+  /// `first` is a worker launched for the store in the link.
   constructor(first: Worker) {
     this.renderer = new Renderer(this.canvas);
     this.readLink();
@@ -116,7 +116,7 @@ class Viewer {
     requestAnimationFrame(() => this.tick());
   }
 
-  /// For tests and for those who look behind the curtain.
+  /// For tests and debugging.
   async hash(): Promise<string> {
     return new Promise(resolve => {
       const id = ++this.next;
@@ -141,7 +141,7 @@ class Viewer {
       kind: this.kind
     };
   }
-  /// For tests: the view of a recorded flight.
+  /// For tests: sets the view of a recorded flight.
   fly(eye: Vec3, direction: Vec3, aspect: number, height: number, error: number): void {
     this.tell({
       type: 'view',
@@ -174,7 +174,7 @@ class Viewer {
     worker.onmessage = event => this.hear(event.data as FromWorker, first);
     worker.onerror = event => fail(event.message || NO_WORKER);
   }
-  /// The stores that there are, and which of them is shown.
+  /// Shows the list of stores, and which of them is open.
   private list(stores: Listed[], name: string): void {
     this.stores = stores;
     this.store = name;
@@ -187,9 +187,9 @@ class Viewer {
     select.value = name;
   }
   private noSuchStore(name: string): void {
-    // The place in the link belongs to it.
+    // The place in the link belongs to the missing store.
     this.link = new URLSearchParams();
-    element('notice').textContent = `There is no store “${name}” here: this is “${this.store}”.`;
+    element('notice').textContent = `Store “${name}” not found; this is “${this.store}”.`;
     element('notice').hidden = false;
     setTimeout(() => element('notice').hidden = true, 10_000);
   }
@@ -205,7 +205,7 @@ class Viewer {
         element('progress-text').textContent = `Loading, ${readable(message.bytes)}`;
         break;
       case 'opened': {
-        const again = this.manifest !== null;  // the same scan, shown otherwise
+        const again = this.manifest !== null;  // the same scan in another form
         this.manifest = message.manifest;
         this.box = message.scene.box;
         this.kind = message.scene.kind;
@@ -218,7 +218,7 @@ class Viewer {
         if (this.level !== 255) this.level = Math.min(this.level, message.manifest.levels.length - 1);
         this.renderer.show(this.box, message.manifest.levels.length - 1, this.kind, this.scan);
         if (!again) {
-          // Most scans have Y upward; what is tallest along Z stands on it.
+          // Most scans have Y upward; objects that are tallest along Z have Z upward.
           const [x, y, z] = [0, 1, 2].map(i => this.box[i + 3] - this.box[i]);
           if (!first || !this.link.has('u')) this.camera.yUp = z <= 1.2 * Math.max(x, y);
           this.fit();
@@ -240,7 +240,7 @@ class Viewer {
         break;
       }
       case 'frame': {
-        // The clock of the worker has another origin; slides count from now.
+        // The worker's clock has a different origin; slides start now.
         const shift = this.now - message.time;
         if (this.kind !== 'points' && message.changes.vertexBlocks.length > 0) this.shift(message.changes.vertices, message.time, shift);
         this.renderer.apply(message.state, message.changes, this.now);
@@ -286,7 +286,7 @@ class Viewer {
         break;
     }
   }
-  /// Start times of the vertices of a frame, from the worker's clock to the page's.
+  /// Converts the vertices' start times of a frame from the worker's clock to the page's.
   private shift(vertices: Uint8Array, time: number, by: number): void {
     const floats = new Float32Array(vertices.buffer, vertices.byteOffset, vertices.byteLength / 4);
     const exact = Math.fround(time), to = Math.fround(time + by), words = VERTEX_BYTES[this.kind] / 4;
@@ -331,10 +331,10 @@ class Viewer {
     }
     const time = this.now;
     if (!this.redraw && !this.renderer.sliding(time)) return;
-    if (!this.status && this.lastDrawn > 0) return;  // nothing more than before
+    if (!this.status && this.lastDrawn > 0) return;  // nothing has changed
     this.redraw = false;
     this.renderer.draw(this.camera, this.look, time);
-    // A pause is no frame.
+    // Do not count a pause as a frame.
     if (time - this.lastDrawn < 0.5) this.frameTime = 0.9 * this.frameTime + 100 * (time - this.lastDrawn);
     this.lastDrawn = time;
     this.showMark();
@@ -367,11 +367,11 @@ class Viewer {
     if (this.kind !== 'points') parts.push(' · ', ...counted(s.state.triangles, 'triangle'));
     parts.push(' · ', bold(readable(s.stats.bytes)));
     parts.push(make('span', 'wide', ' · ', ...counted(s.stats.requests, 'request'), ' · ', bold(this.frameTime.toFixed(0)), ' ms a frame'));
-    const [brief, whole] = !s.state.settled ? ['refining', ''] : s.state.worst > 1 ? ['full', 'as fine as memory allows'] : ['done', 'as fine as asked for'];
+    const [brief, whole] = !s.state.settled ? ['refining', ''] : s.state.worst > 1 ? ['full', 'as fine as memory allows'] : ['done', 'detail as requested'];
     parts.push(' · ', ...(whole ? [make('span', 'wide', whole), make('span', 'brief', brief)] : [brief]));
     element('status').replaceChildren(...parts);
   }
-  /// Whether the store can be drawn by it.
+  /// Returns whether the store can be coloured by it.
   private offers(colour: Colour): boolean {
     const {rgb, intensity, classes} = this.colours;
     const raster = this.kind === 'raster', grey = this.kind === 'surface';
@@ -403,8 +403,8 @@ class Viewer {
 
   // ---- A place ---------------------------------------------------------------------------------
 
-  /// The picture is coarser than the store, so the store is asked for the height of a raster's place and for the point nearest to
-  /// a place of a scan. Neither is shown before it has answered.
+  /// The picture is coarser than the store, so the height of a raster's place, or the point nearest to a scan's place, is
+  /// read from the store. Neither is shown before the answer.
   private showPlace(hit: Hit|null): void {
     this.before = this.hit;
     if (!hit || !this.manifest) return this.closePlace();
@@ -433,7 +433,7 @@ class Viewer {
           [crs.geographic ? 'Latitude' : 'North', place(world[1])],
           ['Height', known ? `${about}${this.plain(world[2], 2)}${this.unit}` : waits]
         ];
-    // As the command takes it: --cluster L:N.
+    // In the command's notation: --cluster L:N.
     rows.push(['Level', `${hit.level}`], ['Cluster', `${hit.clusterLevel}:${hit.clusterOrdinal}`]);
     if (crs.epsg) rows.push(['CRS', `EPSG:${crs.epsg}`]);
     manifest.attributes.forEach((channel, i) => {
@@ -451,26 +451,26 @@ class Viewer {
     element('place-text').replaceChildren(...rows.flatMap(([name, value]) => [make('dt', '', name), make('dd', '', value)]));
     this.redraw = true;
   }
-  /// A number to a hundred-thousandth of the store's size, with so many digits at least.
+  /// Formats a number to a hundred-thousandth of the store's size, with at least `least` digits.
   private plain(n: number, least = 0): string {
     const size = Math.max(...[0, 1, 2].map(i => this.box[i + 3] - this.box[i]));
     return n.toFixed(Math.min(12, Math.max(least, 5 - Math.floor(Math.log10(size || 1)))));
   }
-  /// 0: as suits the store; few small points would be lost from sight.
+  /// Sets the point size; 0 selects one that suits the store. A few small points would be hard to see.
   private setSize(size: number): void {
     this.size = size;
     this.look.pointSize = size || ((this.manifest?.points ?? 0) < 1000 ? 6 : 2.5);
   }
-  /// The unit of heights, if it is known.
+  /// The unit of heights, if known.
   private get unit(): string {
     const unit = this.manifest?.coordinates[2].unit || this.manifest?.crs.vertical_unit;
     return unit ? ` ${UNITS[unit] ?? unit}` : '';
   }
-  /// A height of the view frame, or a difference of two, in the unit of the store.
+  /// Formats a height of the view frame, or a difference of two, in the store's unit.
   private height(metres: number): string {
     return `${rounded(metres / this.heightUnit)}${this.unit}`;
   }
-  /// A distance over ground.
+  /// Formats a distance over ground.
   private ground(n: number): string {
     return this.manifest?.crs.horizontal_unit ? metres(n) : rounded(n);
   }
@@ -482,7 +482,7 @@ class Viewer {
     this.renderer.outline(new Uint32Array());
     this.redraw = true;
   }
-  /// The outline of the cluster, by the surface as it is after so many milliseconds.
+  /// Requests the outline of the cluster after `delay` milliseconds, when the surface has changed.
   private askOutline(delay: number): void {
     if (this.outlineTimer !== 0 && delay > 0) return;
     clearTimeout(this.outlineTimer);
@@ -491,7 +491,7 @@ class Viewer {
       if (this.hit) this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
     }, delay);
   }
-  /// Asks for the profile of the store between the places, which does not depend on the picture.
+  /// Requests the profile of the store between the places, which does not depend on the picture.
   private askProfile(): void {
     const {hit, before} = this;
     if (!hit || !before || (this.kind === 'surface' && !(hit.state === 'known' && before.state === 'known'))) return;
@@ -505,7 +505,7 @@ class Viewer {
     if (heights.length < 2 || !hit || !before || !manifest) return;
     const low = heights.reduce((a, b) => Math.min(a, b)), high = heights.reduce((a, b) => Math.max(a, b)), rise = high - low || 1;
     const at = ([t, h]: [number, number]) => `${(256 * t).toFixed(2)},${(80 - 76 * (h - low) / rise).toFixed(2)}`;
-    // The ground down to the bottom, in parts between voids; or the points.
+    // Fill the ground down to the bottom, in parts between voids; or plot the points.
     let path = '', part: Array<[number, number]> = [];
     const close = () => {
       if (part.length > 1) path += `M${(256 * part[0][0]).toFixed(2)},84 L${part.map(at).join(' ')} L${(256 * part[part.length - 1][0]).toFixed(2)},84 Z`;
@@ -525,14 +525,14 @@ class Viewer {
     shape.setAttribute('class', this.kind === 'raster' ? 'raster' : 'points');
     shape.setAttribute('d', path);
     element('profile-plot').replaceChildren(shape);
-    // As many digits as tell the lowest from the highest.
+    // Enough digits to distinguish the lowest from the highest.
     const digits = Math.min(12, Math.max(0, 2 - Math.floor(Math.log10(rise))));
     const about = profile.level > 0 || profile.sampled ? 'about ' : '';
-    const told = (h: number) => `${about}${this.scan ? h.toFixed(digits) : `${rounded(h)}${this.unit}`}`;
+    const label = (h: number) => `${about}${this.scan ? h.toFixed(digits) : `${rounded(h)}${this.unit}`}`;
     const metres = wayOnEarth(manifest, worldPoint(manifest, before.stored), worldPoint(manifest, hit.stored)) ?? profile.metres;
-    element('profile-low').textContent = `${told(low)} lowest`;
+    element('profile-low').textContent = `${label(low)} lowest`;
     element('profile-length').textContent = this.scan ? `${Number(metres.toPrecision(4))}` : this.ground(metres);
-    element('profile-high').textContent = `${told(high)} highest`;
+    element('profile-high').textContent = `${label(high)} highest`;
   }
   private showMark(): void {
     this.showMarkAt('mark', this.hit);
@@ -573,7 +573,7 @@ class Viewer {
   private applyLink(): void {
     const numbers = (this.link.get('v') ?? '').split(',').map(Number);
     if (numbers.length !== 6 || !numbers.every(Number.isFinite) || numbers[5] <= 0) return;
-    // From farther away nothing would be seen.
+    // From farther away nothing would be visible.
     const {least, most} = this.camera, middle = [0, 1, 2].map(i => (this.box[i] + this.box[i + 3]) / 2);
     if (Math.hypot(...middle.map((c, i) => numbers[i] - c)) > most) return;
     this.camera.target = [numbers[0], numbers[1], numbers[2]];
@@ -620,14 +620,14 @@ class Viewer {
   private change(zoomed = false): void {
     this.moved = true;
     this.fitted = false;
-    // A body is turned about its middle until one goes nearer.
+    // Orbit the middle of a body until the user zooms in.
     if (this.scan && !zoomed) return;
     this.pivoting = true;
     clearTimeout(this.pivotTimer);
-    this.pivotTimer = window.setTimeout(() => void this.turnAboutWhatIsSeen(), 250);
+    this.pivotTimer = window.setTimeout(() => void this.orbitVisiblePlace(), 250);
   }
-  /// Once the camera rests: what it turns about is the ground in the middle of the picture.
-  private async turnAboutWhatIsSeen(): Promise<void> {
+  /// Once the camera rests, makes it orbit the ground in the middle of the picture.
+  private async orbitVisiblePlace(): Promise<void> {
     const timer = this.pivotTimer;
     const eye = this.camera.eye, direction = this.camera.direction;
     const hit = await this.pickRay(eye, direction, 0.02);
@@ -747,7 +747,7 @@ class Viewer {
     });
     element('store').addEventListener('change', event => {
       const {value} = event.target as HTMLSelectElement;
-      // The way back leads to the store before.
+      // The browser's Back returns to the previous store.
       this.writeLink();
       history.pushState(null, '', `#s=${encodeURIComponent(value)}`);
       this.open(value, false);
@@ -795,9 +795,9 @@ class Viewer {
       event.preventDefault();
       this.lost = true;
       if (this.manifest) this.writeLink();
-      fail('The graphics driver has given up, as it may when it is short of memory.');
+      fail('The graphics driver failed; it may be short of memory.');
     });
-    // The link restores the view.
+    // Reloading restores the view from the link.
     canvas.addEventListener('webglcontextrestored', () => location.reload());
   }
   private changeLook(): void {
@@ -809,7 +809,7 @@ class Viewer {
     if (!this.manifest) return;
     const {clientWidth: width, clientHeight: height} = this.canvas;
     const across = (pixels: number) => 2 * pixels / width, down = (pixels: number) => 2 * pixels / height;
-    // Between the panels.
+    // The area between the panels.
     const narrow = phone.matches, edge = across(narrow ? 16 : 24), tools = narrow || width < 900 ? 0 : across(256);
     this.camera.fit(
         this.box, this.aspect, -1 + edge, 1 - Math.max(edge, tools), -1 + down(52), 1 - down(narrow ? 72 : 24));
@@ -850,7 +850,7 @@ class Viewer {
   }
 }
 
-// The worker fetches while WebGL starts, which takes long and holds the page; before that the worker has to be there.
+// The worker fetches while WebGL starts, which is slow and blocks the page, so start the worker first.
 function start(): void {
   const link = new URLSearchParams(location.hash.slice(1));
   const first = launch(link.get('s') ?? '', true, link.get('p') === '1');
@@ -865,7 +865,7 @@ function start(): void {
   first.onerror = event => fail(event.message || NO_WORKER, false);
 }
 if (location.protocol === 'file:') {
-  fail('Browsers let pages read no files beside them on the disk. Put this folder on a web server that answers range requests, or use "terrace view".', false);
+  fail('Browsers do not let pages read local files. Put this folder on a web server that supports range requests, or use "terrace view".', false);
 } else {
   start();
 }

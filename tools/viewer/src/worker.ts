@@ -1,23 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-/// The worker: the core, the bytes that it lacks, and a frame whenever there is something to do.
+/// The worker: runs the core, fetches the bytes that it lacks, and computes a frame whenever there is work.
 
 import {type Answer, type ByteRange, type Camera, type Changes, Core, CoreError, type Kind, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
 import {FetchFault, fetchWhole, Ranges} from './ranges';
 import {type Listed, type Manifest, parseManifest, parseStart} from './store';
 
-/// What a frame may take in the worker, in milliseconds, and what of it is kept in hand for what the core cannot foresee:
-/// garbage to collect, requests to start, other programs.
+/// Milliseconds that a frame may take in the worker, and the part reserved for the unpredictable: garbage collection,
+/// starting requests, other programs.
 const FRAME = 10, IN_HAND = 3;
-/// Points of a surface in space take so many times the work and memory of others.
+/// Work and memory of a point on a surface in space, relative to other points.
 const SURFACE_COST = 4;
-/// Bytes of a scan that are kept for the other module at most.
+/// Maximum number of a scan's bytes kept for the other module.
 const MOST_GIVEN = 64 << 20;
-/// The surface is computed from scratch once nothing has changed for so many milliseconds.
+/// Milliseconds without changes after which the surface is recomputed from scratch.
 const REST = 700;
-/// A frame looks after so many milliseconds whether what has gone is to be drawn no longer.
+/// Milliseconds after which a frame checks whether removed parts need no longer be drawn.
 const EXCHANGE = 30;
-/// Frames that the page may be behind.
+/// Maximum number of frames that the page may lag behind.
 const AHEAD = 6;
 
 declare const self: {
@@ -35,30 +35,30 @@ class Session {
   private surface: Core|null = null;    ///< shows the surface of a scan
   private scan = false;
   private asPoints: boolean;
-  private restored = false;             ///< just now
-  private followed = false;             ///< the surface has followed changes since it was computed from scratch
+  private restored = false;             ///< the surface was just recomputed
+  private followed = false;             ///< the surface has changed since it was last recomputed
   private restTimer: ReturnType<typeof setTimeout>|undefined;
   private exchange: ReturnType<typeof setTimeout>|undefined;
-  private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< of a scan
+  private given: Array<{file: string, offset: number, data: Uint8Array}> = [];  ///< bytes of a scan
   private givenBytes = 0;
   private ranges!: Ranges;
-  private probing!: Ranges;  ///< fetches the bytes that questions about the store lack
-  /// Questions that wait; answer() tries to answer and returns the bytes that it lacks.
+  private probing!: Ranges;  ///< fetches bytes for questions about the store
+  /// Waiting questions; answer() tries to answer and returns the bytes that it lacks.
   private questions: Array<{type: string, answer: () => Answer<void>}> = [];
-  private lacking: ByteRange[] = [];  ///< by the first of them
-  private classes = new Set<number>();  ///< of the points, as far as they are known
-  private classKind: Kind|null = null;  ///< in which points have classes
+  private lacking: ByteRange[] = [];  ///< bytes missing for the first question
+  private classes = new Set<number>();  ///< classes of the points found so far
+  private classKind: Kind|null = null;  ///< the kind in which points have classes
   private manifest!: Manifest;
   private ground: number[] = [];
   private camera: Camera|null = null;
-  private serial = 0;  ///< of the view
+  private serial = 0;  ///< number of the view
   private opened = false;
   private failed = false;
-  private damaged = 0;  ///< how often what came was damaged
+  private damaged = 0;  ///< how often damaged bytes arrived
   private undrawn = 0;
   private scheduled = false;
-  private idle = false;  ///< nothing to do before something new comes
-  /// What has come in the meantime is heard between two frames; browsers put 4 ms between timers.
+  private idle = false;  ///< nothing to do until a message or bytes arrive
+  /// Lets pending messages in between two frames; timers would add 4 ms in browsers.
   private readonly turns = new MessageChannel();
 
   constructor(private readonly request: ToWorker&{type: 'open'}) {
@@ -112,7 +112,7 @@ class Session {
   private async load(module: string, kind?: Kind): Promise<Core> {
     return Core.load(await fetchWhole(this.at(module), 'the viewer') as BufferSource, kind);
   }
-  /// The store that is opened.
+  /// Returns the store to open.
   private async choose(): Promise<string> {
     if (this.request.choose) {
       let stores: Listed[];
@@ -121,14 +121,14 @@ class Session {
       } catch (error) {
         throw error instanceof FetchFault ? error : new FetchFault(`stores.json: ${(error as Error).message}`, false);
       }
-      if (stores.length === 0) throw new FetchFault('stores.json: it lists no store.', false);
+      if (stores.length === 0) throw new FetchFault('stores.json: it lists no stores.', false);
       this.request.name = (stores.find(store => store.name === this.request.name) ?? stores[0]).name;
       this.request.choose = false;
       post({type: 'chosen', stores, name: this.request.name});
     }
     return this.request.name;
   }
-  /// After a fault: the same again.
+  /// Retries after a fault.
   retry(): void {
     this.failed = false;
     if (!this.ranges) {
@@ -168,7 +168,7 @@ class Session {
     if (this.opened) this.core.pin(how);
     this.wake();
   }
-  /// Shows a scan by its surface or as points.
+  /// Shows a scan as a surface or as points.
   async show(asPoints: boolean): Promise<void> {
     if (asPoints === this.asPoints || !this.scan) return;
     this.asPoints = asPoints;
@@ -195,7 +195,7 @@ class Session {
     });
     this.reply();
   }
-  /// Answers questions in turn, and fetches the bytes that the next answer lacks.
+  /// Answers questions in order, and fetches the bytes that the next answer lacks.
   private reply(): void {
     while (this.questions.length > 0 && !this.failed) {
       try {
@@ -245,7 +245,7 @@ class Session {
       this.suspect(error as Error);
     }
   }
-  /// Bytes whose checksum is wrong are fetched once more, past all caches.
+  /// Fetches bytes with a wrong checksum once more, bypassing all caches.
   private suspect(error: Error): void {
     if (!(error instanceof CoreError) || ++this.damaged > 1) return this.fail(error.message);
     this.dropGiven();
@@ -257,7 +257,7 @@ class Session {
     this.schedule();
   }
   private give(file: string, offset: number, data: Uint8Array): void {
-    // Whether it is a scan is known once the scene is open; few bytes come before that.
+    // It is known whether a store is a scan once the scene is open; few bytes arrive before that.
     if (!this.opened || this.scan) {
       this.given.push({file, offset, data});
       this.givenBytes += data.length;
@@ -290,7 +290,7 @@ class Session {
   private listed(): number[] {
     return [...this.classes].sort((a, b) => a - b);
   }
-  /// Reports classes that no point had before: the store may have too many points for the start file to know them all.
+  /// Reports classes not seen before: a large store's start file may not list them all.
   private noteClasses({vertices}: Changes): void {
     if (this.classKind === null) return;
     const before = this.classes.size;
@@ -307,7 +307,7 @@ class Session {
   private get showsSurface(): boolean {
     return this.core === this.surface;
   }
-  /// Goes on with the module for what a scan is to be shown as, and with the bytes that are there.
+  /// Switches to the module for the form in which a scan is shown, and passes on the available bytes.
   private async change(): Promise<void> {
     this.opened = false;
     clearTimeout(this.restTimer);
@@ -331,7 +331,7 @@ class Session {
     this.followed = false;
     this.restored = true;
   }
-  /// The surface of a scan as its points alone make it, once the camera rests.
+  /// Recomputes the surface of a scan, so that it depends on the points alone, once the camera rests.
   private settle(settled: boolean, changed: boolean): void {
     clearTimeout(this.restTimer);
     this.followed ||= changed;
@@ -353,7 +353,7 @@ class Session {
     const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
     if (this.showsSurface) this.settle(state.settled, changed && !this.restored);
     this.restored = false;
-    // What is missing wakes it again.
+    // Missing bytes wake it again when they arrive.
     this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);
     clearTimeout(this.exchange);
     if (this.idle && state.waiting) this.exchange = setTimeout(() => this.wake(), EXCHANGE);
