@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# A fractal DEM and a scanned body, what they hold, and pictures of them.
+# Creates a fractal DEM and a scanned body, describes them, and draws pictures of them.
 # Usage: first_look.sh FOLDER (TERRACE=path/to/terrace unless it is installed)
 set -eu
 terrace=${TERRACE:-terrace}

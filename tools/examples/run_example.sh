@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Runs an example in a folder of its own and checks that it made what it names.
+# Runs an example in a temporary folder and checks that it created the named files.
 # Usage: run_example.sh EXAMPLE FILE...
 set -eu
 example=$1
@@ -9,5 +9,5 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "$example" "$folder"
 for file in "$@"; do
-  test -s "$folder/$file" || { echo "$example made no $file" >&2; exit 1; }
+  test -s "$folder/$file" || { echo "$example did not create $file" >&2; exit 1; }
 done

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What --force looks at in a file that stands where it is to write: any bytes, and whether terrace
-// wrote them as far as they tell.
+// The check by --force of an existing output: whether terrace wrote a file with these bytes.
 #include "cli/output.hpp"
 #include "fuzz_target.hpp"
 
@@ -12,8 +11,8 @@ bool accepts(const std::uint8_t* data, std::size_t size) {
   const std::string_view text = text_of(data, size);
   const MemoryFile file(text);
   const bool ours = written_by_terrace(file.name());
-  // Every mark has the name in it.
-  require(!ours || text.empty() || text.find("terrace") != std::string_view::npos, "a mark");
+  // Every mark contains the name.
+  require(!ours || text.empty() || text.find("terrace") != std::string_view::npos, "no mark");
   return ours;
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Values of options. The first line names the parser, the second is the value.
+// Option values. The first line names the parser, the second is the value.
 #include <algorithm>
 #include <cmath>
 
@@ -84,7 +84,7 @@ bool parse(std::string_view name, const std::string& value) {
     if (!tile) return false;
     require(tile_path(*tile) == value, "a tile has one path");
   } else if (name == "names") {
-    // One of the many options that are one word of a few.
+    // Options that accept one of a few words.
     const auto known = [&](auto parser) {
       try {
         static_cast<void>(parser(value));

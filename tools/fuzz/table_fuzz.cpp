@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tables as text. The first line says of what and, where it matters, of how many points: "places",
-// "labels 5", "dendrogram", "matching 5".
+// Tables as text. The first line names the kind of table and, where it matters, the number of
+// points: "places", "labels 5", "dendrogram", "matching 5".
 #include <charconv>
 #include <cmath>
 
@@ -17,7 +17,7 @@ using namespace tools;
 
 namespace {
 
-/// As `sample` goes through a table; true if there was a place in it.
+/// Reads a table as `sample` does. Returns true if it contained a place.
 bool read_places(const std::string& path) {
   PlaceFile file(path);
   PlaceBatch batch;
@@ -38,7 +38,7 @@ bool read_places(const std::string& path) {
       ++places;
       out.clear();
       append_with_place(out, line, *layout, "1", "2");
-      require(out.size() <= line.size() + 4, "a line with its place exchanged");
+      require(out.size() <= line.size() + 4, "a line with its place replaced");
     }
   }
   return places > 0;
@@ -47,7 +47,7 @@ bool read_places(const std::string& path) {
 bool read_tree(const std::string& path) {
   const std::optional<cluster::Dendrogram> dendrogram = read_dendrogram(path);
   if (!dendrogram) return false;
-  require(dendrogram->points == dendrogram->merges.size() + 1, "a merge less than points");
+  require(dendrogram->points == dendrogram->merges.size() + 1, "one merge fewer than points");
   for (std::size_t r = 0; r < dendrogram->merges.size(); ++r) {
     const cluster::Merge& merge = dendrogram->merges[r];
     const std::size_t nodes = dendrogram->points + r;
@@ -61,7 +61,7 @@ bool read_tree(const std::string& path) {
 bool read_matching(const std::string& path, std::size_t points) {
   static_cast<void>(is_matching_result(path));
   const MatchingResult result = read_matching_result(path, points);
-  require(result.points == points, "so many points");
+  require(result.points == points, "the number of points");
   for (std::size_t r = 0; r < result.lines.size(); ++r) {
     const MatchingLine& line = result.lines[r];
     const std::size_t nodes = result.tree ? points + r : points;

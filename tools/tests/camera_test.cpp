@@ -11,7 +11,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-TEST(ParseView, TakesTopAndTwoAngles) {
+TEST(ParseView, AcceptsTopAndTwoAngles) {
   EXPECT_EQ(parse_view("top").elevation, 90);
   EXPECT_EQ(parse_view("-30,45.5").azimuth, -30);
   for (const char* text : {"", "up", "1", "1,2,3", "0,91", "0,nan"}) {

@@ -15,7 +15,7 @@
 namespace terrace::tools {
 namespace {
 
-/// On a Fibonacci spiral about (10, 0, 0), in random order.
+/// Returns points on a Fibonacci spiral around (10, 0, 0), in random order.
 std::vector<tri::Point3> sphere(std::size_t count) {
   std::vector<tri::Point3> points;
   for (std::size_t i = 0; i < count; ++i) {
@@ -41,7 +41,7 @@ double volume_ratio(const tri::Surface& surface) {
   return tri::measure(surface).volume / (4 * std::numbers::pi / 3);
 }
 
-TEST(CgalSurfaceTest, AdvancingFrontGivesASphere) {
+TEST(CgalSurfaceTest, AdvancingFrontRestoresASphere) {
   std::vector<tri::Point3> points = sphere(1500);
   points.push_back(points[0]);
   const tri::RestoredSurface found = advancing_front_surface(points);
@@ -54,7 +54,7 @@ TEST(CgalSurfaceTest, AdvancingFrontGivesASphere) {
   EXPECT_EQ(advancing_front_surface(points).surface.faces.size(), found.surface.faces.size());
 }
 
-TEST(CgalSurfaceTest, AlphaWrapGivesASphereAroundThePoints) {
+TEST(CgalSurfaceTest, AlphaWrapEnclosesThePointsInASphere) {
   const std::vector<tri::Point3> points = sphere(1500);
   const tri::Surface found = alpha_wrap_surface(points);
   expect_sphere(found);
@@ -65,7 +65,7 @@ TEST(CgalSurfaceTest, AlphaWrapGivesASphereAroundThePoints) {
   EXPECT_TRUE(again.points == found.points);
 }
 
-TEST(CgalSurfaceTest, DegeneratePoints) {
+TEST(CgalSurfaceTest, HandlesDegeneratePoints) {
   const std::vector<tri::Point3> equal(5, tri::Point3{1, 2, 3});
   EXPECT_TRUE(advancing_front_surface({}).surface.faces.empty());
   EXPECT_TRUE(alpha_wrap_surface({}).faces.empty());
@@ -86,7 +86,7 @@ TEST(CgalSurfaceTest, DegeneratePoints) {
   tri::measure(alpha_wrap_surface(grid));
 }
 
-TEST(CgalSurfaceTest, PointsThatCgalCannotBearAreNamed) {
+TEST(CgalSurfaceTest, ErrorsNameUnsupportedPoints) {
   const auto refused = [](const std::vector<tri::Point3>& points, const char* why) {
     try {
       alpha_wrap_surface(points);

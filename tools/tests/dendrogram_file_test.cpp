@@ -24,14 +24,14 @@ class DendrogramFile : public ::testing::Test {
 
 const cluster::Dendrogram kDendrogram{4, {{0, 1, 0.1, 2}, {2, 3, 1.0 / 3.0, 2}, {4, 5, 1e20, 4}}};
 
-TEST_F(DendrogramFile, ComesBackToTheBit) {
+TEST_F(DendrogramFile, RoundTripsExactly) {
   write_dendrogram(path_, kDendrogram, true);
   const auto back = read_dendrogram(path_);
   ASSERT_TRUE(back);
   EXPECT_EQ(*back, kDendrogram);
 }
 
-TEST_F(DendrogramFile, OtherFilesAreNone) {
+TEST_F(DendrogramFile, IgnoresOtherFiles) {
   for (const char* text :
        {"", "a", "a,b,height", "a,b,height,sizes\n0,1,2,2\n", "x,y,z\n1,2,3\n"}) {
     hold(text);
@@ -41,14 +41,14 @@ TEST_F(DendrogramFile, OtherFilesAreNone) {
   EXPECT_FALSE(read_dendrogram(path_ + ".none"));
 }
 
-TEST_F(DendrogramFile, TakesLineEndsOfAllKinds) {
+TEST_F(DendrogramFile, AcceptsAllLineEnds) {
   hold("a,b,height,size\r\n0,1,2.5,2\r\n\r\n");
   const auto tree = read_dendrogram(path_);
   ASSERT_TRUE(tree);
   EXPECT_EQ(tree->merges.front().height, 2.5);
 }
 
-TEST_F(DendrogramFile, RefusesWhatIsNoDendrogram) {
+TEST_F(DendrogramFile, RejectsMalformedDendrograms) {
   for (const char* rows : {"0,1,2", "0,1,2,2,3", "0,1,x,2", "0;1;2;2", "-1,1,2,2", "0,1,nan,2",
                            "0,1,-1,2", "0,2,1,2", "0,1,1,3", "0,0,1,2", "0,1,1,2\n0,2,2,3"}) {
     hold(std::string("a,b,height,size\n") + rows + "\n");
@@ -70,27 +70,27 @@ TEST(DrawDendrogram, LinesRiseFromTheLeavesToTheRoot) {
   };
   Canvas canvas(400, 200);
   draw_dendrogram({4, {{0, 1, 1.0, 2}, {2, 3, 2.0, 2}, {4, 5, 4.0, 4}}}, canvas);
-  // The margin is 12 samples of 800 x 400; leaves stand at 1/8, 3/8, 5/8, 7/8 of what is inside.
+  // The margin is 12 samples of 800 x 400; leaves are at 1/8, 3/8, 5/8 and 7/8 of the inside.
   const auto across = [](double share) { return (12 + share * 776) / 800; };
   const auto up = [](double share) { return (388 - share * 376) / 400; };
   for (const double leaf : {0.125, 0.375, 0.625, 0.875})
     EXPECT_TRUE(drawn(canvas, across(leaf), up(0.1)));
   EXPECT_TRUE(drawn(canvas, across(0.25), up(0.25)));   // across the first pair
-  EXPECT_FALSE(drawn(canvas, across(0.25), up(0.2)));   // nothing hangs below it
+  EXPECT_FALSE(drawn(canvas, across(0.25), up(0.2)));   // nothing below it
   EXPECT_TRUE(drawn(canvas, across(0.25), up(0.6)));    // its stem
   EXPECT_FALSE(drawn(canvas, across(0.375), up(0.4)));  // a leaf ends at its merge
   EXPECT_TRUE(drawn(canvas, across(0.875), up(0.4)));
   EXPECT_TRUE(drawn(canvas, across(0.5), up(1.0)));  // the root
 }
 
-TEST(DrawDendrogram, OneThousandLevelsDeepAndAllAtOneHeight) {
+TEST(DrawDendrogram, DrawsDeepAndFlatTrees) {
   cluster::Dendrogram chain{2000, {}};
   for (std::uint32_t r = 0; r < 1999; ++r) {
     chain.merges.push_back({r == 0 ? 0 : r + 1, r == 0 ? 1 : 1999 + r, 0.0, r + 2});
   }
   Canvas canvas(64, 64);
   draw_dendrogram(chain, canvas);
-  // Without a height all of it lies on the bottom line, 3 % of 128 samples from the edge.
+  // Without a height, everything is on the bottom line, 3 % of 128 samples from the edge.
   EXPECT_TRUE(std::isfinite(canvas.depth(64, 124)));
   Canvas empty(64, 64);
   draw_dendrogram({1, {}}, empty);

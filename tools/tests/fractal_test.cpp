@@ -39,7 +39,7 @@ double rms_step(const std::vector<float>& heights, std::size_t width, std::size_
   return std::sqrt(sum / static_cast<double>(count));
 }
 
-TEST(Fractal, StepIsTheRoughnessAtAnyHurst) {
+TEST(Fractal, StepEqualsRoughnessForAnyHurst) {
   for (const double hurst : {0.3, 0.5, 0.8, 0.95}) {
     for (const std::uint64_t seed : {1u, 2u}) {
       SCOPED_TRACE(hurst);
@@ -49,16 +49,16 @@ TEST(Fractal, StepIsTheRoughnessAtAnyHurst) {
   }
 }
 
-TEST(Fractal, RoundingIsPartOfTheStep) {
+TEST(Fractal, StepIncludesRounding) {
   const Fractal fractal({.roughness = 1.5, .rounded = true});
   std::vector<float> heights = field(fractal, 2048, 1024);
   for (float& h : heights) h = std::nearbyint(h);
   EXPECT_NEAR(rms_step(heights, 2048) / 1.5, 1.0, 0.03);
 }
 
-// Law: the structure function of a field with exponent H grows like lag^H. Lags well above the
-// cell and well below the longest wavelength.
-TEST(Fractal, GrowsWithTheHurstExponent) {
+// The structure function of a field with exponent H grows like lag^H. Use lags well above the cell
+// size and well below the longest wavelength.
+TEST(Fractal, StructureFunctionFollowsTheHurstExponent) {
   for (const double hurst : {0.5, 0.8}) {
     const Fractal fractal({.seed = 5, .hurst = hurst});
     const std::vector<float> heights = field(fractal, 2048, 2048);
@@ -67,7 +67,7 @@ TEST(Fractal, GrowsWithTheHurstExponent) {
   }
 }
 
-// The calculated bound and deviation hold for what is made.
+// The computed bound and deviation hold for the generated heights.
 TEST(Fractal, StaysWithinItsBound) {
   const Fractal fractal({.seed = 3, .hurst = 0.5});
   const std::vector<float> heights = field(fractal, 4096, 512);
@@ -76,7 +76,7 @@ TEST(Fractal, StaysWithinItsBound) {
   EXPECT_LT(5 * fractal.deviation(), fractal.bound());
 }
 
-TEST(Fractal, AnyPieceIsThatPieceOfTheWhole) {
+TEST(Fractal, PiecesMatchTheWhole) {
   const Fractal fractal({.seed = 9});
   const std::uint32_t width = 301;
   const std::vector<float> whole = field(fractal, width, 200);
@@ -95,7 +95,7 @@ TEST(Fractal, AnyPieceIsThatPieceOfTheWhole) {
 }
 
 // Golden: these bytes must be the same on every machine and compiler. A change of the method
-// changes them, and every benchmark's input with them.
+// changes them, and with them the input of every benchmark.
 TEST(Fractal, BytesAreFixed) {
   const Fractal fractal({.seed = 1});
   std::uint64_t hash = 14695981039346656037u;  // FNV-1a

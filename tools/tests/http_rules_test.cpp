@@ -15,7 +15,7 @@ struct RangeCase {
   std::uint64_t first, length;
 };
 
-// The laws of RFC 9110, section 14.
+// The rules of RFC 9110, section 14.
 TEST(HttpRange, FollowsTheStandard) {
   using enum RangeKind;
   for (const RangeCase& c : {
@@ -54,7 +54,7 @@ TEST(HttpRange, FollowsTheStandard) {
   }
 }
 
-TEST(HttpPath, IsDecodedOnce) {
+TEST(HttpPath, DecodesOnce) {
   EXPECT_EQ(decoded_path("/a/b"), "a/b");
   EXPECT_EQ(decoded_path("/"), "");
   EXPECT_EQ(decoded_path("/a%20b%2Fc?x=1#y"), "a b/c");
@@ -72,7 +72,7 @@ class HttpAnswers : public testing::Test {
     site_["stores/a/data"] = {stream::bytes_in_memory("d", std::vector<std::byte>(100)),
                               "application/octet-stream", "\"t\""};
   }
-  /// With the token.
+  /// Answers a request that has the token.
   [[nodiscard]] Answer get(const std::string& target, const char* range = "",
                            const char* if_range = "", const char* if_none_match = "") const {
     return answer_to(
@@ -92,7 +92,7 @@ class HttpAnswers : public testing::Test {
   Access access_{8000, "abc"};
 };
 
-TEST_F(HttpAnswers, ServeWhatTheSiteHasAndNothingElse) {
+TEST_F(HttpAnswers, ServeOnlyFilesOfTheSite) {
   EXPECT_EQ(get("/").length, 7u);
   EXPECT_EQ(get("/index.html?x").status, 200u);
   EXPECT_EQ(get("/stores/a/%64ata").status, 200u);
@@ -107,7 +107,7 @@ TEST_F(HttpAnswers, ServeWhatTheSiteHasAndNothingElse) {
   EXPECT_EQ(status("/", "localhost:8000", "OPTIONS"), 405u);
 }
 
-TEST(HttpQuery, ParametersHaveWholeNames) {
+TEST(HttpQuery, MatchesFullParameterNames) {
   EXPECT_EQ(query_value("/a?token=x", "token"), "x");
   EXPECT_EQ(query_value("/a?b=1&token=x&c", "token"), "x");
   EXPECT_EQ(query_value("/a?token=x&token=y#z", "token"), "x");
@@ -117,7 +117,7 @@ TEST(HttpQuery, ParametersHaveWholeNames) {
   }
 }
 
-TEST_F(HttpAnswers, NeedTheTokenForWhatIsTheUsers) {
+TEST_F(HttpAnswers, RequireTheTokenForStores) {
   EXPECT_EQ(status("/stores/a/data?token=abc"), 200u);
   for (const char* target : {"/stores/a/data", "/stores/a/data?token=", "/stores/a/data?token=ab",
                              "/stores/a/data?token=abcd", "/stores/a/data?token=abd", "/nothing"}) {
@@ -127,7 +127,7 @@ TEST_F(HttpAnswers, NeedTheTokenForWhatIsTheUsers) {
   EXPECT_EQ(status("/"), 200u);
 }
 
-TEST_F(HttpAnswers, NameTheServerInTheHeaderHost) {
+TEST_F(HttpAnswers, RequireAHostOfThisServer) {
   for (const char* host : {"127.0.0.1:8000", "localhost:8000", "LOCALHOST:8000", "[::1]:8000"}) {
     EXPECT_EQ(status("/", host), 200u) << host;
   }
@@ -136,20 +136,20 @@ TEST_F(HttpAnswers, NameTheServerInTheHeaderHost) {
         "localhost.evil:8000", "x@localhost:8000", ":8000"}) {
     EXPECT_EQ(status("/", host), 403u) << host;
   }
-  // Browsers leave out port 80 alone.
+  // Browsers omit only port 80.
   EXPECT_EQ(
       answer_to({.method = "GET", .target = "/", .host = "localhost"}, site_, {80, "abc"}).status,
       200u);
 }
 
-TEST_F(HttpAnswers, RefuseSeveralHosts) {
+TEST_F(HttpAnswers, RejectSeveralHosts) {
   Request request{.method = "GET", .target = "/", .host = "localhost:8000", .hosts = 2};
   EXPECT_EQ(answer_to(request, site_, {8000, "abc"}).status, 400u);
   request.host = "evil.example";
   EXPECT_EQ(answer_to(request, site_, {8000, "abc"}).status, 400u);
 }
 
-TEST_F(HttpAnswers, GiveOtherOriginsNoLeave) {
+TEST_F(HttpAnswers, GrantNothingToOtherOrigins) {
   for (const Answer& answer : {get("/"), get("/stores/a/data", "bytes=0-1"), get("/nothing")}) {
     const std::string header = header_of(answer);
     EXPECT_EQ(header.find("Access-Control-"), header.npos) << header;
@@ -158,7 +158,7 @@ TEST_F(HttpAnswers, GiveOtherOriginsNoLeave) {
   }
 }
 
-TEST_F(HttpAnswers, SendPartsOfWhatTheClientKnows) {
+TEST_F(HttpAnswers, SendRangesIfTheTagMatches) {
   const Answer part = get("/stores/a/data", "bytes=10-19");
   EXPECT_EQ(part.status, 206u);
   EXPECT_EQ(part.first, 10u);

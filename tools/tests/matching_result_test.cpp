@@ -23,7 +23,7 @@ constexpr const char* kTree = "a,b,distance,size,level\n";
 class MatchingResultFile : public ::testing::Test {
  protected:
   void hold(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
-  /// What is wrong with the file's text.
+  /// Returns the error for a file with this text.
   [[nodiscard]] stream::Error::Parts fault(const std::string& text, std::size_t points) const {
     hold(text);
     try {
@@ -31,7 +31,7 @@ class MatchingResultFile : public ::testing::Test {
     } catch (const stream::Error& error) {
       return error.parts();
     }
-    ADD_FAILURE() << text << " is taken for right";
+    ADD_FAILURE() << text << " was accepted";
     return {};
   }
 
@@ -39,7 +39,7 @@ class MatchingResultFile : public ::testing::Test {
   std::string path_ = scratch_.path() / "matching.csv";
 };
 
-TEST_F(MatchingResultFile, IsToldByItsFirstLine) {
+TEST_F(MatchingResultFile, IsRecognisedByItsFirstLine) {
   for (const char* text : {"a,b,distance", "a,b,distance\n", "a,b,distance\r\n0,1,2\r\n",
                            "a,b,distance,size,level\n0,1,nonsense"}) {
     hold(text);
@@ -56,7 +56,7 @@ TEST_F(MatchingResultFile, IsToldByItsFirstLine) {
   EXPECT_FALSE(is_matching_result(path_ + ".none"));
 }
 
-TEST_F(MatchingResultFile, HoldsPairs) {
+TEST_F(MatchingResultFile, ReadsPairs) {
   hold(std::string(kPairs) + "0,3,1.5\r\n\n4,1,0\n");
   const MatchingResult result = read_matching_result(path_, 5);
   EXPECT_FALSE(result.tree);
@@ -68,8 +68,8 @@ TEST_F(MatchingResultFile, HoldsPairs) {
   EXPECT_EQ(read_matching_result(path_, 1).top, 0u);
 }
 
-TEST_F(MatchingResultFile, HoldsTrees) {
-  // Rows need not be sorted by level: clusters follow one another.
+TEST_F(MatchingResultFile, ReadsTrees) {
+  // Rows need not be sorted by level, because clusters follow one another.
   hold(std::string(kTree) + "0,1,1,2,1\n2,5,1,3,2\n3,4,1,2,1\n6,7,9,5,3");
   const MatchingResult result = read_matching_result(path_, 5);
   EXPECT_TRUE(result.tree);
@@ -79,7 +79,7 @@ TEST_F(MatchingResultFile, HoldsTrees) {
   EXPECT_EQ(read_matching_result(path_, 1).lines.size(), 0u);
 }
 
-TEST_F(MatchingResultFile, RefusesRowsThatAreNoPairs) {
+TEST_F(MatchingResultFile, RejectsMalformedPairs) {
   for (const char* row : {"0,1", "0,1,2,3", "0;1;2", "-1,1,2", "0,1,x", "0,1,nan", "0,1,inf",
                           "0,1,-1", "0,0,1", "0,4,1", "4294967296,1,1", "0,1,1 ", " 0,1,1"}) {
     const auto parts = fault(std::string(kPairs) + "2,3,1\n" + row + "\n", 4);
@@ -92,7 +92,7 @@ TEST_F(MatchingResultFile, RefusesRowsThatAreNoPairs) {
             std::string::npos);
 }
 
-TEST_F(MatchingResultFile, RefusesRowsThatAreNoTree) {
+TEST_F(MatchingResultFile, RejectsMalformedTrees) {
   const std::string first = std::string(kTree) + "0,1,1,2,1\n";
   for (const char* row : {"2,3,1,2", "2,3,1", "2,3,1,2,1,1", "2,3,1,3,1", "2,4,1,2,2", "2,4,1,3,1",
                           "2,5,1,2,1", "2,6,1,2,1", "2,7,1,2,1", "1,2,1,2,1", "2,2,1,2,1",
@@ -100,18 +100,18 @@ TEST_F(MatchingResultFile, RefusesRowsThatAreNoTree) {
     EXPECT_EQ(fault(first + row + "\n", 4).where, "line 3") << row;
   }
   EXPECT_NE(fault(first + "2,5,1,2,1\n", 4).cause.find("before"), std::string::npos);
-  // One row less than points, no more and no fewer.
+  // A tree has exactly one row fewer than points.
   EXPECT_NE(fault(first + "2,3,1,2,1\n", 4).cause.find("has 2 rows"), std::string::npos);
   EXPECT_EQ(fault(first + "2,3,1,3,2\n", 2).where, "line 3");
 }
 
-TEST_F(MatchingResultFile, RefusesLinesWithoutEnd) {
+TEST_F(MatchingResultFile, RejectsEndlessLines) {
   const auto parts = fault(kPairs + std::string(100000, '1'), 4);
   EXPECT_EQ(parts.where, "line 2");
   EXPECT_NE(parts.cause.find("longer"), std::string::npos);
 }
 
-TEST_F(MatchingResultFile, PutsNodesAtTheMeansOfTheirPoints) {
+TEST_F(MatchingResultFile, PlacesNodesAtTheMeanOfTheirPoints) {
   const std::string points = path_ + ".points.csv";
   std::ofstream(points) << "x,y,z\n0,0,0\n3,0,0\n0,9,3\n3,3,3\n";
   hold(std::string(kTree) + "0,1,3,2,1\n2,4,1,3,2\n3,5,1,4,3\n");
@@ -142,7 +142,7 @@ TEST_F(MatchingResultFile, PutsNodesAtTheMeansOfTheirPoints) {
   EXPECT_TRUE(picture.result.lines.empty());
 }
 
-/// Four points on a line, 100 apart, seen from above at one sample per metre and drawn.
+/// Four points on a line, 100 apart, drawn from above at one sample per metre.
 class DrawMatching : public ::testing::Test {
  protected:
   DrawMatching() {
@@ -167,28 +167,28 @@ TEST_F(DrawMatching, PairsAreRedLinesBetweenDarkDots) {
   picture_.result.top = 1;
   EXPECT_GT(at(-100, 0)[0], 0.8F);
   EXPECT_LT(at(-100, 0)[1], 0.2F);
-  EXPECT_EQ(at(0, 0)[1], 1.0F);      // paper between the pairs
-  EXPECT_EQ(at(-100, 20)[1], 1.0F);  // and beside
+  EXPECT_EQ(at(0, 0)[1], 1.0F);      // background between the pairs
+  EXPECT_EQ(at(-100, 20)[1], 1.0F);  // and next to a pair
   EXPECT_LT(at(150, 0)[0], 0.2F);    // a point
   picture_.result.lines.pop_back();
-  EXPECT_GT(at(150, 0)[0], 0.95F);  // without a partner it is a ring
+  EXPECT_GT(at(150, 0)[0], 0.95F);  // a ring without a partner
   EXPECT_EQ(at(100, 0)[1], 1.0F);
 }
 
-TEST_F(DrawMatching, LevelsGoFromRedToBlackAndLowerOnesLieAbove) {
+TEST_F(DrawMatching, LevelsGoFromRedToBlackWithLowerOnesOnTop) {
   picture_.positions.insert(picture_.positions.end(), {{-100, 0, 0}, {100, 0, 0}, {0, 0, 0}});
   picture_.result.lines = {{0, 1, 1}, {2, 3, 1}, {4, 5, 2}};
   picture_.result.tree = true;
   picture_.result.top = 2;
   EXPECT_GT(at(-75, 0)[0], 0.8F);  // the pair, over the line to the other pair
   EXPECT_LT(at(20, 0)[0], 0.05F);
-  // Without its upper level the rest stays as it was.
+  // Without the upper level, the rest stays as it was.
   picture_.result.lines.pop_back();
   EXPECT_GT(at(-75, 0)[0], 0.8F);
   EXPECT_EQ(at(20, 0)[0], 1.0F);
 }
 
-TEST_F(DrawMatching, InACrowdHigherLevelsLieAboveAndPointsAreNoDots) {
+TEST_F(DrawMatching, CrowdedPicturesPutHigherLevelsOnTopWithoutDots) {
   picture_.positions = {{-103, 0, 0}, {-97, 0, 0}, {97, 0, 0}, {103, 0, 0},
                         {-100, 0, 0}, {100, 0, 0}, {0, 0, 0}};
   picture_.result.lines = {{0, 1, 1}, {2, 3, 1}, {4, 5, 2}};
@@ -197,13 +197,13 @@ TEST_F(DrawMatching, InACrowdHigherLevelsLieAboveAndPointsAreNoDots) {
   EXPECT_LT(at(-98, 0)[0], 0.2F);
   EXPECT_GT(at(-102.5, 0)[0], 0.8F);
   EXPECT_LT(at(-102.5, 0)[1], 0.6F);
-  // Without any line all points are dots, without a hole.
+  // Without any lines, all points are solid dots.
   picture_.result.lines.clear();
   EXPECT_LT(at(100, 0)[0], 1.0F);
   EXPECT_LT(at(97, 0)[0], 0.2F);
 }
 
-TEST_F(DrawMatching, AnyNumberOfThreadsGivesTheSamePictureAndNothingLeavesIt) {
+TEST_F(DrawMatching, ThreadsDoNotChangeThePictureAndDrawingStaysInside) {
   constexpr double kHuge = std::numeric_limits<double>::max();
   picture_.positions = {{-1e6, -1e6, 0},    {1e6, 1e6, 0},      {0, 0, 0},   {0, 0, 0},
                         {-kHuge, kHuge, 0}, {kHuge, -kHuge, 0}, {3, -90, 7}, {kHuge, 0, kHuge / 2}};

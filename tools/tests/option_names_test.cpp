@@ -6,14 +6,14 @@
 namespace terrace::tools {
 namespace {
 
-TEST(OptionNames, ParametersBecomeOptions) {
+TEST(OptionNames, ReplacesParametersByOptions) {
   EXPECT_EQ(with_option_names("raise `memory_bytes`, lower `block_points`"),
             "raise --memory, lower --block");
   EXPECT_EQ(with_option_names("`max_edge` is for points"), "--max-edge is for points");
   EXPECT_EQ(with_option_names("give `replace`"), "give --force");
 }
 
-TEST(OptionNames, OtherTextStays) {
+TEST(OptionNames, KeepsOtherText) {
   for (const char* text : {"", "a", "`", "``", "`level", "level`", "`terrace info` tells",
                            "a file named `x", "`levels`", "``level", "` level`"}) {
     EXPECT_EQ(with_option_names(text), text);

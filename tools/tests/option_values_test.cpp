@@ -8,7 +8,7 @@
 namespace terrace::tools {
 namespace {
 
-TEST(Focus, IsABoxAndALevel) {
+TEST(Focus, ParsesBoxAndLevel) {
   const Focus focus = parse_focus("-1,-1,1,1:3");
   EXPECT_EQ(focus.level, 3u);
   EXPECT_EQ(focus.region.box().max[0], 1);

@@ -42,8 +42,8 @@ class MayReplace : public ::testing::Test {
   void expect_foreign(const std::string& what) const {
     EXPECT_THROW(may_replace(path_, true), stream::Error) << what;
   }
-  /// What is in the file is ours, and no more with the mark spelt otherwise, wherever else the word
-  /// may be.
+  /// Expects that the file counts as ours, and no longer does once its mark is misspelt, even if
+  /// the word occurs elsewhere.
   void expect_ours_by_mark(const std::string& mark, const std::string& what) const {
     expect_ours(what);
     std::string bytes = text();
@@ -89,15 +89,15 @@ class MayReplace : public ::testing::Test {
   std::string path_ = scratch_.path() / "output";
 };
 
-TEST_F(MayReplace, NothingIsThere) { EXPECT_FALSE(may_replace(path_, false).replace); }
+TEST_F(MayReplace, AllowsNewNames) { EXPECT_FALSE(may_replace(path_, false).replace); }
 
-TEST_F(MayReplace, RefusesAnExistingFileWithoutForce) {
+TEST_F(MayReplace, RejectsAnExistingFileWithoutForce) {
   write_points("ply");
   EXPECT_THROW(may_replace(path_, false), stream::Error);
   EXPECT_TRUE(may_replace(path_, true).replace);
 }
 
-TEST_F(MayReplace, ForceGoesByTheMarkOfEachFormat) {
+TEST_F(MayReplace, ForceDependsOnTheMarkOfEachFormat) {
   for (const char* format : {"ply", "ply-ascii"}) {
     write_points(format);
     expect_ours_by_mark("comment written by terrace", format);
@@ -123,8 +123,9 @@ TEST_F(MayReplace, ForceGoesByTheMarkOfEachFormat) {
   expect_ours_by_mark("terrace", "tiff");
 }
 
-/// BigTIFF keeps eight bytes in the entry itself; other writers may turn the bytes of numbers.
-TEST_F(MayReplace, TiffOfAllKindsIsReadToItsTag) {
+/// BigTIFF keeps up to eight bytes in the entry itself, and other writers may use the opposite byte
+/// order.
+TEST_F(MayReplace, FindsTheTagInAllKindsOfTiff) {
   const auto tiff = [](bool big_endian, bool big_tiff, std::uint64_t tag, const std::string& name) {
     std::string bytes = big_endian ? "MM" : "II";
     const auto put = [&](std::uint64_t number, std::size_t size) {
@@ -135,7 +136,7 @@ TEST_F(MayReplace, TiffOfAllKindsIsReadToItsTag) {
     const std::size_t word = big_tiff ? 8 : 4;
     put(big_tiff ? 43 : 42, 2);
     if (big_tiff) put(8, 2), put(0, 2);
-    put(big_tiff ? 16 : 8, word);  // of the directory
+    put(big_tiff ? 16 : 8, word);  // offset of the directory
     put(2, big_tiff ? 8 : 2);
     for (const std::uint64_t entry : {std::uint64_t{256}, tag}) {
       put(entry, 2);
@@ -171,8 +172,8 @@ TEST_F(MayReplace, TiffOfAllKindsIsReadToItsTag) {
   }
 }
 
-/// Text of ours has no mark, and other programs write the very same.
-TEST_F(MayReplace, ForceTakesTextAsLongAsNothingHasChangedIt) {
+/// Text files have no mark, and other programs may write the same text.
+TEST_F(MayReplace, ForceReplacesUnchangedText) {
   write("");
   expect_ours("empty");
   if (::setxattr(path_.c_str(), "user.terrace", "", 0, 0) != 0 && errno == ENOTSUP) {
@@ -191,7 +192,7 @@ TEST_F(MayReplace, ForceTakesTextAsLongAsNothingHasChangedIt) {
     fs::rename(path_, path_ + ".moved");
     fs::rename(path_ + ".moved", path_);
     expect_ours(content);
-    // Another program writes the same into the file, or makes its own.
+    // Another program writes the same text into the file, or creates a new file.
     write(content);
     fs::last_write_time(path_, fs::last_write_time(path_) - std::chrono::hours(1));
     expect_foreign(content);
@@ -208,7 +209,7 @@ TEST_F(MayReplace, ForceTakesTextAsLongAsNothingHasChangedIt) {
   }
 }
 
-TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
+TEST_F(MayReplace, ForceKeepsFilesThatOnlyContainTheWord) {
   for (const char* foreign :
        {"terrace\n", "The terrace is 3 m wide.\n", "ply\nformat ascii 1.0\ncomment terrace\n",
         "ply\nformat ascii 1.0\nend_header\ncomment written by terrace\n",
@@ -219,7 +220,7 @@ TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
         "\x7F"
         "ELF terrace",
         "\x89PNG\r\n\x1a\n terrace", "glTF terrace", "II*", "MM", "Dear diary,\ntoday 1 2 3\n",
-        // Tables of other programs.
+        // Tables from other programs.
         "x,y,z\n1.50,2,3\n", "x,y,z\n1,2\n", "1.0 2.0 3.0\n", "1 2 3\r\n", "1  2 3\n", "1\t2\t3\n",
         "1,2,3\n", "+1 2 3\n", "01 2 3\n", "1 2 3\n1 2\n", "1 2 3\n\n", "1e5 2 3\n", "x,y\n1,2\n",
         "# points\n1 2 3\n", "\n", "height,gradient,slope\n"}) {
@@ -234,7 +235,7 @@ TEST_F(MayReplace, ForceLeavesWhatMerelyHasTheWord) {
   expect_foreign("the word at the end");
 }
 
-TEST_F(MayReplace, ALinkIsWhatItLeadsTo) {
+TEST_F(MayReplace, FollowsLinks) {
   const std::string link = scratch_.path() / "link";
   fs::create_symlink("output", link);
   EXPECT_FALSE(may_replace(link, false).replace) << "the target does not exist yet";
@@ -248,7 +249,7 @@ TEST_F(MayReplace, ALinkIsWhatItLeadsTo) {
   EXPECT_THROW(may_replace(link, true), stream::Error) << "in a circle";
 }
 
-TEST_F(MayReplace, NeverAFolder) {
+TEST_F(MayReplace, RejectsFolders) {
   EXPECT_THROW(may_replace(scratch_.path(), true), stream::Error);
 }
 

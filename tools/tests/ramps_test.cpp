@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `terrace render` and the viewer share: the viewer takes ramps and light from a file, which
-// must have the numbers of the command.
+// The viewer reads colour ramps and light from a file, which must match those of `terrace render`.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,7 +24,7 @@ Json shared() {
   return Json::parse(file);
 }
 
-/// As ramps.ts mixes colours.
+/// Mixes colours as ramps.ts does.
 Rgb mixed(const Json& stops, double place) {
   std::size_t next = 1;
   while (next + 1 < stops.size() && stops[next][0] < place) ++next;
@@ -39,7 +38,7 @@ Rgb mixed(const Json& stops, double place) {
   return colour;
 }
 
-TEST(Ramps, TheViewerHasThoseOfTheCommand) {
+TEST(Ramps, ViewerMatchesTheCommand) {
   const Json ramps = shared();
   for (int i = -10; i <= 1010; ++i) {
     const double share = i / 1000.0;
@@ -65,7 +64,7 @@ TEST(Ramps, TheViewerHasThoseOfTheCommand) {
   }
 }
 
-TEST(Ramps, ClassesHaveTheCustomaryColours) {
+TEST(Ramps, ClassesHaveCustomaryColours) {
   const auto is_most = [](const Rgb& c, std::size_t channel) {
     return std::max_element(c.begin(), c.end()) - c.begin() == static_cast<std::ptrdiff_t>(channel);
   };
@@ -88,12 +87,12 @@ TEST(Ramps, ClassesHaveTheCustomaryColours) {
   EXPECT_EQ(class_colour(64), category_colour(64));
 }
 
-TEST(Ramps, TheViewerHasTheLightOfTheCommand) {
+TEST(Ramps, ViewerLightMatchesTheCommand) {
   const Json light = shared()["light"];
   const double radians = std::acos(-1.0) / 180;
   std::mt19937 random(16);
   std::uniform_real_distribution<double> slope(-2, 2);
-  // The viewer's azimuth is where it looks to, the command's where the viewer stands.
+  // The viewer's azimuth is its direction of view, the command's is the position of the viewer.
   for (const double looking : {0.0, 30.0, 135.0, 270.0}) {
     const ViewDirection view{.azimuth = looking + 180, .elevation = 40};
     const Camera camera(view);

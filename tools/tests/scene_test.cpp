@@ -28,7 +28,7 @@ double height(std::uint32_t column, std::uint32_t row) {
   return std::round(200.0 + 90.0 * std::sin(column / 15.0) * std::cos(row / 19.0));
 }
 
-/// A store of a raster in a folder of its own.
+/// A store of a raster in a separate folder.
 class Scenes : public testing::Test {
  protected:
   Scenes()
@@ -60,7 +60,7 @@ class Scenes : public testing::Test {
   std::filesystem::path folder_;
 };
 
-/// What a page has: arrays by slot, to which changes are applied.
+/// The page's arrays by slot, to which changes are applied.
 template <class Vertex>
 struct MirrorOf {
   std::vector<Vertex> vertices;
@@ -98,10 +98,10 @@ tri::View looking(double east, double north, double above, double pixel_error) {
   return view;
 }
 
-// After every frame at which nothing that has gone is drawn on, the arrays are the Delaunay
-// triangulation of the vertices in them, each at the height of its cell; in the end at the level
-// that was asked for.
-TEST_F(Scenes, TheArraysAreTheTriangulation) {
+// After every frame without removed parts that are still drawn, the arrays are the Delaunay
+// triangulation of their vertices, each at the height of its cell. At the end they are at the
+// requested level.
+TEST_F(Scenes, ArraysMatchTheTriangulation) {
   const auto scene = Scene::open(store(), kGround, 1'000'000);
   const double middle = (scene->box().min[2] + scene->box().max[2]) / 2;
   Mirror mirror;
@@ -160,7 +160,7 @@ TEST_F(Scenes, TheArraysAreTheTriangulation) {
   EXPECT_GT(most, 5000u);
 }
 
-TEST_F(Scenes, ARayMeetsTheSurfaceWhereItsHeightIs) {
+TEST_F(Scenes, PicksThePointOnTheSurface) {
   const auto scene = Scene::open(store(), kGround, 1'000'000);
   tri::View all;
   all.ground_error = 0;
@@ -176,7 +176,7 @@ TEST_F(Scenes, ARayMeetsTheSurfaceWhereItsHeightIs) {
     ASSERT_TRUE(hit);
     EXPECT_NEAR(hit->stored[0], column + 0.1, 1e-4);
     EXPECT_NEAR(hit->stored[1], row + 0.2, 1e-4);
-    // Between the samples of the cell around it.
+    // Between the samples of the surrounding cell.
     double low = 1e9, high = -1e9;
     for (std::uint32_t dc = 0; dc < 2; ++dc) {
       for (std::uint32_t dr = 0; dr < 2; ++dr) {
@@ -192,8 +192,8 @@ TEST_F(Scenes, ARayMeetsTheSurfaceWhereItsHeightIs) {
   EXPECT_FALSE(scene->pick({1e5, 0, 5000}, {0, 0, -1}, 0.01));
 }
 
-// Attributes travel with the points: whatever came and went, each is drawn by its own.
-TEST_F(Scenes, PointsHaveTheirOwnColoursClassesAndIntensities) {
+// Attributes follow the points: after any changes, each point is drawn with its own.
+TEST_F(Scenes, PointsKeepTheirColoursClassesAndIntensities) {
   const std::filesystem::path file = folder_ / "cloud.csv", built = folder_ / "cloud";
   const auto group_at = [](int x, int y) { return (x / 10 + y / 20) % 12; };
   {
@@ -237,7 +237,7 @@ TEST_F(Scenes, PointsHaveTheirOwnColoursClassesAndIntensities) {
       ASSERT_EQ(p.rgb[1], y * 60 / 257);
       ASSERT_EQ(p.rgb[2], (x + y) * 30 / 257);
       ASSERT_EQ(p.group, group_at(x, y));
-      // Stretched over most of 1000 ... 2008.
+      // The range is stretched over most of 1000 ... 2008.
       ASSERT_NEAR(p.intensity, std::clamp(255 * (x - 20) / 968.0, 0.0, 255.0), 8);
     }
     EXPECT_EQ(shown, state.points);
@@ -274,8 +274,8 @@ TEST_F(Scenes, ClustersExpandAndCollapseByHand) {
   EXPECT_EQ(scene->hash(), hash);
 }
 
-// The outline is made of closed lines between points that lie below the cluster.
-TEST_F(Scenes, AnOutlineGoesAroundACluster) {
+// The outline consists of closed lines between points below the cluster.
+TEST_F(Scenes, OutlineSurroundsACluster) {
   const auto scene = Scene::open(store(), kGround, 1'000'000);
   for (int frame = 0; frame < 2000; ++frame) {
     if (scene->frame(looking(0, 0, 900, 1), 0.01, 0).settled) break;

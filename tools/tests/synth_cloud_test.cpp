@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::uint64_t kOrderMemory = 1 << 20;
 
-TEST(Permutation, IsOneOfEverySize) {
+TEST(Permutation, IsBijectiveForEverySize) {
   for (std::uint64_t size = 1; size < 300; ++size) {
     const Permutation permutation(size, size);
     std::vector<std::uint64_t> seen;
@@ -28,7 +28,7 @@ TEST(Permutation, IsOneOfEverySize) {
   }
 }
 
-TEST(Permutation, LeavesLittleInOrder) {
+TEST(Permutation, DestroysTheOrder) {
   constexpr std::uint64_t kSize = 100000;
   const Permutation permutation(kSize, 1);
   std::uint64_t fixed = 0, ascending = 0;
@@ -55,7 +55,7 @@ TEST(DeliveryOrder, KeepsPiecesTogether) {
   for (std::uint64_t n = 0; n < kSize; ++n) ASSERT_EQ(seen[n], n);
 }
 
-TEST(DeliveryOrder, RefusesWhatItCannotDo) {
+TEST(DeliveryOrder, RejectsInvalidOptions) {
   for (const char* text :
        {"some", "pieces", "pieces:5", "pieces:0-5", "pieces:7-5", "pieces:a-b"}) {
     EXPECT_THROW(DeliveryOrder(text, 10, 1, kOrderMemory), UsageError) << text;
@@ -63,7 +63,7 @@ TEST(DeliveryOrder, RefusesWhatItCannotDo) {
   EXPECT_THROW(DeliveryOrder("pieces:1-1", 1000000, 1, kOrderMemory), stream::Error);
 }
 
-TEST(Clouds, LieInTheirPlace) {
+TEST(Clouds, StayWithinTheirBounds) {
   const auto uniform = uniform_cloud(1);
   const auto surface = surface_cloud(5000, 1);
   const auto clusters = cluster_cloud(5000, 1);
@@ -82,7 +82,7 @@ TEST(Clouds, LieInTheirPlace) {
   for (const double m : mean) EXPECT_NEAR(m, 0.5, 0.02);
 }
 
-// A block of a swath is compact: successive points lie side by side.
+// A block of a swath is compact: successive points are adjacent.
 TEST(Surface, ComesInSwaths) {
   const auto surface = surface_cloud(100000, 1);
   double near = 0;

@@ -8,14 +8,14 @@
 namespace terrace::tools {
 namespace {
 
-TEST(Terminal, TextThatATerminalShowsStays) {
+TEST(Terminal, KeepsPrintableText) {
   for (const std::string text :
        {"", "plain, 12 % ~", "a\nb\n", "Großglockner", "富士山", "🏔", "\\x"}) {
     EXPECT_EQ(printable(text), text);
   }
 }
 
-TEST(Terminal, WhatATerminalObeysIsShown) {
+TEST(Terminal, EscapesControlCharacters) {
   EXPECT_EQ(printable("\x1b[31m"), "\\x1b[31m");
   EXPECT_EQ(printable("a\rb\tc\bd\x7f"), "a\\x0db\\tc\\x08d\\x7f");
   EXPECT_EQ(printable(std::string("\0", 1)), "\\x00");
@@ -24,7 +24,7 @@ TEST(Terminal, WhatATerminalObeysIsShown) {
   EXPECT_EQ(printable_line("a\nb"), "a\\nb");
 }
 
-TEST(Terminal, BytesThatAreNoUtf8AreShown) {
+TEST(Terminal, EscapesInvalidUtf8) {
   EXPECT_EQ(printable("caf\xe9"), "caf\\xe9");
   EXPECT_EQ(printable("\x9b"
                       "1m"),
