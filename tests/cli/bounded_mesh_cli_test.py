@@ -312,7 +312,7 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertGreater(summary['uncovered'], 1000)
         text = terrace('mesh', store, '-o', out, '--max-error', 3, '--force').stderr
         self.assertIn(f"of {summary['covered']:,} of {summary['samples']:,} samples", text)
-        self.assertIn(f"{summary['uncovered']:,} samples lie on no triangle", text)
+        self.assertIn(f"{summary['uncovered']:,} samples are on no triangle", text)
         self.assertNotIn('of all', text)
 
         triangle = [(100.25, 90.25), (1000.25, 300.25), (350.25, 700.25)]  # columns and rows

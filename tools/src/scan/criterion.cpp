@@ -58,7 +58,7 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
 void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options) {
   if (metric.kind == MetricChoice::Kind::euclidean) return;
   if (metric.kind != MetricChoice::Kind::elliptical) {
-    throw UsageError("--metric: a surface takes euclidean or elliptical:FILE, not  " + metric.text);
+    throw UsageError("--metric: a surface takes euclidean or elliptical:FILE, not " + metric.text);
   }
   if (options.method) throw UsageError("--metric needs --criterion poles, gabriel or edge");
   if (metric.has_boxes()) {

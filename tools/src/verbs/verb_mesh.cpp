@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include <cstdlib>  // tells which C library this is
+#include <cstdlib>  // defines __GLIBC__
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -165,7 +165,7 @@ class MeshCommand final : public Command {
         counted(result.samples, "sample") + " (RMS " + readable_number(result.rms_error) +
         " m), in " + readable_seconds(watch.seconds()) + "\n";
     if (!all) {
-      summary.text += counted(result.uncovered, "sample", "lies", "lie") + " on no triangle: " +
+      summary.text += counted(result.uncovered, "sample", "is", "are") + " on no triangle: " +
                       why_uncovered(result, store.schema().grid, options.region.has_value()) + "\n";
     }
     if (result.duplicates > 0) {
@@ -181,8 +181,8 @@ class MeshCommand final : public Command {
 
   static std::string why_uncovered(const BoundedMeshResult& result, bool grid, bool region) {
     if (result.triangles == 0) return "nothing spans an area";
-    if (grid && region) return "they are at the region's border or beside cells without data";
-    return grid ? "they are beside cells without data"
+    if (grid && region) return "they are at the region's border or next to cells without data";
+    return grid ? "they are next to cells without data"
                 : "the file's format rounds the border of the mesh";
   }
 

@@ -172,9 +172,9 @@ class PointsCommand final : public Command {
     const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
     const auto& [x, y] = place.xy;
     if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
-      common.say(near_ + " is outside the store: in its CRS X is from  " +
-                 plain_number(box.min[0]) + " to " + plain_number(box.max[0]) + ", Y from " +
-                 plain_number(box.min[1]) + " to " + plain_number(box.max[1]));
+      common.say(near_ + " is outside the store: in its CRS X is from " + plain_number(box.min[0]) +
+                 " to " + plain_number(box.max[0]) + ", Y from " + plain_number(box.min[1]) +
+                 " to " + plain_number(box.max[1]));
     }
     stream::StoreQuery query(store);
     const std::vector<stream::FoundPoint> found =

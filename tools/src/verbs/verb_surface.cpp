@@ -66,7 +66,7 @@ class SurfaceCommand final : public Command {
                  [&] { surface = scan_surface(store, detail, options, common.context()); });
     if (surface.mesh.triangles.empty() && surface.tetrahedra.empty()) {
       common.say(
-          part_.path + ": the points enclose no volume,  " +
+          part_.path + ": the points enclose no volume, " +
           (surface.spanned == 0   ? "all are at one place"
            : surface.spanned == 1 ? "all are on a line"
            : surface.spanned == 3 && options.restore.shape.rule == tri::ShapeRule::kPublished

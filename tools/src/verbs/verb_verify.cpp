@@ -114,7 +114,7 @@ class VerifyCommand final : public Command {
             counted(zoom.samples, "sample");
         if (zoom.uncovered > 0) {
           summary.text += " (" + with_commas(zoom.uncovered) +
-                          (zoom.uncovered == 1 ? " lies" : " lie") + " on no triangle)";
+                          (zoom.uncovered == 1 ? " is" : " are") + " on no triangle)";
         }
       }
       summary.text += "\n";

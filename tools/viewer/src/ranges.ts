@@ -275,7 +275,7 @@ export class Ranges {
     };
     if (response.status === 200) {
       throw fault(
-          'the server sent the whole file instead of a part (HTTP 200, not 206).  ' +
+          'the server sent the whole file instead of a part (HTTP 200, not 206). ' +
               'It must support range requests, as "terrace view" and most web servers do.',
           true);
     }

@@ -167,7 +167,7 @@ export class Renderer {
     }
     gl.linkProgram(this.program);
     if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
-      throw new Error(`The graphics driver rejects the shaders:  ${gl.getProgramInfoLog(this.program)}`);
+      throw new Error(`The graphics driver rejects the shaders: ${gl.getProgramInfoLog(this.program)}`);
     }
     this.ramps = {
       height: gl.createTexture()!,
