@@ -162,7 +162,7 @@ const Verb& find_verb(const std::string& name) {
   }
   std::vector<std::string> names;
   for (const Verb& verb : verbs()) names.push_back(verb.name);
-  throw UsageError("there is no verb '" + name + "'; " + suggestion(name, names) +
+  throw UsageError("unknown verb '" + name + "'; " + suggestion(name, names) +
                    "`terrace --help` lists them");
 }
 
@@ -341,11 +341,11 @@ double number_of_option(const std::string& name, const std::string& text,
                         const NumberRange& range) {
   const double value = parse_number(text, name);
   if (value < range.least || (range.above_least && value == range.least) || value > range.most) {
-    std::string wanted = range.above_least        ? "above " + plain_number(range.least)
-                         : std::isinf(range.most) ? "at least " + plain_number(range.least)
-                                                  : "from " + plain_number(range.least) + " to " +
-                                                        plain_number(range.most);
-    throw UsageError(name + " must be " + wanted + ", not " + text);
+    std::string expected = range.above_least        ? "above " + plain_number(range.least)
+                           : std::isinf(range.most) ? "at least " + plain_number(range.least)
+                                                    : "from " + plain_number(range.least) + " to " +
+                                                          plain_number(range.most);
+    throw UsageError(name + " must be " + expected + ", not " + text);
   }
   return value;
 }

@@ -17,15 +17,15 @@ bool written_by_terrace(const std::string& path) {
   return marked ? *marked : stream::is_unchanged_output(path);
 }
 
-void tell_rounding(const stream::PointWriter& writer, Summary& summary) {
+void report_rounding(const stream::PointWriter& writer, Summary& summary) {
   if (writer.rounding() == 0.0) return;
   summary.json["rounding"] = writer.rounding();
   summary.text += "coordinates were rounded by up to " + readable_number(writer.rounding()) +
                   " to fit the format\n";
 }
 
-void tell_coordinates(const terrain::MeshCoordinates& coordinates, const CommonOptions& common,
-                      Summary& summary) {
+void report_coordinates(const terrain::MeshCoordinates& coordinates, const CommonOptions& common,
+                        Summary& summary) {
   if (!coordinates.note.empty()) common.say(coordinates.note);
   if (!coordinates.frame) return;
   const stream::MeshFrame& frame = *coordinates.frame;

@@ -27,11 +27,11 @@ inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 bool written_by_terrace(const std::string& path);
 
 /// Adds a line to the summary if coordinates were rounded to fit the file's format.
-void tell_rounding(const stream::PointWriter& writer, Summary& summary);
+void report_rounding(const stream::PointWriter& writer, Summary& summary);
 
 /// Reports how a mesh file stores its coordinates: prints a note, and adds "frame" to the summary.
-void tell_coordinates(const terrain::MeshCoordinates& coordinates, const CommonOptions& common,
-                      Summary& summary);
+void report_coordinates(const terrain::MeshCoordinates& coordinates, const CommonOptions& common,
+                        Summary& summary);
 
 /// Checks, before the work begins, that the output `path` may be written. Returns the writers'
 /// `replace`. With `force` it allows replacing a file that terrace wrote, which is checked again at

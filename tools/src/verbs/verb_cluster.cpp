@@ -206,7 +206,7 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
   }
   if (used < request.k) {
     outcome.notes.push_back(std::string(used == 1 ? "there is only " : "there are only ") +
-                            counted(used, "distinct point") + ", so there are no more clusters");
+                            counted(used, "distinct point") + ", and therefore no more clusters");
   }
   if (!result.converged) {
     outcome.notes.push_back("k-means stopped after " + counted(result.iterations, "iteration") +

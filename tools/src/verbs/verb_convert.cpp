@@ -136,7 +136,7 @@ class ConvertCommand : public Command {
     summary.text = output_ + ": " + counted(writer->points(), "point") +
                    (left_out.empty() ? "" : " (" + left_out + ")") + ", " +
                    readable_seconds(watch.seconds()) + '\n';
-    tell_rounding(*writer, summary);
+    report_rounding(*writer, summary);
     return summary;
   }
 

@@ -124,7 +124,7 @@ class MeshCommand final : public Command {
     options.max_error = max_error_.value_or(0.0);
     if (!max_points_.empty()) {
       options.max_points = count_of_option("--max-points", max_points_);
-      if (options.max_points < 4) throw UsageError("--max-points: at least 4");
+      if (options.max_points < 4) throw UsageError("--max-points must be at least 4");
     }
     options.quality = parse_quality(quality_);
     const std::string duplicates = !duplicates_.empty()  ? duplicates_
@@ -156,7 +156,7 @@ class MeshCommand final : public Command {
                     {"reading_seconds", result.reading_seconds},
                     {"meshing_seconds", result.meshing_seconds},
                     {"peak_rss_bytes", peak_rss_bytes()}};
-    tell_coordinates(result.coordinates, common, summary);
+    report_coordinates(result.coordinates, common, summary);
     const bool all = result.uncovered == 0;
     summary.text =
         output_ + ": " + counted(result.vertices, "vertex") + ", " +
@@ -208,7 +208,7 @@ class MeshCommand final : public Command {
   Summary multiresolution(const CommonOptions& common) const {
     const Stopwatch watch;
     if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
-      throw UsageError("--quality, --duplicates and --fill belong to --max-error and --max-points");
+      throw UsageError("--quality, --duplicates and --fill need --max-error or --max-points");
     }
     DetailMeshOptions options{{.smoothing = parse_smoothing(smooth_)},
                               MetricChoice::parse(metric_)};
@@ -246,7 +246,7 @@ class MeshCommand final : public Command {
     Summary summary;
     summary.json = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
     summary.add_cost(watch);
-    tell_coordinates(coordinates, common, summary);
+    report_coordinates(coordinates, common, summary);
     summary.text = output_ + ": " + counted(mesh.positions.size(), "vertex") + ", " +
                    counted(mesh.triangles.size(), "triangle") + " in " +
                    readable_seconds(watch.seconds()) + "\n";

@@ -81,7 +81,7 @@ class PointsCommand final : public Command {
         stream::open_point_writer(output_, header(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
-    tell_lost_unit(*writer, store, to, common);
+    report_lost_unit(*writer, store, to, common);
     const std::uint64_t replaced = write_points(store, detail, *writer, places(to),
                                                 overlay ? &*overlay : nullptr, common.context());
     const std::uint64_t points = writer->points();
@@ -93,7 +93,7 @@ class PointsCommand final : public Command {
     summary.add_cost(watch);
     summary.text = output_ + ": " + counted(points, "point") + " in " +
                    readable_seconds(watch.seconds()) + "\n";
-    tell_rounding(*writer, summary);
+    report_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = replaced;
       summary.text += counted(replaced, "height") + " from " + overlay_ + "\n";
@@ -118,8 +118,9 @@ class PointsCommand final : public Command {
   static std::optional<stream::Crs> crs_of(const std::optional<Transformation>& to) {
     return to ? std::optional(to->to().crs()) : std::nullopt;
   }
-  void tell_lost_unit(const stream::PointWriter& writer, const stream::Store& store,
-                      const std::optional<Transformation>& to, const CommonOptions& common) const {
+  void report_lost_unit(const stream::PointWriter& writer, const stream::Store& store,
+                        const std::optional<Transformation>& to,
+                        const CommonOptions& common) const {
     const std::string note = lost_height_unit(output_, writer, store.schema(), crs_of(to));
     if (!note.empty()) common.say(note);
   }
@@ -194,7 +195,7 @@ class PointsCommand final : public Command {
     const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
                                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
-    tell_lost_unit(*writer, store, to, common);
+    report_lost_unit(*writer, store, to, common);
     write_found_points(query, found, *writer, places(to));
     writer->finish();
     Summary summary;
@@ -208,7 +209,7 @@ class PointsCommand final : public Command {
                       readable_number(found.back().distance) + " m away";
     }
     summary.text += ", in " + readable_seconds(watch.seconds()) + "\n";
-    tell_rounding(*writer, summary);
+    report_rounding(*writer, summary);
     return summary;
   }
 

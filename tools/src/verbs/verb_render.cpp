@@ -126,8 +126,8 @@ std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, 
   if (fixed + bytes <= memory) return memory - fixed;
   throw stream::Error({.file = path,
                        .where = {},
-                       .cause = "a picture of " + std::to_string(size.width) + " x " +
-                                std::to_string(size.height) + " pixels of it needs " +
+                       .cause = "drawing it with " + std::to_string(size.width) + " x " +
+                                std::to_string(size.height) + " pixels needs " +
                                 std::to_string(((fixed + bytes) >> 20) + 1) + " MiB, --memory is " +
                                 readable_bytes(memory),
                        .remedy = "give a smaller --size, a coarser --level, or more --memory"});
@@ -500,17 +500,17 @@ class RenderCommand : public Command {
            : terrain                       ? "height"
                                            : "grey";
     }
-    const auto lacks = [&](const std::string& what) {
+    const auto fail_without = [&](const std::string& what) {
       throw UsageError("--color " + by + ": '" + input_ + "' has no " + what);
     };
     std::vector<Rgb> colours(mesh.positions.size(), Rgb{205, 205, 200});
     if (by == "rgb") {
-      if (mesh.colours.empty()) lacks("colours");
+      if (mesh.colours.empty()) fail_without("colours");
       return rgb_of(mesh);
     }
-    if (by == "level" && mesh.levels.empty()) lacks("levels");
-    if ((by == "class" || by == "cluster") && mesh.classes.empty()) lacks(by);
-    if (by == "slope" && mesh.triangles.empty()) lacks("triangles to have a slope");
+    if (by == "level" && mesh.levels.empty()) fail_without("levels");
+    if ((by == "class" || by == "cluster") && mesh.classes.empty()) fail_without(by);
+    if (by == "slope" && mesh.triangles.empty()) fail_without("triangles to have a slope");
     const HeightTint tint =
         by == "height" ? HeightTint::of(shown_heights(mesh, heights, terrain)) : HeightTint{};
     const auto normals = by == "slope" ? vertex_normals(mesh) : std::vector<std::array<float, 3>>();

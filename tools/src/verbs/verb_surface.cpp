@@ -88,7 +88,7 @@ class SurfaceCommand final : public Command {
       coordinates = write_mesh(output_, surface.mesh, writer, units);
     }
     Summary summary = summary_of(surface, watch);
-    tell_coordinates(coordinates, common, summary);
+    report_coordinates(coordinates, common, summary);
     return summary;
   }
 

@@ -42,7 +42,7 @@ struct ScenePoint {
 };
 static_assert(sizeof(ScenePoint) == 24);
 
-/// A vertex of the surface of a scan. Its members fill the padding of ScenePoint.
+/// A vertex of the surface of a scan. Its first members use the padding of ScenePoint.
 struct SceneBodyPoint : ScenePoint {
   std::int8_t start_exponent = 0;       ///< exponent of start's unit: 2^n metres
   std::array<std::int16_t, 3> start{};  ///< start of the slide, relative to x, y, z
