@@ -179,7 +179,7 @@ std::uint64_t value_of_option(const std::string& name, const std::string& text,
 
 void add_common_options(CLI::App& app, CommonOptions& common) {
   const std::string group = "Common options";
-  app.add_option("--threads", common.threads, "Threads; never changes results (default: all cores)")
+  app.add_option("--threads", common.threads, "threads; never changes results (default: all cores)")
       ->check(CLI::Range(1U, 4096U))
       ->group(group)
       ->type_name("N");
@@ -188,19 +188,19 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
          [&common](const std::string& text) {
            common.memory_bytes = value_of_option("--memory", text, parse_memory);
          },
-         "Memory limit, such as 256M or 2G; never changes results")
+         "memory limit, such as 256M or 2G; never changes results")
       ->group(group)
       ->type_name("SIZE");
   app.add_option_function<std::string>(
          "--seed",
          [&common](const std::string& text) { common.seed = count_of_option("--seed", text); },
-         "Same input, options and seed give the same bytes (default: 1)")
+         "same input, options and seed give the same bytes (default: 1)")
       ->group(group)
       ->type_name("N");
-  app.add_flag("--json", common.json, "Print the summary as one JSON object on standard output")
+  app.add_flag("--json", common.json, "print the summary as one JSON object on standard output")
       ->group(group);
   app.add_flag("--force", common.force,
-               "Replace an existing output if terrace wrote it: a file with its mark or unchanged "
+               "replace an existing output if terrace wrote it: a file with its mark or unchanged "
                "text, or a folder without files of other programs")
       ->group(group);
   app.add_option_function<std::string>(
@@ -210,12 +210,12 @@ void add_common_options(CLI::App& app, CommonOptions& common) {
                              : mode == "none" ? ProgressMode::none
                                               : ProgressMode::automatic;
          },
-         "Progress on standard error: auto (on a terminal), json (JSON lines) or none")
+         "progress on standard error: auto (on a terminal), json (JSON lines) or none")
       ->check(CLI::IsMember({"auto", "json", "none"}))
       ->group(group)
       ->type_name("MODE");
-  app.add_flag("-q,--quiet", common.quiet, "Print nothing but errors")->group(group);
-  app.add_flag("-v,--verbose", common.verbose, "Explain each step")->group(group);
+  app.add_flag("-q,--quiet", common.quiet, "print nothing but errors")->group(group);
+  app.add_flag("-v,--verbose", common.verbose, "explain each step")->group(group);
 }
 
 /// Returns true if -o, or its default, is '-'.
@@ -229,7 +229,7 @@ bool writes_to_stdout(const CLI::App& app) {
 int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   CLI::App app{verb.brief.empty() ? "" : "terrace " + verb.name + ": " + verb.brief + ".",
                "terrace " + verb.name};
-  app.set_help_flag("-h,--help", "Print this help")->group("Common options");
+  app.set_help_flag("-h,--help", "print this help")->group("Common options");
   app.footer("Example:\n  " + verb.example);
 
   CommonOptions common;
@@ -385,7 +385,7 @@ CLI::Option* add_output(CLI::App& app, std::string& target, const std::string& d
 
 void add_input_format(CLI::App& app, std::string& target) {
   app.add_option("--input-format", target,
-                 "Format of the input (default: from its content, then its ending)")
+                 "format of the input (default: from its content, then its ending)")
       ->type_name("NAME");
 }
 

@@ -468,17 +468,17 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
 class ClusterCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("input", input_, "File of points (or cells); - is standard input")
+    app.add_option("input", input_, "file of points (or cells); - is standard input")
         ->required()
         ->type_name("FILE");
     app.add_option("-o,--output", output_,
-                   "The points with columns 'cluster' and 'representative' (index of the point "
+                   "the points with columns 'cluster' and 'representative' (index of the point "
                    "that represents the cluster; -1: outlier); - is standard output")
         ->type_name("FILE");
-    app.add_option("--labels", labels_, "One cluster number per line, in the order of the input")
+    app.add_option("--labels", labels_, "one cluster number per line, in the order of the input")
         ->type_name("FILE");
     app.add_option("--dendrogram", dendrogram_,
-                   "Linkage: the whole tree as rows a,b,height,size (SciPy's)")
+                   "linkage: the whole tree as rows a,b,height,size (SciPy's)")
         ->type_name("FILE.csv");
     add_point_format(app, format_);
     add_input_format(app, input_format_);
@@ -487,14 +487,14 @@ class ClusterCommand final : public Command {
                    "average, weighted, ward, centroid, median")
         ->capture_default_str()
         ->type_name("NAME");
-    app.add_option("-k", request_.k, "Number of clusters")
+    app.add_option("-k", request_.k, "number of clusters")
         ->check(CLI::Range(1U, 4294967295U))
         ->type_name("K");
-    add_number(app, "--height", request_.height, "Linkage: cut the tree at this distance",
+    add_number(app, "--height", request_.height, "linkage: cut the tree at this distance",
                kNotNegative)
         ->type_name("H");
     add_number(app, "--facility-cost", facility_cost_,
-               "Times the diagonal of the points: larger makes fewer clusters", kFactor);
+               "times the diagonal of the points: larger makes fewer clusters", kFactor);
     add_number(app, "--outlier-price", outlier_price_,
                "facility: leave a point out if that is cheaper; times the diagonal", kFactor)
         ->type_name("PRICE");
@@ -516,18 +516,18 @@ class ClusterCommand final : public Command {
         ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--bound-iterations", request_.bound_iterations,
-                   "Steps for a lower bound of the cost; 0: none (default: a few seconds' worth)")
+                   "steps for a lower bound of the cost; 0: none (default: a few seconds' worth)")
         ->type_name("N");
     app.add_option(
            "--metric", metric_,
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
         ->capture_default_str()
         ->type_name("METRIC");
-    app.add_option("--channel", channels_, "Add a column to distances, one unit as WEIGHT metres")
+    app.add_option("--channel", channels_, "add a column to distances, one unit as WEIGHT metres")
         ->allow_extra_args(false)
         ->type_name("NAME:WEIGHT");
-    app.add_option("--weight", weight_, "Column with the points' weights")->type_name("NAME");
-    add_number(app, "--z-weight", z_weight_, "Weight of heights in distances", kFactorOrZero);
+    app.add_option("--weight", weight_, "column with the points' weights")->type_name("NAME");
+    add_number(app, "--z-weight", z_weight_, "weight of heights in distances", kFactorOrZero);
     app.add_flag("--single-precision", request_.single_precision,
                  "complete, average, weighted: a matrix of half the size");
     app.add_option("--device", device_, "single, complete: cpu or cuda")

@@ -38,7 +38,7 @@ class ConvertCommand : public Command {
            "files of points or cells, one after another (rasters form a mosaic); a folder of them, "
            "@FILE with one name per line, or a quoted pattern; - is standard input")
         ->required();
-    add_output(app, output_, "The file to write; - is standard output");
+    add_output(app, output_, "the file to write; - is standard output");
     add_point_format(app, format_);
     add_input_format(app, input_format_);
     selection_.define(app);

@@ -197,11 +197,11 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
 class MatchCommand final : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option("input", input_, "File of points (or cells); - is standard input")
+    app.add_option("input", input_, "file of points (or cells); - is standard input")
         ->required()
         ->type_name("FILE");
     add_output(app, output_,
-               "The pairs, rows a,b,distance: indices of points in the input, from 0, and metres; "
+               "the pairs, rows a,b,distance: indices of points in the input, from 0, and metres; "
                "with --tree rows a,b,distance,size,level, for triangles also the box of all below: "
                "minx,miny,minz,maxx,maxy,maxz; - is standard output");
     add_input_format(app, input_format_);
@@ -218,9 +218,9 @@ class MatchCommand final : public Command {
     add_number(app, "--seconds", seconds_,
                "monotone, monte-carlo: start no iteration after S seconds", kAboveZero)
         ->type_name("S");
-    add_number(app, "--z-weight", z_weight_, "Weight of heights in distances", kFactorOrZero);
+    add_number(app, "--z-weight", z_weight_, "weight of heights in distances", kFactorOrZero);
     app.add_flag("--tree", tree_,
-                 "Match the pairs again, up to one root: a binary tree. With n points, row k is "
+                 "match the pairs again, up to one root: a binary tree. With n points, row k is "
                  "node n + k and joins the nodes a and b; size counts the points below");
     app.add_option(
            "--entities", entities_,
@@ -229,7 +229,7 @@ class MatchCommand final : public Command {
         ->check(CLI::IsMember({"points", "triangles"}))
         ->capture_default_str();
     app.add_option("--labels", labels_,
-                   "One cluster number per line, in the order of the input: match within clusters "
+                   "one cluster number per line, in the order of the input: match within clusters "
                    "first")
         ->type_name("FILE");
   }

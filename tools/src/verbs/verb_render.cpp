@@ -316,24 +316,23 @@ class RenderCommand : public Command {
   void define(CLI::App& app) override {
     app.add_option(
            "input", input_,
-           "Store, raster, mesh (PLY, GLB, OBJ, OFF, STL), cloud of points, dendrogram (CSV), "
-           "or pairs or "
-           "tree of 'match' (CSV)")
+           "store, raster, mesh (PLY, GLB, OBJ, OFF, STL), cloud of points, dendrogram (CSV), "
+           "or pairs or tree of 'match' (CSV)")
         ->required()
         ->type_name("FILE");
-    add_output(app, output_, "The PNG file to write; - is standard output");
-    app.add_option("--size", size_, "Size of the picture in pixels")
+    add_output(app, output_, "the PNG file to write; - is standard output");
+    app.add_option("--size", size_, "size of the picture in pixels")
         ->capture_default_str()
         ->type_name("WxH");
     app.add_option("--color", color_, "height, slope, level, rgb, class, cluster or grey")
         ->check(CLI::IsMember({"height", "slope", "level", "rgb", "class", "cluster", "grey"}))
         ->type_name("WHAT");
-    app.add_flag("--wire", wire_, "Draw the edges of the triangles");
+    app.add_flag("--wire", wire_, "draw the edges of the triangles");
     app.add_option("--view", view_, "top, or the viewer's position: AZIMUTH,ELEVATION in degrees")
         ->capture_default_str()
         ->type_name("VIEW");
     add_number(app, "--exaggerate", exaggerate_,
-               "Multiply heights by this factor (default: enough to show the relief)", kFactor)
+               "multiply heights by this factor (default: enough to show the relief)", kFactor)
         ->type_name("FACTOR");
     define_picture_input(app, selection_);
     app.add_option("--points", points_file_, "pairs, tree: the point file that they were made from")

@@ -35,12 +35,12 @@ class SynthCommand : public Command {
         ->required()
         ->check(CLI::IsMember({"dem", "surface", "uniform", "clusters"}))
         ->type_name("KIND");
-    add_output(app, output_, "The file to write; for points its ending selects the format");
+    add_output(app, output_, "the file to write; for points its ending selects the format");
     size_option_ = app.add_option("--size", size_, "dem: columns x rows")
                        ->capture_default_str()
                        ->type_name("WxH");
     points_option_ =
-        app.add_option("--points", points_, "Number of points (default: 1M)")->type_name("N");
+        app.add_option("--points", points_, "number of points (default: 1M)")->type_name("N");
     add_number(app, "--cell", dem_.cell, "dem: side of a cell, in units of the CRS", kAboveZero);
     add_number(app, "--hurst", dem_.hurst, "dem: smoothness, between 0 and 1",
                {.least = 0.01, .most = 0.99});
@@ -56,7 +56,7 @@ class SynthCommand : public Command {
         ->capture_default_str()
         ->check(CLI::IsMember({"none", "deflate", "zstd"}));
     shuffle_option_ = app.add_option("--shuffle", shuffle_,
-                                     "Order of points: all (every point anywhere) or "
+                                     "order of points: all (every point anywhere) or "
                                      "pieces:MIN-MAX (runs of that many points)")
                           ->type_name("HOW");
   }
