@@ -14,7 +14,7 @@ TEST(OptionNames, ReplacesParametersByOptions) {
 }
 
 TEST(OptionNames, KeepsOtherText) {
-  for (const char* text : {"", "a", "`", "``", "`level", "level`", "`terrace info` tells",
+  for (const char* text : {"", "a", "`", "``", "`level", "level`", "`terrace info` shows",
                            "a file named `x", "`levels`", "``level", "` level`"}) {
     EXPECT_EQ(with_option_names(text), text);
   }

@@ -205,8 +205,8 @@ void light_by_depth(const Camera& camera, const Light& light, const Radii& radii
   });
 }
 
-/// Returns whether the whole disc is behind the drawn samples. A single visible sample is enough:
-/// on a steep slope most of the disc is hidden.
+/// Returns whether the drawn samples hide the whole disc. A single visible sample is enough: on a
+/// steep slope most of the disc is hidden.
 bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth) {
   const auto inside = [](double value, std::uint32_t size) {
     return static_cast<std::uint32_t>(std::clamp(value, 0.0, size - 1.0));

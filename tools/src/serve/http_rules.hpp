@@ -22,8 +22,8 @@ struct Request {
   bool trusted = false;                                   ///< needs no token
 };
 
-/// What a request must present: web pages of other origins and other users of the machine can reach
-/// the port too.
+/// Requirements for requests, because web pages of other origins and other users of the machine can
+/// reach the port too.
 struct Access {
   std::uint16_t port = 0;  ///< port of the server
   std::string token{};     ///< value of `token` in the printed address
@@ -59,8 +59,8 @@ std::string_view query_value(std::string_view target, std::string_view name);
 /// by DNS rebinding has, and a request without the token for anything but the viewer's own files.
 Answer answer_to(const Request& request, const Site& site, const Access& access);
 
-/// What the viewer may load and run: its own files, WebAssembly, and icons embedded in the page.
-/// The page repeats this for other servers (tools/viewer/src/index.html).
+/// Content security policy of the viewer: it may load and run its own files, WebAssembly, and icons
+/// embedded in the page. The page repeats this for other servers (tools/viewer/src/index.html).
 inline constexpr const char* kContentPolicy =
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src "
     "'self'; "

@@ -15,7 +15,8 @@
 #include <terrace/stream/byte_source.hpp>
 #include <terrace/stream/store.hpp>
 
-/// What the viewer needs from a web server: its own files and those of the stores, each at a path.
+/// The site that a web server offers the viewer: its own files and those of the stores, each at a
+/// path.
 
 namespace terrace::tools {
 

@@ -63,7 +63,7 @@ class BuildCommand final : public Command {
     app.add_option("--towgs84", shift_,
                    "dx,dy,dz[,rx,ry,rz,ds]: metres, arc-seconds and ppm (position vector) from "
                    "the CRS's datum to WGS 84");
-    app.add_option("--vertical", request_.vertical, "what heights refer to")
+    app.add_option("--vertical", request_.vertical, "reference of the heights")
         ->check(CLI::IsMember({"ellipsoidal", "orthometric"}));
     selection_.define(app);
     app.add_option("--band", request_.band, "band of rasters, from 1")->check(CLI::Range(1, 65535));

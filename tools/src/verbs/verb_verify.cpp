@@ -42,7 +42,7 @@ class VerifyCommand final : public Command {
                kAboveZero)
         ->type_name("METRES");
     app.add_option("--vertical", vertical_,
-                   "what the store's heights refer to: ellipsoidal; orthometric, as for `terrace "
+                   "reference of the store's heights: ellipsoidal; orthometric, as for `terrace "
                    "tile`; ignore treats them as ellipsoidal");
     app.add_option("--geoid", geoid_, "the geoid grid that the tiles were made with")
         ->type_name("FILE");

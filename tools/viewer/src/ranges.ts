@@ -249,7 +249,7 @@ export class Ranges {
           await fetch(this.url(range), {method: 'HEAD', signal: watch.signal}).then(() => true, () => false)) {
         throw new FetchFault(
             `${range.file}: the server answers, but part of the file cannot be read: the connection was lost, or the server ` +
-                'compresses parts (Content-Encoding). Turn off compression for the stores' files.',
+                'compresses parts (Content-Encoding). Turn off compression for files of stores.',
             false);
       }
       throw watch.fault(range.file, error);

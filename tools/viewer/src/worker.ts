@@ -17,7 +17,7 @@ const MOST_GIVEN = 64 << 20;
 const REST = 700;
 /// Milliseconds after which a frame checks whether removed parts need no longer be drawn.
 const EXCHANGE = 30;
-/// Maximum number of frames that the page may lag behind.
+/// Maximum number of frames sent that the page has not drawn yet.
 const AHEAD = 6;
 
 declare const self: {
