@@ -29,10 +29,10 @@ TEST(Terminal, EscapesInvalidUtf8) {
   EXPECT_EQ(printable("\x9b"
                       "1m"),
             "\\x9b1m");
-  EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b") << "longer than need be";
-  EXPECT_EQ(printable("\xe0\x82\x9b"), "\\xe0\\x82\\x9b") << "longer than need be";
-  EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80") << "half of a pair";
-  EXPECT_EQ(printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80") << "above all characters";
+  EXPECT_EQ(printable("\xc0\x9b"), "\\xc0\\x9b") << "overlong encoding";
+  EXPECT_EQ(printable("\xe0\x82\x9b"), "\\xe0\\x82\\x9b") << "overlong encoding";
+  EXPECT_EQ(printable("\xed\xa0\x80"), "\\xed\\xa0\\x80") << "lone surrogate";
+  EXPECT_EQ(printable("\xf4\x90\x80\x80"), "\\xf4\\x90\\x80\\x80") << "beyond U+10FFFF";
   EXPECT_EQ(printable("x\xe5\xaf"), "x\\xe5\\xaf") << "cut short";
 }
 
