@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a file to a store: the same bytes whatever the number of threads, within the memory granted,
-// and nothing left behind where the work fails.
+// Builds stores from files: the bytes do not depend on the number of threads, memory stays within
+// the limit, and a failed build leaves nothing behind.
 #include "terrace/terrain/build.hpp"
 
 #include <cstdint>
@@ -71,7 +71,7 @@ class Build : public testing::Test {
   std::uint64_t valid_ = 0;
 };
 
-TEST_F(Build, KeepsEveryValidCellOnceAndCountsTheOthers) {
+TEST_F(Build, StoresEveryValidCellOnceAndCountsTheOthers) {
   const terrain::BuildOutcome outcome = terrain::build_store(request_);
   EXPECT_EQ(outcome.points, valid_);
   EXPECT_EQ(outcome.points + outcome.nodata, std::uint64_t{kSize} * kSize);
@@ -100,7 +100,7 @@ TEST_F(Build, GivesTheSameBytesForAnyNumberOfThreads) {
   }
 }
 
-TEST_F(Build, OneOfTwoAtOnceIsGivenUpAndTheOtherGoesOn) {
+TEST_F(Build, StoppingOneOfTwoBuildsLeavesTheOtherRunning) {
   terrain::build_store(request_);
   const auto expected = files_of(request_.store);
   std::stop_source stop;
@@ -130,25 +130,25 @@ TEST_F(Build, OneOfTwoAtOnceIsGivenUpAndTheOtherGoesOn) {
   EXPECT_EQ(left, (std::set<std::string>{"a.store", "dem.tif", "finished"}));
 }
 
-TEST_F(Build, RefusesAnOutputThatExistsAndKeepsIt) {
+TEST_F(Build, RejectsAnExistingOutputAndKeepsIt) {
   terrain::build_store(request_);
   const auto before = files_of(request_.store);
   EXPECT_THROW(terrain::build_store(request_), stream::Error);
   EXPECT_TRUE(files_of(request_.store) == before);
 }
 
-TEST_F(Build, SaysWhatMemoryItNeeds) {
+TEST_F(Build, ReportsTheMemoryItNeeds) {
   const terrain::Context little{.memory_bytes = std::uint64_t{8} << 20};
   try {
     terrain::build_store(request_, little);
-    FAIL() << "8 MiB were enough";
+    FAIL() << "8 MiB was enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("need"), std::string::npos) << error.what();
   }
 }
 
-TEST_F(Build, LeavesNothingWhenTheDiskIsFull) {
-  // A limit on the size of files stands in for a full disk: EFBIG where that says ENOSPC.
+TEST_F(Build, LeavesNothingBehindAtTheFileSizeLimit) {
+  // A limit on file sizes simulates a full disk; it fails with EFBIG instead of ENOSPC.
   for (const rlim_t limit : {rlim_t{1}, rlim_t{5000}, rlim_t{60000}}) {
     SCOPED_TRACE(limit);
     const pid_t child = fork();
@@ -173,7 +173,7 @@ TEST_F(Build, LeavesNothingWhenTheDiskIsFull) {
   }
 }
 
-TEST_F(Build, LeavesNothingOnADiskThatIsFull) {
+TEST_F(Build, LeavesNothingBehindOnAFullDisk) {
   const fs::path disk = folder_.path() / "disk";
   fs::create_directory(disk);
   if (mount("tmpfs", disk.c_str(), "tmpfs", 0, "size=128k") != 0) {
@@ -190,7 +190,7 @@ TEST_F(Build, LeavesNothingOnADiskThatIsFull) {
   EXPECT_EQ(umount(disk.c_str()), 0);
 }
 
-TEST_F(Build, RefusesARasterOfNodataOnly) {
+TEST_F(Build, RejectsARasterOfNodataOnly) {
   stream::GeoTiffOptions options;
   options.columns = options.rows = 20;
   options.sample.type = stream::ScalarType::u8;

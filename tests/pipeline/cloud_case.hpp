@@ -23,7 +23,7 @@
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/region.hpp"
 
-/// Clouds of many kinds in small stores of many clusters, and the triangulation of all their
+/// Clouds of many kinds in small stores with many clusters, and the triangulation of all their
 /// points.
 
 namespace terrace::tests {
@@ -79,7 +79,7 @@ inline Points points_of(const std::string& kind) {
     for (int i = 0; i < 3000; ++i) add(std::round(random.unit() * 1e3), random.unit() * 1000);
     for (int i = 0; i < 600; ++i) add(i % 2 * 1000, random.unit() * 1000);
     for (int i = 0; i < 600; ++i) add(random.unit() * 1000, i % 2 * 1000);
-  } else if (kind == "circle") {  // slivers along the hull, all the same circle within
+  } else if (kind == "circle") {  // slivers along the hull, one common circle inside
     for (int i = 0; i < 700; ++i) add(std::cos(i * 0.1) * 1000, std::sin(i * 0.1) * 1000);
   } else if (kind == "parabola") {
     for (int i = 0; i < 800; ++i) add(i, 1e-5 * i * i);
@@ -167,7 +167,7 @@ struct Whole {
     const stream::Channel& z = store.schema().coordinates[2];
     for (const stream::Point3& p : points.positions) {
       const auto inserted = triangulation.insert({p[0], p[1]});
-      if (!inserted.created) continue;  // the first stands for all
+      if (!inserted.created) continue;  // keep the first of several
       heights.resize(triangulation.vertex_slots());
       heights[tri::slot(inserted.vertex)] = p[2] * z.scale + z.offset;
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meshes out of a store: a focus holds every point inside, the mesh covers the hull without
-// overlap, and a store in pieces gives the mesh of its points whatever they were clustered into.
+// Meshes from a store: a focus contains every point inside, the mesh covers the hull without
+// overlap, and a store of several clusters gives the same mesh as its points in one piece.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -36,7 +36,8 @@ double doubled_area(const terrain::TriangleMesh& mesh, const std::array<std::uin
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/// Every edge lies in one triangle (the border) or in two, and all turn counter-clockwise.
+/// Checks that every edge is in one triangle (on the border) or two, and that all triangles are
+/// counter-clockwise.
 void expect_sound(const terrain::TriangleMesh& mesh) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
   for (const auto& t : mesh.triangles) {
@@ -44,13 +45,13 @@ void expect_sound(const terrain::TriangleMesh& mesh) {
     for (std::size_t i = 0; i < 3; ++i) ++edges[{t[i], t[(i + 1) % 3]}];
   }
   for (const auto& [edge, count] : edges) {
-    ASSERT_EQ(count, 1) << "an edge twice in the same direction: triangles overlap";
+    ASSERT_EQ(count, 1) << "an edge occurs twice in one direction, so triangles overlap";
   }
 }
 
 class Mesh : public testing::Test {
  protected:
-  // One store for all tests: they only read.
+  // The tests only read, so they share one store.
   static void SetUpTestSuite() {
     folder_ = new tests::TemporaryFolder;
     stream::GeoTiffOptions options;
@@ -87,7 +88,7 @@ class Mesh : public testing::Test {
 tests::TemporaryFolder* Mesh::folder_ = nullptr;
 stream::Store* Mesh::store_ = nullptr;
 
-TEST_F(Mesh, OfALevelHasThePointsOfThatLevelAndAbove) {
+TEST_F(Mesh, OfALevelHasItsPointsAndThoseAbove) {
   for (unsigned level = 0; level <= store_->top(); ++level) {
     SCOPED_TRACE(level);
     const terrain::TriangleMesh mesh =
@@ -109,7 +110,7 @@ TEST_F(Mesh, OfLevelZeroIsTheGrid) {
 }
 
 TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
-  // Columns 200 to 260, rows 100 to 160, borders on samples.
+  // Columns 200 to 260, rows 100 to 160; the borders run through samples.
   const std::string box = "506000,5195200,507800,5197000";
   const terrain::TriangleMesh mesh =
       detail_mesh(*store_, tools::parse_detail(*store_, "top", "", {box + ":0"}));
@@ -124,7 +125,7 @@ TEST_F(Mesh, HoldsEveryPointInsideAFocusAndFewOutside) {
   EXPECT_LT(mesh.positions.size(), std::size_t{kSize} * kSize / 10);
 }
 
-TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
+TEST_F(Mesh, OfARegionHasTheTrianglesThatTouchIt) {
   const std::string box = "505003,5190001,507004,5192002";
   const terrain::TriangleMesh part =
       detail_mesh(*store_, tools::parse_detail(*store_, "0", box, {}));
@@ -142,8 +143,9 @@ TEST_F(Mesh, OfARegionIsThePartOfTheWholeThatReachesIn) {
   EXPECT_LE(inside, (2001.0 + 4 * kCell) * (2001.0 + 4 * kCell));
 }
 
-// Clusters beside the polygon are left out, yet the triangles are those of the whole that touch it.
-TEST_F(Mesh, OfAPolygonIsThePartOfTheWholeThatReachesIn) {
+// Clusters next to the polygon are skipped, yet the mesh has all triangles of the whole that touch
+// it.
+TEST_F(Mesh, OfAPolygonHasTheTrianglesThatTouchIt) {
   terrain::Detail detail;
   detail.region = terrain::Region::of_polygons(
       {{{{501003, 5190001}, {507004, 5197102}, {506904, 5197302}, {500903, 5190201}}}}, -1e9, 1e9);
@@ -166,17 +168,17 @@ TEST_F(Mesh, OfAPolygonIsThePartOfTheWholeThatReachesIn) {
   EXPECT_EQ(part, whole);
 }
 
-TEST_F(Mesh, SaysWhatMemoryItNeeds) {
+TEST_F(Mesh, ReportsTheMemoryItNeeds) {
   try {
     static_cast<void>(detail_mesh(*store_, tools::parse_detail(*store_, "0", "", {}), {},
                                   {.memory_bytes = std::uint64_t{1} << 20}));
-    FAIL() << "one MiB was enough";
+    FAIL() << "1 MiB was enough";
   } catch (const stream::Error& error) {
     EXPECT_NE(std::string(error.what()).find("needs"), std::string::npos) << error.what();
   }
 }
 
-TEST_F(Mesh, PointsOfTheSameDetailAreItsVertices) {
+TEST_F(Mesh, HasThePointsOfTheSameDetailAsVertices) {
   const terrain::Detail detail =
       tools::parse_detail(*store_, "1", "", {"506000,5195200,507800,5197000:0"});
   const terrain::TriangleMesh mesh = detail_mesh(*store_, detail);

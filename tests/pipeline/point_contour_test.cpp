@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Contour lines of stores of points, and of rasters above level 0, against the segments of every
-// triangle of the whole triangulation.
+// Compares contour lines of point stores, and of rasters above level 0, with the segments of every
+// triangle of the full triangulation.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -42,7 +42,7 @@ stream::Store store_of(const std::filesystem::path& input, std::size_t block_poi
   terrain::BuildRequest request;
   request.inputs = {input.string()};
   request.store = input.string() + ".store";
-  request.block_points = block_points;  // few: more clusters, more levels
+  request.block_points = block_points;  // small blocks give more clusters and levels
   request.facility_cost = 1.0;
   terrain::build_store(request);
   return stream::Store::open(request.store);
@@ -57,7 +57,8 @@ stream::Store cloud(const std::filesystem::path& folder, std::span<const stream:
   return store_of(file, 100);
 }
 
-/// Some thousand points around a lake, with twins. whole: whole numbers, many at levels.
+/// Some thousand points around a lake, with duplicates. whole: heights are integers, many of them
+/// at contour levels.
 std::vector<stream::Point3> lake_shore(std::uint64_t seed, bool whole) {
   std::mt19937_64 random(seed);
   const auto unit = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
@@ -73,7 +74,7 @@ std::vector<stream::Point3> lake_shore(std::uint64_t seed, bool whole) {
   return points;
 }
 
-/// The whole triangulation.
+/// The full triangulation.
 std::vector<Corners> triangles_of(const stream::Store& store, unsigned level) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   terrain::WindowPoints points;
@@ -85,7 +86,7 @@ std::vector<Corners> triangles_of(const stream::Store& store, unsigned level) {
   const std::vector<tri::VertexId> vertices = whole.build(places);
   const stream::Channel& z = store.schema().coordinates[2];
   std::vector<double> heights(whole.vertex_slots());
-  // The first of several stands for all.
+  // The first of several duplicates counts.
   for (std::size_t i = places.size(); i-- > 0;) {
     heights[tri::slot(vertices[i])] = points.positions[i][2] * z.scale + z.offset;
   }
@@ -102,10 +103,11 @@ std::vector<Corners> triangles_of(const stream::Store& store, unsigned level) {
   return triangles;
 }
 
-/// Each triangle by itself, higher ground on the left by the gradient. Equal ends are left out.
+/// Cuts each triangle separately; the gradient puts higher ground on the left. Skips segments of
+/// zero length.
 std::multiset<Segment> segments_of(const std::vector<Corners>& triangles, double interval,
                                    const std::function<bool(const Corners&)>& wanted) {
-  // The intervals have at most one decimal, and so have the heights of their multiples.
+  // The intervals have at most one decimal, so the multiples do too.
   const auto height = [&](std::int64_t level) {
     return std::round(10 * interval * static_cast<double>(level)) / 10;
   };
@@ -155,7 +157,8 @@ std::vector<terrain::ContourLine> lines_of(const stream::Store& store,
   return lines;
 }
 
-/// The lines are those of the whole, in the same order for any number of threads and memory.
+/// Checks that the lines match the full triangulation, in the same order for any number of threads
+/// and any memory.
 void expect_contours(const stream::Store& store, const terrain::ContourRequest& request,
                      const std::vector<Corners>& triangles) {
   const auto wanted = [&](const Corners& t) {
@@ -189,7 +192,7 @@ void expect_contours(const stream::Store& store, const terrain::ContourRequest& 
   }
 }
 
-TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
+TEST(PointContours, MatchTheFullTriangulationAtAnyLevel) {
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     SCOPED_TRACE(seed);
     const tests::TemporaryFolder folder;
@@ -203,13 +206,13 @@ TEST(PointContours, AreThoseOfTheWholeTriangulationAtAnyLevel) {
   }
 }
 
-TEST(PointContours, AlongAWindingSwathAreThoseOfTheWholeTriangulation) {
+TEST(PointContours, MatchTheFullTriangulationAlongAWindingSwath) {
   const tests::TemporaryFolder folder;
   const stream::Store store = cloud(folder.path(), tests::points_of("winding"));
   expect_contours(store, {.interval = 2}, triangles_of(store, 0));
 }
 
-TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
+TEST(PointContours, EndAtTrianglesWithTooLongASide) {
   const tests::TemporaryFolder folder;
   const stream::Store store = cloud(folder.path(), lake_shore(6, false));
   const std::vector<Corners> triangles = triangles_of(store, 0);
@@ -222,7 +225,7 @@ TEST(PointContours, EndAtTrianglesWithALongerSideThanAllowed) {
                   triangles);
 }
 
-TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
+TEST(PointContours, OfARegionCrossTheTrianglesCentredInside) {
   const tests::TemporaryFolder folder;
   const stream::Store store = cloud(folder.path(), lake_shore(9, false));
   const std::vector<Corners> triangles = triangles_of(store, 0);
@@ -231,7 +234,7 @@ TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
   std::size_t strange = 0;
   for (int i = 0; i < 12; ++i) {
     SCOPED_TRACE(i);
-    // Every second one about the middle of a large triangle, far from its corners.
+    // Every second region is around the centroid of a large triangle, far from its corners.
     double x = unit() * 900 - 300, y = unit() * 450, size = 20 + 150 * unit();
     if (i % 2 == 0) {
       const auto area = [](const Corners& t) {
@@ -266,7 +269,7 @@ TEST(PointContours, OfARegionAreThoseOfTheTrianglesWhoseMiddlesLieInside) {
       stream::Error);
 }
 
-TEST(PointContours, OfACoarserLevelOfARasterAreThoseOfItsSamples) {
+TEST(PointContours, MatchTheSamplesOfACoarserRasterLevel) {
   const tests::TemporaryFolder folder;
   stream::GeoTiffOptions options;
   options.columns = 90;
@@ -295,7 +298,7 @@ TEST(PointContours, OfACoarserLevelOfARasterAreThoseOfItsSamples) {
   expect_contours(store, {.interval = 7, .level = 1}, triangles);
 }
 
-TEST(PointContours, FewFlatAndCollinearPointsHaveNoLines) {
+TEST(PointContours, AreEmptyForFewFlatAndCollinearPoints) {
   const std::vector<std::vector<stream::Point3>> clouds{
       {{1, 2, 3}},
       {{1, 2, 3}, {5, 9, 40}},
@@ -314,11 +317,11 @@ TEST(PointContours, FewFlatAndCollinearPointsHaveNoLines) {
   const stream::Store one =
       cloud(folder.path(), std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 10}, {0, 1, 10}});
   expect_contours(one, {.interval = 4}, triangles_of(one, 0));
-  // At 4 and 8; the one at 0 is the corner alone.
+  // At 4 and 8; the level 0 touches only the corner.
   EXPECT_EQ(lines_of(one, {.interval = 4}, 2).size(), 2u);
 }
 
-TEST(PointContours, TooManyLevelsForMemoryAreToldInsteadOfTried) {
+TEST(PointContours, RejectsMoreLevelsThanFitIntoMemory) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       cloud(folder.path(), std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 10}, {0, 1, 10}});

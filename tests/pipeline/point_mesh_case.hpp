@@ -29,7 +29,7 @@
 #include "terrace/terrain/region.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 
-/// Clouds, and what any mesh of them must be.
+/// Clouds, and the checks that any mesh of them must pass.
 
 namespace terrace::tests {
 
@@ -48,7 +48,7 @@ inline Cloud uniform(std::size_t count, std::uint64_t seed, double size = 100) {
   return cloud;
 }
 
-/// Points in clumps, most of the plane empty.
+/// Points in clumps; most of the plane is empty.
 inline Cloud clumps(std::size_t count, std::uint64_t seed) {
   Random random(seed);
   Cloud cloud;
@@ -64,7 +64,7 @@ inline Cloud clumps(std::size_t count, std::uint64_t seed) {
   return cloud;
 }
 
-/// Every place of a lattice, of which `keep` tells which are there.
+/// The positions of a lattice that `keep` accepts.
 template <class Keep>
 Cloud lattice(int columns, int rows, double x0, double y0, double step, const Keep& keep) {
   Cloud cloud;
@@ -77,10 +77,10 @@ Cloud lattice(int columns, int rows, double x0, double y0, double step, const Ke
 }
 inline bool everywhere(int, int) { return true; }
 
-/// Checks that a mesh is one piece over the hull of samples with a place of their own each, and
-/// tells their errors.
+/// Checks that a mesh is one piece over the hull of samples at distinct positions, and returns
+/// their errors.
 inline tri::TinErrors check_surface(const Cloud& cloud, const terrain::TriangleMesh& mesh) {
-  // Every sample, by other code.
+  // Every sample, checked by separate code.
   std::vector<double> x, y, z;
   std::vector<Point2> places;
   for (const stream::Point3& p : cloud) {
@@ -92,7 +92,7 @@ inline tri::TinErrors check_surface(const Cloud& cloud, const terrain::TriangleM
   const tri::TinErrors errors = tri::measure_surface(x, y, z, mesh.positions, mesh.triangles);
   EXPECT_EQ(errors.uncovered, 0U);
 
-  // No vertex twice, none unused; edges fit; the area is that of the hull.
+  // No vertex is repeated or unused, edges match, and the area equals that of the hull.
   const std::set<stream::Point3> different(mesh.positions.begin(), mesh.positions.end());
   EXPECT_EQ(different.size(), mesh.positions.size());
   std::set<std::uint32_t> used;
@@ -152,7 +152,7 @@ class PointMesh : public testing::Test {
     terrain::BuildRequest request;
     request.inputs = {name + ".ply"};
     request.store = name + ".store";
-    request.block_points = 500;  // more levels
+    request.block_points = 500;  // gives more levels
     request.facility_cost = 1.0;
     terrain::build_store(request);
     return stream::Store::open(request.store);
@@ -179,7 +179,8 @@ class PointMesh : public testing::Test {
     return {std::istreambuf_iterator<char>(stream), {}};
   }
 
-  /// Meshes and checks all that must hold whatever the points are, each with a place of its own.
+  /// Meshes the points, all at distinct positions, and checks everything that must hold for any
+  /// cloud.
   terrain::BoundedMeshResult mesh_and_check(const Cloud& cloud,
                                             const terrain::BoundedMeshOptions& options) {
     return mesh_and_check(build(cloud), cloud, options);

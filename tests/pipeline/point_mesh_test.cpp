@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Error-bounded meshes of irregular points, window by window: whatever the points, the windows fit
-// without gaps and overlaps, every sample is within the bound, and nothing depends on threads.
+// Error-bounded meshes of irregular points, window by window. For any points, the windows fit
+// without gaps or overlaps, every sample is within the bound, and the result does not depend on
+// threads.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -32,7 +33,7 @@ namespace {
 
 using terrain::Point2;
 
-TEST_F(PointMesh, IsOnePieceWithinTheBoundWhateverThePoints) {
+TEST_F(PointMesh, IsOnePieceWithinTheBoundForAnyPoints) {
   const auto diamond = [](int c, int r) {
     return (c + r) % 2 == 0 && std::abs(c - 40) + std::abs(r - 40) <= 40;
   };
@@ -50,14 +51,14 @@ TEST_F(PointMesh, IsOnePieceWithinTheBoundWhateverThePoints) {
   const std::vector<std::pair<const char*, Cloud>> clouds{
       {"uniform", uniform(2500, 1)},
       {"clumps", clumps(2500, 2)},
-      {"a whole lattice", lattice(70, 50, 0, 0, 1, everywhere)},
+      {"a full lattice", lattice(70, 50, 0, 0, 1, everywhere)},
       {"a lattice of tenths", lattice(60, 60, 500000.05, 5100000.05, 0.1, everywhere)},
       {"a diamond", lattice(81, 81, -7, 3, 1, diamond)},
       {"a triangle", lattice(71, 43, 0, 0, 3, triangle)},
       {"a ring", lattice(91, 91, 0, 0, 1, ring)},
       {"a circle", circle},
       {"two columns", columns},
-      {"no number between neighbours", lattice(60, 50, 0x1p52, -0x1p52 - 100, 1, everywhere)},
+      {"adjacent doubles as coordinates", lattice(60, 50, 0x1p52, -0x1p52 - 100, 1, everywhere)},
       {"tiny", lattice(60, 50, 3e-9, -1e-9, 1e-12, everywhere)},
       {"far off", uniform(3000, 3, 1e-3)},
   };
@@ -74,13 +75,13 @@ TEST_F(PointMesh, IsOnePieceWithinTheBoundWhateverThePoints) {
   }
 }
 
-TEST_F(PointMesh, OfManyRandomClouds) {
+TEST_F(PointMesh, IsValidForManyRandomClouds) {
   for (std::uint64_t seed = 10; seed < 40; ++seed) {
     SCOPED_TRACE(seed);
     Random random(seed);
     Cloud cloud = seed % 2 == 0 ? uniform(1500, seed, random(1, 1000)) : clumps(1500, seed);
     if (seed % 3 == 0) {
-      // On a coarse lattice, a point per place.
+      // On a coarse lattice, one point per position.
       std::set<Point2> taken;
       const double step = random(0.5, 3);
       std::erase_if(cloud, [&](stream::Point3& p) {
@@ -95,7 +96,7 @@ TEST_F(PointMesh, OfManyRandomClouds) {
   }
 }
 
-TEST_F(PointMesh, HasHardlyMoreTrianglesThanOfOneWindow) {
+TEST_F(PointMesh, HasFewMoreTrianglesThanOneWindow) {
   const Cloud cloud = uniform(60000, 5, 300);
   const stream::Store store = build(cloud);
   for (const tri::TinQuality quality :
@@ -108,7 +109,7 @@ TEST_F(PointMesh, HasHardlyMoreTrianglesThanOfOneWindow) {
   }
 }
 
-TEST_F(PointMesh, DependsNeitherOnThreadsNorOnMemory) {
+TEST_F(PointMesh, IsTheSameForAnyThreadsAndMemory) {
   const stream::Store store = build(uniform(8000, 6));
   std::set<std::string> different;
   for (const unsigned threads : {1U, 2U, 5U}) {
@@ -121,7 +122,7 @@ TEST_F(PointMesh, DependsNeitherOnThreadsNorOnMemory) {
   EXPECT_THROW(write_bounded_mesh(store, options(1.0, 700), common(1, 8U << 20)), stream::Error);
 }
 
-TEST_F(PointMesh, OfPointsOnOneLineIsEmpty) {
+TEST_F(PointMesh, IsEmptyForCollinearPoints) {
   Cloud line;
   for (int i = 0; i < 1000; ++i) line.push_back({i * 3.0, i * 6.0 + 1, relief(i, 0)});
   const stream::Store store = build(line);
@@ -134,9 +135,9 @@ TEST_F(PointMesh, OfPointsOnOneLineIsEmpty) {
   }
 }
 
-TEST_F(PointMesh, KeepsAllSamplesOfAPlaceWithinTheBound) {
-  // Three samples at a place, in the plane's every part: inside, at the hull's corners and on its
-  // sides. Heights differ by up to `apart`.
+TEST_F(PointMesh, KeepsAllSamplesOfAPositionWithinTheBound) {
+  // Three samples at each position, in every part of the plane: inside, at the corners of the hull
+  // and on its sides. Heights differ by up to `apart`.
   for (const double apart : {0.0, 0.4, 0.9}) {
     SCOPED_TRACE(apart);
     Random random(11);
@@ -177,7 +178,7 @@ TEST_F(PointMesh, KeepsAllSamplesOfAPlaceWithinTheBound) {
   }
 }
 
-TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
+TEST_F(PointMesh, RejectsSamplesOfAPositionThatDifferByMoreThanTheBound) {
   Cloud cloud = uniform(3000, 13);
   for (const std::size_t i : {5U, 2000U}) cloud.push_back(cloud[i]);
   cloud.push_back({cloud[7][0], cloud[7][1], cloud[7][2] + 12.5});
@@ -198,9 +199,9 @@ TEST_F(PointMesh, RefusesSamplesOfAPlaceThatAreFartherApartThanTheBound) {
   }
 }
 
-TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
-  // Every place three times, in an order that is not that of heights; lattice places, so that some
-  // are at the hull's corners and on its sides.
+TEST_F(PointMesh, UsesOneHeightPerPositionOnRequest) {
+  // Three samples at every position, in an order unrelated to height. The positions form a lattice,
+  // so some are at the corners of the hull and on its sides.
   Cloud places = lattice(40, 40, 0, 0, 1, everywhere);
   Cloud cloud;
   for (const double up : {0.5, 0.0, 0.25}) {
@@ -232,7 +233,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
     EXPECT_EQ(errors.uncovered, 0U);
     EXPECT_LE(errors.largest, 1e-9);
   }
-  // Too many at one place for any window.
+  // Too many at one position for any window.
   Cloud heap = uniform(500, 7);
   for (int i = 0; i < 2000; ++i) heap.push_back({50, 50, 1.0 * (i % 10)});
   auto wanted = options(1.0, 300);
@@ -242,7 +243,7 @@ TEST_F(PointMesh, TakesOneHeightPerPlaceAsAsked) {
   EXPECT_LE(result.max_error, 1.0);
 }
 
-TEST_F(PointMesh, OfARegionIsTheMeshOfItsSamples) {
+TEST_F(PointMesh, OfARegionEqualsTheMeshOfItsSamples) {
   const Cloud cloud = uniform(9000, 8);
   const stream::Store store = build(cloud);
   auto wanted = options(0.8, 900);
@@ -253,7 +254,7 @@ TEST_F(PointMesh, OfARegionIsTheMeshOfItsSamples) {
   mesh_and_check(store, inside, wanted);
 }
 
-TEST_F(PointMesh, KeepsTheBoundOnRoundedNumbers) {
+TEST_F(PointMesh, KeepsTheBoundAfterRounding) {
   Cloud cloud = uniform(6000, 9, 1000);
   for (stream::Point3& p : cloud) p = {p[0] + 4e6, p[1] + 5e6, p[2]};
   const stream::Store store = build(cloud);
@@ -265,7 +266,7 @@ TEST_F(PointMesh, KeepsTheBoundOnRoundedNumbers) {
   EXPECT_EQ(result.samples, cloud.size());
 }
 
-/// The points of a LAS file without compression; empty if there is none.
+/// The points of an uncompressed LAS file; empty if the file does not exist.
 Cloud read_las(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
@@ -287,9 +288,9 @@ Cloud read_las(const std::filesystem::path& file) {
   return cloud;
 }
 
-TEST_F(PointMesh, OfALaserScan) {
+TEST_F(PointMesh, IsValidForALaserScan) {
   const char* const data = std::getenv("TERRACE_DATA");
-  if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA names no data";
+  if (data == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
   const Cloud scan = read_las(std::filesystem::path(data) / "lidar" / "autzen_trim.las");
   if (scan.empty()) GTEST_SKIP() << "no lidar/autzen_trim.las";
   std::map<Point2, double> highest;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Heights between the points of stores against libtri's on the triangulation of all points.
+// Compares heights between the points of stores with libtri's on the triangulation of all points.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,7 +35,7 @@ bool same_bits(const SurfacePoint& a, const SurfacePoint& b) {
          same_bits(a.per_row, b.per_row);
 }
 
-/// Some around the store, some on its points, some in the middle of its edges.
+/// Positions around the store, on its points and at the midpoints of its edges.
 std::vector<Point2> places_of(const stream::Store& store, const Whole& whole, std::size_t count) {
   Random random(17);
   std::vector<Point2> places;
@@ -63,7 +63,8 @@ std::vector<Point2> places_of(const stream::Store& store, const Whole& whole, st
   return places;
 }
 
-/// Answers, and that neither threads, memory nor what else is asked changes a bit.
+/// Returns the answers, and checks that neither threads, memory nor the other positions change a
+/// bit.
 std::vector<SurfacePoint> sampled(const stream::Store& store,
                                   const terrain::SamplerOptions& options,
                                   const std::vector<Point2>& places) {
@@ -114,7 +115,7 @@ void check_heights(const stream::Store& store, unsigned level, std::size_t count
       if (method == Interpolation::kNearest) continue;
       const tri::Location location = triangulation.locate(places[i]);
       const bool linear = method == Interpolation::kLinear;
-      if (linear && location.place != tri::Place::kInside) continue;  // another mean
+      if (linear && location.place != tri::Place::kInside) continue;  // a different average there
       ASSERT_EQ(std::isnan(found[i].per_column), std::isnan(gradients[i].x));
       if (std::isnan(gradients[i].x)) continue;
       const double size = std::hypot(gradients[i].x, gradients[i].y);
@@ -126,7 +127,7 @@ void check_heights(const stream::Store& store, unsigned level, std::size_t count
 
 class CloudHeights : public testing::TestWithParam<std::string> {};
 
-TEST_P(CloudHeights, AreThoseOfTheWholeTriangulation) {
+TEST_P(CloudHeights, MatchTheFullTriangulation) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(tests::cloud_store(folder.path(), tests::points_of(GetParam())));
@@ -144,14 +145,15 @@ INSTANTIATE_TEST_SUITE_P(PointSampler, CloudHeights,
                            return name;
                          });
 
-TEST(PointSampler, AnswersTheCoarserLevelsOfRasters) {
+TEST(PointSampler, AnswersOnCoarserLevelsOfRasters) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
   for (unsigned level = 1; level <= store.top(); ++level) check_heights(store, level, 400);
 }
 
-TEST(PointSampler, AnswersAlikeHoweverManyPointsAreTriangulatedAtOnce) {
-  // In no order, so that boxes of clusters overlap; some windows have many places and some few.
+TEST(PointSampler, AnswersDoNotDependOnTheSizeOfWindows) {
+  // Unordered, so that the boxes of clusters overlap; some windows have many positions and some
+  // few.
   const tests::TemporaryFolder folder;
   Random random(41);
   tests::Points points;
@@ -187,7 +189,7 @@ TEST(PointSampler, AnswersAlikeHoweverManyPointsAreTriangulatedAtOnce) {
   }
 }
 
-TEST(PointSampler, GivesNothingInTrianglesWithLongSides) {
+TEST(PointSampler, GivesNoHeightInTrianglesWithLongSides) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(tests::cloud_store(folder.path(), tests::points_of("voids")));
@@ -224,7 +226,7 @@ TEST(PointSampler, GivesNothingInTrianglesWithLongSides) {
   }
 }
 
-TEST(PointSampler, RefusesALimitOfEdgesForRasters) {
+TEST(PointSampler, RejectsAnEdgeLimitForRasters) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
   EXPECT_THROW(terrain::make_sampler(store, {.max_edge = 5.0}), terrain::UsageError);

@@ -36,12 +36,12 @@ std::vector<float> brute_force(const Points& points, unsigned rank) {
   return result;
 }
 
-TEST(NeighbourDistances, AreThoseOfAllPairs) {
+TEST(NeighbourDistances, MatchTheMinimumOverAllPairs) {
   for (std::uint32_t seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
     Points points(random() % 300);
-    // Small integers, so that many distances and many points are equal; on lines and planes too.
+    // Small integers make many distances and many points equal; some sets are on a line or a plane.
     for (stream::Point3& p : points) {
       for (std::size_t k = 0; k < 1 + seed % 3; ++k) {
         p[k] = static_cast<double>(random() % (seed % 2 == 0 ? 6 : 1000));
@@ -55,7 +55,7 @@ TEST(NeighbourDistances, AreThoseOfAllPairs) {
   }
 }
 
-TEST(NeighbourDistances, OfOnePointAndOfEqualOnesAreZero) {
+TEST(NeighbourDistances, AreZeroForOnePointAndForEqualPoints) {
   EXPECT_EQ(neighbour_distances(Points{}, 4, 2), std::vector<float>());
   EXPECT_EQ(neighbour_distances(Points(1), 4, 2), std::vector<float>(1, 0.0F));
   EXPECT_EQ(neighbour_distances(Points(1000, {1, 2, 3}), 4, 2), std::vector<float>(1000, 0.0F));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surface at single places, found without a triangulation, against the triangulation of all
-// points.
+// Compares the surface at single positions, found without a triangulation, with the triangulation
+// of all points.
 #include "surface/point_surface.hpp"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ using tests::points_of;
 using tests::Random;
 using tests::same_bits;
 
-/// Around the store, on its points, and near the middles of its edges.
+/// Positions around the store, on its points and near the midpoints of its edges.
 std::vector<Point2> places_of(const tri::Delaunay2<double>& whole, const stream::Box3& box) {
   Random random(23);
   std::vector<Point2> points, places;
@@ -59,7 +59,7 @@ std::vector<Point2> places_of(const tri::Delaunay2<double>& whole, const stream:
 
 class SurfaceOfClouds : public testing::TestWithParam<std::string> {};
 
-TEST_P(SurfaceOfClouds, IsThatOfTheTriangulationWhateverIsLoaded) {
+TEST_P(SurfaceOfClouds, MatchesTheTriangulationWhateverIsLoaded) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
@@ -96,7 +96,7 @@ TEST_P(SurfaceOfClouds, IsThatOfTheTriangulationWhateverIsLoaded) {
         ASSERT_TRUE(same_bits(found.per_row, expected.per_row));
         ASSERT_EQ(surface->nearest(places[i]), nearest);
       }
-      // Exact areas of cells of hundreds of cocircular points take milliseconds.
+      // The exact areas of cells of hundreds of cocircular points take milliseconds each.
       const bool is_round = GetParam() == "circle" || GetParam() == "parabola";
       if (is_round && (level > 0 || i >= 4)) continue;
       const SurfacePoint natural = loaded.natural(places[i]);
@@ -121,9 +121,9 @@ INSTANTIATE_TEST_SUITE_P(PointSurface, SurfaceOfClouds,
                            return name;
                          });
 
-// The circle above a place in a bend holds most of the swath's border: each place looked through it
-// by itself, for minutes.
-TEST(PointSurface, LooksOfPlacesInTheBendsOfASwathAreFewTimesItsPoints) {
+// The circle above a position in a bend contains most of the swath's border. Each position once
+// searched all of it separately, which took minutes.
+TEST(PointSurface, SearchesInBendsOfASwathVisitFewPoints) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(cloud_store(folder.path(), points_of("winding")));
   const PointHull hull(store, 0);
@@ -144,11 +144,11 @@ TEST(PointSurface, LooksOfPlacesInTheBendsOfASwathAreFewTimesItsPoints) {
   RecordProperty("places", std::to_string(places));
   RecordProperty("looks", std::to_string(voids->looks()));
   EXPECT_TRUE(voids->known());
-  // Up to 16 for each point, and afterwards what lies near each place.
+  // Up to 16 visits per point, then only the points near each position.
   EXPECT_LT(voids->looks(), 17 * store.points() + 400 * places);
 }
 
-TEST(PointSurface, RefusesMoreThanThereIsRoomForAndCrowds) {
+TEST(PointSurface, RejectsMorePointsThanFitAndCrowds) {
   const tests::TemporaryFolder folder;
   Random random(5);
   Points points;
@@ -166,9 +166,9 @@ TEST(PointSurface, RefusesMoreThanThereIsRoomForAndCrowds) {
   EXPECT_TRUE(surface.load({{0, 0}, {0.4, 0.4}}, 6000, false));
 }
 
-/// All points at once, by any number of threads, are those of a box around them, in their cells'
-/// order.
-TEST(PointCells, AreTheSameHoweverManyThreadsLoadThem) {
+/// Loading all points at once gives the same result as loading a box around them, in the order of
+/// the cells, for any number of threads.
+TEST(PointCells, AreTheSameForAnyNumberOfThreads) {
   const tests::TemporaryFolder folder;
   for (const char* kind : {"random", "duplicates", "lattice", "nearly a line"}) {
     SCOPED_TRACE(kind);
@@ -196,8 +196,8 @@ TEST(PointCells, AreTheSameHoweverManyThreadsLoadThem) {
   }
 }
 
-/// A part of the area that has more points than memory allows is halved, again and again.
-TEST(PointSampler, PartsThatDoNotFitAreHalvedAndAnswersStayTheSame) {
+/// A part of the area with more points than memory allows is halved repeatedly.
+TEST(PointSampler, HalvesPartsThatDoNotFitWithoutChangingAnswers) {
   const tests::TemporaryFolder folder;
   Random random(11);
   Points points;
@@ -218,7 +218,7 @@ TEST(PointSampler, PartsThatDoNotFitAreHalvedAndAnswersStayTheSame) {
     options.method = method;
     std::vector<SurfacePoint> expected(places.size()), found(places.size());
     terrain::make_sampler(store, options, {.threads = 2})->sample(places, expected);
-    // Half of it is for places, and 12 MiB of the rest for reading.
+    // Half of it is for positions, and 12 MiB of the rest is for reading.
     terrain::make_sampler(store, options, {.threads = 1, .memory_bytes = std::uint64_t{28} << 20})
         ->sample(places, found);
     for (std::size_t i = 0; i < places.size(); ++i) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What tiles ask of a store of irregular points, against all of its points.
+// Compares what tiles ask of a store of irregular points with answers computed from all of its
+// points.
 #include "tile/make/point_tile_surface.hpp"
 
 #include <algorithm>
@@ -37,7 +38,7 @@ using terrain::Point2;
 using terrain::StoredBox;
 using tests::Random;
 
-/// A cloud as it lies in its CRS.
+/// A cloud in its CRS.
 struct CloudCase {
   std::string name, crs;
   std::vector<stream::Point3> points;
@@ -78,7 +79,7 @@ std::vector<CloudCase> cases() {
     line.points.push_back({165000 + 3.0 * i, 600000 + 1.0 * i, height(i / 9.0, 0)});
   }
   all.push_back(std::move(line));
-  // A swath that winds: nearly all cells of a grid over it are empty.
+  // A winding swath: nearly all cells of a grid over it are empty.
   CloudCase swath{"swath", "EPSG:32632", {}};
   for (int i = 0; i < 20000; ++i) {
     const double along = random(0, 60000);
@@ -91,13 +92,13 @@ std::vector<CloudCase> cases() {
   return all;
 }
 
-/// A store of a case, and all that is known of it without an index.
+/// The store of a case, and what is known about it without an index.
 struct CloudStore {
   tests::TemporaryFolder folder;
   stream::Store store;
   terrain::CoordinateSystem crs;
-  std::vector<stream::Point3> firsts;  ///< of points at one x, y the one that counts
-  std::vector<Point2> globe;           ///< of these
+  std::vector<stream::Point3> firsts;  ///< the first point at each x, y, which is the one used
+  std::vector<Point2> globe;           ///< their longitudes and latitudes
 
   explicit CloudStore(const CloudCase& cloud)
       : store(build(cloud, folder.path())), crs(terrain::system_of(store)) {
@@ -135,7 +136,7 @@ struct CloudStore {
     terrain::BuildRequest request;
     request.inputs = {file.string()};
     request.store = folder / "cloud.store";
-    request.block_points = 300;  // few: more levels
+    request.block_points = 300;  // small blocks give more levels
     request.facility_cost = 1.0;
     request.crs = terrain::CoordinateSystem::parse(cloud.crs).crs();
     terrain::build_store(request);
@@ -143,7 +144,7 @@ struct CloudStore {
   }
 };
 
-/// Boxes around points of a cloud, of all sizes, some of them with a border through the point.
+/// Boxes of all sizes around points of a cloud, some with a border through the point.
 GeographicBox some_box(const CloudStore& cloud, Random& random, int i) {
   const auto at = static_cast<std::size_t>(random(0, static_cast<double>(cloud.globe.size())));
   const Point2 p = cloud.globe[std::min(at, cloud.globe.size() - 1)];
@@ -158,8 +159,8 @@ bool inside(const GeographicBox& box, const Point2& p) {
   return p[0] >= box.west && p[0] <= box.east && p[1] >= box.south && p[1] <= box.north;
 }
 
-/// By polynomials, where points are projected.
-TEST(StoredPlaces, AreThoseOfTheSystemWithinAHundredthOfAMillimetre) {
+/// Projected points are converted by polynomials.
+TEST(StoredPlaces, MatchTheCrsWithinAHundredthOfAMillimetre) {
   for (const CloudCase& cloud : cases()) {
     SCOPED_TRACE(cloud.name);
     const CloudStore all(cloud);
@@ -170,7 +171,7 @@ TEST(StoredPlaces, AreThoseOfTheSystemWithinAHundredthOfAMillimetre) {
     places.to_stored(stored);
     const bool degrees = all.crs.is_geographic();
     for (std::size_t i = 0; i < exact.size(); ++i) {
-      // Near a pole longitudes say little.
+      // Near a pole, longitudes are ill-conditioned.
       const double round = std::cos(exact[i][1] * std::numbers::pi / 180);
       ASSERT_NEAR(std::remainder(all.globe[i][0] - exact[i][0], 360.0) * round, 0, 1e-10);
       ASSERT_NEAR(all.globe[i][1], exact[i][1], 1e-10);
@@ -221,7 +222,7 @@ TEST(PointTileSurface, HasTheSamplesOfABoxAndTheirRange) {
       EXPECT_LE(range->low, low);
       EXPECT_GE(range->high, high);
       certain += range->certain ? 1 : 0;
-      // In parts it is the same, each sample once.
+      // Reading in parts gives the same, each sample once.
       got.clear();
       std::size_t count = 0;
       terrain::for_each_part(box, surface, [&](const terrain::SurfaceSamples& part) {
@@ -247,7 +248,7 @@ std::multiset<std::array<double, 3>> samples_of(terrain::PointTileSurface& surfa
   return samples;
 }
 
-TEST(PointTileSurface, AnswersAlikeWhetherAllFitsIntoMemoryOrNot) {
+TEST(PointTileSurface, AnswersAlikeWhetherOrNotAllFitsIntoMemory) {
   for (const CloudCase& cloud : cases()) {
     SCOPED_TRACE(cloud.name);
     const CloudStore all(cloud);
@@ -278,7 +279,7 @@ TEST(PointTileSurface, AnswersAlikeWhetherAllFitsIntoMemoryOrNot) {
   }
 }
 
-TEST(PointTileSurface, IsThatOfAllPointsWhateverWasAskedBefore) {
+TEST(PointTileSurface, MatchesAllPointsAfterAnyEarlierQueries) {
   for (const CloudCase& cloud : cases()) {
     if (cloud.name == "one" || cloud.name == "line") continue;
     SCOPED_TRACE(cloud.name);
@@ -340,11 +341,11 @@ TEST(PointTileSurface, IsThatOfAllPointsWhateverWasAskedBefore) {
   }
 }
 
-TEST(StoreWindow, TheIndexTellsNumbersAndHeightsOfABox) {
+TEST(StoreWindow, TheIndexGivesCountsAndHeightsOfABox) {
   const CloudStore all(cases().front());
   stream::StoreQuery query(all.store);
   const stream::Box3& bounds = all.store.bounds();
-  // The index grows boxes a little.
+  // The index enlarges boxes slightly.
   EXPECT_NEAR(query.estimate(terrain::tall(terrain::flat(bounds))),
               static_cast<double>(all.store.points()), 1.0);
   std::vector<std::pair<stream::Box3, std::uint64_t>> clusters;
@@ -380,8 +381,8 @@ TEST(StoreWindow, TheIndexTellsNumbersAndHeightsOfABox) {
     const auto heights = terrain::cluster_heights(query, box);
     ASSERT_EQ(heights.has_value(), met > 0);
     if (!heights) continue;
-    // For a cluster above level 0 that is wholly inside the box, the index gives the same range,
-    // widened by its growth.
+    // For a cluster above level 0 that is entirely inside the box, the index gives the same range,
+    // enlarged by the same margin.
     EXPECT_LE(heights->low, low);
     EXPECT_GE(heights->high, high);
     const double growth = (bounds.max[2] - bounds.min[2]) / 1024;
@@ -391,7 +392,7 @@ TEST(StoreWindow, TheIndexTellsNumbersAndHeightsOfABox) {
   }
 }
 
-TEST(CloudSpacing, IsThatOfALatticeOfTheSameDensity) {
+TEST(CloudSpacing, MatchesALatticeOfTheSameDensity) {
   CloudCase lattice{"lattice", "EPSG:4326", {}}, far = lattice;
   Random random(5);
   for (int i = 0; i < 80; ++i) {
@@ -411,7 +412,7 @@ TEST(CloudSpacing, IsThatOfALatticeOfTheSameDensity) {
   EXPECT_EQ(spacing({"one", "EPSG:4326", {{7, 46, 5}, {7, 46, 5}, {7, 46, 9}}}), 180.0 / 64.0);
 }
 
-TEST(TileCandidates, AreAllThatMayHaveSamples) {
+TEST(TileCandidates, IncludeEveryTileThatMayHaveSamples) {
   for (const CloudCase& cloud : cases()) {
     SCOPED_TRACE(cloud.name);
     const CloudStore all(cloud);
@@ -440,7 +441,7 @@ TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
   const CloudStore all(cases().front());
   const terrain::TiledCloud tiled = all.tiled();
   terrain::PointTileSurface surface(tiled);
-  // All of the cloud in a few units of a leaf.
+  // All of the cloud within a few units of a leaf.
   for (const unsigned zoom : {6U, 8U, 10U}) {
     SCOPED_TRACE(zoom);
     const terrain::TileRange range = terrain::tiles_in(surface.bounds(), zoom);
@@ -480,7 +481,7 @@ TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
       EXPECT_EQ(errors.covered, made.errors.covered);
       EXPECT_EQ(errors.largest, made.errors.largest);
       EXPECT_NEAR(errors.rms, made.errors.rms, 1e-9 * errors.rms);
-      // As near as if they had been taken at once, or within the bound.
+      // As close as if they had been read at once, or within the bound.
       const tri::PointTin once = tri::point_tin(u, v, samples.height, frame, options);
       EXPECT_LE(made.errors.largest, std::max(bound, 1.3 * once.errors.largest));
     }

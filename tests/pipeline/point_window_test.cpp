@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Windows of the triangulation of a store's points against the triangulation of all of them.
+// Compares windows of the triangulation of a store's points with the triangulation of all of them.
 #include "surface/point_window.hpp"
 
 #include <algorithm>
@@ -38,7 +38,7 @@ using tests::raster_store;
 using tests::same_bits;
 using tests::Triangle;
 using tests::Whole;
-/// Whether no line separates them, in long double.
+/// True if no line separates them; computed in long double.
 bool meets(const Triangle& t, const StoredBox& box) {
   using Number = long double;
   const std::array<Point2, 4> corner{Point2{box.min[0], box.min[1]}, Point2{box.max[0], box.min[1]},
@@ -101,7 +101,7 @@ void check_windows(const stream::Store& store, unsigned level, int boxes,
         ASSERT_TRUE(certain.contains(corners));
       }
     }
-    // Places of the box, some on points and between them; the same from another window.
+    // Positions in the box, some on points and some between them; the same from another window.
     std::vector<Point2> places;
     for (int k = 0; k < 60; ++k) {
       Point2 p;
@@ -139,7 +139,7 @@ void check_windows(const stream::Store& store, unsigned level, int boxes,
 
 class Clouds : public testing::TestWithParam<std::string> {};
 
-TEST_P(Clouds, WindowsHaveTheTrianglesOfTheWhole) {
+TEST_P(Clouds, WindowsHaveTheTrianglesOfTheFullTriangulation) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
@@ -147,7 +147,7 @@ TEST_P(Clouds, WindowsHaveTheTrianglesOfTheWhole) {
   for (unsigned level = 1; level <= store.top(); ++level) check_windows(store, level, 12);
 }
 
-TEST_P(Clouds, SoTheyDoWithTheBorderOfTheVoids) {
+TEST_P(Clouds, WindowsWithKnownVoidsHaveTheSameTriangles) {
   const tests::TemporaryFolder folder;
   const stream::Store store =
       stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
@@ -165,14 +165,14 @@ INSTANTIATE_TEST_SUITE_P(PointWindow, Clouds,
                            return name;
                          });
 
-TEST(PointWindow, TakesTheCoarserLevelsOfRasters) {
+TEST(PointWindow, SupportsCoarserLevelsOfRasters) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path()));
   ASSERT_GE(store.top(), 2U);
   for (unsigned level = 0; level <= store.top(); ++level) check_windows(store, level, 20);
 }
 
-TEST(PointWindow, ReadsLittleMoreThanItNeeds) {
+TEST(PointWindow, ReadsFewPointsBeyondTheWindow) {
   const tests::TemporaryFolder folder;
   for (const char* const kind : {"random", "voids", "turned"}) {
     SCOPED_TRACE(kind);
@@ -191,15 +191,15 @@ TEST(PointWindow, ReadsLittleMoreThanItNeeds) {
       window.load(box);
       read += window.triangulation().vertex_count();
     }
-    // A box has one 400th of the area: about ten points. The coarse levels come to it, and
-    // where it sees the hull what lies along that.
+    // A box has one 400th of the area, about ten points. The coarse levels are read in addition
+    // and, where the window reaches the hull, the points along it.
     EXPECT_LT(static_cast<double>(read) / 200, 0.1 * static_cast<double>(store.points()));
   }
 }
 
-// Bends leave voids whose circles hold most of the swath's border: each window looked for what was
-// missing from them by itself, for minutes.
-TEST(PointWindow, BoxesLookedAtAlongAWindingSwathAreFewTimesItsPoints) {
+// Bends leave voids whose circles contain most of the swath's border. Each window once searched for
+// its missing points separately, which took minutes.
+TEST(PointWindow, WindowsAlongAWindingSwathVisitFewBoxes) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(cloud_store(folder.path(), points_of("winding")));
   const terrain::WindowTree tree(store, 0, 200);
@@ -218,7 +218,7 @@ TEST(PointWindow, BoxesLookedAtAlongAWindingSwathAreFewTimesItsPoints) {
   EXPECT_LT(triangulated, 4 * store.points());
 }
 
-TEST(PointWindow, SaysWhatMemoryItNeeds) {
+TEST(PointWindow, ReportsTheMemoryItNeeds) {
   const tests::TemporaryFolder folder;
   Random random(1);
   Points points;

@@ -6,7 +6,7 @@
 
 namespace terrace::tests {
 
-/// The same numbers everywhere.
+/// Pseudo-random numbers that are the same on every platform.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}

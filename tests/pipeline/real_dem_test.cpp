@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every elevation raster of the real-data folder goes through the whole chain (build, verify, read
-// back) and must give back every sample. The oracle is GDAL: gdal_translate writes the raster as
-// raw samples. Without TERRACE_DATA or GDAL the tests are skipped and say so.
+// Sends every elevation raster of the real-data folder through the whole chain (build, verify, read
+// back), which must return every sample. The oracle is gdal_translate, which writes the raster as
+// raw samples. Without TERRACE_DATA or GDAL the tests are skipped with the reason.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -82,7 +82,7 @@ void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
 
   const std::vector<char> raw = samples_by_gdal(raster, scratch / "raw");
   ASSERT_EQ(raw.size(), cells * stream::size_of(schema.coordinates[2].type))
-      << "gdal_translate failed or wrote another type";
+      << "gdal_translate failed or wrote an unexpected type";
   std::vector<bool> seen(cells, false);
   std::uint64_t wrong = 0, twice = 0;
   const auto check = [&](const stream::Point3& p) {
@@ -101,7 +101,7 @@ void expect_every_sample(const fs::path& raster, const fs::path& scratch) {
   }
   EXPECT_EQ(wrong, 0u) << "samples that differ from GDAL's";
   EXPECT_EQ(twice, 0u);
-  // What was left out is nodata: one value (or NaN, or an infinity) throughout.
+  // All samples left out are nodata: a single value, NaN or an infinity.
   const double nodata = stream::open_source(request.inputs)->info().nodata.value_or(NAN);
   std::uint64_t lost = 0;
   for (std::size_t cell = 0; cell < cells; ++cell) {
@@ -138,8 +138,8 @@ void expect_every_sample_in(const fs::path& folder) {
   EXPECT_GT(rasters, 0u);
 }
 
-TEST_F(RealDem, GivesBackEverySample) { expect_every_sample_in(folder_); }
-TEST_F(RealDem, GivesBackEverySampleOfEveryEncoding) {
+TEST_F(RealDem, ReturnsEverySample) { expect_every_sample_in(folder_); }
+TEST_F(RealDem, ReturnsEverySampleOfEveryEncoding) {
   expect_every_sample_in(folder_ / "encodings");
 }
 

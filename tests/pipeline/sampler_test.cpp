@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Heights at places of a raster against libtri's interpolation on the Delaunay triangulation of all
-// its samples, holes left out.
+// Compares heights at positions of a raster with libtri's interpolation on the Delaunay
+// triangulation of all its samples; holes are left out.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -48,7 +48,7 @@ class Sampler : public testing::TestWithParam<Raster> {
             raster.holes && (random() % 6 == 0 || std::hypot(column - 40.0, row - 30.0) < 12);
         const double height =
             300 + 20 * std::sin(column / 7.0) + static_cast<double>(random() % 64) / 8;
-        // What a float holds.
+        // Exact in float.
         heights_.push_back(hole ? NAN : static_cast<double>(static_cast<float>(height)));
       }
     }
@@ -88,7 +88,7 @@ class Sampler : public testing::TestWithParam<Raster> {
     std::vector<Point2> places;
     for (std::size_t i = 0; i < count; ++i) {
       Point2 p{unit() * (GetParam().columns + 1.0) - 1, unit() * (GetParam().rows + 1.0) - 1};
-      // A quarter each on samples, on columns and on diagonals.
+      // A quarter each on samples, columns and diagonals; the rest anywhere.
       if (i % 4 == 1) p = {std::round(p[0]), std::round(p[1])};
       if (i % 4 == 2) p[0] = std::round(p[0]);
       if (i % 4 == 3) p = {std::floor(p[0]) + 0.25, std::floor(p[1]) + 0.75};
@@ -97,7 +97,8 @@ class Sampler : public testing::TestWithParam<Raster> {
     return places;
   }
 
-  /// Answers and that they depend on neither threads nor on what else is asked.
+  /// Returns the answers, and checks that they depend neither on threads nor on the other
+  /// positions.
   [[nodiscard]] std::vector<terrain::SurfacePoint> sampled(
       Interpolation method, const std::vector<Point2>& places) const {
     const stream::Store store = stream::Store::open(folder_.path() / "dem.store");
@@ -134,7 +135,7 @@ void expect_near(double got, double expected, std::size_t i) {
   }
 }
 
-TEST_P(Sampler, LinearIsThatOfTheTriangulation) {
+TEST_P(Sampler, LinearMatchesTheTriangulation) {
   const std::vector<Point2> queries = places(21, 4000);
   const auto got = sampled(Interpolation::kLinear, queries);
   const auto heights = tri::heights_at(triangulation_, slots_, queries, Interpolation::kLinear, 1);
@@ -143,8 +144,8 @@ TEST_P(Sampler, LinearIsThatOfTheTriangulation) {
   std::size_t compared = 0, without = 0;
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (GetParam().holes) {
-      // Only what lies inside a triangle can be told by the triangulation, whose triangles also
-      // span holes.
+      // The triangulation also spans holes, so it is an oracle only strictly inside triangles of
+      // the lattice.
       if (i % 4 != 0) continue;
       std::vector<tri::VertexWeight> weights;
       tri::weights_at(triangulation_, queries[i], Interpolation::kLinear, weights);
@@ -169,15 +170,15 @@ TEST_P(Sampler, LinearIsThatOfTheTriangulation) {
   EXPECT_TRUE(!GetParam().holes || without > 100u);
 }
 
-TEST_P(Sampler, NaturalIsThatOfTheWholeLattice) {
+TEST_P(Sampler, NaturalMatchesTheFullLattice) {
   if (GetParam().holes) {
-    // Where a neighbour has no data there is no value; everywhere else the holes do not matter.
+    // There is no value where a neighbour has no data; elsewhere holes do not matter.
     const std::vector<Point2> queries = places(22, 1000);
     const auto got = sampled(Interpolation::kNaturalNeighbour, queries);
     std::size_t with = 0, without = 0;
     for (std::size_t i = 0; i < queries.size(); i += 4) {
       if (queries[i][0] < 0 || queries[i][1] < 0) continue;
-      // A corner of the square without data is always a neighbour of a place inside.
+      // A corner without data is always a neighbour of a position inside the square.
       bool hole = false;
       for (unsigned corner = 0; corner < 4; ++corner) {
         const auto column = static_cast<std::size_t>(queries[i][0]) + (corner & 1);
@@ -205,7 +206,7 @@ TEST_P(Sampler, NaturalIsThatOfTheWholeLattice) {
   }
 }
 
-TEST_P(Sampler, NearestIsTheSampleOfTheCell) {
+TEST_P(Sampler, NearestReturnsTheSampleOfTheCell) {
   const std::vector<Point2> queries = places(24, 2000);
   const auto got = sampled(Interpolation::kNearest, queries);
   for (std::size_t i = 0; i < queries.size(); ++i) {
@@ -221,7 +222,7 @@ TEST_P(Sampler, NearestIsTheSampleOfTheCell) {
   }
 }
 
-TEST_P(Sampler, PlacesThatAreNoNumbersHaveNoHeight) {
+TEST_P(Sampler, NonFinitePositionsHaveNoHeight) {
   const std::vector<Point2> queries{{NAN, 3}, {3, INFINITY}, {-INFINITY, NAN}, {1e300, 1e300}};
   for (const Interpolation method :
        {Interpolation::kLinear, Interpolation::kNearest, Interpolation::kNaturalNeighbour}) {

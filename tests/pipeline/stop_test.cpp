@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Every job of libterrain ends when its context says so, and leaves nothing; others go on.
+// Every job of libterrain ends when its context requests a stop and leaves nothing behind; other
+// jobs continue.
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -53,7 +54,7 @@ class Stop : public testing::Test {
   }
 
   using Job = std::function<void(const terrain::Context&)>;
-  /// By what they are called; those with a file write `path`.
+  /// The jobs by name; those that write a file write `path`.
   [[nodiscard]] std::map<std::string, Job> jobs(const std::string& path) const {
     const stream::Store& store = *store_;
     const auto nowhere = [](std::string_view) {};
@@ -64,7 +65,7 @@ class Stop : public testing::Test {
          }},
         {"raster",
          [=, &store](terrain::Context context) {
-           context.memory_bytes = std::uint64_t{64} << 20;  // so that it comes in several parts
+           context.memory_bytes = std::uint64_t{64} << 20;  // splits the work into several parts
            terrain::RasterRequest request;
            request.output = path + ".tif";
            write_raster(store, request, context);
@@ -106,7 +107,7 @@ class Stop : public testing::Test {
   std::optional<stream::Store> store_;
 };
 
-TEST_F(Stop, EndsEveryJobAndLeavesTheOthers) {
+TEST_F(Stop, EndsEveryJobButNoOther) {
   std::stop_source stop, other;
   stop.request_stop();
   const std::string path = (folder_.path() / "out").string();
@@ -123,7 +124,7 @@ TEST_F(Stop, EndsEveryJobAndLeavesTheOthers) {
   }
 }
 
-TEST_F(Stop, EndsSmoothingThatWouldNotEndByItself) {
+TEST_F(Stop, EndsSmoothingThatWouldNeverFinish) {
   std::stop_source stop;
   terrain::DetailMeshOptions options;
   options.heights.smoothing =
@@ -137,10 +138,10 @@ TEST_F(Stop, EndsSmoothingThatWouldNotEndByItself) {
                stream::Stopped);
 }
 
-TEST_F(Stop, ComesInTheMiddleOfAJob) {
+TEST_F(Stop, TakesEffectInTheMiddleOfAJob) {
   const std::string path = (folder_.path() / "out").string();
   const std::map<std::string, Job> all = jobs(path);
-  // What the others report first is also the last: one part of work each.
+  // The other jobs do one part of work, so their first report is also the last.
   for (const char* name : {"bounded mesh", "contours", "raster", "tiles"}) {
     SCOPED_TRACE(name);
     std::stop_source stop;

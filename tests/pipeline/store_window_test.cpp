@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Windows of a store against the whole store decoded, on a raster with holes and on a cloud; with
-// caches of any size, on several threads, and of a damaged store.
+// Compares windows of a store with the whole store decoded: a raster with holes and a cloud, caches
+// of any size, several threads, and a damaged store.
 #include "surface/store_window.hpp"
 
 #include <algorithm>
@@ -36,7 +36,7 @@ std::filesystem::path build(const std::filesystem::path& input, const std::strin
   terrain::BuildRequest request;
   request.inputs = {input.string()};
   request.store = input.parent_path() / name;
-  request.block_points = block_points;  // few: more levels
+  request.block_points = block_points;  // small blocks give more levels
   request.facility_cost = 1.0;
   terrain::build_store(request);
   return request.store;
@@ -76,14 +76,14 @@ std::filesystem::path cloud_store(const std::filesystem::path& folder) {
   for (int i = 0; i < 40000; ++i) {
     const double x = unit() * unit() * 1000 - 300, y = unit() * 500;
     out << x << ' ' << y << ' ' << 10 * std::sin(x / 50) + unit() << '\n';
-    // Some twins.
+    // Some duplicates.
     if (i % 50 == 0) out << x << ' ' << y << ' ' << 99 + unit() << '\n';
   }
   out.close();
   return build(file, "cloud.store", 300);
 }
 
-/// Every point with its level, by Store::for_each alone.
+/// Every point with its level, read by Store::for_each alone.
 struct EveryPoint {
   std::vector<stream::Point3> positions;
   std::vector<unsigned> levels;
@@ -167,7 +167,7 @@ TEST(StoreWindow, GivesTheSamplesOfARasterAndNaNForItsHoles) {
   }
 }
 
-TEST(StoreWindow, OutsideTheRasterThereIsNothing) {
+TEST(StoreWindow, IsEmptyOutsideTheRaster) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path(), 1.0));
   terrain::StoreWindow reader(store);
@@ -180,7 +180,7 @@ TEST(StoreWindow, OutsideTheRasterThereIsNothing) {
   }
 }
 
-TEST(StoreWindow, GivesThePointsInABoxHigherLevelsFirst) {
+TEST(StoreWindow, GivesThePointsInABoxFromHigherLevelsDown) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(cloud_store(folder.path()));
   ASSERT_GE(store.top(), 2u);
@@ -194,7 +194,7 @@ TEST(StoreWindow, GivesThePointsInABoxHigherLevelsFirst) {
     terrain::WindowPoints points;
     for (int i = 0; i < 60; ++i) {
       terrain::StoredBox box;
-      // Half of the boxes have a corner on a point: they are closed.
+      // Half of the boxes have a corner on a point, because boxes are closed.
       const stream::Point3& corner = whole.positions[random() % whole.positions.size()];
       box.min = {i % 2 == 0 ? corner[0] : unit() * 1000 - 300,
                  i % 2 == 0 ? corner[1] : unit() * 500};
@@ -219,7 +219,7 @@ TEST(StoreWindow, GivesThePointsInABoxHigherLevelsFirst) {
   }
 }
 
-TEST(StoreWindow, ReadersOfOneStoreDoNotDisturbEachOther) {
+TEST(StoreWindow, ReadersOfOneStoreAreIndependent) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(raster_store(folder.path(), 1.0));
   const terrain::LatticeWindow all{0, 0, kColumns, kRows};
@@ -239,7 +239,7 @@ TEST(StoreWindow, ReadersOfOneStoreDoNotDisturbEachOther) {
   for (const std::vector<double>& result : results) EXPECT_TRUE(same_bits(result, expected));
 }
 
-TEST(StoreWindow, DamageComesThroughAndTheRestIsStillRead) {
+TEST(StoreWindow, ReportsDamageAndStillReadsTheRest) {
   const tests::TemporaryFolder folder;
   const auto path = raster_store(folder.path(), 1.0);
   const EveryPoint whole(stream::Store::open(path));

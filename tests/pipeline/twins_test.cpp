@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same landscape in degrees, in feet and in oblong cells clusters like its twin in metres:
-// distances are ground distances.
+// The same landscape in degrees, in feet and in oblong cells clusters like its twin in metres,
+// because distances are measured on the ground.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -25,7 +25,7 @@ namespace {
 constexpr double kExtent = 9000.0;  // metres, both ways
 constexpr double kSurveyFoot = 1200.0 / 3937.0;
 
-/// Hills of some hundred metres; x, y in metres.
+/// Hills of some hundred metres; x and y in metres.
 double height_at(double x, double y) {
   return 800 + 150 * std::sin(x / 700) * std::cos(y / 900) + 90 * std::sin((x + 2 * y) / 410) +
          40 * std::cos((3 * x - y) / 230);
@@ -33,7 +33,7 @@ double height_at(double x, double y) {
 
 struct Twin {
   std::uint32_t columns, rows;
-  double unit_x, unit_y, unit_z;  ///< metres in a unit of x, y, z
+  double unit_x, unit_y, unit_z;  ///< metres per unit of x, y, z
   double x0, y0;                  ///< of the upper left sample, in those units
   std::string crs;
 };
@@ -103,7 +103,7 @@ TEST_F(Twins, MetresMakeClustersAsWideAsDeep) {
 }
 
 TEST_F(Twins, DegreesClusterLikeMetres) {
-  // At 60 degrees north a degree of longitude is half as long as one of latitude.
+  // At 60 degrees north, a degree of longitude is half as long as a degree of latitude.
   const terrain::MetresPerDegree degree = terrain::metres_per_degree(60.0);
   expect_like_metres(cluster({300, 300, degree.longitude, degree.latitude, 1, 10.0,
                               60.0 + kExtent / 2 / degree.latitude, "EPSG:4326"},

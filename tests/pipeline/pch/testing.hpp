@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Compiled once for all tests; each test includes what it uses all the same.
+// Precompiled for all tests; each test still includes what it uses.
 #include <algorithm>
 #include <array>
 #include <cmath>
