@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times `terrace build` as a whole process and weighs its store against a deflate GeoTIFF.
+"""Times `terrace build` as a whole process and compares the size of its store with a deflate GeoTIFF.
 
-Prints one Markdown table: per input the median of the runs (wall clock, fsync included), points per
-second, peak resident set, bytes of the store, and bytes of what
+Prints one Markdown table. Per input: the median of the runs (wall clock, fsync included), points per
+second, peak resident set, bytes of the store, and bytes of the same raster written by
     gdal_translate -co COMPRESS=DEFLATE -co PREDICTOR=2 -co TILED=YES
-makes of the same raster (predictor 3 for floats). Without gdal_translate that column says so.
+(predictor 3 for floats). Without gdal_translate that column says so.
 
 usage: build_table.py TERRACE [--size 8192x8192] [--runs 5] [--threads 2] [RASTER ...]
 """
@@ -70,7 +70,7 @@ def main():
         for raster in [synth] + options.rasters:
             store = os.path.join(folder, "store")
             walls, peaks, summary = [], [], {}
-            for _ in range(options.runs + 1):  # the first warms the cache
+            for _ in range(options.runs + 1):  # the first run warms the cache
                 output, wall, peak = run([options.terrace, "build", raster, "-o", store, "--force", "--json",
                                           "-q", "--threads", options.threads])
                 summary = json.loads(output)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures after those of the thesis, made by the command: of made data, and of a scan of Lucy, of the
-heights of the whole world and of laser scanned streets where TERRACE_DATA names a folder that has them.
+"""Makes pictures modelled on those of the thesis with the command. Most show synthetic data; a scan of
+Lucy, heights of the whole world and laser-scanned streets are used if TERRACE_DATA has them.
 
 figures.py TERRACE --out DIR [--small]
 """
@@ -17,16 +17,16 @@ import tempfile
 
 FIGURES = {
     '7.1': 'clusters with facility costs of 0.3, 1 and 3 times the default',
-    '7.2': 'clusters of a cloud in its order, and of the same shuffled (7.4)',
+    '7.2': 'clusters of a cloud in its original order and shuffled (7.4)',
     '7.3': 'two blocks: an outlier that joins a distant cluster',
-    '7.8': 'points of a scan: all levels coarse, one part fine',
+    '7.8': 'points of a scan: coarse, one part fine',
     '7.11': 'clusters of the whole world',
     '7.15': 'three regions with elliptical metrics: clusters and triangles',
     '7.16': 'the same on an elevation model',
     '8.1': 'an elevation model: coarse, finer round a focus, full resolution in its centre',
-    '8.2': 'the tetrahedra of a scan: wires and their hull',
+    '8.2': 'the tetrahedra of a scan: edges and their hull',
     '8.9': 'a scan with its shape restored: coarse, finer in one part (8.6)',
-    'A.1': 'a laser scanned place: the top, a finer part, full resolution in its centre (to A.3: closer)',
+    'A.1': 'a laser-scanned place: the top, a finer part, full resolution in its centre (to A.3: closer)',
     'A.4': 'a larger one (to A.6: closer)',
 }
 
@@ -59,13 +59,13 @@ class Maker:
         return info['bounds']['min'], info['bounds']['max'], max(l['level'] for l in info['levels'])
 
     def part(self, low, high, begin, end, axes):
-        """The box between two shares of the sides along some axes; all of the others."""
+        """The box between two fractions of the extent along `axes`, and the full extent along the others."""
         first = [l + begin[a] * (h - l) if a in axes else l for a, (l, h) in enumerate(zip(low, high))]
         last = [l + end[a] * (h - l) if a in axes else h for a, (l, h) in enumerate(zip(low, high))]
         return first, last
 
     def data(self, *names):
-        """The path of a file of TERRACE_DATA; None without it."""
+        """The path of a file in TERRACE_DATA, or None if it is missing."""
         path = os.path.join(os.environ.get('TERRACE_DATA', ''), *names)
         return path if os.path.exists(path) else None
 
@@ -73,7 +73,7 @@ class Maker:
         return ','.join(map(str, sum(self.part(low, high, begin, end, axes), [])))
 
     def regions(self, low, high, ratio):
-        """Three boxes in the plane with ellipses across, along and aslant, as in figure 7.15."""
+        """Three boxes in the plane with ellipses across, along and diagonal, as in figure 7.15."""
         list_ = []
         for begin, end, angle in (((.08, .55), (.42, .92), 45), ((.58, .55), (.92, .92), -45),
                                   ((.3, .08), (.7, .42), 0)):
@@ -105,7 +105,7 @@ class Maker:
                 self.picture(points, f'{name}_level{level}')
 
     def outlier(self):
-        """Two clouds of one cluster each; a point of the right one came with the left one's block."""
+        """Two clouds of one cluster each; a point of the right one is in the left one's block."""
         generator = random.Random(3)
         blocks = []
         for x, count in ((0, 200), (7, 199)):
@@ -131,7 +131,7 @@ class Maker:
         self.picture(both, '7_3', '--color', 'class')
 
     def scan(self):
-        """The store of Lucy, or of a made surface, and which axis points up."""
+        """The store of Lucy, or of a synthetic surface, and the index of the vertical axis."""
         store = self.path('scan.store')
         if not os.path.exists(store):
             cloud = self.data('scan', 'lucy_100k.ply')
@@ -157,7 +157,7 @@ class Maker:
             self.run('synth', 'dem', '--size', '60x30' if self.small else '360x180', '-o', dem)
         clusters = self.path('world.ply')
         self.run('cluster', dem, '-o', clusters, '--bound-iterations', 0)
-        # Seen as a map: heights beside degrees would be walls.
+        # Seen from above: with x and y in degrees, heights in metres would be walls.
         self.picture(clusters, '7_11', '--exaggerate', 1e-6)
 
     def elliptical_points(self):
@@ -203,7 +203,7 @@ class Maker:
         self.picture(mesh, '8_1_aslant', '--wire', '--view', '200,35')
 
     def tetrahedra(self):
-        """Without a limit of edges nothing is peeled off: the tetrahedra fill the convex hull."""
+        """Without an edge limit nothing is removed, so the tetrahedra fill the convex hull."""
         store = self.scan()
         low, high, top = self.bounds(store)
         hull, inside, wires = (self.path(name) for name in ('hull.ply', 'inside.vtk', 'wires.obj'))
@@ -231,7 +231,7 @@ class Maker:
         self.picture(surface, '8_9_full', '--view', '20,10')
 
     def place(self, number, name, block, view):
-        """A laser scanned place: overview, the finer part, its centre."""
+        """A laser-scanned place: overview, the finer part, its centre."""
         cloud, store = self.path('place.ply'), self.path('place.store')
         las = self.data('lidar', name)
         if las and not self.small:
@@ -259,7 +259,7 @@ class Maker:
 
 
 def las_to_ply(path, target):
-    """The records of an uncompressed LAS file as a PLY file, coordinates as stored."""
+    """Converts the records of an uncompressed LAS file to PLY, with coordinates as stored."""
     with (lzma.open if path.endswith('.xz') else open)(path, 'rb') as file:
         data = file.read()
     begin, _, _, length, count = struct.unpack('<IIBHI', data[96:111])
@@ -273,7 +273,7 @@ def las_to_ply(path, target):
 
 
 def read_tetrahedra(path):
-    """Points and quadruples of a binary VTK file."""
+    """Reads the points and quadruples of a binary VTK file."""
     with open(path, 'rb') as file:
         data = file.read().split(b'POINTS ', 1)[1]
     line, data = data.split(b'\n', 1)
@@ -285,7 +285,7 @@ def read_tetrahedra(path):
 
 
 def write_wires(points, tetrahedra, width, file):
-    """Every edge as two thin strips across each other."""
+    """Writes every edge as two thin crossed strips."""
     edges = {tuple(sorted((cell[i], cell[j]))) for cell in tetrahedra
              for i in range(4) for j in range(i)}
     vertices = 0
@@ -304,7 +304,7 @@ def write_wires(points, tetrahedra, width, file):
 
 
 def cross(a, b, length):
-    """A vector of that length across both."""
+    """A vector of the given length, perpendicular to both."""
     c = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     size = sum(x * x for x in c) ** .5
     return [length * x / size for x in c]
@@ -314,8 +314,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split('\n\n')[0])
     parser.add_argument('terrace')
     parser.add_argument('--out', required=True)
-    parser.add_argument('--small', action='store_true', help='quickly, to see that it works')
-    parser.add_argument('--only', metavar='LIST', help='of these figures alone: 7.3,A.1')
+    parser.add_argument('--small', action='store_true', help='small inputs, as a smoke test')
+    parser.add_argument('--only', metavar='LIST', help='only these figures, such as 7.3,A.1')
     options = parser.parse_args()
     os.makedirs(options.out, exist_ok=True)
     maker = Maker(options.terrace, options.out, options.small)

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A camera flies over a store of 67 million points, with as tight an error as keeps about 500,000
-// of them in the model: 600 frames, each moving by 1 % of the width of what is seen, 10 ms at most
-// per frame, reading and decoding what is wanted included (the files are in the page cache). In one
-// thread, and with a second one that reads: then a frame is what the first one does.
+// A camera flies over a store of 67 million points, with an error small enough to keep about
+// 500,000 of them in the model: 600 frames, each moving by 1 % of the width of the visible ground.
+// A frame may take 10 ms, reading and decoding included (the files are in the page cache). Measured
+// in one thread, and with a second thread that reads, where a frame is the first thread's time.
 //
-// The store is the one that TERRACE_BENCH_STORE names, made there if nothing is there; else one
-// made for this run. Exit 1: a flight did not end at what its view asks for.
+// Uses the store that TERRACE_BENCH_STORE names and creates it if it does not exist; without the
+// variable, makes one for this run. Exits with 1 if a flight did not reach the target of its view.
 #include <array>
 #include <cstdint>
 #include <cstdio>

@@ -16,11 +16,11 @@ namespace terrace::tests {
 
 enum class Kind { perspective, map };
 
-/// The way of the camera: a circle about the middle, looking ahead and down by 30 degrees. For the
-/// map it looks straight down.
+/// The camera's path: a circle around the centre, looking ahead and down by 30 degrees. The map
+/// view looks straight down.
 class Flight {
  public:
-  /// active: points that are to be in the model.
+  /// active: number of points wanted in the model.
   Flight(const stream::Store& store, Kind kind, std::size_t active)
       : kind_(kind), points_(static_cast<double>(active)) {
     const terrain::StoreView<std::int32_t> view(store);
@@ -33,13 +33,13 @@ class Flight {
                       static_cast<double>(store.points()));
     radius_ = 0.22 * side;
     const double ground = view.in_view_frame({0, 0, store.mean_height()})[2];
-    // As much is seen over small stores as over large ones, in proportion.
+    // The visible width is proportional to the size of the store.
     const double seen = std::sqrt(points_) * cell_;
     above_ = 0.3 * seen;
     height_ = kind == Kind::perspective ? ground + above_ : box.max[2] + 1.0;
   }
 
-  /// More of it, more points: of the map the extent, in perspective the detail.
+  /// A larger scale gives more points: a larger extent of the map, more detail in perspective.
   double scale = 1.0;
 
   [[nodiscard]] tri::View view(double way) const {

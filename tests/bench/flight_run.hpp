@@ -16,7 +16,7 @@
 
 #include "terrace/terrain/store_view.hpp"
 
-/// A flight over a store, measured frame by frame; of terrain or of a scan.
+/// A measured flight over a store of terrain or of a scan, frame by frame.
 
 namespace terrace::tests {
 
@@ -26,7 +26,7 @@ inline double now() {
 
 inline bool small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 
-/// Reads every byte once: what is measured is not the disk.
+/// Reads every byte once, so that the disk is not measured.
 inline void warm(const stream::Store& store) {
   for (unsigned level = 0; level <= store.top(); ++level) {
     store.for_each(level, [](stream::ClusterId, const stream::ClusterRecord&,
@@ -34,7 +34,7 @@ inline void warm(const stream::Store& store) {
   }
 }
 
-/// Frames until nothing is left to do; 0 if that takes more than 100,000.
+/// Returns the number of frames until nothing is left to do, or 0 if that takes more than 100,000.
 template <class View>
 int settle(View& viewer, typename View::Reader reader, const tri::View& view, double seconds) {
   for (int frame = 1; frame <= 100'000; ++frame) {
@@ -45,7 +45,7 @@ int settle(View& viewer, typename View::Reader reader, const tri::View& view, do
   return 0;
 }
 
-/// Sets the scale at which the model has about the wanted number of points at the start.
+/// Sets the scale at which the model starts with about the wanted number of points.
 template <class View, class Path>
 void tune(Path& flight, const stream::Store& store, std::size_t active) {
   double low = 1e-3, high = 1e3;
@@ -69,8 +69,8 @@ inline double cpu_seconds() {
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-/// Processor time of the calling thread: what a frame took, whatever else the machine did
-/// meanwhile.
+/// Processor time of the calling thread. Measures a frame independently of the machine's other
+/// load.
 inline double thread_seconds() {
   timespec time{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -83,11 +83,11 @@ inline double quantile(const std::vector<double>& sorted, double q) {
 
 inline int frames() { return small() ? 60 : 600; }
 
-/// share: of the width of what is seen, by which each frame moves.
+/// share: how far each frame moves, as a fraction of the visible width.
 inline void print_head(const stream::Store& store, double budget, double share = 0.01) {
   std::printf(
-      "%d frames over a store of %llu points, each moving by %g %% of the width of what is seen;\n"
-      "milliseconds of the thread that draws, CPU of all, at most %.0f ms asked for\n"
+      "%d frames over a store of %llu points, each moving by %g %% of the visible width;\n"
+      "milliseconds of the drawing thread, CPU of all threads, budget %.0f ms\n"
       "%-27s %6s %6s %6s %7s %9s %9s %6s %9s %8s %9s %10s %8s %7s\n",
       frames(), static_cast<unsigned long long>(store.points()), 100.0 * share, 1e3 * budget,
       "flight", "p50", "p99", "max", "p99 CPU", "CPU/frame", "at target", "stop", "vertices",
@@ -97,12 +97,13 @@ inline void print_head(const stream::Store& store, double budget, double share =
               "pixels");
 }
 
-/// At the end of the flight: the points of the expanded clusters, each once.
+/// Checks that at the end of the flight the model has each point of the expanded clusters once.
+/// Returns the error, or an empty string.
 template <class View>
 std::string fault(const View& viewer, const stream::Store& store, int stop, double worst) {
   const auto& model = viewer.model();
-  if (stop == 0) return "the view that stopped is never at its target";
-  if (worst > 1.0) return "the view that stopped is settled and not at its target";
+  if (stop == 0) return "the stopped view never reaches its target";
+  if (worst > 1.0) return "the stopped view settled short of its target";
   std::uint64_t points = store.levels()[store.top()].members;
   for (const tri::ClusterId id : model.expanded()) {
     points += store.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id))).points;
@@ -115,9 +116,9 @@ std::string fault(const View& viewer, const stream::Store& store, int stop, doub
   return {};
 }
 
-/// 600 frames, each moving by this share of the width of what is seen, in at most `budget` seconds
-/// each; then until the view that stopped is at its target. Prints a line below print_head().
-/// Returns what is wrong.
+/// Flies 600 frames, each moving by this fraction of the visible width, in at most `budget` seconds
+/// each, then holds the view until it reaches its target. Prints a line below print_head(). Returns
+/// the error, or an empty string.
 template <class View, class Path>
 std::string fly(const char* name, const Path& flight, View& viewer, typename View::Reader reader,
                 const stream::Store& store, double budget, double share = 0.01) {
@@ -137,7 +138,7 @@ std::string fly(const char* name, const Path& flight, View& viewer, typename Vie
     points += static_cast<double>(viewer.model().point_count());
     changed += static_cast<double>(step.delta->changes.added_vertices.size() +
                                    step.delta->changes.removed_vertices.size());
-    // A second thread has as long as a display leaves it.
+    // Give the reading thread the time left until the display's next frame.
     const double rest = budget - times.back();
     if (reader == View::Reader::thread && rest > 0.0) {
       std::this_thread::sleep_for(std::chrono::duration<double>(rest));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Longitudes and latitudes on one core: of a raster's samples by window, of places all over a box,
-// and of single places, which is what the others would cost without their polynomials; and what a
-// geoid adds to heights.
+// Longitudes and latitudes on one core: of a raster's samples by window, of random places in a box,
+// and of single places, which shows the cost without the polynomials. Also geoid heights.
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -49,7 +48,7 @@ void windows(benchmark::State& state) {
 }
 BENCHMARK(windows)->DenseRange(0, 4);
 
-/// All over 1024 x 1024 cells.
+/// Random places within 1024 x 1024 cells.
 std::vector<Point2> places_of(const Grid& grid) {
   std::vector<Point2> list(4096);
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -93,7 +92,8 @@ void places(benchmark::State& state) {
 }
 BENCHMARK(places)->DenseRange(0, 4);
 
-/// What EGM96 adds to heights on 400 x 400 places of 1, 3 or 9 arc seconds, or to each alone.
+/// Adds EGM96 to heights at 400 x 400 places 1, 3 or 9 arc seconds apart; argument 0: place by
+/// place.
 void geoid(benchmark::State& state) {
   terrace::stream::StoreSchema schema;
   const terrace::terrain::EllipsoidalHeights ellipsoidal(

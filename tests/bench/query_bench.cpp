@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What questions to a store cost, on the store that TERRACE_BENCH_STORE names or else on one made
-// here of a fractal elevation model of 2049 x 2049 samples.
+// The cost of queries on the store that TERRACE_BENCH_STORE names, or else on one made here from a
+// fractal elevation model of 2049 x 2049 samples.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -56,9 +56,9 @@ const Store& store() {
   return opened;
 }
 
-/// All samples, window by window, floats; the argument is a window's side.
+/// All samples as floats, window by window; the argument is the side of a window.
 void windows(benchmark::State& state) {
-  const Store& source = store();  // made before the clock runs
+  const Store& source = store();  // make the store before the clock starts
   const auto side = state.range(0);
   const auto columns = static_cast<std::int64_t>(source.schema().columns);
   const auto rows = static_cast<std::int64_t>(source.schema().rows);
@@ -76,7 +76,7 @@ void windows(benchmark::State& state) {
 }
 BENCHMARK(windows)->Arg(128)->Arg(512)->Unit(benchmark::kMillisecond);
 
-/// The same window over and over: what the cache keeps.
+/// The same window repeatedly, served from the cache.
 void same_window(benchmark::State& state) {
   const Store& source = store();
   const auto side = state.range(0);
@@ -92,7 +92,7 @@ BENCHMARK(same_window)->Arg(64)->Arg(256)->Unit(benchmark::kMillisecond);
 
 std::size_t place_count() { return small() ? 2000 : 1000000; }
 
-/// Columns and rows in random order anywhere on the lattice.
+/// Random columns and rows on the lattice.
 std::vector<terrace::terrain::Point2> random_places() {
   const auto columns = static_cast<double>(store().schema().columns - 1);
   const auto rows = static_cast<double>(store().schema().rows - 1);
@@ -124,7 +124,8 @@ void sample(benchmark::State& state) {
 }
 BENCHMARK(sample)->DenseRange(0, 2)->Unit(benchmark::kMillisecond);
 
-/// The same, linear, as the command does it: lines of CSV read, answered and written.
+/// The same with linear interpolation, as the command does it: reads, answers and writes lines of
+/// CSV.
 void sample_lines(benchmark::State& state) {
   const Store& source = store();
   static const terrace::tests::TemporaryFolder folder;
@@ -148,7 +149,7 @@ void sample_lines(benchmark::State& state) {
 }
 BENCHMARK(sample_lines)->Unit(benchmark::kMillisecond);
 
-/// A square anywhere within the bounds that covers this share of their area, in the store's CRS.
+/// A random square within the bounds that covers this share of their area, in the store's CRS.
 terrace::terrain::Region random_square(double share, std::uint64_t seed) {
   const terrace::stream::Box3 all = terrace::stream::world_box(store().schema(), store().bounds());
   std::string text[2];
@@ -163,7 +164,7 @@ terrace::terrain::Region random_square(double share, std::uint64_t seed) {
   return terrace::terrain::Region::parse(text[0] + text[1]);
 }
 
-/// A store's folder that counts the bytes that are read.
+/// The folder of a store; counts the bytes read.
 terrace::stream::OpenByName counting(const std::filesystem::path& folder, std::uint64_t& bytes) {
   return [folder, &bytes](const std::string& name) {
     const std::shared_ptr<terrace::stream::ByteSource> file =
@@ -176,12 +177,13 @@ terrace::stream::OpenByName counting(const std::filesystem::path& folder, std::u
   };
 }
 
-/// What it takes to read all points inside a square from a store that has just been opened: the
-/// argument is its share of the area in parts of ten thousand. The counters are means over the
-/// squares. Per point inside: `delivered` are the points that a caller gets, `decoded` those of the
-/// clusters that are read for them, `least` those of the clusters that have points inside, `bytes`
-/// the bytes of clusters. `read` are the bytes read, index included, per byte of clusters that have
-/// points inside. The root, of any size up to a block, is left out: whoever asks often keeps it.
+/// Reads all points inside a square from a store that has just been opened. The argument is the
+/// square's share of the area, in ten-thousandths. The counters are means over the squares. Per
+/// point inside, `delivered` counts the points that a caller gets, `decoded` the points of the
+/// clusters read, `least` the points of the clusters that have points inside, and `bytes` the bytes
+/// of clusters. `read` is the number of bytes read, index included, per byte of clusters that have
+/// points inside. The root, which can be as large as a block, is excluded, because frequent readers
+/// keep it in memory.
 void region(benchmark::State& state) {
   const Store& source = store();
   const terrace::stream::Placement placement = source.schema();
@@ -238,7 +240,7 @@ void region(benchmark::State& state) {
 }
 BENCHMARK(region)->Arg(1)->Arg(6)->Arg(100)->Arg(1000)->Unit(benchmark::kMillisecond);
 
-/// An outline of 100,000 corners around most of the store, jagged at every scale as a coast is.
+/// An outline of 100,000 vertices around most of the store, jagged at every scale like a coast.
 terrace::terrain::Region coast() {
   const terrace::stream::Box3 all = terrace::stream::world_box(store().schema(), store().bounds());
   const std::size_t corners = small() ? 2000 : 100000;
@@ -267,7 +269,8 @@ terrace::terrain::Region coast() {
   return terrace::terrain::Region::of_polygons({{std::move(ring)}}, all.min[2], all.max[2]);
 }
 
-/// What a polygon costs above its box, which of course holds more; 0: the box, 1: the polygon.
+/// 0: the box of the polygon, which contains more; 1: the polygon. Shows what a polygon costs in
+/// addition.
 terrace::terrain::Region region_of(const benchmark::State& state) {
   const terrace::terrain::Region polygon = coast();
   return state.range(0) == 0 ? terrace::terrain::Region::of_box(polygon.box()) : polygon;
@@ -279,7 +282,7 @@ void prepare_polygon(benchmark::State& state) {
 }
 BENCHMARK(prepare_polygon)->Unit(benchmark::kMillisecond);
 
-/// All points inside, as the command writes them.
+/// All points inside, written as by the command.
 void polygon_points(benchmark::State& state) {
   const Store& source = store();
   terrace::terrain::Detail detail;

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A camera flies close over a body that was scanned in 20 million points, once round, with as tight
-// an error as keeps about 200,000 of them in the model: 600 frames, each moving by 0.2 % of the
-// width of what is seen, 10 ms at most per frame, reading, tetrahedra and surface included (the
-// files are in the page cache). In one thread, and with a second one that reads: then a frame is
-// what the first one does. And what a computation of the surface from scratch takes and changes
-// then.
+// A camera flies once around a body scanned in 20 million points, close to its surface, with an
+// error small enough to keep about 200,000 of them in the model: 600 frames, each moving by 0.2 %
+// of the visible width. A frame may take 10 ms, reading, tetrahedra and surface included (the files
+// are in the page cache). Measured in one thread, and with a second thread that reads, where a
+// frame is the first thread's time. At the end, computes the surface from scratch and reports the
+// time and the changes.
 //
-// The store is the one that TERRACE_BENCH_SCAN names, made there if nothing is there; else one made
-// for this run. Exit 1: a flight did not end at what its view asks for, or not with the tetrahedra
-// and, from scratch, the surface of those points.
+// Uses the store that TERRACE_BENCH_SCAN names and creates it if it does not exist; without the
+// variable, makes one for this run. Exits with 1 if a flight did not reach the target of its view
+// or ended with different tetrahedra or, after the recomputation, a different surface than a new
+// computation from its points.
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -57,7 +58,7 @@ Store open_store(const std::filesystem::path& folder) {
   return Store::open(request.store);
 }
 
-/// A circle close over the body's equator, looking ahead and down by 30 degrees.
+/// A circle close above the body's equator, looking ahead and down by 30 degrees.
 class Orbit {
  public:
   explicit Orbit(const Store& store) {
@@ -69,14 +70,14 @@ class Orbit {
       side += (high[k] - low[k]) / 3.0;
       middle_[k] = (high[k] + low[k]) / 2.0;
     }
-    // As much is seen of small bodies as of large ones, in proportion.
+    // The visible width is proportional to the size of the body.
     const double area = std::numbers::pi * side * side;
     above_ =
         0.3 * std::sqrt(area * static_cast<double>(active()) / static_cast<double>(store.points()));
     radius_ = 0.5 * std::max(high[0] - low[0], high[1] - low[1]) + above_;
   }
 
-  double scale = 1.0;  ///< more of it, more points
+  double scale = 1.0;  ///< a larger scale gives more points
 
   [[nodiscard]] tri::View view(double way) const {
     const double angle = way / radius_, c = std::cos(angle), s = std::sin(angle);
@@ -90,7 +91,7 @@ class Orbit {
     view.pixel_error = 2.0 / scale;
     return view;
   }
-  /// Width of what is seen at the centre of the picture.
+  /// Visible width at the centre of the picture.
   [[nodiscard]] double width() const {
     return 2.0 * (2.0 * above_) * std::tan(kFov / 2 * std::numbers::pi / 180.0) * kAspect;
   }
@@ -101,15 +102,16 @@ class Orbit {
   double above_ = 0.0, radius_ = 0.0;
 };
 
-/// The surface from scratch: the time and the change, then against one of a new object.
+/// Recomputes the surface from scratch, prints the time and the changes, and compares the result
+/// with a new object's. Returns the error, or an empty string.
 std::string rest(View& viewer) {
   const Surface& surface = viewer.model().triangulation();
   const std::size_t triangles = surface.triangle_count();
   const double begin = now();
   const auto& changes = viewer.restore().changes;
   std::printf(
-      "  at rest %zu vertices, %zu triangles; from scratch in %.0f ms: %zu triangles go, %zu "
-      "come\n",
+      "  at rest %zu vertices, %zu triangles; from scratch in %.0f ms: %zu triangles removed, %zu "
+      "added\n",
       surface.vertex_count(), triangles, 1e3 * (now() - begin), changes.removed_triangles.size(),
       changes.added_triangles.size());
   std::vector<Surface::Point> points;
@@ -117,8 +119,8 @@ std::string rest(View& viewer) {
   Surface fresh;
   fresh.build(points);
   if (fresh.tetrahedra().hash() != surface.tetrahedra().hash())
-    return "other tetrahedra than fresh";
-  if (fresh.hash() != surface.hash()) return "another surface than fresh";
+    return "the tetrahedra differ from a new computation";
+  if (fresh.hash() != surface.hash()) return "the surface differs from a new computation";
   return {};
 }
 

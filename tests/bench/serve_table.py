@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Range requests per second of `terrace view`, beside nginx where that is installed, by wrk.
+"""Range requests per second of `terrace view`, measured by wrk, next to nginx where it is installed.
 
-Prints one Markdown table: requests per second for 64 KiB at random places of a store's largest file, the slowest
-answer of 99 in 100, and the peak resident set of the server (of nginx: of its one worker), medians of the runs.
-Client and server share the machine's cores, one thread each.
+Prints one Markdown table: requests per second for 64 KiB at random offsets of a store's largest file, the
+99th percentile of the latency, and the peak resident set of the server (for nginx, of its one worker). All
+values are medians of the runs. Client and server share the machine's cores, with one thread each.
 
 usage: serve_table.py TERRACE [--store STORE] [--size 4096x4096] [--seconds 5] [--connections 32] [--runs 3]
 """
@@ -116,7 +116,7 @@ def main():
             results = {server: [] for server in servers}
             for server, (_, url) in servers.items():
                 wait_for(url)
-            for _ in range(options.runs):  # alternating
+            for _ in range(options.runs):  # alternate the servers
                 for server, (_, url) in servers.items():
                     results[server].append(load(url, script, options))
             print('| server | requests/s of 64 KiB | 99 % within, ms | peak MiB |\n|---|---|---|---|')

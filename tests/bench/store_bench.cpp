@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a store costs to read and to expand, on the store that TERRACE_BENCH_STORE names or else on
-// one made here of a fractal elevation model. The peer of the expansions is CGAL's Delaunay
+// The cost of reading and expanding a store: the one that TERRACE_BENCH_STORE names, or else one
+// made here from a fractal elevation model. Expansions are compared with CGAL's Delaunay
 // triangulation, given the same points in the same order.
 #include <algorithm>
 #include <array>
@@ -51,7 +51,7 @@ const Store& store() {
 }
 
 void read_everything(benchmark::State& state) {
-  const Store& source = store();  // made before the clock runs
+  const Store& source = store();  // make the store before the clock starts
   std::int64_t points = 0;
   for (auto _ : state) {
     for (unsigned level = 0; level <= source.top(); ++level) {
@@ -79,8 +79,8 @@ void random_cluster(benchmark::State& state) {
 }
 BENCHMARK(random_cluster)->Unit(benchmark::kMicrosecond);
 
-/// Members of 500 clusters of level 0 spread over the store, and the points of level 1 and above as
-/// the base they are expanded in.
+/// The members of 500 clusters of level 0 spread over the store, and the points of level 1 and
+/// above as the base in which they are expanded.
 struct Expansion {
   std::vector<std::array<std::int32_t, 2>> base;
   std::vector<std::vector<std::array<std::int32_t, 2>>> clusters;
@@ -124,7 +124,7 @@ void expand_terrace(benchmark::State& state) {
     triangulation->build(e.base);
     std::vector<terrace::tri::VertexId> heads;
     for (const auto& head : e.heads) heads.push_back(triangulation->nearest(head));
-    // As in a session that has run for a while: memory is there.
+    // Allocate memory first, as in a session that has run for a while.
     std::vector<std::vector<terrace::tri::VertexId>> sets(e.clusters.size());
     for (std::size_t c = 0; c < e.clusters.size(); ++c) {
       inserted.resize(e.clusters[c].size());
@@ -236,7 +236,7 @@ void collapse_cgal_one_by_one(benchmark::State& state) {
 }
 BENCHMARK(collapse_cgal_one_by_one)->Unit(benchmark::kMillisecond);
 
-/// The whole model, reading included: expand 500 clusters of level 0 and collapse them again.
+/// The whole model, reading included: expands 500 clusters of level 0 and collapses them again.
 void model_expand_and_collapse(benchmark::State& state) {
   terrace::terrain::StoreSource source(store());
   if (store().top() == 0) return state.SkipWithError("the store has one level");

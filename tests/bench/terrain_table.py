@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Times error-bounded meshes, web-globe tiles and heights at points as whole processes.
+"""Times error-bounded meshes, web-globe tiles and heights at points, each as a whole process.
 
-Prints five Markdown tables, medians of the runs. meshes: triangles, seconds of reading (decoding with
-checksums) and of meshing (checks at every sample included; of all threads together), wall clock.
-tiles: of the raster as longitudes and latitudes, zoom 0 to the one that shows every sample. heights: at
-a million random places in one call. points: the samples of the raster to tile as irregular points.
-passes: a scan in overlapping swaths, then as many points again in no order.
+Prints five Markdown tables, medians of the runs.
+meshes: triangles, seconds of reading (decoding with checksums) and of meshing (with the check of every
+sample; summed over threads), wall clock.
+tiles: the raster in longitude and latitude, from zoom 0 to the one that shows every sample.
+heights: a million random places in one call.
+points: the samples of the tiled raster as irregular points.
+passes: a scan in overlapping swaths, followed by as many points in random order.
 
 usage: terrain_table.py TERRACE [--size 2049x2049] [--runs 3] [--errors 20,5,1] [--points 1000000]
                         [--pass 5000000] [--dem FILE.tif] [--tile-dem FILE.tif]
@@ -27,7 +29,7 @@ import time
 
 
 def terrace(command, *args):
-    """Runs a verb; returns its summary, with wall and CPU seconds of the process."""
+    """Runs a verb; returns its summary, with the wall and CPU seconds of the process."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     result = subprocess.run([command, *map(str, args), '--json', '-q'], capture_output=True, text=True)
     if result.returncode != 0:
@@ -98,7 +100,7 @@ def sample_table(options, store, folder):
 
 
 def cloud_table(options, store, folder):
-    """The same verbs on the samples of a raster as irregular points."""
+    """Times the same verbs on the samples of a raster as irregular points."""
     points, cloud = os.path.join(folder, 'cloud.xyz'), os.path.join(folder, 'cloud.terrace')
     system = terrace(options.terrace, 'info', store)['crs']['epsg']
     terrace(options.terrace, 'points', store, '-o', points)
@@ -124,15 +126,15 @@ def cloud_table(options, store, folder):
         for threads in (1, 2):
             runs = []
             for _ in range(options.runs):
-                shutil.rmtree(out, ignore_errors=True)  # else tiles that are there are kept
+                shutil.rmtree(out, ignore_errors=True)  # otherwise existing tiles are kept
                 runs.append(terrace(options.terrace, *verb, '--threads', threads))
             print(f"| {name} | {threads} | {runs[0][key]:,} | {median(runs, 'cpu'):.2f} "
                   f"| {median(runs, 'wall'):.2f} | {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)
 
 
 def write_passes(path, points):
-    """Two passes of so many points each over 10 km x 10 km: swaths of 1,000 m, half of each seen again
-    in the next, then places at random."""
+    """Writes two passes of `points` points each over 10 km x 10 km: swaths of 1,000 m, of which half
+    overlaps the next, then random positions."""
     side, swath, choice = 10000.0, 1000.0, random.Random(1)
     lines = [k * swath / 2 for k in range(int(2 * side / swath) - 1)]
     spacing = math.sqrt(len(lines) * swath * side / points)
@@ -174,7 +176,7 @@ def passes_table(options, folder):
         for threads in (1, 2):
             runs = []
             for _ in range(options.runs):
-                shutil.rmtree(out, ignore_errors=True)  # else tiles that are there are kept
+                shutil.rmtree(out, ignore_errors=True)  # otherwise existing tiles are kept
                 runs.append(terrace(options.terrace, *verb, '--threads', threads))
             print(f"| {name} | {threads} | {median(runs, 'cpu'):.2f} | {median(runs, 'wall'):.2f} "
                   f"| {runs[0]['peak_rss_bytes'] / 2**20:.0f} |", flush=True)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `terrace build` would take if reading, encoding and writing cost nothing: points are read
-// into memory first, and only the hierarchy is timed, with a sink that drops everything. For table
-// 7.2 of J. Skála, Algorithms for manipulating large geometric data: see thesis_store.py.
+// Time of `terrace build` without reading, encoding and writing: points are read into memory first,
+// and only the hierarchy is timed, with a sink that drops everything. For table 7.2 of J. Skála,
+// Algorithms for manipulating large geometric data: see thesis_store.py.
 //
 // usage: thesis_io_bench FILE BLOCK FACILITY_COST THREADS
 // Prints {"points": N, "seconds": S}.
@@ -32,7 +32,7 @@ class NullSink : public terrace::cluster::HierarchySink {
   void root(const FinishedBlock&) override {}
 };
 
-// So many points are in memory at once (400 MB); between two such parts the clock stands still.
+// Number of points in memory at once (400 MB); the clock stops while the next part is read.
 constexpr std::size_t kPart = std::size_t{1} << 24;
 
 int measure(const std::string& file, std::size_t block_points, double facility_cost,

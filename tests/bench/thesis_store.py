@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tables 7.2 and 7.3 of the thesis, rerun with files and stores.
+"""Reruns tables 7.2 and 7.3 of the thesis with files and stores.
 
 J. Skála, Algorithms for manipulating large geometric data. Blocks of 10,000 points, facility cost
 twice the diagonal. For each of the thesis's eight sets a file is made (`terrace synth`), built into
-a store (`terrace build`), and clustered once more without files (thesis_io_bench); medians of the
-runs. The thesis's figures stand beside, in brackets; they are of other data and of the plain
-search, and nothing is tested against them. With the folder of real data that TERRACE_DATA names,
-some files there are run too.
+a store (`terrace build`), and clustered once more without files (thesis_io_bench). Values are
+medians of the runs. The thesis's figures follow in brackets. They come from other data and from the
+plain search, and nothing is tested against them. Some files of the real-data folder that
+TERRACE_DATA names are run too.
 
 usage: thesis_store.py TERRACE THESIS_IO_BENCH [--most 4000000] [--full] [--runs 3] [--threads 2]
                        [--data DIR] [--out DIR]
-TERRACE may be left to the environment variable of that name (give -).
+Give - as TERRACE to take the environment variable of that name.
 """
 import argparse
 import csv
@@ -27,8 +27,8 @@ import tempfile
 
 BLOCK, FACILITY_COST = "10000", "2"
 
-# Name, points, kind of `terrace synth`, its ending; with I/O, without I/O, share; points on levels
-# 1, 2 and 3, megabytes.
+# Name, points, kind of `terrace synth`, its ending; seconds with and without I/O, share of I/O;
+# points on levels 1, 2 and 3, megabytes.
 THESIS = [
     ("Grand Canyon", 8_400_000, "dem", "tif", "26:55", "25:11", "6%", "37 991", "318", "", "89"),
     ("Puget Sound", 268_500_000, "dem", "tif", "14:15:24", "13:22:55", "6%", "1 173 166", "10 054", "144", "163"),
@@ -51,7 +51,7 @@ def json_of(command):
 
 
 def unpacked(path, folder):
-    """The file itself, or what is in it if it is compressed by gzip."""
+    """The file itself, or its decompressed copy if it is compressed by gzip."""
     if not path.endswith(".gz"):
         return path
     plain = os.path.join(folder, os.path.basename(path)[:-len(".gz")])
@@ -61,12 +61,12 @@ def unpacked(path, folder):
 
 
 def quoted(figures):
-    """Figures of the thesis."""
+    """Formats figures of the thesis."""
     return [f"[{figure}]" if figure else "" for figure in figures]
 
 
 def synth(options, folder, kind, ending, points, seed):
-    """Makes a file of about so many points; a surface has its rows in order, as a scan has."""
+    """Makes a file of about `points` points; a surface has its rows in order, like a scan."""
     path = os.path.join(folder, f"input.{ending}")
     size = ["--points", str(points)]
     if kind == "dem":
@@ -78,7 +78,7 @@ def synth(options, folder, kind, ending, points, seed):
 
 
 def measure(options, path, folder):
-    """Builds and clusters a file; returns its rows of both tables, less name and thesis."""
+    """Builds and clusters a file; returns its rows of both tables without the name and the thesis's figures."""
     store = os.path.join(folder, "store")
     builds, bare = [], []
     for _ in range(options.runs):
@@ -144,7 +144,7 @@ def main():
     with_threads = f"Blocks of {BLOCK}, facility cost {FACILITY_COST} x diagonal, {options.threads} threads"
     show(options, "table-7.2",
          f"Table 7.2: time with and without I/O. {with_threads}; seconds, medians of {options.runs}.\n"
-         "The clustering is not the thesis's, but the fast one: so the share of I/O is greater. [..] the thesis.",
+         "The fast clustering is used instead of the thesis's, so the share of I/O is greater. [..] the thesis.",
          ["set", "points", "with I/O", "without", "share of I/O", "[with I/O]", "[without]", "[share]"], times)
     show(options, "table-7.3",
          f"Table 7.3: points per level, and memory of the whole process. {with_threads}. [..] the thesis, more points.",
