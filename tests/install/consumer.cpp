@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A program outside the workspace that knows the libraries by pkg-config alone: it clusters a
+// A program outside the workspace that finds the libraries through pkg-config alone. It clusters a
 // small terrain into a store, reads it back, triangulates the top level and solves an assignment.
-// Usage: consumer FOLDER, where the store is to be made.
+// Usage: consumer FOLDER, where the store is created.
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -64,7 +64,7 @@ int main(int argc, char** argv) {
   if (triangulation.vertex_count() != cells.size()) return fail("the triangulation lost points");
 
   const std::vector<double> costs{4, 1, 3, 9, 2, 0, 5, 9, 3, 2, 2, 9};
-  if (matching::assign(costs, 3, 4).cost != 5) return fail("the assignment is not the cheapest");
+  if (matching::assign(costs, 3, 4).cost != 5) return fail("the assignment is not optimal");
 
   std::printf("%zu points, %zu at the top, %zu triangles\n", points.size(), cells.size(),
               triangulation.triangle_count());

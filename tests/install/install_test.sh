@@ -1,8 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Installs the build into a temporary folder and uses it from there, away from its prefix, as programs of others do:
+# Installs the build into a temporary folder and uses it from there, away from its prefix, as third-party programs do:
 # - no installed text file names the source or the build folder, or a library by its absolute path;
-# - every public header compiles with nothing but its own library's pkg-config flags;
+# - every public header compiles with only its own library's pkg-config flags;
 # - consumer.cpp, which uses all libraries, links by pkg-config and runs;
 # - the CMake lines of each library's README build and run use_LIBRARY.cpp.
 # The same CMake projects are then built with shared libraries (see below).
@@ -17,11 +17,11 @@ trap 'rm -rf "$folder"' EXIT
 meson install -C "$build" --no-rebuild --quiet --destdir "$folder/root"
 installed=$folder/root$prefix
 export PKG_CONFIG_PATH="$installed/$libdir/pkgconfig"
-# Elsewhere than at its prefix, whether the build was set up with relocatable files or not.
+# The installation is not at its prefix, even if the build was not set up with relocatable files.
 flags() { pkg-config --define-variable=prefix="$installed" "$@"; }
 fail() { echo "install_test: $*"; exit 1; }
 
-# No path of the machine that built it.
+# No installed file may contain a path of the build machine.
 ! grep -rIlF -e "$source" -e "$build" "$installed" || fail 'these installed files name the source or the build folder'
 for library in $libraries; do
   if sed -E '/^prefix=/d; s/\$\{[a-z]+\}[^ ]*//g' "$installed/$libdir/pkgconfig/terrace-$library.pc" | grep -E '(^|[ =])(-[LI])?/'; then
@@ -47,8 +47,9 @@ mkdir "$folder/work"
 LD_LIBRARY_PATH="$installed/$libdir" "$folder/consumer" "$folder/work"
 
 command -v cmake >/dev/null || fail 'cmake is missing'
-# with_cmake NAME PREFIX: each ```cmake block of each README makes a program of its own of one project. Anything that is
-# found elsewhere than in PREFIX would hide a fault, so the project is configured without other packages of terrace.
+# with_cmake NAME PREFIX: each ```cmake block of each README builds a separate program of one
+# project. The project is configured without other installations of terrace, which would hide
+# errors.
 with_cmake() {
   project=$folder/project-$1
   mkdir "$project"
@@ -81,7 +82,8 @@ CMAKE
 for compiler; do case $compiler in *ccache) ;; *) break ;; esac; done
 with_cmake "$kind" "$installed"
 
-# A build of shared libraries differs in its lists of what programs link. Its libraries are made of the objects at hand.
+# A build of shared libraries differs in the lists of libraries that programs link. The shared
+# libraries are made from the existing objects.
 if [ "$kind" = static ]; then
   meson setup "$folder/shared-build" "$source" -Ddefault_library=shared -Dprefix="$prefix" -Dlibdir="$libdir" -Dterrace_tests=disabled \
     -Dterrace_python=disabled -Dterrace_bench=disabled -Dbuildtype=plain >"$folder/log" 2>&1 || { tail -n 30 "$folder/log"; exit 1; }

@@ -1,9 +1,9 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# Each library is configured as a project of its own; and copied into the subprojects of a stranger's project
-# it is found there by its name, and would build there without its tests. The stranger has options of the most
-# ordinary names. As the whole workspace is built of such subprojects, little is compiled again: what includes
-# each library, and all of one.
+# Configures each library as a separate project. Then copies it into the subprojects of a
+# third-party project, which must find it by name and not build its tests. That project has options
+# with very common names. The workspace itself is built from these subprojects, so little is
+# compiled again: files that include each library, and one library as a whole.
 # Usage: subproject_test.sh SOURCE
 set -eu
 source=$1
@@ -32,7 +32,7 @@ cp "$source"/tests/install/use_*.cpp "$folder"
 for library in base stream cluster matching tri terrain; do
   meson setup "$folder/alone-$library" "$source/lib$library" >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 done
-# Unoptimised: what is tested is the building, not the result.
+# Unoptimised, because this tests the build and not the result.
 meson setup "$folder/build" "$folder" --buildtype=plain -Dunity=on -Dunity_size=30 >"$folder/log" 2>&1 || { cat "$folder/log"; exit 1; }
 ninja -C "$folder/build" use_base use_matching use_stream.p/use_stream.cpp.o use_cluster.p/use_cluster.cpp.o \
   use_tri.p/use_tri.cpp.o use_terrain.p/use_terrain.cpp.o >"$folder/log" 2>&1 || { tail -n 50 "$folder/log"; exit 1; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asks for a GPU, so the CUDA runtime must link where the library has it.
+// Requests a GPU, so the CUDA runtime must link if the library uses it.
 #include <terrace/cluster/linkage.hpp>
 
 int main() {

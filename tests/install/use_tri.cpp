@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Four cocircular points of doubles: decided by exact numbers, so GMP must link.
+// Four cocircular points in doubles need exact numbers to decide, so GMP must link.
 #include <vector>
 
 #include <terrace/tri/delaunay2.hpp>
