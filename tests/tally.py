@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Counts the cases of a run of `meson test`: not programs, but what they tested.
+"""Counts the cases of a run of `meson test`, rather than its programs.
 
-tally.py LOG...   reads meson-logs/testlog.json of each build; names what was left out and why and
-                  the programs that failed with the end of what they printed, and ends with the line
-                  "N passed, N failed, N skipped". Exit status 1 if a case failed, if none passed,
-                  or, with TERRACE_REQUIRE_ORACLES=1, if one was left out for want of a program or
-                  library that can be installed.
+tally.py LOG...   reads meson-logs/testlog.json of each build. Lists skipped cases by reason, and
+                  failed programs with the end of their output. The last line is
+                  "N passed, N failed, N skipped". The exit status is 1 if a case failed, if none
+                  passed or, with TERRACE_REQUIRE_ORACLES=1, if a case was skipped for lack of a
+                  program or library that can be installed.
 """
 
 import collections
@@ -15,8 +15,9 @@ import os
 import re
 import sys
 
-# Reasons that no installation can mend (hardware, privileges, data that a machine need not have), and
-# Emscripten and QGIS, which take half a gigabyte or more; and what a registry that is away would give.
+# Acceptable reasons to skip: things that no installation can provide (hardware, privileges, data
+# that a machine may lack), Emscripten and QGIS, which take half a gigabyte or more, and packages of
+# a registry that cannot be reached.
 MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|QGIS|cannot be downloaded|TERRACE_DATA', re.IGNORECASE)
 
 GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)
@@ -27,7 +28,7 @@ NODE = re.compile(r'^(?:#|ℹ) (pass|fail|skipped) (\d+)$', re.MULTILINE)
 
 
 class Tally:
-    """Cases that passed and failed, and the names of those left out by reason."""
+    """Counts of passed and failed cases, and the names of skipped ones by reason."""
 
     def __init__(self):
         self.passed = self.failed = self.skipped = 0
@@ -39,7 +40,7 @@ class Tally:
         self.left_out[reason].append(name)
 
     def add(self, row):
-        """One line of testlog.json: a program and what it printed."""
+        """Adds one line of testlog.json: a program and its output."""
         text = (row.get('stdout') or '') + '\n' + (row.get('stderr') or '')
         failed = self.failed
         known = self.gtest(text) or self.unittest(text, row['name']) or self.node(text, row['name'])
@@ -47,7 +48,7 @@ class Tally:
         if kind == 'SKIP':
             self.skip((text.strip().splitlines() or ['no reason given'])[-1], row['name'])
         elif kind not in ('OK', 'EXPECTEDFAIL'):
-            # It may have stopped before it could name a case.
+            # It may have stopped before it named a case.
             self.failed += self.failed == failed
             cases = [case[2] for case in GTEST.finditer(text) if case[1] == 'FAILED']
             self.failures.append((row['name'], kind, cases, text.strip().splitlines()[-30:]))
@@ -108,7 +109,7 @@ def main(logs):
         print(*('    ' + line for line in lines), sep='\n')
     required = os.environ.get('TERRACE_REQUIRE_ORACLES') == '1'
     if required and missing:
-        print(f'{missing} cases lack what can be installed (./dev oracles), and TERRACE_REQUIRE_ORACLES=1')
+        print(f'TERRACE_REQUIRE_ORACLES=1, but {missing} cases lack packages that ./dev oracles installs')
     print(f'{tally.passed} passed, {tally.failed} failed, {tally.skipped} skipped')
     return tally.failed != 0 or tally.passed == 0 or (required and missing != 0)
 

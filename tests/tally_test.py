@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What tally.py makes of the output of each kind of test program."""
+"""Tests how tally.py counts the output of each kind of test program."""
 
 import json
 import os
@@ -40,7 +40,7 @@ NODE = '# tests 4\n# pass 3\n# fail 0\n# cancelled 0\n# skipped 1\n'
 
 
 def tally(*rows, required=False):
-    """(exit status, lines printed) for programs (result, output)."""
+    """Returns (exit status, lines printed) for programs given as (result, output)."""
     with tempfile.NamedTemporaryFile('w', suffix='.json') as log:
         for number, (result, text) in enumerate(rows):
             log.write(json.dumps({'name': f'program{number}', 'result': result, 'stdout': text}) + '\n')
@@ -52,7 +52,7 @@ def tally(*rows, required=False):
 
 
 class TallyTest(unittest.TestCase):
-    def test_cases_of_googletest_are_counted_and_named(self):
+    def test_counts_and_names_googletest_cases(self):
         status, lines = tally(('FAIL', GTEST))
         self.assertEqual(status, 1)
         self.assertEqual(lines[-1], '1 passed, 1 failed, 2 skipped')
@@ -60,27 +60,27 @@ class TallyTest(unittest.TestCase):
         self.assertIn('FAIL: program0 All/Grid.Of/3', lines)
         self.assertIn('    ../grid_test.cpp:17: Skipped', lines)
 
-    def test_cases_of_unittest_are_counted_and_named(self):
+    def test_counts_and_names_unittest_cases(self):
         status, lines = tally(('OK', UNITTEST))
         self.assertEqual((status, lines), (0, ['left out: 1: not installed: cs2cs (test_b)',
                                                '2 passed, 0 failed, 1 skipped']))
 
-    def test_cases_of_node_are_counted(self):
+    def test_counts_node_cases(self):
         self.assertEqual(tally(('OK', NODE))[1][-1], '3 passed, 0 failed, 1 skipped')
 
-    def test_a_program_without_cases_is_one(self):
+    def test_counts_a_program_without_cases_as_one(self):
         status, lines = tally(('OK', 'done'), ('SKIP', 'npm is not installed\n'))
         self.assertEqual((status, lines[-1]), (0, '1 passed, 0 failed, 1 skipped'))
         self.assertIn('left out: 1: npm is not installed (program1)', lines)
 
-    def test_a_program_that_stops_before_it_names_a_case_fails(self):
+    def test_fails_if_a_program_stops_before_naming_a_case(self):
         status, lines = tally(('OK', 'done'), ('TIMEOUT', '[       OK ] Grid.Is (3 ms)\n'))
         self.assertEqual((status, lines[-1]), (1, '2 passed, 1 failed, 0 skipped'))
 
-    def test_nothing_passed_is_a_failure(self):
+    def test_fails_if_nothing_passed(self):
         self.assertEqual(tally(('SKIP', 'no browser'))[0], 1)
 
-    def test_what_can_be_installed_may_be_required(self):
+    def test_can_require_everything_that_can_be_installed(self):
         self.assertEqual(tally(('OK', UNITTEST))[0], 0)
         self.assertEqual(tally(('OK', UNITTEST), required=True)[0], 1)
         lacks_data = '[       OK ] A.B (0 ms)\n../a.cpp:1: Skipped\nTERRACE_DATA is not set\n\n' \
