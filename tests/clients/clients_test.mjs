@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// clients_test.mjs PACKAGES: tiles of terrace in CesiumJS and in another decoder, meshes in the
-// validator of glTF. TERRACE names the command, CHROMIUM the browser, TERRACE_DATA a folder with a
-// DEM of the Alps; without it the DEM is synthetic. Pictures of the globe stay in PACKAGES.
+// clients_test.mjs PACKAGES: reads terrace's tiles in CesiumJS and in another decoder, and checks
+// meshes with the glTF validator. TERRACE names the command, CHROMIUM the browser, TERRACE_DATA a
+// folder with a DEM of the Alps; without it the DEM is synthetic. Pictures of the globe are kept in
+// PACKAGES.
 
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
@@ -26,7 +27,7 @@ const NAMES = ['plain', 'extended', 'metadata', 'dateline', 'pole'];
 const sets = {};
 let browser, server, base;
 
-/// What the tiles of a set have beside their meshes.
+/// The extensions that the tiles of a set have.
 const extensionsOf = name => ({
   normals: ['extended', 'dateline', 'pole'].includes(name),
   water: ['extended', 'dateline'].includes(name),
@@ -52,7 +53,7 @@ before(async () => {
       '--water', 'nodata', '--gzip', '-q', '-o', 'extended');
   terrace(
       'tile', 'synthetic.terrace', '--vertical', 'ignore', '--metadata', '-q', '-o', 'metadata');
-  // A degree across the line of 180 degrees, with a lagoon; and 480 km around the pole.
+  // A degree across the antimeridian, with a lagoon; and 480 km around the pole.
   writeRaster(join(folder, 'dateline.tif'), {
     columns: 600,
     rows: 450,
@@ -101,18 +102,18 @@ after(async () => {
 
 for (const name of NAMES) {
   test(`the globe shows the ${name} tiles`, async () => {
-    // Of a border the client may find the tile of one side by metadata and ask that of the other,
-    // since it rounds twice: there, and everywhere else as well, both sides are asked by
-    // themselves.
+    // On a border the client rounds twice: it may find the tile on one side through metadata and
+    // then request the tile on the other. With metadata, only positions next to borders are
+    // therefore sampled, one on each side; without it, positions on borders too.
     const places = [
       ...sets[name].layer.metadataAvailability ? [] : placesOf(sets[name], 80),
       ...placesOf(sets[name], 80, {beside: true})
     ];
     assert.ok(places.length >= 200, `${places.length} places`);
-    // At the pole the client's triangles are so large that they cut through the globe: what is
-    // drawn there tells nothing of heights.
+    // At the pole, the client's triangles are so large that they cut through the globe, so the
+    // drawn picture does not show heights.
     const pictures = name === 'pole' ? undefined : join(packages, `globe-${name}`);
-    // Of the dateline's the one that begins there.
+    // For the dateline set, look at the tile that begins at the antimeridian.
     const column = name === 'dateline' ? 0 : undefined;
     const {complaints, facts} =
         await survey(browser, base, name, sets[name], places, {pictures, column});
@@ -129,7 +130,7 @@ for (const name of NAMES) {
 }
 
 Object.entries(FAULTS).forEach(([name, {complaint, drawn, of = 'plain'}], i) => {
-  test(`found: ${name}`, async () => {
+  test(`the survey finds: ${name}`, async () => {
     const set = sets[of];
     const pictures = drawn ? join(packages, `globe-fault${i}`) : undefined;
     const places = placesOf(set, 20, {beside: true});
@@ -139,13 +140,13 @@ Object.entries(FAULTS).forEach(([name, {complaint, drawn, of = 'plain'}], i) => 
 });
 
 for (const name of NAMES) {
-  test(`another decoder reads the ${name} tiles alike`, () => {
+  test(`another decoder reads the same ${name} tiles`, () => {
     const decode = load('@here/quantized-mesh-decoder');
     const set = sets[name];
     for (const key of set.tiles.keys()) {
       const mine = set.tile(...key.split('/'));
       const bytes = tileBytes(join(set.folder, `${key}.terrain`));
-      // It decodes in place, and wants a buffer of its own.
+      // The decoder works in place and needs a separate buffer.
       const theirs = (decode.default ?? decode)(new Uint8Array(bytes).buffer);
       assert.deepEqual(
           Object.values(theirs.header),
@@ -175,7 +176,7 @@ for (const name of NAMES) {
 for (const options
          of [['--max-error', '20'], ['--max-error', '20', '--quality', 'fitted'],
              ['--level', 'top'], ['--level', '0', '--to-crs', 'EPSG:32632']]) {
-  test(`the validator of glTF passes mesh ${options.join(' ')}`, async () => {
+  test(`the glTF validator accepts mesh ${options.join(' ')}`, async () => {
     const {validateBytes} = load('gltf-validator');
     terrace('mesh', 'synthetic.terrace', ...options, '-o', 'mesh.glb', '--force', '-q');
     const glb = readFileSync(join(folder, 'mesh.glb'));
@@ -183,7 +184,7 @@ for (const options
     assert.deepEqual(issues.messages.filter(({severity}) => severity < 2), []);
     assert.equal(issues.numErrors, 0);
     assert.ok(info.totalVertexCount > 100 && info.totalTriangleCount > 100, JSON.stringify(info));
-    // What is cut short is refused.
+    // A truncated file is rejected.
     const cut =
         await validateBytes(new Uint8Array(glb.subarray(0, glb.length - 8))).catch(error => error);
     assert.ok(cut instanceof Error || cut.issues.numErrors > 0);

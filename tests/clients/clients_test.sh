@@ -1,7 +1,8 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
-# clients_test.sh BUILD TEST [ARGUMENTS]: installs the clients below BUILD, unless they are there, and runs
-# in them the test: TEST FOLDER ARGUMENTS. TERRACE names the command. Exits with 77 where a client cannot be had.
+# clients_test.sh BUILD TEST [ARGUMENTS]: installs the clients below BUILD unless they exist, and
+# runs the test there: TEST FOLDER ARGUMENTS. TERRACE names the command. Exits with 77 if a client
+# cannot be installed.
 set -eu
 source=$(cd "${0%/*}" && pwd)
 build=$1 test=$2
@@ -17,11 +18,11 @@ done
 
 mkdir -p "$build/clients"
 packages=$(cd "$build/clients" && pwd)
-# One at a time.
+# Only one process installs at a time.
 exec 9> "$packages/lock"
 flock 9
 cp "$source/package.json" "$source/package-lock.json" "$packages"
-# The list of what is installed is put there last.
+# This copy is made last, so it marks a complete installation.
 if ! cmp -s "$packages/package-lock.json" "$packages/node_modules/.clients"; then
   if ! npm ci --prefix "$packages" --ignore-scripts --no-audit --no-fund --prefer-offline \
       --fetch-retries=1 --fetch-retry-mintimeout=1000 --fetch-timeout=30000 \

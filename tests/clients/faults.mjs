@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What goes wrong with sets of tiles on servers: each must be found. A fault changes what is sent
+// Faults of tile sets on servers, each of which a survey must find. A fault changes the response
 // for a path of a set.
 
 const zoomOf = path => /\.terrain$/.test(path) ? parseInt(path) : undefined;
 
-/// What goes wrong: fault(set) makes what tile_server.mjs wants, complaint is among those that a
-/// survey must make. of: the set, else the plain one.
+/// The faults by name. fault(set) returns what tile_server.mjs expects; at least one complaint of
+/// the survey must match `complaint`. of: the set, by default the plain one.
 export const FAULTS = {
   'the deepest zoom is listed and missing': {
     drawn: true,
@@ -55,7 +55,7 @@ export const FAULTS = {
       return {bytes: higher};
     },
   },
-  'metadata says nothing of the deepest zoom': {
+  'metadata omits the deepest zoom': {
     of: 'metadata',
     complaint: /^height .* off by/,
     fault: set => (path, bytes) => {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A set of tiles in CesiumJS in headless Chromium: what of it is wrong, in words.
+// Loads a set of tiles in CesiumJS in headless Chromium and reports in words what is wrong.
 //
-// tilesLoaded of the globe proves nothing: it is true while every tile fails. What counts: heights
-// that the client interpolates, its errors, its requests, the tiles that it draws, and pixels.
+// tilesLoaded of the globe proves nothing, because it is true even if every tile fails. Instead, checks
+// interpolated heights, errors, requests, the tiles that the client draws, and pixels.
 
 import {join} from 'node:path';
 
@@ -30,7 +30,8 @@ export function launch() {
   });
 }
 
-/// What a page did: requests outside this machine, refusals, errors, addresses that were answered.
+/// Events of a page: requests outside this machine, refused requests, errors, and addresses that
+/// were answered.
 class Record {
   constructor() {
     this.outside = [];
@@ -39,7 +40,7 @@ class Record {
     this.answered = new Set();
   }
 
-  /// Whether a tile was answered.
+  /// Returns whether a tile was answered.
   has(name, set, {z, x, y}) {
     return this.answered.has(join(name, `${z}/${x}/${y}.terrain?v=${set.layer.version}`));
   }
@@ -63,9 +64,9 @@ class Record {
   }
 }
 
-/// The complaints about set as it comes from base + name. places: [longitude, latitude] with the
-/// tiles that may answer. pictures: a path without ending for the views; without it nothing is
-/// drawn. column: of the tile that is looked at.
+/// Returns the complaints about the set as served from base + name. places: [longitude, latitude]
+/// with the tiles that may answer. pictures: path of the screenshots without extension; without it
+/// nothing is drawn. column: the x of the tile to look at.
 export async function survey(browser, base, name, set, places, {pictures, column} = {}) {
   const context = await browser.newContext({viewport: SIZE});
   const page = await context.newPage();
@@ -110,13 +111,13 @@ function compareSamples(set, places, heights, complain, facts) {
       const first = borders.get(border) ?? borders.set(border, here).get(border);
       const gap = Math.abs(first.height - here.height);
       facts.widest = Math.max(facts.widest, gap);
-      // Each tile rounds a height that both share. A millimetre more, and what a slope makes of the
-      // place next to the border.
+      // Each tile rounds the height that both share. The tolerance adds a millimetre and the effect
+      // of the slope next to the border.
       if (!(gap <= 2e-3 + first.rounding + rounding)) {
-        complain(`a gap of ${gap} m beside the border at ${place}`);
+        complain(`a gap of ${gap} m at the border at ${place}`);
       }
     }
-    // On a border any of the tiles may answer; interpolation has roundings of its own.
+    // On a border, any of the tiles may answer; the client's interpolation also rounds.
     const off = tiles.map(tile => {
       const {height, rounding} = set.height(tile, ...place);
       return {off: Math.abs(heights[i] - height), allowed: rounding + 1e-6};
@@ -129,11 +130,11 @@ function compareSamples(set, places, heights, complain, facts) {
   });
 }
 
-/// A tile's row from the north, as the client counts.
+/// The tile with its row counted from the north, like the client's.
 const fromNorth = ({z, x, y}) => ({z, x, row: 2 ** z - 1 - y});
 
-/// What the client knows of tiles must be so. With metadata it knows those below the tiles that it
-/// has loaded.
+/// Checks the client's list of available tiles. With metadata it knows only the tiles below those
+/// that it has loaded.
 async function compareAvailability(page, name, set, record, complain, facts) {
   const loaded = ({z, x, y}) => z === 0 || record.has(name, set, {z: z - 1, x: x >> 1, y: y >> 1});
   const tiles = tilesToAskFor(set, 300).filter(tile => !facts.extensions.metadata || loaded(tile));
@@ -144,12 +145,12 @@ async function compareAvailability(page, name, set, record, complain, facts) {
     ++facts.asked[there ? 'there' : 'missing'];
     if (answers[i] !== there)
       complain(
-          `tile ${tile.z}/${tile.x}/${tile.y} is ${there ? '' : 'not '}there; the client ` +
-          `takes it for ${answers[i]}`);
+          `tile ${tile.z}/${tile.x}/${tile.y} ${there ? 'exists' : 'does not exist'}; the client ` +
+          `considers it available: ${answers[i]}`);
   });
 }
 
-/// Normals and water masks must come as they stand in the files.
+/// Checks that normals and water masks arrive as stored in the files.
 async function compareExtensions(page, set, complain, facts) {
   if (!facts.extensions.normals && !facts.extensions.water) return;
   const tiles = set.at(set.deepest)
@@ -174,7 +175,7 @@ async function compareExtensions(page, set, complain, facts) {
 
 async function surveyView(page, set, {pictures, column}, complain, facts) {
   const view = viewOf(set, column);
-  if (!await page.evaluate(draw, view)) complain('the tiles in view were not loaded in a minute');
+  if (!await page.evaluate(draw, view)) complain('the tiles in view did not load within a minute');
   const seen = await page.evaluate(look, view);
   await page.screenshot({path: `${pictures}-heights.png`});
   if (facts.extensions.normals) {
@@ -200,7 +201,7 @@ async function surveyView(page, set, {pictures, column}, complain, facts) {
       continue;
     }
     facts.drawnVertices += u.length;
-    // The client keeps 12 bits at least.
+    // The client keeps at least 12 bits.
     const bad = vertices.findIndex((vertex, i) => {
       const mine = [u[i] / UNITS, v[i] / UNITS, height[i] / UNITS];
       const theirs = [vertex[0], vertex[1], (vertex[2] - lowest) / (highest - lowest)];
@@ -210,7 +211,7 @@ async function surveyView(page, set, {pictures, column}, complain, facts) {
   }
 
   const step = (view.highest - view.lowest) / 256;
-  // Where the height changes by more than two colours from pixel to pixel, nothing can be told.
+  // Skip pixels where the height changes by more than two colours from pixel to pixel.
   const flat = seen.pixels.filter(({spread}) => spread < 2 * step);
   facts.pixels = flat.length;
   if (flat.length < 15)
@@ -228,6 +229,6 @@ function compareRequests(name, set, places, record, complain) {
   for (const text of record.errors) complain(`console: ${text}`);
   for (const {tiles} of places) {
     if (!tiles.some(tile => record.has(name, set, tile)))
-      complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not asked for`);
+      complain(`tile ${tiles.map(({z, x, y}) => `${z}/${x}/${y}`)} was not requested`);
   }
 }

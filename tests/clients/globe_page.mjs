@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What runs in the page of globe.html, with CesiumJS as Cesium: each function by itself, arguments
-// and results are plain data.
+// Functions that run in the page of globe.html, where CesiumJS is available as Cesium. Each is
+// self-contained; arguments and results are plain data.
 
-/// A provider of the tiles.
+/// Opens a provider of the tiles and returns the extensions that it has.
 export async function open(url) {
   Cesium.Ion.defaultAccessToken = '';
   const provider = await Cesium.CesiumTerrainProvider.fromUrl(
@@ -17,7 +17,7 @@ export async function open(url) {
   };
 }
 
-/// Heights at places, [longitude, latitude] in degrees; a text where it failed.
+/// Returns the heights at [longitude, latitude] in degrees, or the error as a string.
 export async function sample(places) {
   try {
     const points = places.map(place => Cesium.Cartographic.fromDegrees(...place));
@@ -28,13 +28,13 @@ export async function sample(places) {
   }
 }
 
-/// Whether the client thinks that tiles are there: true, false or 'unknown'. Tiles by zoom, column
-/// and row from the north.
+/// Returns whether the client considers tiles available: true, false or 'unknown'. Tiles are given
+/// by zoom, column and row from the north.
 export function available(tiles) {
   return tiles.map(({z, x, row}) => window.provider.getTileDataAvailable(x, row, z) ?? 'unknown');
 }
 
-/// The extensions of tiles as the client has them, in numbers.
+/// Returns the extensions of tiles as arrays of numbers, as the client received them.
 export async function extensionsOf(tiles) {
   return Promise.all(tiles.map(async ({z, x, row}) => {
     const {_encodedNormals: normals, _waterMask: water} =
@@ -43,7 +43,7 @@ export async function extensionsOf(tiles) {
   }));
 }
 
-/// Draws the globe seen towards a place; resolves when its tiles have been there for some frames.
+/// Draws the globe seen towards a place; resolves once its tiles have been loaded for some frames.
 export async function draw({target, range, lowest, highest}) {
   const widget = new Cesium.CesiumWidget('globe', {
     terrainProvider: window.provider,
@@ -62,7 +62,7 @@ export async function draw({target, range, lowest, highest}) {
   scene.backgroundColor = Cesium.Color.fromCssColorString('#aac4dd');
   globe.showGroundAtmosphere = false;
   globe.showWaterEffect = false;
-  // Red tells the height, from 0 to 255.
+  // Red encodes the height, from 0 to 255.
   const ramp = document.createElement('canvas');
   ramp.width = 256;
   ramp.height = 1;
@@ -87,8 +87,8 @@ export async function draw({target, range, lowest, highest}) {
   }));
 }
 
-/// What was drawn: tiles, with the vertices of the deepest zoom's as the client has them (u and v
-/// to 1, metres), and at pixels the height by the colour and by the ray.
+/// Returns what was drawn: the tiles, with the client's vertices for those of the deepest zoom (u
+/// and v from 0 to 1, metres), and at sample pixels the height by colour and by ray.
 export function look({z, lowest, highest}) {
   const {scene, camera} = window.widget;
   const {globe} = scene;
@@ -130,7 +130,7 @@ export function look({z, lowest, highest}) {
   return {tiles, pixels};
 }
 
-/// The same view lit from the side, for eyes.
+/// Lights the same view from the side, for visual inspection.
 export async function light() {
   const {scene} = window.widget;
   scene.globe.enableLighting = true;

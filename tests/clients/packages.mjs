@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The packages of npm that clients_test.sh installed.
+// Loads the npm packages that clients_test.sh installed.
 
 import {createRequire} from 'node:module';
 import {join} from 'node:path';

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Places at which the heights of a set of tiles are compared, tiles that a client is asked for, and
-// where it looks.
+// Positions at which the heights of a set of tiles are compared, tiles that a client is asked
+// about, and the camera's target.
 
 const EARTH = 6371000;
 
-/// Numbers in [0, 1), always the same.
+/// Pseudo-random numbers in [0, 1), the same for each seed.
 export function* numbers(seed) {
   for (let state = seed >>> 0;;) {
     state = (Math.imul(state, 1664525) + 1013904223) >>> 0;
@@ -12,13 +12,13 @@ export function* numbers(seed) {
   }
 }
 
-/// Degrees from a border to a place beside it: a hundredth of a millimetre.
+/// Distance in degrees from a border to a position next to it: a hundredth of a millimetre.
 const BESIDE = 1e-10;
 
-/// count places anywhere in tiles of the deepest zoom, count / 2 on borders between them, and
-/// count / 2 where four of them meet: {place: [longitude, latitude], tiles}, the tiles that touch
-/// it. beside: in place of one on a border, one in each of its tiles at its very edge; they have
-/// the border's number as `border`, since their heights must be one.
+/// Returns `count` random positions in tiles of the deepest zoom, count / 2 on borders between
+/// them, and count / 2 where four of them meet: {place: [longitude, latitude], tiles}, with the
+/// tiles that touch it. With `beside`, each position on a border is replaced by one in each of its
+/// tiles, at the very edge. These share a `border` number, because their heights must be equal.
 export function placesOf(set, count, {beside = false} = {}) {
   const random = numbers(7);
   const next = () => random.next().value;
@@ -31,7 +31,7 @@ export function placesOf(set, count, {beside = false} = {}) {
     const [i, j] = [0.001 + 0.998 * next(), 0.001 + 0.998 * next()];
     places.push({place: [-180 + (x + i) * side, -90 + (y + j) * side], tiles: [{z, x, y}]});
   }
-  // Tiles that touch a place of tile x/y, each with the corner or side there as it counts it.
+  // Tiles that touch a position of tile x/y, each with that corner or side in its own coordinates.
   const touching = (x, y, i, j) => {
     const tiles = [];
     for (const [tx, ti] of i ? [[x, i]] : [[(x - 1 + around) % around, 1], [x, 0]]) {
@@ -67,7 +67,7 @@ export function placesOf(set, count, {beside = false} = {}) {
   return places;
 }
 
-/// Tiles that are there and tiles beside them that are not, at every zoom: at most count of each.
+/// Existing tiles and missing tiles next to them, at every zoom; at most `count` of each.
 export function tilesToAskFor(set, count) {
   const random = numbers(11);
   const some = list => {
@@ -92,7 +92,7 @@ export function tilesToAskFor(set, count) {
   return [...some(there), ...some(missing)];
 }
 
-/// A tile of the deepest zoom, all tiles around it there, with the most relief; and its peak.
+/// A view of the tile of the deepest zoom with the most relief that is surrounded by other tiles.
 /// column: its x.
 export function viewOf(set, column) {
   const z = set.deepest, around = 2 ** (z + 1);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tiles of quantized-mesh 1.0 read by the letter of the format.
+// Reads tiles of quantized-mesh 1.0, written from the specification.
 
 import {readdirSync, readFileSync} from 'node:fs';
 import {join} from 'node:path';
@@ -7,7 +7,7 @@ import {gunzipSync} from 'node:zlib';
 
 export const UNITS = 32767;
 
-/// The bytes of a tile's file as a client gets them.
+/// The bytes of a tile's file as a client receives them.
 export function tileBytes(path) {
   const bytes = readFileSync(path);
   return bytes[0] === 0x1f && bytes[1] === 0x8b ? gunzipSync(bytes) : bytes;
@@ -62,7 +62,7 @@ export function decodeTile(bytes) {
   return tile;
 }
 
-/// The height at (u, v), between 0 and UNITS; undefined where no triangle is.
+/// The height at (u, v), between 0 and UNITS; undefined if no triangle covers it.
 export function heightAt(tile, u, v) {
   const {triangles} = tile;
   for (let t = 0; t < triangles.length; t += 3) {
@@ -71,7 +71,7 @@ export function heightAt(tile, u, v) {
         (tile.u[j] - tile.u[i]) * (v - tile.v[i]) - (tile.v[j] - tile.v[i]) * (u - tile.u[i]);
     const [over, right, left] = [side(b, c), side(c, a), side(a, b)];
     const whole = over + right + left;
-    // A point on an edge may come out on the wrong side of both triangles.
+    // Rounding may put a point on an edge outside both triangles.
     if (Math.min(over, right, left) < -1e-9 * whole) continue;
     const height = (over * tile.height[a] + right * tile.height[b] + left * tile.height[c]) / whole;
     return tile.lowest + (tile.highest - tile.lowest) * height / UNITS;
@@ -79,12 +79,12 @@ export function heightAt(tile, u, v) {
   return undefined;
 }
 
-/// A folder of tiles in the two squares of geographic coordinates.
+/// A folder of tiles in the geographic tiling scheme, with two tiles at zoom 0.
 export class TileSet {
   constructor(folder) {
     this.folder = folder;
     this.layer = JSON.parse(readFileSync(join(folder, 'layer.json'), 'utf8'));
-    this.tiles = new Map();  // 'z/x/y' to the tile; undefined until it is read
+    this.tiles = new Map();  // 'z/x/y' to the tile; undefined until read
     for (const name of readdirSync(folder, {recursive: true})) {
       if (name.endsWith('.terrain')) this.tiles.set(name.slice(0, -'.terrain'.length), undefined);
     }
@@ -120,7 +120,7 @@ export class TileSet {
     throw new Error(`no tile at ${longitude}, ${latitude}`);
   }
 
-  /// Height in tile z/x/y at a place in it, and half of what its heights are rounded to.
+  /// The height in tile z/x/y at a position in it, and half of its height step.
   height({z, x, y}, longitude, latitude) {
     const side = 180 / 2 ** z;
     const tile = this.tile(z, x, y);

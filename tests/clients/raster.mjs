@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Elevation models at places that nobody's are at hand of.
+// Writes elevation models at places for which the tests have no real data.
 
 import {writeFileSync} from 'node:fs';
 
@@ -9,8 +9,8 @@ export const GEOGRAPHIC =
 export const ARCTIC =
     [1, 1, 0, 4, 1024, 0, 1, 1, 1025, 0, 1, 1, 3072, 0, 1, 3413, 3076, 0, 1, 9001];
 
-/// A GeoTIFF of float32 in one strip, cells of one side from its north-western corner on:
-/// height(column, row), NaN where there is no data.
+/// Writes a GeoTIFF of float32 in one strip with square cells, starting at its north-western
+/// corner. height(column, row) returns NaN where there is no data.
 export function writeRaster(path, {columns, rows, west, north, cell, keys, height}) {
   const heights = new Float32Array(columns * rows);
   for (let row = 0; row < rows; ++row) {
@@ -51,7 +51,7 @@ export function writeRaster(path, {columns, rows, west, north, cell, keys, heigh
   writeFileSync(path, Buffer.concat([head, body, ...beside, directory]));
 }
 
-/// Hills and ridges, some hundred metres high: a height for columns and rows.
+/// Hills and ridges some hundred metres high: the height at a column and row.
 export function hills(column, row) {
   return 600 + 250 * Math.sin(column / 9 + row / 31) * Math.cos(row / 13) +
       120 * Math.sin(column / 3.7) * Math.sin(row / 4.3 + column / 50) +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A server of static files on this machine: the clients, the page, and folders of tiles, some of
+// A local server of static files: the client libraries, the page, and folders of tiles, some of
 // them with a fault.
 
 import {createReadStream, readFileSync, statSync} from 'node:fs';
@@ -22,7 +22,7 @@ const TYPES = {
 const isGzip = bytes => bytes.length > 1 && bytes[0] === 0x1f && bytes[1] === 0x8b;
 
 /// Serves mounts (/name/ to {folder, fault}) on a free port of 127.0.0.1; resolves to the server.
-/// fault(path, bytes): what is sent in place of bytes, {status, bytes, encoding} where it differs.
+/// fault(path, bytes) returns the changes to the response, {status, bytes, encoding}.
 export function serve(mounts) {
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://localhost').pathname));
