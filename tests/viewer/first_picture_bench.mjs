@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// first_picture_bench.mjs PACKAGES [STORE [ROUNDS]]: milliseconds from navigation until the first picture of a store is on
-// the screen of headless Chromium, in a browser that has just been started and in one that has shown a page before; medians.
-// TERRACE names the command, CHROMIUM the browser. Without STORE a made raster of 8192 x 8192 cells.
+// first_picture_bench.mjs PACKAGES [STORE [ROUNDS]]: measures milliseconds from navigation until
+// the first picture of a store is on the screen of headless Chromium, in a new browser and in one
+// that has shown a page before; prints medians. TERRACE names the command, CHROMIUM the browser.
+// Without STORE, uses a synthetic raster of 8192 x 8192 cells.
 import {spawn, spawnSync} from 'node:child_process';
 import {mkdtempSync, rmSync} from 'node:fs';
 import {tmpdir} from 'node:os';
@@ -21,7 +22,7 @@ function made() {
 }
 const median = values => values.sort((a, b) => a - b)[Math.floor(values.length / 2)];
 
-/// Milliseconds until two frames after the first triangles or points have come.
+/// Milliseconds until two frames after the first triangles or points arrived.
 async function firstPicture(browser, url) {
   const context = await browser.newContext({viewport: {width: 960, height: 600}});
   const page = await context.newPage();
@@ -61,7 +62,7 @@ try {
     warm.push(await firstPicture(browser, url));
     await browser.close();
   }
-  console.log(`first picture after ${median(fresh).toFixed(0)} ms in a browser just started, ${median(warm).toFixed(0)} ms later on (medians of ${rounds})`);
+  console.log(`first picture after ${median(fresh).toFixed(0)} ms in a new browser, ${median(warm).toFixed(0)} ms later on (medians of ${rounds})`);
 } finally {
   server?.kill();
   rmSync(folder, {recursive: true, force: true});

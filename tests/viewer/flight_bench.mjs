@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// flight_bench.mjs [PACKAGES [STORE]]: what a frame takes in the viewer's worker, in node and in headless Chromium, and
-// what a flight fetches. TERRACE names the command, CHROMIUM the browser; without it and PACKAGES (npm's, with
-// playwright-core) node alone is measured. STORE: a store, or a published folder, whose first store is taken; without it a made
-// raster of 8192 x 8192 cells.
+// flight_bench.mjs [PACKAGES [STORE]]: measures the frames of the viewer's worker, in node and in headless Chromium,
+// and the data that a flight fetches. TERRACE names the command, CHROMIUM the browser; without CHROMIUM and PACKAGES
+// (npm's, with playwright-core) only node is measured. STORE is a store, or a published folder, whose first store is
+// used; without it, a synthetic raster of 8192 x 8192 cells.
 //
-// The first flight keeps 500,000 points in the mean, 600 pictures at 60 a second; TERRACE_BENCH_ERROR: the pixels of error
-// for that, as an earlier run has found and printed them; then it is flown twice. The second goes down from the whole to full detail of 1 % of the
-// area; where answers come late, 30 frames a second. Times are of the worker (the model's step, normals, slides and copies of what
-// has changed), measured by the worker itself, seconds those from the last view to full detail, bytes those of requests, the start
-// file included, against the stored bytes of all clusters read; start file, pages of the index and clusters are shares of the ratio.
+// The first flight keeps 500,000 points on average in 600 pictures at 60 per second. It is flown twice if
+// TERRACE_BENCH_ERROR gives the pixel error that an earlier run found and printed. The second flight goes down from
+// the whole to full detail of 1 % of the area, at 30 frames per second if answers are delayed. The worker measures its
+// own times (the model's step, normals, slides, and copies of the changes). Seconds count from the last view to full
+// detail. Bytes are those of requests, start file included, compared with the stored bytes of all clusters read; the
+// columns for the start file, the index and clusters are shares of that ratio.
 import {existsSync, mkdtempSync, readFileSync, rmSync, statSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join, resolve} from 'node:path';
@@ -53,7 +54,7 @@ async function inChromium(browser, url, call, ...args) {
   }
 }
 
-/// Bytes of the requests for files with this ending.
+/// Bytes of the requests for files with this extension.
 function fetched(log, ending) {
   let bytes = 0;
   for (const {path, range} of log.filter(request => request.path.endsWith(ending))) {
@@ -82,7 +83,7 @@ try {
   }
   const {name} = JSON.parse(readFileSync(join(site, 'stores.json'), 'utf8')).stores[0];
 
-  // A log of each flight: the worker of the one before may go on for a while.
+  // Each flight has its own log, because the previous flight's worker may continue for a while.
   let files;
   const inNodeAfter = latency => (fly, ...args) => {
     files = folderFetch(site, undefined, latency);

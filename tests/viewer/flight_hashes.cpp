@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// flight_hashes STORE MAX_POINTS [surface]: flies over a store and prints for each stop, as a line
-// of JSON, the camera and the hash of what is shown once the view has settled. The same flight in
-// the browser's core must give the same. surface: where the store is taken for a scan, its surface
-// is shown, computed from scratch at each stop.
+// flight_hashes STORE MAX_POINTS [surface]: flies over a store. For each stop, prints the camera
+// and the hash of the settled view as a line of JSON. The same flight in the browser's core must
+// give the same hashes. surface: for a store taken for a scan, shows its surface, computed from
+// scratch at each stop.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -34,7 +34,8 @@ int fly(const stream::Store& store, std::size_t max_points) {
   box.include(view.in_view_frame(store.bounds().max));
   const double size =
       std::sqrt(std::pow(box.max[0] - box.min[0], 2) + std::pow(box.max[1] - box.min[1], 2));
-  // Shares of the size from the middle, above the highest point; ways to look; pixels of error.
+  // Offset from the centre and height above the highest point as fractions of the size, direction of
+  // view, pixels of error.
   struct Stop {
     double east, north, above;
     tri::Point3 direction;
@@ -78,7 +79,7 @@ int main(int arguments, char** values) {
     const std::size_t max_points = std::strtoull(values[2], nullptr, 10);
     if (surface) {
       const auto ground = terrain::StoreView<tri::PointCloud>(store).ground();
-      if (!terrain::is_scan(store, ground)) throw std::invalid_argument("the store is no scan");
+      if (!terrain::is_scan(store, ground)) throw std::invalid_argument("the store is not a scan");
       return fly<tri::DynamicSurface<std::int32_t>>(store, max_points);
     }
     return store.schema().grid ? fly<std::int32_t>(store, max_points)

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Drives the viewer's worker: sends views, waits for answers, flies. Imports nothing, so that it runs in node and in a page.
+// Drives the viewer's worker: sends views, waits for answers, flies. It has no imports, so it runs in node and in a page.
 
-/// A worker with its answers to wait for.
+/// Sends messages to a worker and waits for its answers.
 export class Flyer {
-  /// connect(heard): starts worker.js, returns {tell(message)}; heard takes what it says. base: the URL of a published
-  /// folder. name: of a store in it; choose: as in messages.ts.
+  /// connect(heard): starts worker.js and returns {tell(message)}; `heard` receives its messages.
+  /// base: the URL of a published folder. name: a store in it. choose: as in messages.ts.
   constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, choose = false, heard = () => {}} = {}) {
     this.serial = 0;
     this.waiting = [];
@@ -24,11 +24,11 @@ export class Flyer {
       maxPoints
     });
   }
-  /// The next message that fits.
+  /// Resolves to the next message that fits.
   until(fits, seconds = 120) {
     return new Promise((resolve, reject) => {
       const timer =
-          setTimeout(() => reject(new Error(`waited in vain; last: ${JSON.stringify(this.last?.state)}`)), seconds * 1000);
+          setTimeout(() => reject(new Error(`timed out waiting for a message; last frame: ${JSON.stringify(this.last?.state)}`)), seconds * 1000);
       this.waiting.push(message => {
         if (!fits(message)) return false;
         clearTimeout(timer);
@@ -40,7 +40,8 @@ export class Flyer {
   opened() {
     return this.until(message => message.type === 'opened');
   }
-  /// Sends a view and waits for its first frame, or for the one after which nothing changes any more.
+  /// Sends a view and waits for its first frame or, if `settled`, for the frame after which nothing
+  /// changes.
   view(camera, settled = true) {
     const serial = ++this.serial;
     const done = this.until(m => m.type === 'frame' && m.serial === serial && (!settled || m.state.settled));
@@ -55,13 +56,13 @@ const picture = {fov: FOV, aspect: 1.6, height: 1000, up: [0, 1, 0]};
 const sizeOf = box => Math.hypot(box[3] - box[0], box[4] - box[1]);
 const middleOf = box => [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2];
 
-/// Milliseconds from one picture of a flight to the next.
+/// Milliseconds between the pictures of a flight.
 const PICTURE = 1000 / 60;
 
-/// Level flight over the middle, looking ahead and down, there and back, each picture 0.25 % of its width further and 1/60 s
-/// after the one before, with so small an error that `points` are kept in the mean: found by flights before the one that
-/// counts, unless it is given. Returns the milliseconds of the worker's frames, the mean number of points, and the error in
-/// pixels.
+/// Flies level over the centre, looking ahead and down, back and forth. Each picture is 1/60 s
+/// after the previous one and moves by 0.25 % of its width. Without `error`, trial flights find the
+/// error at which `points` points are kept on average. Returns the milliseconds of the worker's
+/// frames, the mean number of points, and the error in pixels.
 export async function cruise(connect, base, name, points, frames, error) {
   let milliseconds = [];
   const flyer = new Flyer(connect, base, name, {
@@ -91,7 +92,7 @@ export async function cruise(connect, base, name, points, frames, error) {
     return mean;
   };
   if (error) {
-    await fly(error);  // by then all code is compiled
+    await fly(error);  // compiles all code first
     return {points: Math.round(await fly(error)), milliseconds, error};
   }
   error = 64;
@@ -108,8 +109,9 @@ export async function cruise(connect, base, name, points, frames, error) {
   return {milliseconds, points: Math.round(mean), error};
 }
 
-/// From above the whole down to full detail of 1 % of the area in 60 frames, each of at least `pace` milliseconds. Returns
-/// the state and the statistics of the last frame, and the seconds from the last view to it.
+/// Flies from above the whole store down to full detail of 1 % of the area in 60 frames of at least
+/// `pace` milliseconds each. Returns the state and statistics of the last frame, and the seconds
+/// from the last view to it.
 export async function dive(connect, base, name, pace = 0) {
   const flyer = new Flyer(connect, base, name);
   const {scene: {box}} = await flyer.opened();

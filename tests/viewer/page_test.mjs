@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// page_test.mjs PACKAGES: the viewer in headless Chromium over published stores and over `terrace view`. TERRACE names
-// the command, FLIGHT_HASHES the native flight, CHROMIUM the browser. Pictures stay in PACKAGES.
+// page_test.mjs PACKAGES: tests the viewer in headless Chromium over published stores and over
+// `terrace view`. TERRACE names the command, FLIGHT_HASHES the native flight, CHROMIUM the browser.
+// Pictures are kept in PACKAGES.
 import assert from 'node:assert/strict';
 import {spawn, spawnSync} from 'node:child_process';
 import {writeFileSync} from 'node:fs';
@@ -28,7 +29,7 @@ after(async () => {
   sites.remove();
 });
 
-/// A page that must not ask for anything elsewhere; `errors` is what its console complains of.
+/// Opens a page that must not request anything elsewhere; `errors` lists the errors on its console.
 async function open(hash = '', {url = site.url, size = {width: 720, height: 450}, dark = false, settle = true} = {}) {
   const context = await browser.newContext({viewport: size, colorScheme: dark ? 'dark' : 'light'});
   const page = await context.newPage();
@@ -53,13 +54,13 @@ async function settled(page) {
   }
 }
 const state = page => page.evaluate(() => window.terrace?.state);
-/// The rows of the panel of a place, once the store has told what it holds there.
+/// The rows of the panel of a place, once the store has been read there.
 async function place(page) {
   await page.waitForSelector('#place:not([hidden])');
   await page.waitForFunction(() => !/reading/.test(document.getElementById('place-text').textContent));
   return Object.fromEntries(await page.$$eval('#place-text dt', dts => dts.map(dt => [dt.textContent, dt.nextElementSibling.textContent])));
 }
-/// The texts and the line of the profile.
+/// The labels and the path of the profile.
 async function profile(page) {
   await page.waitForSelector('#profile:not([hidden])');
   return page.evaluate(() => [
@@ -68,7 +69,7 @@ async function profile(page) {
   ]);
 }
 
-/// Colours of the picture at some places, 0 to 255.
+/// Colours of the picture at some positions, 0 to 255.
 const pixels = (page, places) => page.evaluate(places => {
   const canvas = document.getElementById('picture'), gl = canvas.getContext('webgl2');
   return places.map(([x, y]) => {
@@ -78,7 +79,7 @@ const pixels = (page, places) => page.evaluate(places => {
   });
 }, places);
 
-test('a DEM: coarse, then fine, by ranges alone, as the native run', async () => {
+test('a DEM: refines by range requests alone, like the native run', async () => {
   site.log.length = 0;
   const {page, errors, outside, close} = await open('#s=alps&q=16');
   assert.equal(await page.title(), 'alps · terrace');
@@ -92,11 +93,11 @@ test('a DEM: coarse, then fine, by ranges alone, as the native run', async () =>
   }
   const data = site.log.filter(({path}) => path.startsWith('/stores/')).reduce((sum, {bytes}) => sum + bytes, 0);
   assert.equal((await state(page)).bytes, data);
-  // Within its budget: a quarter of the store at this error, and no range twice.
+  // Within its budget: a quarter of the store at this error, and each range once.
   assert.ok(data < 600_000, `${data} bytes`);
   const ranges = site.log.filter(({range}) => range !== null).map(({path, range}) => path + range);
   assert.equal(new Set(ranges).size, ranges.length);
-  // Software that draws a million triangles takes minutes; the worker's test flies all of it.
+  // Drawing a million triangles in software takes minutes; the worker's test flies the whole path.
   for (const stop of sites.flight('alps', {maxPoints: MAX_POINTS}).slice(0, 1)) {
     await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
     await settled(page);
@@ -108,19 +109,19 @@ test('a DEM: coarse, then fine, by ranges alone, as the native run', async () =>
   await close();
 });
 
-test('the picture: land in its colours, sky around it, heights where one clicks, a link that restores it', async () => {
+test('the picture: land in colour, sky around it, heights on click, a link that restores it', async () => {
   const {page, errors, close} = await open('#s=alps&q=16', {size: {width: 960, height: 600}});
   await page.waitForTimeout(600);
   const land = await pixels(page, [[0.5, 0.5], [0.45, 0.6], [0.55, 0.4], [0.5, 0.7]]);
   const [sky] = await pixels(page, [[0.02, 0.5]]);
   assert.ok(sky.every(c => c > 200), `sky ${sky}`);
   for (const colour of land) {
-    assert.ok(Math.hypot(...colour.map((c, i) => c - sky[i])) > 60, `land ${colour} like the sky`);
+    assert.ok(Math.hypot(...colour.map((c, i) => c - sky[i])) > 60, `land ${colour} is like the sky`);
   }
-  assert.ok(new Set(land.map(String)).size >= 3, 'the land is of one colour');
+  assert.ok(new Set(land.map(String)).size >= 3, 'the land has too few colours');
   await page.screenshot({path: join(packages, 'viewer-light.png')});
 
-  // The legend's colour of a height is that of the pixel: by level there is no light from the side.
+  // A click on the land shows its position and height.
   await page.mouse.click(480, 330);
   const rows = () => place(page), first = await rows();
   assert.ok(Number(first.Longitude) > 8 && Number(first.Longitude) < 9, JSON.stringify(first));
@@ -144,13 +145,13 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   await settled(page);
   await page.mouse.click(400, 330);
   await page.waitForTimeout(200);
-  // By hand: a cluster more, and back.
+  // Expand a cluster manually, and collapse it again.
   for (let x = 400; (await rows()).Cluster[0] !== '0'; x += 7) {
     assert.ok(x < 600, 'no point of level 0 is shown');
     await page.mouse.click(x, 330);
     await page.waitForTimeout(100);
   }
-  // What belongs to the cluster is outlined, and the surface between the two places is drawn.
+  // The members of the cluster are outlined, and the profile between the two places is drawn.
   await page.waitForFunction(() => window.terrace.state.outlined >= 3);
   await page.waitForSelector('#profile:not([hidden])');
   const [drawn, lowest, highest] = await page.evaluate(() => [
@@ -181,39 +182,39 @@ test('the picture: land in its colours, sky around it, heights where one clicks,
   await close();
 });
 
-/// What the command says of a place of the CRS.
+/// The command's answer at a position in the CRS.
 function sampled(store, x, y) {
   const {stdout} = spawnSync(process.env.TERRACE, ['sample', store, '-q'], {cwd: sites.folder, encoding: 'utf8', input: `x,y\n${x},${y}\n`});
   return number(stdout.split('\n')[1].split(',')[2]);
 }
 const number = text => text === '' ? NaN : Number(text);
 
-test('a click reads the store, not what is drawn: heights and profiles that are true and stay', async () => {
+test('a click reads the store, not the drawn surface: heights and profiles are exact and stay', async () => {
   for (const name of ['alps', 'hills']) {
     const {page, errors, close} = await open(`#s=${name}&q=32`, {size: {width: 960, height: 600}});
     const before = await state(page);
-    const told = [];
-    // Two places one after the other. Where there are no data nothing is met, or the panel says so.
-    for (let i = 0; told.length < 2; ++i) {
-      assert.ok(i < 60, 'no places are met');
+    const clicked = [];
+    // Two consecutive places. Where there is no data, nothing is picked or the panel says so.
+    for (let i = 0; clicked.length < 2; ++i) {
+      assert.ok(i < 60, 'no places are picked');
       await page.mouse.click(400 + 13 * (i % 12), 280 + 37 * (i % 5));
       await page.waitForTimeout(250);
       if (!await page.isVisible('#place')) {
-        told.length = 0;
+        clicked.length = 0;
         continue;
       }
       const rows = await place(page), east = rows.Longitude ?? rows.East, north = rows.Latitude ?? rows.North;
-      // The place is shown to a tenth of a metre.
+      // The panel shows positions to a tenth of a metre.
       const height = sampled(`${name}.store`, east, north);
       if (rows.Height === 'no data') {
         assert.ok(Number.isNaN(height), `no data at ${east} ${north}`);
-        told.length = 0;
+        clicked.length = 0;
         continue;
       }
       assert.ok(Math.abs(parseFloat(rows.Height) - height) < 0.5, `${rows.Height} for ${height} at ${east} ${north}`);
-      told.push([east, north]);
+      clicked.push([east, north]);
     }
-    const shown = await profile(page), line = told.flat().join();
+    const shown = await profile(page), line = clicked.flat().join();
     const {stdout} = spawnSync(process.env.TERRACE, ['profile', `${name}.store`, '--line', line, '-o', '-', '-q'], {cwd: sites.folder, encoding: 'utf8'});
     const rows = stdout.trim().split('\n').slice(1).map(row => row.split(',').map(number));
     const heights = rows.map(row => row[3]).filter(height => !Number.isNaN(height));
@@ -233,7 +234,7 @@ test('a click reads the store, not what is drawn: heights and profiles that are 
   }
 });
 
-test('what data say is text: no markup of a store gets into the page, and none would run', async () => {
+test('texts of a store stay text: no markup gets into the page, and none would run', async () => {
   const name = '<img src=x onerror=document.title=1>';
   const points = Array.from({length: 3600}, (_, i) => `${i % 60},${Math.floor(i / 60)},0,${i}`);
   writeFileSync(join(sites.folder, 'marked.csv'), `x,y,z,${name}\n${points.join('\n')}\n`);
@@ -272,14 +273,14 @@ test('lines have the colours of levels, from violet at the top to yellow', async
     await close();
     return seen.reduce((sum, [r, , b]) => sum + r - b, 0) / seen.length;
   };
-  // Of the one coarse levels are seen, of the other all points.
+  // The first store shows coarse levels, the second all points.
   for (const [hash, turn] of [['s=alps&q=32&c=height', -1], [`s=${'bunny' in sites.real ? 'bunny' : 'ball'}&q=1&c=grey`, 1]]) {
     const plain = await warmth(hash), lines = await warmth(`${hash}&w=1`);
-    assert.ok(turn * (lines - plain) > 3, `${hash}: red less blue is ${plain} without lines, ${lines} with them`);
+    assert.ok(turn * (lines - plain) > 3, `${hash}: red minus blue is ${plain} without lines, ${lines} with them`);
   }
 });
 
-test('a scan: its surface from all sides, as points and back, a link that restores it', async () => {
+test('a scan: its surface from all sides, switching to points and back, a link that restores it', async () => {
   const name = 'bunny' in sites.real ? 'bunny' : 'ball';
   const {page, errors, outside, close} = await open(`#s=${name}&q=2`, {size: {width: 900, height: 600}});
   const first = await state(page);
@@ -288,7 +289,7 @@ test('a scan: its surface from all sides, as points and back, a link that restor
   assert.equal(await page.isChecked('input[value=grey]'), true);
   assert.ok(!await page.isVisible('#by-slope'));
   const [sky] = await pixels(page, [[0.02, 0.5]]);
-  // Grey in many shades from wherever one looks, below as well.
+  // Many shades of grey from every side, also from below.
   for (const drag of [[0, 0], [250, 0], [250, 0], [0, -260], [0, 500]]) {
     await page.mouse.move(450, 300);
     await page.mouse.down();
@@ -305,7 +306,7 @@ test('a scan: its surface from all sides, as points and back, a link that restor
     const coloured = shown.filter(([r, g, b]) => Math.abs(r - g) > 8 || Math.abs(g - b) > 12);
     assert.ok(coloured.length <= 6, `not grey: ${coloured.join(' | ')} after ${drag}`);
   }
-  assert.ok((await state(page)).camera.tilt > 60, 'it cannot be turned that far');
+  assert.ok((await state(page)).camera.tilt > 60, 'it cannot be tilted that far');
   await page.mouse.click(450, 300);
   await page.waitForSelector('#place:not([hidden])');
   assert.deepEqual(await page.$$eval('#place-text dt', dts => dts.slice(0, 5).map(dt => dt.textContent)), ['X', 'Y', 'Z', 'Level', 'Cluster']);
@@ -338,7 +339,7 @@ test('a scan: its surface from all sides, as points and back, a link that restor
   await close();
 });
 
-// Much of what follows is waiting: for servers, and for what is drawn by software.
+// Most of the time these wait for servers and for software rendering.
 describe('pages side by side', {concurrency: 3}, () => {
   test('a flight over a raster of cocircular points gives the hashes of the native run', async () => {
     const {page, errors, close} = await open('#s=flat&q=32');
@@ -352,7 +353,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('a level that is shown everywhere, and the link keeps it', async () => {
+  test('a fixed level is shown everywhere, and the link keeps it', async () => {
     const {page, errors, close} = await open('#s=flat&q=32');
     const coarse = (await state(page)).points;
     await page.focus('#level');
@@ -374,10 +375,10 @@ describe('pages side by side', {concurrency: 3}, () => {
   for (const name of ['bunny', 'autzen']) {
     test(`real data: ${name}`, {skip: name in sites.real ? false : 'TERRACE_DATA has no such file'}, async () => {
       const {page, errors, outside, close} = await open(`#s=${name}&q=32`);
-      // Over the bunny the worker's test flies further.
+      // The worker's test flies further over the bunny.
       const stops = name === 'bunny' && !process.env.TERRACE_NIGHTLY ? 1 : 3;
       const flight = sites.flight(name, {maxPoints: MAX_POINTS, kind: name === 'bunny' ? 'surface' : 'points'}).slice(0, stops);
-      // The native flight begins with nothing expanded.
+      // The native flight starts with no cluster expanded.
       for (const stop of [{...flight[0], error: 1e6, points: null}, ...flight]) {
         await page.evaluate(({eye, direction, error}) => window.terrace.fly(eye, direction, 1.5, 800, error), stop);
         await settled(page);
@@ -393,7 +394,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     });
   }
 
-  test('a slow server: never blank, no message, and all there in the end', async () => {
+  test('a slow server: never blank, no message, and complete in the end', async () => {
     const server = await serveSite(sites.site);
     server.fault = ({range}) => range === null ? null : 'slow';
     const {page, errors, close} = await open('#s=alps&q=8', {url: server.url, settle: false});
@@ -425,7 +426,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     }));
     await page.goto(`${site.url}#s=alps&q=8`);
     assert.equal(await page.evaluate(() => window.atFirst), 'hidden');
-    await page.waitForSelector('#progress');  // to be seen
+    await page.waitForSelector('#progress');  // waits until it is visible
     assert.ok(await page.isVisible('#head'));
     assert.equal(await page.evaluate(() => window.terrace?.state.points ?? 0), 0);
     answer();
@@ -438,7 +439,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await quick.close();
   });
 
-  test('a phone and a cloud', async () => {
+  test('a cloud on a phone', async () => {
     const {page, errors, close} = await open('#s=cloud', {size: {width: 390, height: 760}});
     assert.equal((await state(page)).triangles, 0);
     assert.ok((await state(page)).points > 1000);
@@ -456,7 +457,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('the worker is at work before WebGL starts', async () => {
+  test('the worker starts before WebGL', async () => {
     const context = await browser.newContext();
     const page = await context.newPage();
     await page.addInitScript(() => {
@@ -480,7 +481,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await context.close();
   });
 
-  test('all is seen at first, between the panels, at any size', async () => {
+  test('the first view shows everything between the panels, at any size', async () => {
     for (const size of [{width: 1100, height: 500}, {width: 700, height: 700}, {width: 390, height: 760}]) {
       for (const name of ['flat', 'ball']) {
         const {page, errors, close} = await open(`#s=${name}&q=32`, {size});
@@ -495,7 +496,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     }
   });
 
-  test('few points, one row of cells, a single cell: seen, and met by a click', async () => {
+  test('few points, one row of cells, a single cell: visible, and picked by a click', async () => {
     for (const [name, points] of Object.entries({point: 1, three: 3, cell: 1, row: 60})) {
       const {page, errors, close} = await open(`#s=${name}`, {size: {width: 600, height: 400}});
       assert.equal((await state(page)).points, points);
@@ -518,17 +519,17 @@ describe('pages side by side', {concurrency: 3}, () => {
     }
   });
 
-  test('a plain without relief is of one colour', async () => {
+  test('a plain without relief has one colour', async () => {
     const {page, errors, close} = await open('#s=plain', {size: {width: 600, height: 400}});
     const shown = await pixels(page, Array.from({length: 400}, (_, i) => [0.4 + 0.2 * (i % 20) / 20, 0.45 + 0.2 * Math.floor(i / 20) / 20]));
     const spread = Math.max(...[0, 1, 2].map(c => Math.max(...shown.map(colour => colour[c])) - Math.min(...shown.map(colour => colour[c]))));
-    // But for the haze.
+    // Except for the haze.
     assert.ok(spread < 12, `colours differ by ${spread}`);
     assert.deepEqual(errors, []);
     await close();
   });
 
-  test('a small scan at a great height is drawn, and its profile has digits that tell', async () => {
+  test('a small scan at a great height is drawn, and its profile has enough digits', async () => {
     const {page, errors, close} = await open('#s=high&q=1', {size: {width: 700, height: 600}});
     assert.equal((await state(page)).kind, 'surface');
     const [sky, ...body] = await pixels(page, [[0.02, 0.5], ...Array.from({length: 100}, (_, i) => [0.45 + 0.1 * (i % 10) / 10, 0.45 + 0.1 * Math.floor(i / 10) / 10])]);
@@ -546,7 +547,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('a place of a small cloud has digits enough, in the link as well, and a long name leaves room for them', async () => {
+  test('places in a small cloud have enough digits, also in links, and long names leave room for them', async () => {
     const {page, errors, close} = await open('#s=long', {size: {width: 900, height: 600}});
     await page.focus('#picture');
     for (let i = 0; i < 9; ++i) await page.keyboard.press('+');
@@ -575,13 +576,13 @@ describe('pages side by side', {concurrency: 3}, () => {
     await page.waitForSelector('#place:not([hidden])');
     const first = page.locator('#place-text dd').first();
     assert.match(await first.textContent(), /^0\.(1234|2345|3000)\d+$/);
-    assert.ok((await first.boundingBox()).height < 30, 'a number is broken into lines');
+    assert.ok((await first.boundingBox()).height < 30, 'a number wraps');
     assert.deepEqual([...errors, ...again.errors], []);
     await again.close();
     await close();
   });
 
-  test('a link to a store that is not there says so, one to nowhere shows all, and the way back leads to the store before', async () => {
+  test('links to a missing store say so, links to nowhere show everything, and Back returns to the previous store', async () => {
     const {page, errors, close} = await open('#s=gone&v=0,0,0,0,42,1&q=32', {size: {width: 600, height: 400}});
     assert.match(await page.textContent('#notice'), /“gone”/);
     const {camera} = await state(page);
@@ -598,7 +599,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('when the graphics driver comes back, so does the view', async () => {
+  test('the view is restored with the graphics context', async () => {
     const {page, close} = await open('#s=three', {size: {width: 600, height: 400}});
     await page.keyboard.press('Tab');
     await page.keyboard.press('e');
@@ -616,7 +617,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('all stays in sight when the window changes, until one moves', async () => {
+  test('everything stays in view when the window is resized, until the user moves', async () => {
     const {page, close} = await open('#s=cloud', {size: {width: 900, height: 500}});
     const before = (await state(page)).camera.distance;
     await page.setViewportSize({width: 400, height: 500});
@@ -632,7 +633,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('a store of triangles is no scan: a point for each, and the status says so', async () => {
+  test('a store of triangles is not a scan: it shows a point for each, and the status says so', async () => {
     const {page, errors, close} = await open('#s=corners');
     assert.equal((await state(page)).kind, 'points');
     assert.match(await page.textContent('#status'), /triangles, the first corner of each/);
@@ -640,14 +641,14 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('a page from the disk says what it needs', async () => {
+  test('a page opened from the disk says what it needs', async () => {
     const {page, close} = await open('', {url: `file://${sites.site}/index.html`, settle: false});
     await page.waitForSelector('#message:not([hidden])');
     assert.match(await page.textContent('#message-text'), /web server/);
     await close();
   });
 
-  test('by keyboard alone: looks, reads the middle, expands and collapses a cluster', async () => {
+  test('keyboard alone moves the view, reads the centre, expands and collapses a cluster', async () => {
     const {page, errors, close} = await open('#s=flat&q=32', {size: {width: 800, height: 600}});
     await page.keyboard.press('Tab');
     assert.equal(await page.evaluate(() => document.activeElement.id), 'picture');
@@ -672,7 +673,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await close();
   });
 
-  test('two fingers zoom, one moves, a tap reads a point', async () => {
+  test('two fingers zoom, one finger moves, a tap reads a point', async () => {
     const context = await browser.newContext({viewport: {width: 390, height: 760}, hasTouch: true, isMobile: true});
     const page = await context.newPage();
     await page.goto(`${site.url}#s=flat&q=32`);
@@ -697,7 +698,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     await context.close();
   });
 
-  test('a cloud by its colours, classes and intensities', async () => {
+  test('a cloud in its colours, classes and intensities', async () => {
     const {page, errors, close} = await open('#s=cloud', {size: {width: 900, height: 600}});
     const spots = Array.from({length: 400}, (_, i) => [0.3 + 0.4 * (i % 20) / 20, 0.4 + 0.25 * Math.floor(i / 20) / 20]);
     const seen = async () => {
@@ -712,7 +713,7 @@ describe('pages side by side', {concurrency: 3}, () => {
       });
       return {red, blue};
     };
-    // It comes in its own colours: red in the west, blue in the east.
+    // It opens in its own colours: red in the west, blue in the east.
     assert.equal(await page.isChecked('input[value=rgb]'), true);
     assert.ok(!await page.isVisible('#by-slope'));
     const {red, blue} = kinds(await seen());
@@ -727,18 +728,18 @@ describe('pages side by side', {concurrency: 3}, () => {
     const classed = await seen(), of = (colour, near) => classed.filter(c => Math.hypot(...c.map((v, i) => v - colour[i])) < near).length;
     assert.equal(kinds(classed).red.length, 0);
     // Ground is brown, water is blue.
-    assert.ok(of([152, 104, 64], 40) > 20 && of([48, 112, 208], 40) > 20, 'classes have other colours');
+    assert.ok(of([152, 104, 64], 40) > 20 && of([48, 112, 208], 40) > 20, 'classes have the wrong colours');
     await page.click('text=Intensity');
     const greys = await seen();
     assert.ok(greys.filter(([r, g, b]) => Math.abs(r - g) < 12 && Math.abs(g - b) < 16 && r < 200).length > 40);
     for (let x = 400; !await page.isVisible('#place'); x += 7) {
-      assert.ok(x < 600, 'no point is met');
+      assert.ok(x < 600, 'no point is picked');
       await page.mouse.click(x, 320);
       await page.waitForTimeout(100);
     }
     const rows = await page.$$eval('#place-text dt', dts => dts.map(dt => dt.textContent));
     for (const name of ['red', 'green', 'blue', 'classification', 'intensity']) assert.ok(rows.includes(name), rows.join());
-    // Between two places the points of a strip; those of the cluster are marked.
+    // The profile between two places shows the points of a strip and marks those of the cluster.
     await page.mouse.click(330, 330);
     await page.waitForSelector('#profile:not([hidden])');
     const dots = await page.getAttribute('#profile path', 'd');
@@ -759,7 +760,7 @@ describe('pages side by side', {concurrency: 3}, () => {
          whole: /whole file/, short: /connection was lost|bytes received/, packed: /compresses parts/, missing: /not found/, replaced: /replaced/, damaged: /checksum|damaged/,
          error: /HTTP 500/, dead: /does not answer/
        })) {
-    test(`a server that misbehaves (${fault}): a message, and a retry that helps`, async () => {
+    test(`a faulty server (${fault}): a message, and a retry succeeds`, async () => {
       const server = await serveSite(sites.site);
       server.fault = ({range, method}) => range !== null || (fault === 'dead' && method === 'HEAD') ? fault : null;
       const {page, close} = await open('#s=alps&q=8', {url: server.url, size: {width: 480, height: 320}, settle: false});
@@ -776,7 +777,7 @@ describe('pages side by side', {concurrency: 3}, () => {
     });
   }
 
-  test('terrace view serves it', async () => {
+  test('terrace view serves the viewer', async () => {
     const server = spawn(process.env.TERRACE, ['view', 'alps.store', 'cloud.store', '--no-open'],
                          {cwd: sites.folder, stdio: ['ignore', 'ignore', 'pipe']});
     try {
@@ -791,7 +792,7 @@ describe('pages side by side', {concurrency: 3}, () => {
       assert.equal((await state(page)).store, 'cloud');
       assert.deepEqual([errors, outside], [[], []]);
       await close();
-      // Without the token of the address a page says what to do.
+      // Without the token in the address, the page says what to do.
       const stranger = await open('', {url: new URL(url).origin + '/', settle: false});
       await stranger.page.waitForSelector('#message:not([hidden])');
       assert.match(await stranger.page.textContent('#message-text'), /full address .* token/);

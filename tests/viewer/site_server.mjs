@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A static web server with ranges for a published folder, which misbehaves as it is told to.
+// A static web server with range requests for a published folder, with faults on request.
 import {createServer} from 'node:http';
 import {createReadStream, existsSync, statSync} from 'node:fs';
 import {join, normalize} from 'node:path';
@@ -50,11 +50,11 @@ export async function serveSite(folder) {
       if (!range || fault === 'whole') return send(200, {...type, 'Content-Length': size}, 0, size - 1);
       const first = Number(range[1]), last = Math.min(Number(range[2]), size - 1);
       if (first >= size) return send(416, {'Content-Range': `bytes */${size}`});
-      const told = fault === 'replaced' ? size + 1 : size;
-      const headers = {...type, 'Content-Range': `bytes ${first}-${last}/${told}`, 'Cache-Control': 'no-store'};
+      const total = fault === 'replaced' ? size + 1 : size;
+      const headers = {...type, 'Content-Range': `bytes ${first}-${last}/${total}`, 'Cache-Control': 'no-store'};
       if (fault === 'packed') headers['Content-Encoding'] = 'gzip';
       if (fault === 'short') {
-        // The connection ends in the middle of what was announced.
+        // The connection ends in the middle of the announced content.
         response.writeHead(206, {...headers, 'Content-Length': last - first + 1});
         entry.status = 206;
         response.write(Buffer.alloc(Math.floor((last - first + 1) / 2)), () => request.socket.destroy());

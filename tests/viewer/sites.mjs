@@ -16,7 +16,7 @@ export class Sites {
     this.folder = mkdtempSync(join(tmpdir(), 'terrace-viewer-'));
     this.site = join(this.folder, 'site');
   }
-  /// A scan and a laser cloud, where real data are at hand.
+  /// A scan and a laser cloud, if the real data are available.
   get real() {
     const files = {bunny: 'scan/bun_zipper.ply', autzen: 'lidar/autzen_trim.laz'};
     const there = Object.values(files).every(file => existsSync(join(process.env.TERRACE_DATA ?? '', file)));
@@ -26,7 +26,8 @@ export class Sites {
     const {status, stderr, error} = spawnSync(process.env.TERRACE, args, {cwd: this.folder, encoding: 'utf8'});
     assert.equal(status, 0, `terrace ${args.join(' ')}: ${error ?? stderr}`);
   }
-  /// A DEM of the Alps with voids, one of hills without, a coast, a raster whose points are cocircular wherever one looks, and a cloud.
+  /// Builds a DEM of the Alps with voids, hills without voids, a coast, a raster whose points are
+  /// cocircular everywhere, a cloud, scans, and small stores.
   build() {
     this.terrace('build', join(ROOT, 'libterrain', 'examples', 'alps.tif'), '-o', 'alps.store', '-q');
     const flat = ['ncols 200', 'nrows 180', 'xllcorner 0', 'yllcorner 0', 'cellsize 30'];
@@ -37,7 +38,7 @@ export class Sites {
     this.terrace('build', 'flat.asc', '-o', 'flat.store', '--block', '1000', '-q');
     this.terrace('synth', 'dem', '--size', '1000x1000', '-o', 'hills.tif', '-q');
     this.terrace('build', 'hills.tif', '-o', 'hills.store', '-q');
-    // Land in the west and a bay in it, 3 km wide, and a lake of one cell.
+    // Land in the west with a bay 3 km wide and a lake of one cell.
     const coast = ['ncols 200', 'nrows 200', 'xllcorner 0', 'yllcorner 0', 'cellsize 30', 'nodata_value -9999'];
     for (let row = 0; row < 200; ++row) {
       coast.push(Array.from({length: 200}, (_, column) => {
@@ -51,25 +52,25 @@ export class Sites {
     const random = () => (state = (state * 1103515245 + 12345) % 2147483648) / 2147483648;
     for (let i = 0; i < 40_000; ++i) {
       const x = 100 * random(), y = 80 * random();
-      // Left of the middle it is red ground, right of it blue water.
+      // Red ground on the left, blue water on the right.
       const tree = i % 5 === 0, colours = x < 50 ? '60000,2570,0' : '0,2570,60000';
       cloud += `${x},${y},${3 * Math.sin(x / 9) + (tree ? 4 * random() : 0)},${colours},${x < 50 ? 2 : 9},${i % 1000}\n`;
     }
     writeFileSync(join(this.folder, 'cloud.csv'), cloud);
     this.terrace('build', 'cloud.csv', '-o', 'cloud.store', '--block', '2000', '-q');
-    // One point is noise, deep in the hierarchy.
+    // One noise point, deep in the hierarchy.
     const rare = cloud.split('\n');
     rare[20_001] = rare[20_001].replace(/,[29],/, ',7,');
     writeFileSync(join(this.folder, 'rare.csv'), rare.join('\n'));
     this.terrace('build', 'rare.csv', '-o', 'rare.store', '--block', '2000', '-q');
-    // A scan: a ball with bumps; and one that lacks a cap in the east.
+    // Scans: a ball with bumps, and one without a cap in the east.
     let ball = 'x,y,z\n', bowl = ball, high = ball;
     for (let i = 0; i < 12_000; ++i) {
       const z = 1 - (2 * i + 1) / 12_000, turn = i * 2.399963229728653, r = Math.sqrt(1 - z * z);
       const size = 10 + 0.5 * Math.sin(5 * z) + 0.4 * Math.sin(6 * r * Math.cos(turn));
       const point = `${size * r * Math.cos(turn)},${size * r * Math.sin(turn)},${size * z}\n`;
       ball += point;
-      // As small as the steps of a float at its height.
+      // As small as the spacing of floats at its height.
       if (i % 4 === 0) high += `${0.01 * r * Math.cos(turn)},${0.01 * r * Math.sin(turn)},${1e6 + 0.01 * z}\n`;
       if (r * Math.cos(turn) < 0.4) bowl += point;
     }
@@ -79,7 +80,7 @@ export class Sites {
     }
     this.terrace('surface', 'high.store', '-o', 'high.ply', '-q');
     this.terrace('build', 'high.ply', '--entities', 'triangles', '-o', 'corners.store', '-q');
-    // Few points, and such as have no triangles.
+    // Few points, and stores without triangles.
     const grid = (columns, rows, value) => [`ncols ${columns}`, `nrows ${rows}`, 'xllcorner 0', 'yllcorner 0', 'cellsize 10', 'nodata_value -9999',
       ...Array.from({length: rows}, (_, row) => Array.from({length: columns}, (_, column) => value(column, row)).join(' '))].join('\n');
     const small = {
@@ -102,7 +103,8 @@ export class Sites {
     }
     this.terrace('publish', ...stores, '-o', 'site', '-q');
   }
-  /// kind: 'surface' for that of a scan, for which the worker allows a quarter of the points.
+  /// kind: 'surface' for the surface of a scan, for which the worker allows a quarter of the
+  /// points.
   flight(name, {maxPoints = MAX_POINTS, kind = 'points'} = {}) {
     const key = `${name} ${maxPoints} ${kind}`, known = this.flights.get(key);
     if (known) return known;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The viewer's worker as it is shipped, in node: a folder of published files stands for the web server.
+// Runs the shipped viewer worker in node; a folder of published files replaces the web server.
 import {closeSync, existsSync, fstatSync, openSync, readFileSync, readSync} from 'node:fs';
 import {join} from 'node:path';
 import vm from 'node:vm';
 
-/// fetch() of the files of a folder under http://folder/, with ranges. `fault(request, response)` may change what
-/// comes (undefined: nothing ever; a null body: the answer breaks off), `latency` milliseconds after the request; `log` is of all requests, with the number of those
-/// made before that were still `unanswered`, without those made at once with it.
+/// Returns fetch() for the files of a folder under http://folder/, with ranges. `fault(request,
+/// response)` may change the response (undefined: never answers; null: the request fails; a null
+/// body: the response breaks off). Responses come `latency` milliseconds after the request. `log`
+/// lists all requests. Its `unanswered` counts the earlier requests that were still open, except
+/// those made at the same time.
 export function folderFetch(folder, fault = (_, response) => response, latency = 1) {
   const log = [];
   let batch = 0;
@@ -54,7 +56,7 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
   return {fetch, log};
 }
 
-/// Starts `script` (worker.js), in which times pass `haste` times as fast. What it says goes to `said`.
+/// Starts `script` (worker.js) with timeouts `haste` times as fast. Its messages go to `said`.
 export class Worker {
   constructor(script, fetch, said, haste = 1) {
     this.self = {
@@ -74,7 +76,7 @@ export class Worker {
       DecompressionStream,
       Response,
       performance,
-      // One of node's would keep the process alive.
+      // A MessageChannel of node would keep the process alive.
       MessageChannel: class {
         port1 = {};
         port2 = {postMessage: () => setImmediate(() => this.port1.onmessage())};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// worker_test.mjs: the viewer's worker, as it is shipped, in node over published stores. TERRACE names the command,
-// FLIGHT_HASHES the native flight.
+// worker_test.mjs: tests the shipped viewer worker in node over published stores. TERRACE names the
+// command, FLIGHT_HASHES the native flight.
 import assert from 'node:assert/strict';
 import {spawnSync} from 'node:child_process';
 import {cpSync, readFileSync, statSync, writeFileSync} from 'node:fs';
@@ -30,7 +30,7 @@ class Tested extends Flyer {
       asPoints,
       heard: message => {
         messages.push(message.type);
-        // The worker would take what is thrown here for a fault of its own.
+        // The worker would report an exception from here as its own error.
         try {
           if (message.type === 'frame') changed(message);
         } catch (error) {
@@ -44,13 +44,13 @@ class Tested extends Flyer {
   async settle({eye, direction, error}) {
     return (await this.view({eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error})).state;
   }
-  /// What it answers to a message.
+  /// Sends a message and resolves to the answer of that type.
   async ask(message, type) {
     const done = this.until(m => m.type === type);
     this.worker.tell(message);
     return done;
   }
-  /// What the store holds.
+  /// The sample of the store nearest to a position.
   async probe(stored, reach) {
     return (await this.ask({type: 'probe', id: 1, stored: [...stored], reach}, 'probed')).found;
   }
@@ -63,7 +63,7 @@ class Tested extends Flyer {
     this.worker.tell({type: 'hash', id: 1});
     return (await done).hash;
   }
-  /// Until nothing is drawn that has gone.
+  /// Waits until nothing outdated is drawn.
   async rest() {
     if (this.broken()) throw this.broken();
     if (this.last.state.waiting) await this.until(message => message.type === 'frame' && !message.state.waiting);
@@ -77,7 +77,7 @@ class Tested extends Flyer {
 const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', bowl: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
 for (const [name, kind] of Object.entries(FLIGHTS)) {
   test(`a flight over ${name} gives the hashes of the native run`, {skip: name === 'bunny' && !sites.real.bunny}, async () => {
-    // Close to the bunny it takes a minute, and goes on by night alone.
+    // Close to the bunny this takes a minute, so only nightly runs continue.
     const stops = name === 'bunny' && !process.env.TERRACE_NIGHTLY ? 2 : 8;
     const flight = sites.flight(name, {kind}).slice(0, stops);
     assert.ok(new Set(flight.map(stop => stop.hash)).size >= Math.min(4, stops), 'the flight does not change what is shown');
@@ -92,7 +92,8 @@ for (const [name, kind] of Object.entries(FLIGHTS)) {
       assert.equal(await flyer.hash(), stop.hash, `stop ${i}`);
     }
     assert.ok(flyer.blocks() > 0);
-    // Ranges of the store's files, none of them twice, and nothing but the viewer and the start file whole.
+    // The worker requests ranges of the store's files, each once, and whole files only of the
+    // viewer and the start file.
     const seen = new Set();
     for (const {path, range} of flyer.log) {
       if (range === undefined) {
@@ -106,11 +107,11 @@ for (const [name, kind] of Object.entries(FLIGHTS)) {
   });
 }
 
-/// What a page has after changes: an array of vertices' bytes, and corners of triangles.
+/// The state of a page after changes: an array of vertex bytes, and the corners of triangles.
 class Arrays {
   vertices = new Uint8Array();
   triangles = new Uint32Array();
-  /// bytes: of a vertex.
+  /// bytes: per vertex.
   constructor(bytes) {
     this.bytes = bytes;
   }
@@ -127,7 +128,7 @@ class Arrays {
     changes.vertexBlocks.forEach((b, i) => this.vertices.set(changes.vertices.subarray(i * block, (i + 1) * block), b * block));
     changes.triangleBlocks.forEach((b, i) => this.triangles.set(changes.triangles.subarray(i * 192, (i + 1) * 192), b * 192));
   }
-  /// All that is known of a vertex but its slide.
+  /// All bytes of a vertex except its slide.
   vertex(slot) {
     return Buffer.from(this.vertices.subarray(this.bytes * slot, this.bytes * slot + (this.bytes === 32 ? 21 : 16))).toString('hex');
   }
@@ -135,7 +136,7 @@ class Arrays {
   began(slot) {
     return new DataView(this.vertices.buffer).getFloat32(this.bytes * (slot + 1) - 4, true);
   }
-  /// Where it is drawn at a time; without one at last. As in render.ts.
+  /// The drawn position at a time, or the final one. As in render.ts.
   place(slot, time = Infinity) {
     const view = new DataView(this.vertices.buffer), at = this.bytes * slot;
     const place = [0, 4, 8].map(o => view.getFloat32(at + o, true));
@@ -143,13 +144,13 @@ class Arrays {
     if (this.bytes === 24) return [place[0], place[1], place[2] + left * (view.getFloat32(at + 16, true) - place[2])];
     return place.map((c, k) => c + left * view.getInt16(at + 22 + 2 * k, true) * 2 ** view.getInt8(at + 21));
   }
-  /// The corners of each triangle that is drawn.
+  /// The corners of each drawn triangle.
   * drawn() {
     for (let i = 0; i < this.triangles.length; i += 3) {
       if (this.triangles[i] !== this.triangles[i + 1]) yield this.triangles.subarray(i, i + 3);
     }
   }
-  /// The triangles by all that is known of their corners, in order.
+  /// The triangles as strings of their corners' bytes, sorted.
   listed() {
     const list = [];
     for (const slots of this.drawn()) {
@@ -161,7 +162,7 @@ class Arrays {
   }
 }
 
-test('a surface: what changes have made of the arrays is what a new worker sends, closed and turned outward', async () => {
+test('a surface: changed arrays equal those of a new worker, closed and facing outward', async () => {
   const flight = sites.flight('ball', {kind: 'surface'});
   const arrays = new Arrays(32), fresh = new Arrays(32);
   const flyer = new Tested('ball', {changed: message => arrays.apply(message)});
@@ -172,7 +173,8 @@ test('a surface: what changes have made of the arrays is what a new worker sends
   await other.opened();
   for (const stop of flight) await other.settle(stop);
   await other.hash();
-  // One more: both ways to the same points, the second with restored surfaces between.
+  // One more view: both workers reach the same points, the second with restored surfaces in
+  // between.
   const last = {...flight[0], error: 3};
   for (const stop of flight.slice(2, 6)) {
     await other.settle(stop);
@@ -188,7 +190,7 @@ test('a surface: what changes have made of the arrays is what a new worker sends
   assert.ok(list.length > 1000);
   assert.equal(list.length, flyer.last.state.triangles);
   assert.deepEqual(list, fresh.listed());
-  // Each edge is passed as often one way as the other, and normals point away from the middle.
+  // Each edge occurs equally often in both directions, and normals point away from the centre.
   const edges = new Map(), view = new DataView(arrays.vertices.buffer);
   for (const c of arrays.drawn()) {
     for (let k = 0; k < 3; ++k) {
@@ -202,7 +204,8 @@ test('a surface: what changes have made of the arrays is what a new worker sends
   assert.ok([...edges.values()].every(n => n === 0));
 });
 
-/// The distance of p to a triangle: to its plane if the foot is inside, else to its nearest edge.
+/// The distance from p to a triangle: to its plane if the foot is inside, otherwise to its nearest
+/// edge.
 function distanceTo(p, [a, b, c]) {
   const minus = (u, v) => u.map((x, k) => x - v[k]), dot = (u, v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
   const cross = (u, v) => [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
@@ -216,19 +219,19 @@ function distanceTo(p, [a, b, c]) {
   }));
 }
 
-/// Whether p is less than `reach` from a triangle.
+/// Returns whether p is less than `reach` from a triangle.
 function isNear(p, triangle, reach) {
   const [a, b, c] = triangle;
   const beside = k => p[k] < Math.min(a[k], b[k], c[k]) - reach || p[k] > Math.max(a[k], b[k], c[k]) + reach;
   return !beside(0) && !beside(1) && !beside(2) && distanceTo(p, triangle) < reach;
 }
 
-test('a surface: what comes begins where the surface was', async () => {
+test('a surface: new vertices start on the previous surface', async () => {
   const arrays = new Arrays(32);
   let came = 0, waited = false;
   const flyer = new Tested('ball', {
     changed: message => {
-      // What is exchanged at once differs between its vertices.
+      // After a wait, triangles are replaced at once, which changes the surface between vertices.
       const skip = waited;
       waited = message.state.waiting;
       if (skip) return arrays.apply(message);
@@ -239,7 +242,7 @@ test('a surface: what comes begins where the surface was', async () => {
       for (const slot of slots) {
         if (arrays.began(slot) !== Math.fround(message.time) || ++came % 60 !== 0) continue;
         const start = arrays.place(slot, message.time);
-        assert.ok(before.some(triangle => isNear(start, triangle, 2e-4)), `${start} is not on the surface before`);
+        assert.ok(before.some(triangle => isNear(start, triangle, 2e-4)), `${start} is not on the previous surface`);
       }
     }
   });
@@ -251,7 +254,7 @@ test('a surface: what comes begins where the surface was', async () => {
   assert.ok(came > 500, `${came} came`);
 });
 
-/// Triangles as they are drawn at a time, with corners to a thousandth of `unit`, as a set.
+/// The triangles drawn at a time as a set, with corners rounded to a thousandth of `unit`.
 function pictureOf(arrays, time, unit) {
   return new Set([...arrays.drawn()].map(corners => {
     const places = [...corners].map(slot => arrays.place(slot, time).map(c => Math.round(c / unit * 1000)).join());
@@ -260,7 +263,7 @@ function pictureOf(arrays, time, unit) {
 }
 
 for (const [name, kind] of [['alps', 'raster'], ['ball', 'surface']]) {
-  test(`${name}: where points go, the same is drawn on until it has slid, and then what is left`, async () => {
+  test(`${name}: points that go are still drawn until they have slid, and then disappear`, async () => {
     const arrays = new Arrays(kind === 'raster' ? 24 : 32), unit = kind === 'raster' ? 10 : 0.01;
     let begin = Infinity, compared = 0, gone = 0, last = null;
     const flyer = new Tested(name, {
@@ -273,15 +276,15 @@ for (const [name, kind] of [['alps', 'raster'], ['ball', 'surface']]) {
         if (before === null) return;
         const after = pictureOf(arrays, time, unit);
         const changed = [...before].filter(triangle => !after.has(triangle)).length;
-        // A few corners are rounded the other way.
+        // A few corners round the other way.
         assert.ok(changed <= 0.01 * before.size && Math.abs(after.size - before.size) <= 0.01 * before.size,
-                  `${changed} of ${before.size} triangles change, ${after.size} are there, ${time - begin} s after points began to go`);
+                  `${changed} of ${before.size} triangles change and ${after.size} exist ${time - begin} s after points began to go`);
         ++compared;
         gone += went;
       }
     });
     await flyer.opened();
-    // Hundreds of points go: there is room for them, however many go in a frame.
+    // Hundreds of points disappear; the space for waiting vertices suffices, however many go in a frame.
     const [fine] = sites.flight(name, {kind}), coarse = {...fine, error: 4 * fine.error};
     await flyer.settle(fine);
     await flyer.rest();
@@ -302,14 +305,15 @@ for (const [name, kind] of [['alps', 'raster'], ['ball', 'surface']]) {
   });
 }
 
-/// Heights of what is drawn at a time over a grid of places, NaN where nothing is; and how often one is covered twice.
+/// Heights of the triangles drawn at a time over a grid of positions, NaN where there are none; and
+/// how many positions are covered twice.
 function heightsOf(arrays, time, box, side) {
   const heights = new Float64Array(side * side).fill(NaN), step = [0, 1].map(k => (box[3 + k] - box[k]) / side);
   let twice = 0;
   for (const corners of arrays.drawn()) {
     const [a, b, c] = [...corners].map(slot => arrays.place(slot, time));
     const area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-    // Places are half a step off the corners of the grid.
+    // Positions are offset by half a step from the corners of the grid.
     const range = k => [Math.min(a[k], b[k], c[k]), Math.max(a[k], b[k], c[k])].map(x => (x - box[k]) / step[k] - 0.5);
     const [x0, x1] = range(0), [y0, y1] = range(1);
     for (let j = Math.max(0, Math.ceil(y0)); j <= Math.min(side - 1, y1); ++j) {
@@ -326,7 +330,7 @@ function heightsOf(arrays, time, box, side) {
   return {heights, twice};
 }
 
-test('a raster that is left in a flight: no holes, nothing twice, and less moves at once than without slides', async () => {
+test('leaving a raster in a flight: no holes, no overlaps, and smaller jumps than without slides', async () => {
   const side = 60, arrays = new Arrays(24);
   let box = null, last = null, jumps = 0, slides = 0, worst = 0, most = 0;
   const flyer = new Tested('hills', {
@@ -339,7 +343,7 @@ test('a raster that is left in a flight: no holes, nothing twice, and less moves
       if (!moves) return;
       const {heights, twice} = heightsOf(arrays, message.time, box, side);
       const rest = heightsOf(arrays, Infinity, box, side).heights;
-      assert.ok(twice < 10, `${twice} places are covered twice`);
+      assert.ok(twice < 10, `${twice} positions are covered twice`);
       heights.forEach((z, i) => {
         assert.equal(Number.isNaN(z), Number.isNaN(before[i]), `place ${i}`);
         if (Number.isNaN(z)) return;
@@ -353,7 +357,7 @@ test('a raster that is left in a flight: no holes, nothing twice, and less moves
   const [stop] = sites.flight('hills', {kind: 'raster'}), close = {...stop, error: stop.error / 1.5};
   await flyer.settle(close);
   await flyer.rest();
-  // Away from there, so that the points go from near to far.
+  // Fly away, so that points disappear from near to far.
   for (let i = 1; i <= 10; ++i) {
     const [x, y, z] = close.eye;
     await flyer.view({eye: [x, y, z * 1.08 ** i], direction: close.direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error: close.error}, false);
@@ -363,7 +367,8 @@ test('a raster that is left in a flight: no holes, nothing twice, and less moves
   assert.ok(slides > 0 && jumps < 0.3 * slides, `${jumps} of ${slides}`);
 });
 
-/// How far normals of vertices, times 127, are from those of the triangles drawn around them, by area.
+/// Largest deviation of vertex normals, times 127, from the area-weighted normals of the triangles
+/// around them.
 function worstNormal(arrays) {
   const sums = new Map(), view = new DataView(arrays.vertices.buffer);
   for (const corners of arrays.drawn()) {
@@ -378,7 +383,7 @@ function worstNormal(arrays) {
       ([slot, sum]) => sum.map((x, k) => Math.abs(127 * x / Math.hypot(...sum) - view.getInt8(24 * slot + 12 + k)))));
 }
 
-test('a raster with cells without data: nothing is drawn, met or cut there', async () => {
+test('a raster with voids: they are not drawn, picked or in profiles', async () => {
   const arrays = new Arrays(24), flyer = new Tested('coast', {changed: message => arrays.apply(message)});
   await flyer.opened();
   const above = {eye: [0, 0, 9000], direction: [0, 0.001, -1]};
@@ -386,7 +391,7 @@ test('a raster with cells without data: nothing is drawn, met or cut there', asy
     const places = [...corners].map(slot => arrays.place(slot));
     return places.map((p, i) => Math.hypot(p[0] - places[(i + 1) % 3][0], p[1] - places[(i + 1) % 3][1]));
   }));
-  // From north to south over the bay; the middle is at column 74.5 and row 99.5.
+  // From north to south across the bay; the centre is at column 74.5 and row 99.5.
   const middle = [-500, 0, 0], column = 74.5 - 500 / 30;
   const cut = () => flyer.profile([column, 2.5, 0], [column, 196.5, 0], 2);
   const meets = async (x, y) => (await flyer.ask({type: 'pick', id: 1, origin: [x, y, 3000], direction: [0, 0, -1], angle: 0.001}, 'picked')).hit !== null;
@@ -424,7 +429,7 @@ test('a raster whose samples have no neighbours is shown as points', async () =>
   assert.ok(Math.hypot(hit.place[0] - 3, hit.place[1] - 4) < 10, JSON.stringify(hit));
 });
 
-test('a scan as points and back, with the bytes that are there', async () => {
+test('a scan switches to points and back without further requests', async () => {
   const flyer = new Tested('ball', {asPoints: true});
   assert.equal((await flyer.opened()).scene.kind, 'points');
   const [stop] = sites.flight('ball');
@@ -444,7 +449,7 @@ test('a scan as points and back, with the bytes that are there', async () => {
   assert.equal(flyer.log.filter(request => request.path === '/body.wasm').length, 1);
 });
 
-test('by hand: a cluster of a surface expands, collapses and is released; a point of it is met', async () => {
+test('manual control: a cluster of a surface expands, collapses and is released; a point of it is picked', async () => {
   const flyer = new Tested('ball');
   await flyer.opened();
   const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: 1e6};
@@ -460,7 +465,7 @@ test('by hand: a cluster of a surface expands, collapses and is released; a poin
   assert.equal((await flyer.settle(camera)).points, before);
 });
 
-test('a cluster of points expands by hand, and its points are told', async () => {
+test('a cluster of points expands manually, and its outline lists its points', async () => {
   const flyer = new Tested('cloud');
   await flyer.opened();
   const camera = {eye: [0, 0, 300], direction: [0, 0.01, -1], error: 1e6};
@@ -468,7 +473,7 @@ test('a cluster of points expands by hand, and its points are told', async () =>
   const outline = async hit => (await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined')).lines;
   const pick = async () => (await flyer.ask({type: 'pick', id: 1, origin: [0, 0, 300], direction: [0, 0, -1], angle: 0.05}, 'picked')).hit;
   const coarse = await pick();
-  assert.equal((await outline(coarse)).length, 0, 'a cluster of the top is not expanded');
+  assert.equal((await outline(coarse)).length, 0, 'a cluster of the top is expanded');
   flyer.worker.tell({type: 'pin', how: 1});
   const more = (await flyer.settle(camera)).points - before;
   assert.ok(more > 0);
@@ -479,23 +484,23 @@ test('a cluster of points expands by hand, and its points are told', async () =>
     const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [...at, 300], direction: [0, 0, -1], angle: 0.001}, 'picked');
     if (hit && hit.clusterLevel < coarse.clusterLevel) lines = await outline(hit);
   }
-  // Each twice, as both ends of a line: the members and the head.
+  // Each of the members and the head occurs twice, as both ends of a line.
   assert.equal(lines.length, 2 * (more + 1));
   for (let i = 0; i < lines.length; i += 2) assert.equal(lines[i], lines[i + 1]);
 });
 
-/// What the command answers, as rows of numbers.
+/// The answer of the command as rows of numbers.
 function command(...args) {
   const {status, stdout, stderr} = spawnSync(process.env.TERRACE, [...args, '-q'], {cwd: sites.folder, encoding: 'utf8'});
   assert.equal(status, 0, `terrace ${args.join(' ')}: ${stderr}`);
   return stdout.trim().split('\n').slice(1).map(line => line.split(',').map(text => text === '' ? NaN : Number(text)));
 }
-/// Places of the CRS in stored coordinates; neither has a rotation.
+/// Converts between the CRS and stored coordinates; neither store has a rotation.
 const inStored = ({world: w}, [x, y]) => [(x - w[2]) / w[0], (y - w[5]) / w[4]];
 const inWorld = ({world: w, coordinates: [, , z]}, s) => [w[0] * s[0] + w[2], w[4] * s[1] + w[5], s[2] * z.scale + z.offset];
 
 for (const name of ['alps', 'hills', 'coast']) {
-  test(`${name}: heights and profiles are those of the store, whatever is drawn`, async () => {
+  test(`${name}: heights and profiles match the store, whatever is drawn`, async () => {
     const flyer = new Tested(name);
     const {manifest, scene} = await flyer.opened(), [x0, y0, , x1, y1] = scene.box;
     let off = 0, voids = 0;
@@ -516,11 +521,11 @@ for (const name of ['alps', 'hills', 'coast']) {
         const {hit, found} = asked[i];
         if (found === null) {
           ++voids;
-          assert.ok(Number.isNaN(height), `a height of ${height} at ${x} ${y} is not found`);
+          assert.ok(Number.isNaN(height), `the height ${height} at ${x} ${y} is not found`);
           return;
         }
-        const [, , told] = inWorld(manifest, found.stored);
-        assert.ok(Math.abs(told - height) < 1e-4, `${told} m for ${height} m at ${x} ${y}`);
+        const [, , shown] = inWorld(manifest, found.stored);
+        assert.ok(Math.abs(shown - height) < 1e-4, `${shown} m for ${height} m at ${x} ${y}`);
         assert.deepEqual([...found.stored].slice(0, 2), [...hit.stored].slice(0, 2));
         off = Math.max(off, Math.abs(inWorld(manifest, hit.stored)[2] - height));
       });
@@ -530,23 +535,23 @@ for (const name of ['alps', 'hills', 'coast']) {
       });
       profiles.push({ends, profile: await flyer.profile(...ends.map(end => [...inStored(manifest, end), 0]), 2)});
     }
-    // What is drawn is far from it, or this tests little.
-    if (name !== 'coast') assert.ok(off > 5, `what is drawn is off by ${off} m at most`);
+    // The drawn surface must be far from the answers for this to test much.
+    if (name !== 'coast') assert.ok(off > 5, `the drawn surface is off by ${off} m at most`);
     if (name === 'hills') assert.equal(voids, 0);
     const [{ends, profile}] = profiles;
     for (const other of profiles) assert.deepEqual(other, profiles[0]);
     assert.deepEqual([profile.level, profile.sampled], [0, false]);
     command('profile', `${name}.store`, '--line', ends.flat().join(), '-o', '-').forEach(([distance, , , height], i, rows) => {
-      const [share, told] = profile.points[i];
-      assert.equal(Number.isNaN(told), Number.isNaN(height), `row ${i}: ${told} for ${height}`);
-      if (!Number.isNaN(height)) assert.ok(Math.abs(told - height) < 1e-4, `row ${i}: ${told} m for ${height} m`);
+      const [share, shown] = profile.points[i];
+      assert.equal(Number.isNaN(shown), Number.isNaN(height), `row ${i}: ${shown} for ${height}`);
+      if (!Number.isNaN(height)) assert.ok(Math.abs(shown - height) < 1e-4, `row ${i}: ${shown} m for ${height} m`);
       assert.ok(Math.abs(share - distance / rows.at(-1)[0]) < 0.01);
       assert.equal(rows.length, profile.points.length);
     });
   });
 }
 
-test('a long profile is sampled, and true where it is', async () => {
+test('a long profile is sampled, and its samples are correct', async () => {
   const row = Array.from({length: 9000}, (_, column) => (500 + 300 * Math.sin(column / 40)).toFixed(2)).join(' ');
   writeFileSync(join(sites.folder, 'strip.asc'), `ncols 9000\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 1\n${`${row}\n`.repeat(3)}`);
   sites.terrace('build', 'strip.asc', '-o', 'strip.store', '-q');
@@ -559,7 +564,7 @@ test('a long profile is sampled, and true where it is', async () => {
   for (const [share, height] of points) assert.ok(Math.abs(height - (500 + 300 * Math.sin(8999 * share / 40))) < 0.2, `${height} at ${share}`);
 });
 
-test('a profile of points and of a scan is that of a strip of all of them, whatever is drawn', async () => {
+test('profiles of points and of scans show all points of a strip, whatever is drawn', async () => {
   for (const [name, from, to, axis] of [['cloud', [10, 30, 0], [90, 50, 3], 2], ['ball', [-15, -2, 0], [15, 2, 0], 2], ['ball', [-15, 0, -2], [15, 0, 2], 1]]) {
     const flyer = new Tested(name);
     await flyer.opened();
@@ -587,7 +592,7 @@ test('a profile of points and of a scan is that of a strip of all of them, whate
   }
 });
 
-test('a place of a scan is told by the point of the store that is nearest', async () => {
+test('a place on a scan gives the nearest point of the store', async () => {
   const flyer = new Tested('ball');
   await flyer.opened();
   const all = readFileSync(join(sites.folder, 'ball.csv'), 'utf8').trim().split('\n').slice(1).map(line => line.split(',').map(Number));
@@ -604,7 +609,7 @@ test('a place of a scan is told by the point of the store that is nearest', asyn
   }
 });
 
-test('what a question lacks is fetched in a few rounds, and again after damage', async () => {
+test('a query fetches missing data in few rounds, and again after damage', async () => {
   let damaged = 0;
   const flyer = new Tested('hills', {
     fault: (request, response) => {
@@ -627,10 +632,10 @@ test('what a question lacks is fetched in a few rounds, and again after damage',
   assert.ok(found !== null);
 });
 
-test('the legend has the classes of all points, those of a store that does not say it as they come', async () => {
+test('the legend lists the classes of all points, or as they load if the start file has none', async () => {
   const known = new Tested('cloud');
   assert.deepEqual([...(await known.opened()).scene.colours.classes], [2, 9]);
-  // As of a store of too many points.
+  // As for a store with too many points.
   const site = join(sites.folder, 'unsaid');
   cpSync(sites.site, site, {recursive: true});
   const start = readFileSync(join(site, 'stores', 'rare.start')), end = start.indexOf(10);
@@ -648,14 +653,14 @@ test('an open scan: a ray through its opening meets the far side', async () => {
   const flyer = new Tested('bowl');
   await flyer.opened();
   await flyer.settle({eye: [40, 0, 0], direction: [-1, 0, 0], error: 0.5});
-  await flyer.hash();  // the surface from scratch
+  await flyer.hash();  // computes the surface from scratch
   const picked = flyer.until(message => message.type === 'picked');
   flyer.worker.tell({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01});
   const {hit} = await picked;
   assert.ok(hit.place[0] < -6, JSON.stringify(hit));
 });
 
-test('a module for bodies that cannot be fetched: a message, and a retry that helps', async () => {
+test('the module for bodies cannot be fetched: a message, and a retry succeeds', async () => {
   let bad = true;
   const flyer = new Tested('ball', {
     fault: (request, response) => bad && request.path === '/body.wasm' ? {status: 404, headers: {}, body: Buffer.alloc(0)} : response
@@ -667,14 +672,14 @@ test('a module for bodies that cannot be fetched: a message, and a retry that he
   assert.equal((await opened).scene.kind, 'surface');
 });
 
-test('few requests: small ones wait for those under way, and an index comes in blocks', async () => {
+test('few requests: small ones wait for open ones, and an index is read in blocks', async () => {
   sites.terrace('synth', 'dem', '--size', '2048x2048', '-o', 'made.tif', '-q');
   sites.terrace('build', 'made.tif', '-o', 'made.store', '-q');
   sites.terrace('publish', 'made.store', '-o', 'made', '-q');
   const flyer = new Tested('made', {latency: 10, site: join(sites.folder, 'made')});
   const {scene: {box}} = await flyer.opened();
   const middle = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2], high = box[4] - box[1];
-  // All of it in sight, and the index of level 0 with it.
+  // The whole store in view, which needs the index of level 0.
   await flyer.settle({eye: [middle[0], middle[1] - high, box[5] + high], direction: [0, Math.SQRT1_2, -Math.SQRT1_2], error: 4});
   let small = 0;
   const asked = [];  // parts of indices
@@ -695,7 +700,7 @@ test('few requests: small ones wait for those under way, and an index comes in b
   assert.ok(asked.length > 5);
 });
 
-test('the first picture needs the start file alone', async () => {
+test('the first picture needs only the start file', async () => {
   const flyer = new Tested('alps');
   await flyer.opened();
   assert.deepEqual(flyer.log.map(request => request.path), ['/core.wasm', '/stores/alps.start']);
@@ -705,7 +710,7 @@ test('the first picture needs the start file alone', async () => {
 
 const CLOSE = {eye: [2000, -9000, 9000], direction: [0, 0.7071067811865476, -0.7071067811865476], error: 4};
 
-/// The part of the message, and how the n-th range of a store is spoiled.
+/// A pattern of the message, and how responses to range requests are spoiled.
 const FAULTS = {
   'a whole file instead of a part': [/whole file.*200/, request => ({status: 200, headers: {}, body: request.body})],
   'a missing file': [/not found.*404/, () => ({status: 404, headers: {}, body: Buffer.alloc(0)})],
@@ -723,7 +728,7 @@ const FAULTS = {
   'damaged bytes': [/checksum|damaged/i, response => ({...response, body: response.body.map(b => b ^ 0x5a)})]
 };
 for (const [name, [expected, spoil]] of Object.entries(FAULTS)) {
-  test(`${name}: a message, no wrong picture, and a retry that helps`, async () => {
+  test(`${name}: a message, no wrong picture, and a retry succeeds`, async () => {
     let bad = true;
     const flyer = new Tested('alps', {
       fault: (request, response) => bad && (request.range || request.method === 'HEAD') ? spoil(response, request) : response
@@ -743,7 +748,7 @@ for (const [name, [expected, spoil]] of Object.entries(FAULTS)) {
   });
 }
 
-test('one short body or damaged part is fetched again without a word', async () => {
+test('a single short body or damaged part is fetched again silently', async () => {
   for (const spoil of [FAULTS['a short body'][1], FAULTS['damaged bytes'][1], FAULTS['a broken server'][1]]) {
     let left = 1;
     const flyer = new Tested('alps', {fault: (request, response) => request.range && left-- > 0 ? spoil(response) : response});
@@ -753,7 +758,7 @@ test('one short body or damaged part is fetched again without a word', async () 
   }
 });
 
-test('a server that falls silent: a message after two tries, and a retry that helps', async () => {
+test('a server stops answering: a message after two tries, and a retry succeeds', async () => {
   let silent = range => range;
   const flyer = new Tested('alps', {haste: 100, fault: ({range}, response) => silent(range) ? undefined : response});
   await flyer.opened();
@@ -771,7 +776,7 @@ test('a server that falls silent: a message after two tries, and a retry that he
   assert.match(await dead.failed(), /silent/);
 });
 
-test('the store of a link, or else the first of stores.json', async () => {
+test('opens the store of the link, or else the first of stores.json', async () => {
   for (const [name, chosen] of [['cloud', 'cloud'], ['', 'alps'], ['nothing', 'alps']]) {
     const flyer = new Tested(name, {choose: true});
     const message = await flyer.until(message => message.type === 'chosen');
@@ -782,7 +787,7 @@ test('the store of a link, or else the first of stores.json', async () => {
   }
 });
 
-test('a start file that is missing or damaged', async () => {
+test('a missing or damaged start file: a message, and a retry succeeds', async () => {
   for (const [expected, spoil] of [
            [/HTTP 404/, () => ({status: 404, headers: {}, body: Buffer.alloc(0)})],
            [/start file.*damaged/, response => ({...response, body: response.body.subarray(0, -1)})],
