@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""golden_test.py finds every kind of difference, and says which command and which output.
+"""golden_test.py finds every kind of difference and names the command and the output.
 
 TERRACE=path/to/terrace golden_check_test.py
 """
@@ -66,7 +66,7 @@ class GoldenCheckTest(unittest.TestCase):
         for word in words:
             self.assertIn(word, out)
 
-    def test_a_list_that_was_updated_is_met_and_stays(self):
+    def test_an_updated_list_passes_and_stays_unchanged(self):
         self.assertEqual(self.check('--update')[0], 0)
         text = self.read()
         self.assertEqual([line for line in text.splitlines(True) if not line.startswith('  ')],
@@ -79,7 +79,7 @@ class GoldenCheckTest(unittest.TestCase):
         self.assertEqual(self.check('--update')[0], 0)
         self.assertEqual(self.read(), text)
 
-    def test_the_command_and_the_first_output_that_differ_are_named(self):
+    def test_names_the_command_and_the_first_differing_output(self):
         self.check('--update')
         text = self.read()
         self.write(re.sub(r'[0-9a-f]{64} some\.csv', '0' * 64 + ' some.csv', text))
@@ -89,16 +89,16 @@ class GoldenCheckTest(unittest.TestCase):
         self.write(re.sub(r'  [0-9a-f]{64} -\n', '', text))
         self.differs('terrace convert', 'new: ')
         self.write(re.sub(r'( [0-9a-f]{64} -\n)', r'\1  ' + 'f' * 64 + ' more\n', text))
-        self.differs('terrace convert', 'not there any more: ' + 'f' * 64)
+        self.differs('terrace convert', 'missing now: ' + 'f' * 64)
         self.write(re.sub(r'[0-9a-f]{64} ring\.ply', '0' * 64 + ' ring.ply', text))
         self.differs('inputs', 'ring.ply')
 
-    def test_options_that_must_change_nothing_are_checked(self):
+    def test_checks_options_that_must_not_change_the_output(self):
         self.write(LIST.replace('= --threads 1', '= --seed 2'))
         self.assertEqual(self.check('--update')[0], 1)
         self.differs('terrace build', 'with --seed 2')
 
-    def test_a_command_that_fails_is_no_result(self):
+    def test_rejects_a_failing_command(self):
         self.write(LIST.replace('--level 1', '--level 99'))
         before = self.read()
         code, out = self.check('--update')

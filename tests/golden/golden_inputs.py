@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The inputs of the golden commands, made from integers alone: no random numbers of a library, no
-function that rounds in its own way, so that they have the same bytes everywhere.
+"""Makes the inputs of the golden commands from integers alone. It uses no library's random numbers and no
+function whose rounding may vary, so the bytes are the same everywhere.
 
-Small on purpose: with --block 600 they make stores of two to four levels.
+The inputs are small: with --block 600 they make stores of two to four levels.
 """
 
 import json
@@ -13,7 +13,7 @@ from small_tiff import GEOGRAPHIC, utm, write_tiff
 
 
 def chance(*place):
-    """A number from 0 to 2^32 - 1 that belongs to the place."""
+    """A pseudo-random number from 0 to 2^32 - 1 that depends only on the place."""
     value = 0x9E3779B9
     for part in place:
         value = (value ^ (part & 0xFFFFFFFF)) * 0x85EBCA6B & 0xFFFFFFFF
@@ -23,7 +23,7 @@ def chance(*place):
 
 
 def hills(seed, column, row):
-    """Heights in sixteenths, from 0 to some 19000: lattices of 48, 16 and 5 cells, and noise."""
+    """Heights in sixteenths, from 0 to about 19000: lattices of 48, 16 and 5 cells, and noise."""
     height = chance(seed, 0, column, row) % 40
     for step, amplitude in ((48, 12000), (16, 5000), (5, 1800)):
         i, u = divmod(column, step)
@@ -40,7 +40,7 @@ def table(seed, columns, rows, height=lambda sixteenths, column, row: sixteenths
 
 
 def without_data(column, row):
-    """A lake, a corner cut off, single cells."""
+    """True in a lake, in a corner and in single cells."""
     return ((column - 60) ** 2 + (row - 30) ** 2 < 90 or column + row < 14 or
             chance(5, column, row) % 500 == 0)
 
@@ -49,14 +49,14 @@ def make_rasters():
     write_tiff('hills.tif', 96, 80,
                table(1, 96, 80, lambda h, c, r: -9999.0 if without_data(c, r) else h / 16),
                (690000.0, 5202000.0), 25.0, utm(32), nodata='-9999')
-    # A coast: whole metres, the sea at 0, nothing beyond the border of the survey.
+    # A coast: whole metres, the sea at 0, no data outside the surveyed area.
     coast = table(2, 90, 70, lambda h, c, r: -32768 if c > 84 and r > 40 else max(0, h // 8 - 700))
     write_tiff('coast.tif', 90, 70, coast, (8.4, 46.42), 0.0009765625, GEOGRAPHIC, kind='h',
                nodata='-32768')
     # Rows from south to north.
     up = [20.0, 0.0, 0.0, 400000.0, 0.0, 20.0, 0.0, 300000.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     write_tiff('south-up.tif', 70, 60, table(3, 70, 60), matrix=up, keys=utm(33))
-    # Two sheets of one map, the second ten rows lower.
+    # Two sheets of one map; the second is ten rows lower.
     sheet = [hills(4, c, r) // 16 for r in range(60) for c in range(100)]
     cell = 0.00390625
     write_tiff('sheet-west.tif', 52, 50, [sheet[100 * r + c] for r in range(50) for c in range(52)],
@@ -64,19 +64,20 @@ def make_rasters():
     write_tiff('sheet-east.tif', 48, 50,
                [sheet[100 * r + c] for r in range(10, 60) for c in range(52, 100)],
                (14.0 + 52 * cell, 50.0 - 10 * cell), cell, GEOGRAPHIC, kind='h', nodata='-32768')
-    # The second band is the heights.
+    # The second band contains the heights.
     write_tiff('bands.tif', 40, 30,
                [value for c in range(40 * 30) for value in (c % 7, hills(5, c % 40, c // 40) // 8)],
                (500000.0, 5300000.0), 10.0, utm(31), kind='H', bands=2)
     write_tiff('dateline.tif', 64, 48, table(6, 64, 48, lambda h, c, r: h // 16), (179.9, -16.4),
                0.00390625, GEOGRAPHIC, kind='h')
-    # A projection whose ground map is no diagonal: Lambert azimuthal equal area, far off its middle.
+    # A projection whose ground map is not diagonal: Lambert azimuthal equal area, far from its
+    # centre.
     write_tiff('laea.tif', 72, 64, table(7, 72, 64), (2800000.0, 1800000.0), 500.0,
                {1024: 1, 1025: 1, 3072: 3035})
 
 
 def laser_points():
-    """Points of a strip of laser data: x, y, z in centimetres, intensity, class, time."""
+    """Points of a laser scan strip: x, y, z in centimetres, intensity, class, time."""
     for i in range(2600):
         x = 40000 * (i % 65) // 64 + chance(8, i) % 500
         y = 30000 * (i // 65) // 40 + chance(9, i) % 700
@@ -106,14 +107,14 @@ def make_clouds():
         for x, y, z, intensity, kind, time in reversed(points):
             file.write(struct.pack('<3dHBf3B', 690000 + x / 100, 5190000 + y / 100, z / 100,
                                    intensity, kind, time / 128, intensity >> 4, z >> 8, kind * 40))
-    # Three samples at each seventh place, two at each fifth; heights differ by at most 4 cm.
+    # Three samples at every seventh place, two at every fifth; heights differ by at most 4 cm.
     with open('twice.xyz', 'w', encoding='ascii') as file:
         for i in range(900):
             x, y = i % 30 * 100 + chance(13, i) % 60, i // 30 * 100 + chance(14, i) % 60
             z = hills(9, x // 80, y // 80)
             for copy in range(3 if i % 7 == 0 else 2 if i % 5 == 0 else 1):
                 file.write(f'{decimal(x)} {decimal(y)} {decimal(z + 2 * copy)}\n')
-    # A ring: a body with a hole. Rational points of circles, so that no sine is needed.
+    # A ring, which is a body with a hole. Its circles have rational points, so no sine is needed.
     with open('ring.ply', 'wb') as file:
         file.write(b'ply\nformat binary_little_endian 1.0\nelement vertex 1200\n'
                    b'property float x\nproperty float y\nproperty float z\nend_header\n')
@@ -131,7 +132,7 @@ def make_clouds():
 
 
 def around(i, count, jitter):
-    """A point of the unit circle, the i-th of `count` nearly even ones, a little off its place."""
+    """The i-th of `count` nearly evenly spaced points of the unit circle, slightly displaced."""
     quarter, t = divmod(4 * i, count)
     t = (t + (jitter % 1000) / 1250) / count
     x, y = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
@@ -174,7 +175,7 @@ def make_other_files():
         file.write('longitude,latitude\n')
         for i in range(40):
             file.write(f'-1.{9820 + chance(26, i) % 180:04},52.{5985 + chance(27, i) % 90:04}\n')
-    # A geoid of 30 to 60 m, in GeographicLib's format, five degrees apart.
+    # A geoid of 30 to 60 m in GeographicLib's format, five degrees apart.
     with open('geoid.pgm', 'wb') as file:
         file.write(b'P5\n# Description made for tests\n# DateTime 2020-01-01 00:00:00\n'
                    b'# MaxBilinearError 0.1\n# RMSBilinearError 0.1\n# MaxCubicError 0.1\n'
@@ -190,7 +191,7 @@ def make_other_files():
 
 
 def make_inputs(folder):
-    """Writes all of them; returns their names."""
+    """Writes all inputs; returns their names."""
     here = os.getcwd()
     os.chdir(folder)
     try:

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks that the whole command still writes the bytes that it wrote before.
+"""Checks that the command still writes the same bytes as before.
 
 TERRACE=path/to/terrace golden_test.py [--update] [--keep FOLDER] [--list FILE] [--jobs N]
 
-The list, golden.txt, has commands and below each what came out of it:
+The list, golden.txt, has commands, each followed by its results:
 
     $ terrace build hills.tif -o hills.terrace --block 600
     = --threads 1 --memory 200M
@@ -12,16 +12,18 @@ The list, golden.txt, has commands and below each what came out of it:
       5b1f... hills.terrace
       09ac... hills.terrace/manifest.json
 
-A line with $ is run, in the order of the list as far as one needs what another one made; `< FILE` at
-its end is standard input. A line with = names options with which the same command must write the
-same bytes. Hashes are SHA-256: of a file's bytes; of a folder's list of the lines below it; of what
-a picture, a GeoTIFF and a compressed tile hold, for their compressed bytes belong to libraries of
-the system; of texts that --to-crs writes with rounded numbers, for the last digits of coordinates are
-those of the C library's sines. `~` before a hash: these bytes may change between releases (pictures,
-the journal of a tile set). All others change only on purpose, and a release says so.
+A line with $ is run. Commands run in the order of the list as far as one needs the output of another;
+`< FILE` at the end redirects standard input. A line with = gives options with which the same command must
+write the same bytes.
 
-After such a change: golden_test.py --update runs all commands and writes the list anew. To add a
-command, add its $ line and do the same.
+Hashes are SHA-256: of a file's bytes, and of a folder's list of the lines below it. Of pictures, GeoTIFFs
+and compressed tiles, the decompressed content is hashed, because the compressed bytes depend on system
+libraries. Texts written with --to-crs are hashed with rounded numbers, because the last digits of
+coordinates depend on the C library's sines. Bytes marked with `~` before the hash may change between
+releases (pictures, the journal of a tile set). All others change only on purpose, and a release says so.
+
+After such a change, golden_test.py --update runs all commands and rewrites the list. To add a command, add
+its $ line and do the same.
 """
 
 import argparse
@@ -45,11 +47,11 @@ from cli_test import png_pixels  # noqa: E402
 from golden_inputs import make_inputs  # noqa: E402
 from small_tiff import tiff_content  # noqa: E402
 
-# Commands run in another folder.
+# Commands that run in another folder.
 TERRACE = os.path.abspath(shutil.which(os.environ.get('TERRACE', 'terrace')) or 'terrace')
 JOURNAL = '.terrace-tiles'
 
-# The parts of summaries that are results; what tells of time, memory and files' sizes is not.
+# The parts of summaries that are results. Times, memory and file sizes are not.
 KEYS = ['format', 'ok', 'points', 'nodata', 'levels', 'vertices', 'triangles', 'tetrahedra', 'samples',
         'covered', 'uncovered', 'max_error', 'tiles', 'zooms', 'answered', 'lines', 'rows', 'columns',
         'clusters', 'cost', 'opening_cost', 'connection_cost', 'pairs', 'unmatched', 'bounds', 'crs',
@@ -57,13 +59,13 @@ KEYS = ['format', 'ok', 'points', 'nodata', 'levels', 'vertices', 'triangles', '
 
 
 class Step:
-    """A command of the list, and the lines that the list has below it."""
+    """A command of the list and the lines below it."""
 
     def __init__(self, number, command):
         self.number, self.command = number, command
         self.variants, self.expected = [], []
         words = shlex.split(command)
-        assert words[0] == 'terrace', f'line {number}: a command begins with "terrace"'
+        assert words[0] == 'terrace', f'line {number}: a command must begin with "terrace"'
         self.input = None
         if '<' in words:
             self.input = words[words.index('<') + 1]
@@ -76,12 +78,12 @@ class Step:
         self.outputs = [self.arguments[i] for i in self.output_places]
 
     def reads(self):
-        """Names that may be those of files, also behind a colon (elliptical:FILE)."""
+        """Words that may be file names, also after a colon (elliptical:FILE)."""
         words = [w for i, w in enumerate(self.arguments) if i not in self.output_places]
         return {self.input, *words, *(w.split(':', 1)[-1] for w in words)}
 
     def run(self, folder, options, prefix):
-        """Runs it; outputs get the prefix. Returns the lines for the list."""
+        """Runs the command with prefixed output names. Returns the lines for the list."""
         arguments = list(self.arguments)
         for i in self.output_places:
             if arguments[i] != '-':
@@ -118,7 +120,7 @@ def hash_of(data):
 
 
 def rounded_numbers(text):
-    """A text whose numbers have digits for a tenth of a millimetre and no more."""
+    """Rounds the numbers in a text to a tenth of a millimetre."""
     def rounded(match):
         value = float(match.group())
         return f'{value:.{4 if abs(value) >= 1000 else 9}f}'
@@ -127,7 +129,7 @@ def rounded_numbers(text):
 
 
 def content_of(path):
-    """What is promised of a file's bytes: without what a library's compression makes of it."""
+    """The reproducible content of a file, without the compression by a library."""
     if path.endswith('.png'):
         width, height, rows = png_pixels(path)
         return struct.pack('<II', width, height) + b''.join(rows)
@@ -143,7 +145,7 @@ def content_of(path):
 
 
 def hash_lines(folder, prefix, name, rounded):
-    """The lines of an output, a file or a folder."""
+    """The lines for an output, which is a file or a folder."""
     path = os.path.join(folder, prefix + name)
     if os.path.isfile(path):
         mark = '~' if name.endswith('.png') else ''
@@ -162,7 +164,7 @@ def hash_lines(folder, prefix, name, rounded):
             compressed = compressed or stream.read(2) == b'\x1f\x8b'
     for file in files:
         if file == JOURNAL and compressed:
-            continue  # it has the sizes and checksums of the compressed tiles
+            continue  # contains the sizes and checksums of the compressed tiles
         mark = '~' if file == JOURNAL else ''
         lines.append(f'{mark}{hash_of(content_of(os.path.join(path, file)))} {name}/{file}')
     promised = [line for line in lines if not line.startswith('~')]
@@ -170,8 +172,8 @@ def hash_lines(folder, prefix, name, rounded):
 
 
 class Inputs:
-    """The line `$ inputs`: the files that golden_inputs.py makes. If these differ, Python made
-    something else, not terrace."""
+    """The line `$ inputs`, which stands for the files that golden_inputs.py makes. If these differ, Python is
+    the cause, not terrace."""
 
     outputs = ()
 
@@ -192,7 +194,7 @@ class Inputs:
 
 
 def read_list(path):
-    """The steps, and all lines with the step in place of each line with $."""
+    """Returns the steps, and all lines with each $ line replaced by its step."""
     steps, layout = [], []
     with open(path, encoding='utf-8') as file:
         for number, line in enumerate(file.read().splitlines(), 1):
@@ -223,7 +225,7 @@ def write_list(path, layout, results):
 
 
 def run_all(steps, folder, jobs):
-    """{step: [(options, lines), ...]}, the command as it stands first."""
+    """Returns {step: [(options, lines), ...]}, starting with the command as written."""
     makers = {}
     for step in steps:
         for name in step.outputs:
@@ -233,7 +235,7 @@ def run_all(steps, folder, jobs):
     running = {}
 
     def work(step):
-        # Those were begun earlier, so that waiting for them ends.
+        # The steps it needs were submitted earlier, so waiting for them ends.
         for needed in {makers[name] for name in step.reads() if name in makers}:
             running[needed].result()
         results = [('', step.run(folder, [], ''))]
@@ -257,12 +259,12 @@ def first_difference(expected, found):
         if a != b:
             return f'the list has  {a}\n      now it is   {b}'
     if len(expected) > len(found):
-        return f'not there any more: {expected[len(found)]}'
+        return f'missing now: {expected[len(found)]}'
     return f'new: {found[len(expected)]}'
 
 
 def complaints(steps, results):
-    """One text per command that gave something else, the first first."""
+    """One text per command with different results, in the order of the list."""
     for step in steps:
         plain = results[step][0][1]
         if plain != step.expected:
@@ -277,8 +279,8 @@ def complaints(steps, results):
 
 def main(arguments):
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--update', action='store_true', help='write the list anew')
-    parser.add_argument('--keep', metavar='FOLDER', help='run there, in a new folder, and leave all files')
+    parser.add_argument('--update', action='store_true', help='rewrite the list')
+    parser.add_argument('--keep', metavar='FOLDER', help='run in FOLDER, which must not exist, and keep all files')
     parser.add_argument('--list', default=os.path.join(HERE, 'golden.txt'))
     parser.add_argument('--jobs', type=int, default=os.cpu_count())
     options = parser.parse_args(arguments)
@@ -301,18 +303,18 @@ def main(arguments):
         write_list(options.list, layout, results)
         for step in steps:
             step.expected = results[step][0][1]
-        print(f'{changed} of {len(steps)} commands gave something else than before: see git diff')
+        print(f'{changed} of {len(steps)} commands gave different results: see git diff')
     found = list(complaints(steps, results))
     if not found:
         print(f'{len(steps)} commands in {runs} runs: every output as listed')
         return 0
-    print(f'{len(found)} of {len(steps)} commands write something else than {options.list} has.\n'
-          'The first is the cause to look for; those below may follow from it.')
+    print(f'{len(found)} of {len(steps)} commands do not match {options.list}.\n'
+          'Look for the cause in the first; the others may follow from it.')
     print('\n'.join(found[:20]))
     if len(found) > 20:
         print(f'  and {len(found) - 20} more')
-    print('If that is meant: golden_test.py --update, and say in the commit why the bytes changed.\n'
-          'If not: golden_test.py --keep FOLDER leaves the files, to compare with those of a sound build.')
+    print('If intended: golden_test.py --update, and say in the commit why the bytes changed.\n'
+          'If not: golden_test.py --keep FOLDER keeps the files, to compare with those of a good build.')
     return 1
 
 
