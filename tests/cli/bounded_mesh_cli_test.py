@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Error-bounded meshes as their users meet them, checked against every sample by other code.
+"""Tests error-bounded meshes end to end and checks every sample with independent code.
 
 TERRACE=path/to/terrace bounded_mesh_cli_test.py
 """
@@ -46,7 +46,7 @@ def read_obj(path):
 
 
 def read_glb(path):
-    """Of the one mesh of a file of ours, with z upwards again."""
+    """Vertices and faces of the single mesh in a GLB file of terrace, with z up."""
     with open(path, 'rb') as file:
         data = file.read()
     size = int.from_bytes(data[12:16], 'little')
@@ -66,7 +66,7 @@ def read_glb(path):
 
 
 class Raster:
-    """Samples, and a check of a mesh against them in whole numbers."""
+    """Samples of a raster, and an exact check of meshes against them in integers."""
 
     def __init__(self, columns, rows, heights):
         self.columns, self.rows = columns, rows
@@ -76,14 +76,14 @@ class Raster:
         return self.heights[row * self.columns + column] != NODATA
 
     def inner(self, column, row):
-        """Whether a sample and its neighbours have data."""
+        """True if a sample and its neighbours have data."""
         return all(self.valid(c, r)
                    for r in range(max(row - 1, 0), min(row + 2, self.rows))
                    for c in range(max(column - 1, 0), min(column + 2, self.columns)))
 
     def measure(self, vertices, faces):
-        """Largest error and the number of inner samples that no triangle covers. Fails on samples
-        without data in a triangle and on triangles that overlap or turn."""
+        """Returns the largest error, the number of inner samples that no triangle covers, and twice the
+        area. Fails if a triangle covers a sample without data, or if triangles overlap or are turned."""
         places = []
         for x, y, z in vertices:
             column, row = (x - WEST) / CELL - 0.5, (NORTH - y) / CELL - 0.5
@@ -93,9 +93,10 @@ class Raster:
         box = [math.inf, math.inf, -math.inf, -math.inf]
         for face in faces:
             (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (places[v] for v in face)
-            # Rows grow southward, so counter-clockwise on the ground is clockwise here.
+            # Rows grow southward, so counter-clockwise triangles on the ground have a clockwise
+            # order here.
             area = (cx - ax) * (by - ay) - (bx - ax) * (cy - ay)
-            assert area > 0, 'a triangle without area or turned'
+            assert area > 0, 'a triangle is degenerate or turned'
             twice_area += area
             for row in range(min(ay, by, cy), max(ay, by, cy) + 1):
                 for column in range(min(ax, bx, cx), max(ax, bx, cx) + 1):
@@ -122,12 +123,12 @@ def border_edges(faces):
     for face in faces:
         for k in range(3):
             edges[face[k], face[(k + 1) % 3]] += 1
-    assert max(edges.values()) == 1, 'an edge with two triangles on one side'
+    assert max(edges.values()) == 1, 'an edge has two triangles on one side'
     return [edge for edge in edges if edge[::-1] not in edges]
 
 
 def hills(columns, rows, seed):
-    """Waves, noise, and a flat lake."""
+    """Heights of waves and noise with a flat lake."""
     noise = random.Random(seed)
     heights = []
     for row in range(rows):
@@ -190,7 +191,7 @@ class BoundedMeshTest(unittest.TestCase):
                 self.assertLess(summary['rms_error'], largest)
                 self.assertEqual(missed, 0)
                 self.assertEqual(twice_area, 2 * (self.COLUMNS - 1) * (self.ROWS - 1))
-                # One piece without cracks: its only border is the raster's.
+                # One piece without cracks has only the raster's border.
                 for a, b in border_edges(faces):
                     x = {vertices[a][0], vertices[b][0]}
                     y = {vertices[a][1], vertices[b][1]}
@@ -212,7 +213,7 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertEqual(len(texts), 1)
         self.assertEqual(sorted(name for name in os.listdir(self.folder.name) if 'tmp' in name), [])
 
-    def test_max_points_is_kept_and_used(self):
+    def test_max_points_is_a_limit_that_is_used(self):
         summary, out = self.mesh(self.store, 'few.obj', '--max-points', '5k')
         vertices, faces = read_obj(out)
         self.assertLessEqual(len(vertices), 5000)
@@ -238,7 +239,7 @@ class BoundedMeshTest(unittest.TestCase):
         self.refuse(2, '--region', 'mesh', self.store, '-o', self.path('none.obj'),
                     '--max-error', 3, '--region', '0,0,1,1')
 
-    def test_glb_keeps_the_bound_on_its_own_numbers(self):
+    def test_glb_keeps_the_bound_after_rounding(self):
         summary, _ = self.mesh(self.store, 'mesh.glb', '--max-error', 3)
         self.assertLessEqual(summary['max_error'], 3)
         self.refuse(1, 'write PLY', 'mesh', self.store, '-o', self.path('fine.glb'),
@@ -266,7 +267,7 @@ class BoundedMeshTest(unittest.TestCase):
                 self.assertEqual(summary['samples'], columns * rows - heights.count(NODATA))
                 self.assertEqual(summary['covered'], sum(raster.covered))
                 self.assertEqual(summary['covered'] + summary['uncovered'], summary['samples'])
-        # The shores need many points at any error.
+        # The shores need many points for any error.
         refused = terrace('mesh', store, '-o', self.path('none.obj'), '--max-points', 9)
         self.assertEqual(refused.returncode, 1)
         said = re.search(r'--max-points 9 is too few: .* takes (\d+); .*--fill', refused.stderr)
@@ -289,13 +290,13 @@ class BoundedMeshTest(unittest.TestCase):
                 self.assertGreaterEqual(low, 179)
                 self.assertLessEqual(high, 330)
 
-    def test_samples_on_no_triangle_are_counted_and_said(self):
-        """Beside voids, on the sides of windows too, and with a region that is no box."""
+    def test_uncovered_samples_are_counted_and_reported(self):
+        """Next to voids, also on the sides of windows, and with a polygon as the region."""
         noise = random.Random(6)
         heights = list(self.raster.heights)
         for row in range(self.ROWS):
             for column in range(self.COLUMNS):
-                # The sides of the four windows are near the middle.
+                # The windows share sides near the middle.
                 near = min(abs(column - self.COLUMNS // 2), abs(row - self.ROWS // 2)) < 4
                 hole = math.hypot(column - 300, row - 200) < 90
                 if noise.random() < (0.3 if near else 0.0005) or hole:
@@ -325,7 +326,7 @@ class BoundedMeshTest(unittest.TestCase):
         inside = set()
         for row in range(self.ROWS):
             for column in range(self.COLUMNS):
-                # Exact, and regions are closed: ten samples lie on a side.
+                # Exact. Regions are closed, and ten samples are on a side.
                 turns = [(bx - ax) * (row - ay) - (column - ax) * (by - ay)
                          for (ax, ay), (bx, by) in zip(triangle, triangle[1:] + triangle[:1])]
                 within = min(turns) >= 0 or max(turns) <= 0
@@ -336,8 +337,8 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertEqual(summary['uncovered'], len(inside) - summary['covered'])
         self.assertGreater(summary['uncovered'], 100)
 
-    def test_several_samples_at_one_place(self):
-        """As in all laser data: each is within the bound, or the error says what can be done."""
+    def test_several_samples_at_one_position(self):
+        """As in laser data: each sample is within the bound, or the error names a remedy."""
         noise = random.Random(7)
         points = []
         for _ in range(3000):
@@ -382,7 +383,7 @@ class BoundedMeshTest(unittest.TestCase):
                       f"{len(points):,} samples", text)
         self.assertIn(f"{summary['duplicates']:,} samples share the place of another: the bound "
                       "holds for each", text)
-        # GLB rounds, which does not matter to the check.
+        # GLB rounds, which must not affect the check.
         self.assertLessEqual(self.mesh(store, 'pulses.glb', '--max-error', 1)[0]['max_error'], 1)
         text = terrace('mesh', store, '-o', out, '--max-error', 1, '--force', '--duplicates',
                        'max').stderr
@@ -403,7 +404,7 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertIn('--duplicates min, max, mean or first', result.stderr)
         self.assertFalse(os.path.exists(self.path('tree.obj')))
 
-        # The file is measured as it is read back, by the samples that count.
+        # The error is measured on the file as readers see it, at the samples that the rule selects.
         heights = collections.defaultdict(list)
         for *place, height in points + [(x, y, z + 17.25)]:
             heights[tuple(place)].append(height)
@@ -444,7 +445,7 @@ class BoundedMeshTest(unittest.TestCase):
                     '--fill', 'flat')
 
     def test_irregular_points_in_windows(self):
-        """More points than one window takes: out of core, one piece, whatever the threads."""
+        """More points than fit into one window: out of core, one piece, for any number of threads."""
         noise = random.Random(5)
         columns, rows = 640, 450  # a jittered lattice
         points = array.array('d')
@@ -490,8 +491,9 @@ class BoundedMeshTest(unittest.TestCase):
         left = [name for name in os.listdir(self.folder.name) if 'tmp' in name or 'samples' in name]
         self.assertEqual(left, [])
 
-    def test_more_points_than_samples_in_a_format_that_rounds(self):
-        # No bound was asked for, so rounding breaks none: what readers see is measured.
+    def test_a_point_limit_above_the_samples_works_in_formats_that_round(self):
+        # No bound was requested, so rounding cannot break it; the summary gives the error that
+        # readers see.
         write_tiff(self.path('raster.tif'), 40, 30, hills(40, 30, 2))
         scattered = random.Random(3)
         with open(self.path('cloud.xyz'), 'w', encoding='utf-8') as file:
@@ -507,8 +509,8 @@ class BoundedMeshTest(unittest.TestCase):
                 self.assertEqual(rounded['vertices'], exact['vertices'])
                 self.assertLess(rounded['max_error'], 1e-3)
 
-    def test_no_error_of_heights_in_doubles(self):
-        # Errors that are 0, computed in doubles, need not be.
+    def test_bound_0_allows_rounding_of_heights_in_doubles(self):
+        # Errors that are mathematically 0 need not be 0 when computed in doubles.
         slopes = random.Random(4)
         for steep in (1, 1e6):
             heights = [steep * (c * 100 / 3 + r * 700 / 9) if slopes.random() < 0.9 else steep * slopes.uniform(0, 900)
@@ -537,7 +539,7 @@ class BoundedMeshTest(unittest.TestCase):
         self.refuse(1, '--memory', *mesh, '--max-error', 1, '--memory', '20M')
         self.assertFalse(os.path.exists(self.path('none.obj')))
 
-    def test_flat_land_is_few_triangles(self):
+    def test_flat_land_needs_few_triangles(self):
         write_tiff(self.path('flat.tif'), 700, 700, [5.0] * 490000)
         summary, _ = self.mesh(self.build('flat.tif'), 'flat.obj', '--max-error', 0)
         self.assertEqual(summary['max_error'], 0)

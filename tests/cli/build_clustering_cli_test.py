@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""build --channel, --outlier-price and --strategy, seen through the decoder that FORMAT.md's test has.
+"""build --channel, --outlier-price and --strategy, checked with the decoder of FORMAT.md's test.
 
 TERRACE=path/to/terrace build_clustering_cli_test.py
 """
@@ -30,7 +30,7 @@ class ClusteringOptionsTest(unittest.TestCase):
         seed = 11
         print('seed', seed)
         rng = random.Random(seed)
-        # Two kinds of points over one another on a plain, and birds above and below it.
+        # Two kinds of points on top of each other on a plain, and birds above and below it.
         cls.points = [(rng.randrange(5000) / 100, rng.randrange(5000) / 100, rng.randrange(100) / 100, k % 2)
                       for k in range(6000)]
         for k, bird in enumerate(BIRDS):
@@ -71,7 +71,7 @@ class ClusteringOptionsTest(unittest.TestCase):
         self.assertEqual([a['name'] for a in store.manifest['attributes']], ['kind', 'outlier'])
         self.assertEqual(sorted(p[2:5] for p in store.points() if p[6]), sorted(BIRDS))
         self.assertEqual(sorted(p[2:6] for p in store.points()), sorted(self.points))
-        # They are members: no cluster is about one of them.
+        # Outliers are members and never the representative of a cluster.
         for level in store.levels[:-1]:
             for cluster in level.clusters:
                 self.assertEqual(cluster.attributes[1][cluster.representative], 0)
@@ -79,11 +79,11 @@ class ClusteringOptionsTest(unittest.TestCase):
         self.assertEqual(plain['outliers'], 0)
         self.assertEqual([a['name'] for a in without.manifest['attributes']], ['kind'])
         result = self.terrace('build', self.file, '-o', self.path('again.st'), '--outlier-price', 0.2)
-        # A single block has outliers too, though it is not clustered.
+        # A single block has outliers too, although it is not clustered.
         self.assertIn('3 of them are marked: outlier = 1', result.stderr)
         self.assertIn('outlier_price 0.2', self.run_ok('info', self.path('again.st')))
 
-    def test_an_attribute_of_that_name_is_in_the_way(self):
+    def test_an_attribute_named_outlier_is_an_error(self):
         named = self.path('named.csv')
         with open(named, 'w', encoding='ascii') as file:
             file.write('x,y,z,outlier\n1,2,3,0\n2,3,4,1\n')
@@ -91,7 +91,7 @@ class ClusteringOptionsTest(unittest.TestCase):
         self.run_ok('build', named, '-o', self.path('dropped.st'), '--outlier-price', 0.5, '--drop', 'outlier')
         self.expect_error('--outlier-price', 'build', named, '-o', self.path('no.st'), '--outlier-price', 0)
 
-    def test_attributes_count_in_distances(self):
+    def test_channels_count_in_distances(self):
         def mixed(store):
             clusters = [c for c in store.levels[0].clusters if c]
             return sum(len(set(c.attributes[0])) > 1 for c in clusters), len(clusters)
@@ -104,7 +104,7 @@ class ClusteringOptionsTest(unittest.TestCase):
         for bad in ('kind', ':1', 'kind:-1', 'kind:nan', 'kind:'):
             self.expect_error('--channel', 'build', self.file, '-o', self.path('no.st'), '--channel', bad)
 
-    def test_what_is_no_number_cannot_count(self):
+    def test_a_channel_with_nan_is_an_error(self):
         holes = self.path('holes.csv')
         with open(holes, 'w', encoding='ascii') as file:
             file.write('x,y,z,gloss\n' + ''.join('%d,%d,3,%s\n' % (k % 60, k // 60, 'nan' if k == 77 else k)
@@ -115,7 +115,7 @@ class ClusteringOptionsTest(unittest.TestCase):
         self.run_ok('build', holes, '-o', self.path('whole.st'), '--channel', 'gloss:1', '--block', 1000,
                     '--where', 'gloss >= 0')
 
-    def test_searches_of_the_thesis_find_one_solution(self):
+    def test_searches_of_the_thesis_find_the_same_solution(self):
         names = ['full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities']
         levels = {}
         for name in names + ['automatic']:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules of the command line that hold for all verbs, and the verbs that need no store.
+"""Tests the rules of the command line for all verbs, and the verbs that need no store.
 
 TERRACE=path/to/terrace cli_test.py [CLASS...]
 """
@@ -27,20 +27,20 @@ import zlib
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 
-# Every verb of the contract; those that may be refused are still known by name.
+# Every verb of the contract; verbs that may be unavailable are still known by name.
 VERBS = ['build', 'info', 'verify', 'points', 'mesh', 'surface', 'tile', 'sample', 'raster',
          'profile', 'contour', 'cluster', 'match', 'render', 'view', 'publish', 'synth', 'convert']
 
 
 def terrace(*args, **kwargs):
-    """Runs the command; output is text unless text=False."""
+    """Runs the command; the output is text unless text=False."""
     kwargs.setdefault('text', True)
     return subprocess.run([TERRACE, *map(str, args)], capture_output=True, timeout=120, **kwargs)
 
 
 def png_pixels(path):
-    """Width, height, rows of an 8-bit RGB PNG without interlace: a reader of our own, so that the
-    test does not share its writer's library."""
+    """Width, height and rows of an 8-bit RGB PNG without interlacing. Written here, so that the test
+    does not share a library with the writer."""
     data = open(path, 'rb').read()
     assert data[:8] == b'\x89PNG\r\n\x1a\n'
     place, packed = 8, b''
@@ -104,7 +104,7 @@ class CommandTest(unittest.TestCase):
 
 
 class FrameTest(CommandTest):
-    def test_version_names_version_build_and_parts(self):
+    def test_version_lists_version_build_and_libraries(self):
         out = self.run_ok('--version').stdout
         self.assertRegex(out, r'^terrace \d+\.\d+\.\d+\nbuild: .+\nparts: .+\n$')
 
@@ -120,7 +120,7 @@ class FrameTest(CommandTest):
             self.assertEqual(last[-2], 'Example:')
             self.assertTrue(last[-1].startswith(f'  terrace {verb} '), last[-1])
 
-    def test_wrong_usage_is_2(self):
+    def test_wrong_usage_exits_with_2(self):
         for args in ([], ['no-such-verb'], ['--no-such-option'], ['info'], ['verify', 'a', 'b'],
                      ['info', 'a', '--no-such-option'], ['info', 'a', '--threads', '0'],
                      ['info', 'a', '--threads', 'x'], ['info', 'a', '--memory', 'lots'],
@@ -139,7 +139,7 @@ class FrameTest(CommandTest):
                 self.assert_one_line_error(terrace(*args, cwd=self.folder), 2)
         self.assertEqual(os.listdir(self.folder), [])
 
-    def test_names_of_formats_that_do_not_exist_are_2(self):
+    def test_unknown_formats_exit_with_2(self):
         self.assertEqual(terrace('synth', 'surface', '--points', '100', '-o', 's.ply', cwd=self.folder).returncode, 0)
         self.assertEqual(terrace('build', 's.ply', '-o', 's.store', cwd=self.folder).returncode, 0)
         before = sorted(os.listdir(self.folder))
@@ -154,13 +154,13 @@ class FrameTest(CommandTest):
                 self.assertRegex(result.stderr, 'known are|can be')
         self.assertEqual(sorted(os.listdir(self.folder)), before)
 
-    def test_json_fails_silently_on_stdout(self):
+    def test_json_errors_leave_stdout_empty(self):
         result = terrace('info', 'no-such-file', '--json')
         self.assert_one_line_error(result, 1)
 
     def progress_of(self, *options):
-        """What the command says on standard error while it reads points from us, until it has said
-        something or the million is full."""
+        """Returns the standard error of a run that reads points until it has reported something or has
+        got a million points."""
         command = subprocess.Popen([TERRACE, 'convert', '-', '-o', self.path('a.ply'), '--force', *options],
                                    stdin=subprocess.PIPE, stderr=subprocess.PIPE)
         points = b'1 2 3\n' * 10000
@@ -182,12 +182,12 @@ class FrameTest(CommandTest):
             self.assertGreater(progress['points_per_second'], 0)
             self.assertIn('seconds_left', progress)
         self.assertEqual(self.progress_of('-q'), '')
-        # Not on a terminal: no progress line, only the summary.
+        # Not a terminal: no progress line, only the summary.
         self.assertEqual(self.progress_of().count('\n'), 1)
 
 
 class ErrorTest(CommandTest):
-    def test_files_that_are_not_there(self):
+    def test_missing_files(self):
         for args in (['info', 'none.tif'], ['convert', 'none.ply', '-o', 'x.xyz'],
                      ['render', 'none.ply', '-o', 'x.png'], ['info', '.']):
             with self.subTest(args=args):
@@ -217,7 +217,7 @@ class ErrorTest(CommandTest):
                     self.assertIn(name, result.stderr)
         self.assertEqual(sorted(os.listdir(self.folder)), sorted(cases))
 
-    def test_formats_that_are_not_read_are_named_with_what_to_do(self):
+    def test_unsupported_formats_are_named_with_a_remedy(self):
         for content, name, remedy in (
                 (b'\x89HDF\r\n\x1a\n', 'HDF5', 'gdalinfo'), (b'PK\x03\x04', 'zip', 'unzip'),
                 (b'\x28\xb5\x2f\xfd', 'zstd', 'zstd -d')):
@@ -245,7 +245,7 @@ class ErrorTest(CommandTest):
         self.run_ok('synth', 'uniform', '--points', '9', '-o', out, '--force')
         self.assertEqual(open(out).read().count('\n'), 9)
         foreign = self.path('letter.ply')
-        open(foreign, 'w').write('Dear friend, this is no cloud of points.\n')
+        open(foreign, 'w').write('Dear friend, this is not a point cloud.\n')
         result = terrace('synth', 'uniform', '--points', '9', '-o', foreign, '--force')
         self.assert_one_line_error(result, 1)
         self.assertIn('Dear friend', open(foreign).read())
@@ -277,7 +277,7 @@ class ErrorTest(CommandTest):
         west, south, _ = bounds['min']
         east, north, _ = bounds['max']
         lines = (f'{west},{south},{east},{north}', f'{west},{north},{east},{south}')
-        # Commands that write -o FILE, each other bytes for 0 and 1.
+        # Commands that write -o FILE, with different bytes for 0 and 1.
         outputs = {
             'raster.tif': lambda n: ['synth', 'dem', '--size', f'{20 + n}x20'],
             'numbers.xyz': lambda n: ['convert', clouds[n]],
@@ -327,7 +327,7 @@ class ErrorTest(CommandTest):
                 if os.path.isdir(out):
                     continue
                 if not self.is_marked(out):
-                    # Text without a mark, as another program may write it.
+                    # A text file without a mark, as another program may write it.
                     os.remove(out)
                     with open(out, 'wb') as file:
                         file.write(old)
@@ -345,23 +345,23 @@ class ErrorTest(CommandTest):
 
     @staticmethod
     def is_marked(path):
-        """Whether the format has a place for a mark."""
+        """True if the format can mark files as written by terrace."""
         return not path.endswith(('.csv', '.txt', '.xyz'))
 
     @staticmethod
     def bytes_of(path):
-        """Of a file, or by name of all files of a folder."""
+        """The bytes of a file, or of all files in a folder by name."""
         if not os.path.isdir(path):
             with open(path, 'rb') as file:
                 return file.read()
         return {name: ErrorTest.bytes_of(os.path.join(path, name)) for name in os.listdir(path)}
 
-    def test_force_replaces_what_a_link_leads_to(self):
+    def test_force_replaces_the_target_of_a_link(self):
         os.mkdir(self.path('elsewhere'))
         for name in ('a.ply', 'a.xyz'):
             real, link = self.path('elsewhere/' + name), self.path(name)
             os.symlink('elsewhere/' + name, link)
-            # Nothing stands there yet: it is made there, as by any write to a link.
+            # The target does not exist yet; the run creates it, like any write to a link.
             self.run_ok('synth', 'uniform', '--points', '10', '-o', link)
             first = self.bytes_of(real)
             self.assert_one_line_error(
@@ -375,7 +375,7 @@ class ErrorTest(CommandTest):
                 terrace('synth', 'uniform', '--points', '9', '-o', link, '--force'), 1)
             self.assertEqual(self.bytes_of(real), b'a letter\n')
 
-    def test_full_disk_leaves_nothing(self):
+    def test_a_full_disk_leaves_no_files(self):
         def small_files():
             resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
         for args in (['synth', 'dem', '--size', '512x512', '-o', 'a.tif'],
@@ -387,7 +387,7 @@ class ErrorTest(CommandTest):
                 self.assertEqual(os.listdir(self.folder), [])
                 self.assertIn(f'terrace: {args[-1]}: ', result.stderr)
 
-    def test_full_disks_name_the_output_and_never_a_temporary_file(self):
+    def test_full_disk_errors_name_the_output_and_no_temporary_file(self):
         def small_files():
             resource.setrlimit(resource.RLIMIT_FSIZE, (3000, 3000))
         dem, cloud, hills, scan = (self.path(name) for name in ('d.tif', 'c.ply', 'd.terrace', 'c.terrace'))
@@ -443,7 +443,7 @@ class InterruptTest(CommandTest):
             caught = next(line for line in status if line.startswith('SigCgt:'))
         return int(caught.split()[1], 16) >> (signal.SIGINT - 1) & 1
 
-    def test_ctrl_c_is_130_and_leaves_nothing(self):
+    def test_ctrl_c_exits_with_130_and_leaves_no_files(self):
         command = subprocess.Popen(
             [TERRACE, 'synth', 'dem', '--size', '60000x60000', '-o', self.path('big.tif'),
              '--threads', '2'], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -471,7 +471,7 @@ class InterruptTest(CommandTest):
 
 
 class DemTest(CommandTest):
-    def test_step_holds_at_every_size(self):
+    def test_the_rms_step_matches_the_roughness_at_every_size(self):
         for size in ('40x30', '300x200', '1000x1000', '3000x2000'):
             for roughness in (1.5, 2.65, 6):
                 with self.subTest(size=size, roughness=roughness):
@@ -492,7 +492,7 @@ class DemTest(CommandTest):
         self.run_ok('synth', 'dem', '--size', '2500x1100', '-o', self.path('s.tif'), '--seed', '2')
         self.assertNotIn(open(self.path('s.tif'), 'rb').read(), contents)
 
-    def test_is_a_raster_as_asked(self):
+    def test_the_raster_has_the_requested_properties(self):
         out = self.path('a.tif')
         self.run_ok('synth', 'dem', '--size', '300x200', '--cell', '10', '--type', 'float32',
                     '--crs', 'EPSG:25832', '--compress', 'deflate', '-o', out)
@@ -506,7 +506,7 @@ class DemTest(CommandTest):
     def test_gdal_reads_it_the_same(self):
         gdalinfo = shutil.which('gdalinfo')
         if gdalinfo is None:
-            self.skipTest('gdalinfo is not there')
+            self.skipTest('gdalinfo is not installed')
         out = self.path('a.tif')
         self.run_ok('synth', 'dem', '--size', '700x300', '-o', out)
         told = json.loads(subprocess.run([gdalinfo, '-json', '-stats', out], check=True,
@@ -518,7 +518,7 @@ class DemTest(CommandTest):
         self.assertEqual((band['minimum'], band['maximum']), (height['min'], height['max']))
         self.assertAlmostEqual(band['mean'], height['mean'], places=3)
 
-    def test_refuses_heights_that_cannot_fit(self):
+    def test_rejects_heights_that_do_not_fit(self):
         result = terrace('synth', 'dem', '--size', '64x64', '--roughness', '50', '-o', self.path('a.tif'))
         self.assert_one_line_error(result, 2)
         self.assertIn('float32', result.stderr)
@@ -528,7 +528,7 @@ class CloudTest(CommandTest):
     def points(self, *args):
         return self.run_ok('synth', *args, '-o', '-').stdout.splitlines()
 
-    def test_kinds_have_the_points_asked_for(self):
+    def test_every_kind_has_the_requested_number_of_points(self):
         for kind in ('surface', 'uniform', 'clusters'):
             for count in (1, 7, 2000):
                 lines = self.points(kind, '--points', count)
@@ -536,7 +536,7 @@ class CloudTest(CommandTest):
                 for line in lines[:50]:
                     self.assertEqual(len(line.split()), 3)
 
-    def test_shuffling_permutes(self):
+    def test_shuffling_only_permutes_points(self):
         for kind in ('surface', 'uniform', 'clusters'):
             plain = self.points(kind, '--points', '3000')
             for how in ('all', 'pieces:1-1', 'pieces:10-50', 'pieces:5000-5000'):
@@ -576,7 +576,7 @@ class InfoTest(CommandTest):
     KEYS = ['format', 'version', 'points', 'levels', 'bounds', 'crs', 'vertical', 'channels',
             'parameters', 'bytes']
 
-    def test_keys_of_the_contract(self):
+    def test_json_has_the_keys_of_the_contract(self):
         open(self.path('a.xyz'), 'w').write('0 0 1\n1 2 3\n-1 5 2\n')
         info = self.json_of('info', self.path('a.xyz'))
         for key in self.KEYS:
@@ -597,7 +597,7 @@ class InfoTest(CommandTest):
 
 
 class NumbersTest(CommandTest):
-    def test_numbers_for_people_are_rounded_and_those_for_programs_are_not(self):
+    def test_text_is_rounded_and_json_is_not(self):
         noise = random.Random(2)
         with open(self.path('cloud.xyz'), 'w') as file:
             for _ in range(3000):
@@ -665,8 +665,8 @@ class NumbersTest(CommandTest):
 
 
 class RenderTest(CommandTest):
-    def test_colours_are_of_the_area_shown(self):
-        """A mesh that is fine in one place is coloured as the same surface without fine places."""
+    def test_mesh_colours_use_heights_by_area(self):
+        """A mesh that is fine in one place has the same colours as the surface without the fine part."""
         def write(path, fine):
             vertices, faces = [], []
 
@@ -682,7 +682,7 @@ class RenderTest(CommandTest):
                         b = a + cells + 1
                         faces.extend(((a, a + 1, b + 1), (a, b + 1, b)))
 
-            # A long slope, of which the upper end is fine.
+            # A long slope whose upper end is fine.
             grid(0, 0, 90, 100, 10, lambda x, y: x)
             grid(90, 0, 100, 100, fine, lambda x, y: x)
             with open(path, 'w') as file:
@@ -699,10 +699,10 @@ class RenderTest(CommandTest):
                        for rows in pictures)
         for a, b in zip(even, dense):
             self.assertLess(max(abs(p - q) for p, q in zip(a, b)), 12, (even, dense))
-        # From the valley's green to the mountains' grey.
+        # From the green of the valley to the grey of the mountains.
         self.assertGreater(max(abs(p - q) for p, q in zip(even[0], even[-1])), 30)
 
-    def test_colours_of_a_cloud_are_of_the_area_shown(self):
+    def test_cloud_colours_use_heights_by_area(self):
         noise = random.Random(3)
         with open(self.path('cloud.xyz'), 'w') as file:
             for _ in range(60000):
@@ -721,8 +721,8 @@ class RenderTest(CommandTest):
         for a, b in zip(even, dense):
             self.assertLess(abs(a - b), 30, (even, dense))
 
-    def test_slope_to_the_light_is_brighter(self):
-        # A roof: its north-western side is lit, the other in shadow.
+    def test_slopes_facing_the_light_are_brighter(self):
+        # A roof: its north-western side is lit, the other one is in shadow.
         with open(self.path('roof.obj'), 'w') as file:
             file.write('v -10 -10 0\nv 10 10 0\nv -10 10 -5\nv 10 -10 -5\n')
             file.write('f 1 2 3\nf 1 4 2\n')
@@ -753,8 +753,9 @@ class RenderTest(CommandTest):
         self.assertLess(empty, 0.08 * 160 * 160)
         self.assertEqual(rows[199][-3:], background)
 
-    def test_heights_are_exaggerated_as_asked(self):
-        # A pyramid from the south, at eye level: half as high as wide when stretched twice.
+    def test_heights_are_exaggerated_on_request(self):
+        # A pyramid seen from the south at eye level: stretched twice, it is half as high as it is
+        # wide.
         with open(self.path('pyramid.obj'), 'w') as file:
             file.write('v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nv 0 0 10\n')
             file.write('f 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n')
@@ -780,7 +781,7 @@ class RenderTest(CommandTest):
             pictures.add(open(out, 'rb').read())
         self.assertEqual(len(pictures), 1)
 
-    def test_colours_that_no_one_filled_are_not_shown(self):
+    def test_empty_colours_are_not_shown(self):
         noise = random.Random(5)
         with open(self.path('black.csv'), 'w') as file:
             file.write('x,y,z,red,green,blue\n')
@@ -795,7 +796,7 @@ class RenderTest(CommandTest):
         self.assertEqual(pictures[0], pictures[1])
         self.assertNotEqual(pictures[0], pictures[2])
 
-    def test_refuses_colours_that_are_not_there(self):
+    def test_rejects_missing_colours(self):
         self.run_ok('synth', 'uniform', '--points', '50', '-o', self.path('a.ply'))
         for what in ('rgb', 'level', 'class', 'slope'):
             result = terrace('render', self.path('a.ply'), '-o', self.path('a.png'), '--color', what)

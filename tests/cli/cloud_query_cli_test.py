@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Heights between irregular points and on coarser levels: sample and profile.
+"""Tests sample and profile on irregular points and on coarser levels.
 
 TERRACE=path/to/terrace cloud_query_cli_test.py
 """
@@ -20,7 +20,7 @@ import unittest
 TERRACE = os.environ.get('TERRACE', 'terrace')
 DATA = os.environ.get('TERRACE_DATA')
 
-# Reads points.xyz and places.csv, writes the heights of Qhull's Delaunay triangulation.
+# Reads points.xyz and places.csv; writes the heights of Qhull's Delaunay triangulation.
 ORACLE = '''
 import sys
 import numpy
@@ -109,7 +109,7 @@ class CloudQueryTest(unittest.TestCase):
             return [float(line) for line in file]
 
     @unittest.skipIf(SCIPY is None, 'SciPy is not installed')
-    def test_linear_is_what_scipy_says(self):
+    def test_linear_matches_scipy(self):
         places = self.places(3000)
         expected = self.scipy_heights(self.points, places)
         self.compare(self.sample(places), expected, 2e-6)
@@ -124,7 +124,7 @@ class CloudQueryTest(unittest.TestCase):
                 answered += 1
         self.assertGreater(answered, len(rows) // 2)
 
-    def test_nearest_is_the_nearest_point(self):
+    def test_nearest_returns_the_nearest_point(self):
         places = self.places(300)
         for place, row in zip(places, self.sample(places, '--method', 'nearest')):
             best = min(self.points, key=lambda p: math.hypot(p[0] - place[0], p[1] - place[1]))
@@ -146,11 +146,11 @@ class CloudQueryTest(unittest.TestCase):
             answered += 1
             self.assertAlmostEqual(float(row['height']), 0.25 * (x - 5e5) - 0.5 * (y - 52e5),
                                    delta=2e-5)
-            # Metres of UTM and of the ground differ by its scale.
+            # Metres of UTM differ from metres on the ground by the projection's scale.
             self.assertAlmostEqual(float(row['gradient']), math.hypot(0.25, 0.5), delta=1e-3)
         self.assertGreater(answered, 600)
 
-    def test_threads_memory_and_order_change_nothing(self):
+    def test_the_result_does_not_depend_on_threads_memory_and_order(self):
         places = self.places(2500)
         shuffled = list(enumerate(places))
         random.Random(1).shuffle(shuffled)
@@ -161,7 +161,7 @@ class CloudQueryTest(unittest.TestCase):
             for (number, _), row in zip(shuffled, two):
                 self.assertEqual(row, one[number])
 
-    def test_long_edges_are_no_data(self):
+    def test_triangles_with_long_edges_have_no_height(self):
         lake = [(501000 + 80 * math.cos(a), 5200700 + 80 * math.sin(a)) for a in range(20)]
         land = [(500300 + 13 * i, 5200100 + 7 * i) for i in range(20)]
         for method in ('linear', 'natural', 'nearest'):
@@ -171,7 +171,7 @@ class CloudQueryTest(unittest.TestCase):
             self.assertFalse(any(row['height'] for row in rows[:20]))
             self.assertTrue(all(row['height'] for row in rows[20:]))
 
-    def test_to_crs_converts_the_places_alone(self):
+    def test_to_crs_converts_only_the_positions(self):
         places = self.places(50)
         text = 'name,y,x,note\n' + ''.join('p%d,%.17g,%.17g,"a, b"\n' % (i, p[1], p[0])
                                            for i, p in enumerate(places)) + '# end\nq,,,\n'
@@ -185,7 +185,7 @@ class CloudQueryTest(unittest.TestCase):
             self.assertTrue(46.9 < float(after[1]) < 47.1 and 14.9 < float(after[2]) < 15.1, after)
         self.assertEqual(rows[51], ['# end'])
         self.assertEqual(rows[52], ['q', '', '', '', '', '', '', ''])
-        # And back: places of another CRS, written in the store's.
+        # And back: positions in another CRS, written in the store's CRS.
         back = list(csv.reader(io.StringIO(self.run_ok(
             'sample', self.store, '--points-crs', 'EPSG:4326', '--to-crs', 'EPSG:32633',
             text=''.join(','.join([r[2], r[1]]) + '\n' for r in rows[1:51])))))
@@ -200,10 +200,10 @@ class CloudQueryTest(unittest.TestCase):
                 for r in csv.DictReader(io.StringIO(out))]
 
     @unittest.skipIf(SCIPY is None, 'SciPy is not installed')
-    def test_a_profile_without_step_is_the_surface_itself(self):
+    def test_a_profile_without_step_follows_the_surface(self):
         line = (500100, 5200100, 501800, 5201300)
         rows = self.profile('--line', ','.join(map(str, line)))
-        # About the square root of the points, three edges each.
+        # About the square root of the number of points, three edges each.
         self.assertGreater(len(rows), 100)
         self.assertEqual(rows[0][:3], (0, line[0], line[1]))
         self.assertTrue(all(a[0] < b[0] for a, b in zip(rows, rows[1:])))
@@ -216,7 +216,7 @@ class CloudQueryTest(unittest.TestCase):
         for a, b, height in zip(rows, rows[1:], heights):
             self.assertAlmostEqual((a[3] + b[3]) / 2, height, delta=1e-4)
 
-    def test_profiles_leave_the_hull_and_mind_long_edges(self):
+    def test_profiles_end_at_the_hull_and_at_long_edges(self):
         rows = self.profile('--line', '499000,5200700,503000,5200700')
         known = [r for r in rows if not math.isnan(r[3])]
         self.assertTrue(math.isnan(rows[0][3]) and math.isnan(rows[-1][3]))
@@ -253,18 +253,18 @@ class CloudQueryTest(unittest.TestCase):
         result = terrace('sample', self.store, '--to-crs', 'EPSG:99999', text='1,2\n')
         self.assertIn('99999', result.stderr)
 
-    def test_a_place_far_outside_has_no_height(self):
+    def test_positions_far_outside_have_no_height(self):
         rows = self.sample([(0, 0), (1e9, 1e9)])
         self.assertEqual([r['height'] for r in rows], ['', ''])
 
-    @unittest.skipIf(DATA is None or SCIPY is None, 'TERRACE_DATA is not set, or no SciPy')
+    @unittest.skipIf(DATA is None or SCIPY is None, 'TERRACE_DATA is not set or SciPy is not installed')
     def test_real_lidar(self):
         with open(os.path.join(DATA, 'lidar', 'autzen_trim.las'), 'rb') as file:
             las = file.read()
         offset, = struct.unpack('<I', las[96:100])
         size, count = struct.unpack('<HI', las[105:111])
         scale = struct.unpack('<6d', las[131:179])
-        # Returns of one pulse may share x and y: which of them counts is not SciPy's to say.
+        # Returns of one pulse may share x and y, and SciPy does not define which of them counts.
         points = {}
         for i in range(count):
             raw = struct.unpack('<3i', las[offset + i * size:offset + i * size + 12])
@@ -284,7 +284,8 @@ class CloudQueryTest(unittest.TestCase):
                   for _ in range(3000)]
         expected = self.scipy_heights(points, places)
         rows = self.sample(places, store=store)
-        # Coordinates are whole hundredths, so some four lie on a circle: either diagonal is right.
+        # Coordinates are multiples of 0.01, so sets of four points lie on a circle; either diagonal
+        # is valid.
         wrong = sum((row['height'] == '') != math.isnan(height) or
                     (row['height'] != '' and abs(float(row['height']) - height) > 1e-4)
                     for row, height in zip(rows, expected))
@@ -324,7 +325,7 @@ class NothingSelectedTest(unittest.TestCase):
                 self.assertIn(message, result.stderr)
                 self.assertFalse(os.path.exists(self.path('none.ply')))
 
-    def test_a_focus_outside_the_points_is_noted(self):
+    def test_a_focus_outside_the_points_gives_a_note(self):
         store = self.build(f'{x} {y} {x * y % 7}\n' for x in range(20) for y in range(20))
         note = 'is outside the store and adds no points: they have x from 0 to 19, y from 0 to 19'
         outside, inside = ('--focus', '100,100,110,110:0'), ('--focus', '3,3,9,9:0')
@@ -335,14 +336,14 @@ class NothingSelectedTest(unittest.TestCase):
                 self.assertIn(named or self.path(out), result.stderr)
                 self.assertEqual(note in result.stderr, named is not None, result.stderr)
 
-    def test_no_points_near_a_place_are_refused(self):
+    def test_asking_for_zero_nearest_points_is_an_error(self):
         store = self.build(f'{x} {x} 1\n' for x in range(9))
         result = terrace('points', store, '--near', '1,1', '-k', '0', '-o', self.path('none.csv'))
         self.assertEqual(result.returncode, 2, result.stderr)
         self.assertIn('-k', result.stderr)
         self.assertFalse(os.path.exists(self.path('none.csv')))
 
-    def test_one_is_not_counted_as_several(self):
+    def test_messages_use_the_singular_for_one(self):
         store = self.build(['500000 1 2\n'])
         for args in (('points', '-o', self.path('one.csv')), ('mesh', '-o', self.path('one.ply')), ('info',), ('verify',)):
             result = terrace(args[0], store, *args[1:])
@@ -354,7 +355,7 @@ class NothingSelectedTest(unittest.TestCase):
         self.assertNotIn('e+', result.stderr)
         self.assertIn('500000', result.stderr)
 
-    def test_a_mesh_without_triangles_says_why(self):
+    def test_a_mesh_without_triangles_gives_the_reason(self):
         for lines, why in ((['1 2 3\n', '1 2 4\n'], 'all points have the same x and y'),
                            ([f'{i} {2 * i} {i * i}\n' for i in range(9)], 'all points are on one line over x and y')):
             store = self.build(lines)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb `cluster` and its pictures as their users meet them.
+"""Tests the verb `cluster` and its pictures end to end.
 
 TERRACE=path/to/terrace cluster_cli_test.py
 """
@@ -39,7 +39,7 @@ def mean(points):
 
 
 def agglomerate(points, method):
-    """Heights of linkage by the definitions of the methods."""
+    """Linkage heights, computed from the definitions of the methods."""
     def apart(a, b):
         if method == 'ward':
             return math.sqrt(2 * len(a) * len(b) / (len(a) + len(b))) * distance(mean(a), mean(b))
@@ -48,7 +48,7 @@ def agglomerate(points, method):
         pairs = [distance(p, q) for p in a for q in b]
         return {'single': min, 'complete': max, 'average': lambda all_: sum(all_) / len(all_)}[method](pairs)
 
-    # A cluster: its points, and the middle between those of its parts.
+    # A cluster is a list of its points and the midpoint of its parts' centres.
     clusters, heights = [([p], p) for p in points], []
     between = {(j, i): distance(points[i], points[j]) for i in range(len(points)) for j in range(i)}
     while between:
@@ -114,13 +114,13 @@ class ClusterTest(unittest.TestCase):
         return result.stderr
 
     def clustered(self, *options, source=None):
-        """Runs the command; summary, rows of the output."""
+        """Runs the command; returns its summary and the rows of the output."""
         out = self.path('out.csv')
         summary = json.loads(self.run_ok('cluster', source or self.blobs, '-o', out, '--json',
                                          '--force', *options))
         return summary, self.read(out)
 
-    def test_facility_location_states_costs_that_add_up_and_a_bound(self):
+    def test_facility_location_reports_consistent_costs_and_a_bound(self):
         summary, rows = self.clustered()
         self.assertLessEqual({'clusters', 'cost', 'opening_cost', 'connection_cost', 'lower_bound',
                               'seconds'}, set(summary))
@@ -144,7 +144,7 @@ class ClusterTest(unittest.TestCase):
         self.assertLessEqual(summary['lower_bound'], summary['cost'])
         self.assertGreater(summary['lower_bound'], 0.9 * summary['cost'])
 
-    def test_every_method_finds_blobs_far_apart(self):
+    def test_every_method_finds_well_separated_blobs(self):
         for method in METHODS:
             options = ['-k', 4] if method in COUNTING else ['--facility-cost', 1]
             summary, rows = self.clustered('--method', method, *options)
@@ -172,7 +172,7 @@ class ClusterTest(unittest.TestCase):
         with open(other, 'rb') as file:
             self.assertNotIn(file.read(), outputs)
 
-    def test_an_outlier_is_left_out_at_its_price(self):
+    def test_an_outlier_costs_its_price(self):
         path = self.path('outlier.csv')
         self.write(path, ['x', 'y', 'z'], self.points + [[1000, 1000, 0]])
         summary, rows = self.clustered('--facility-cost', 0.05, '--outlier-price', 0.04, source=path)
@@ -181,7 +181,7 @@ class ClusterTest(unittest.TestCase):
         self.assertAlmostEqual(summary['outlier_cost'] /
                                (0.04 * diagonal(self.points + [[1000, 1000, 0]])), 1, places=9)
 
-    def test_dendrograms_have_the_heights_of_brute_force(self):
+    def test_dendrogram_heights_match_brute_force(self):
         few = self.path('few.csv')
         self.write(few, ['x', 'y', 'z'], self.points[:40])
         for method in LINKAGE:
@@ -198,7 +198,7 @@ class ClusterTest(unittest.TestCase):
                                              '300x200'))
             self.assertEqual(summary['merges'], 39)
 
-    def test_an_inversion_is_drawn_and_cut(self):
+    def test_dendrograms_with_inversions_are_drawn_and_cut(self):
         triangle = self.path('triangle.csv')
         self.write(triangle, ['x', 'y', 'z'], [[0, 0, 0], [2, 0, 0], [1, 1.75, 0], [50, 0, 0]])
         out, labels, picture = self.path('inversion.csv'), self.path('inversion.txt'), self.path('inversion.png')
@@ -209,7 +209,7 @@ class ClusterTest(unittest.TestCase):
             self.assertEqual(len(set(file.read().split())), 4)  # the pair is 2 apart
         self.run_ok('render', out, '-o', picture, '--size', '100x100')
 
-    def test_other_metrics_are_averaged(self):
+    def test_average_linkage_supports_other_metrics(self):
         few = self.path('taxi.csv')
         self.write(few, ['x', 'y', 'z'], [[0, 0, 0], [1, 1, 0], [0, 5, 0]])
         for method, last in (('average', 5.0), ('weighted', 5.0)):
@@ -217,7 +217,7 @@ class ClusterTest(unittest.TestCase):
             self.run_ok('cluster', few, '--method', method, '--metric', 'minkowski:1', '--dendrogram', out)
             self.assertEqual([float(row['height']) for row in self.read(out)], [2, last])
 
-    def test_trees_are_cut_by_height_and_by_count(self):
+    def test_trees_are_cut_by_height_or_count(self):
         labels = self.path('labels.txt')
         self.run_ok('cluster', self.blobs, '--method', 'single', '--height', 15, '--labels', labels)
         with open(labels) as file:
@@ -228,7 +228,7 @@ class ClusterTest(unittest.TestCase):
         self.assertEqual(summary['clusters'], 9)
         self.assertIsNone(summary['cost'])
 
-    def test_an_ellipse_is_a_scaling(self):
+    def test_an_elliptical_metric_equals_scaled_coordinates(self):
         metric = self.path('ellipse.json')
         with open(metric, 'w') as file:
             json.dump({'regions': [{'semi_axes': [4, 1, 1], 'angle': 0}]}, file)
@@ -240,7 +240,7 @@ class ClusterTest(unittest.TestCase):
         self.assertEqual([row['cluster'] for row in rows], [row['cluster'] for row in others])
         self.assertAlmostEqual(one['cost'] / two['cost'], 1, places=9)
 
-    def test_a_field_of_ellipses_and_other_metrics_run(self):
+    def test_elliptical_regions_and_other_metrics_work(self):
         metric = self.path('field.json')
         with open(metric, 'w') as file:
             json.dump({'regions': [{'box': [-20, -20, 30, 30], 'semi_axes': [5, 0.5], 'angle': 45}]},
@@ -267,7 +267,7 @@ class ClusterTest(unittest.TestCase):
         self.assertIn('intensity', self.expect_error(2, 'cluster', path, '--channel', 'colour:1',
                                                      '-o', self.path('none.csv')))
 
-    def test_clustered_points_are_clustered_anew_and_drawn(self):
+    def test_clustered_points_can_be_clustered_again_and_drawn(self):
         first = self.path('first.ply')
         self.run_ok('cluster', self.blobs, '-o', first)
         again = self.path('again.csv')
@@ -279,7 +279,7 @@ class ClusterTest(unittest.TestCase):
         self.run_ok('render', first, '-o', picture, '--size', '200x200')
         self.assertGreater(os.path.getsize(picture), 1000)
 
-    def test_only_the_result_goes_to_standard_output(self):
+    def test_standard_output_gets_only_the_result(self):
         result = terrace('cluster', self.blobs, '-o', '-', '--format', 'csv')
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(len(result.stdout.splitlines()), len(self.points) + 1)
@@ -305,7 +305,7 @@ class ClusterTest(unittest.TestCase):
             summary, rows = self.clustered('--method', method, *options, source=one)
             self.assertEqual((summary['clusters'], rows[0]['representative']), (1, '0'))
 
-    def test_usage_errors_are_one_line_and_leave_nothing(self):
+    def test_usage_errors_are_one_line_and_leave_no_files(self):
         none = self.path('none.csv')
         for options in (['--method', 'k-means'], ['--method', 'k-median'], ['--method', 'upgma'],
                         ['--method', 'ward'], ['--method', 'ward', '-k', 2, '--metric', 'minkowski:1'],
@@ -335,7 +335,7 @@ class ClusterTest(unittest.TestCase):
         self.assertIn('region 0', self.expect_error(1, 'cluster', self.blobs, '-o', none, '--metric',
                                                     f'elliptical:{metric}'))
 
-    def test_what_is_too_much_for_memory_says_how_much_it_needs(self):
+    def test_too_little_memory_is_an_error_with_the_amount_needed(self):
         many = self.path('many.ply')
         self.run_ok('synth', 'uniform', '--points', 30000, '-o', many)
         for method in ('complete', 'average', 'weighted', 'primal-dual'):
@@ -344,7 +344,7 @@ class ClusterTest(unittest.TestCase):
                                         *(['-k', 2] if method in LINKAGE else []))
             self.assertRegex(message, r'\d+ (bytes|MiB|GiB|B)')
 
-    def test_ctrl_c_stops_what_does_not_look_up(self):
+    def test_ctrl_c_stops_work_that_never_checks_for_signals(self):
         many = self.path('interrupted.ply')
         self.run_ok('synth', 'uniform', '--points', 200000, '-o', many)
         tree = self.path('interrupted.csv')
@@ -360,14 +360,14 @@ class ClusterTest(unittest.TestCase):
 
     @staticmethod
     def wait_for_library(command, path):
-        """Until the input is read and closed, and a second thread does the work."""
+        """Waits until the input has been read and closed and a second thread works."""
         process = f'/proc/{command.pid}'
         while command.poll() is None:
             try:
                 files = [os.readlink(f'{process}/fd/{fd}') for fd in os.listdir(process + '/fd')]
                 threads = len(os.listdir(process + '/task'))
             except FileNotFoundError:
-                continue  # closed meanwhile
+                continue  # it was closed meanwhile
             if threads > 1 and os.path.realpath(path) not in files:
                 return
             time.sleep(0.001)
@@ -394,7 +394,7 @@ class ClusterTest(unittest.TestCase):
         return path
 
     def test_more_effort_finds_cheaper_clusters(self):
-        # Below 2500 points the search is full anyway.
+        # Below 2500 points the search is exhaustive anyway.
         source = self.even(3000)
         standard, fine, full = (
             self.clustered('--effort', effort, '--bound-iterations', 0, source=source)[0]['cost']
@@ -402,7 +402,7 @@ class ClusterTest(unittest.TestCase):
         self.assertLess(fine, standard)
         self.assertLess(full, standard)
 
-    def test_the_best_of_several_restarts_counts(self):
+    def test_the_best_of_several_restarts_wins(self):
         source = self.even(400)
         for method in ('k-means', 'k-median'):
             costs = [self.clustered('--method', method, '-k', 12, '--restarts', restarts,
@@ -419,7 +419,7 @@ class ClusterTest(unittest.TestCase):
         self.assertLess(bounds[1], bounds[2])
         self.assertLessEqual(bounds[2], summary['cost'])
 
-    def test_heights_count_as_much_as_their_weight(self):
+    def test_z_weight_scales_the_influence_of_heights(self):
         generator = random.Random(11)
         points = [[generator.uniform(0, 100) for _ in range(3)] for _ in range(300)]
         heights = [p[2] for p in points]

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""raster: what it writes is a Cloud Optimized GeoTIFF (OGC 21-026, and the rules by which GDAL's
-validate_cloud_optimized_geotiff.py judges), whose overviews are the means of what has data.
+"""raster writes Cloud Optimized GeoTIFFs (OGC 21-026, and the rules of GDAL's
+validate_cloud_optimized_geotiff.py) whose overviews are means of the cells that have data.
 
 TERRACE=path/to/terrace cog_cli_test.py
 """
@@ -23,7 +23,7 @@ SUBFILE, WIDTH, HEIGHT, COMPRESSION, PREDICTOR, SIDE, OFFSETS, SIZES, NODATA = (
 
 
 class Cog:
-    """A little-endian TIFF whose layout is checked while it is read."""
+    """Reads a little-endian TIFF and checks its layout."""
 
     def __init__(self, path):
         with open(path, 'rb') as file:
@@ -46,7 +46,7 @@ class Cog:
         assert at == head + head % 2, 'the first directory is not at the beginning'
         self.levels, behind = [], at
         while at:
-            assert at == behind, 'a directory is not where the one before ends'
+            assert at == behind, 'a directory does not follow the previous one'
             tags, at, behind = self.directory(at)
             self.levels.append(tags)
         self.check(behind)
@@ -89,12 +89,12 @@ class Cog:
                     assert struct.unpack_from('<I', self.data, offset - 4) == (size,)
                     assert self.data[offset + size:][:4] == self.data[offset + size - 4:][:4]
                 around = 4 if self.leaders else 0
-                assert offset == end + around, 'tiles are not one behind the other'
+                assert offset == end + around, 'tiles are not contiguous'
                 end = offset + size + around
-        assert end == self.size, 'something is behind the tiles'
+        assert end == self.size, 'there are bytes after the tiles'
 
     def cells(self, number):
-        """Rows of a level: floats or bytes, None where there is no data."""
+        """The rows of a level: floats or bytes, None where there is no data."""
         tags = self.levels[number]
         width, height, side = tags[WIDTH][0], tags[HEIGHT][0], tags[SIDE][0]
         floats = tags[PREDICTOR] == [3]
@@ -134,12 +134,12 @@ class CogTest(unittest.TestCase):
         cls.run_ok('build', cls.path('dem.tif'), '-o', cls.path('dem.st'), '--crs', 'EPSG:32632', '-q')
         corners = json.loads(cls.run_ok('info', cls.path('dem.st'), '--json'))['bounds']
         x, y, width = corners['min'][0], corners['min'][1], corners['max'][0] - corners['min'][0]
-        # A lower left part with a hole, so that there are cells, and tiles, without data.
+        # The lower left part has a hole, so some cells and tiles have no data.
         ring = [[x, y], [x + 0.45 * width, y], [x, y + 0.9 * width], [x, y]]
         hole = [[x + 0.1 * width + a * 3000, y + 0.1 * width + b * 3000] for a, b in ((0, 0), (1, 0), (1, 1), (0, 0))]
         with open(cls.path('part.geojson'), 'w', encoding='ascii') as file:
             json.dump({'type': 'Polygon', 'coordinates': [ring, hole]}, file)
-        # The store's whole area, nearly, as the polygon's box bounds the raster.
+        # Nearly the store's whole area, because the polygon's box bounds the raster.
         with open(cls.path('wide.geojson'), 'w', encoding='ascii') as file:
             json.dump({'type': 'MultiPolygon', 'coordinates': [
                 [ring, hole], [[[x + width, y + width], [x + width, y + width - 1], [x + width - 1, y + width], [x + width, y + width]]]]}, file)
@@ -176,7 +176,7 @@ class CogTest(unittest.TestCase):
         self.assertEqual([t[WIDTH][0] for t in cog.levels], [1231, 616, 308])
         self.check_overviews(cog, lambda values: single(sum(values) / len(values)))
 
-    def test_overviews_leave_out_what_has_no_data(self):
+    def test_overviews_ignore_cells_without_data(self):
         cog = self.raster('part.tif', '--region', self.path('wide.geojson'))
         self.assertIn(0, cog.levels[0][SIZES])
         self.check_overviews(cog, lambda values: single(sum(values) / len(values)))
@@ -187,7 +187,7 @@ class CogTest(unittest.TestCase):
         cog = self.raster('aspect.tif', '--value', 'aspect', '--region', self.path('wide.geojson'))
         self.check_overviews(cog, lambda values: values[0])
 
-    def test_small_ones_have_the_layout_too(self):
+    def test_small_rasters_have_the_layout_too(self):
         self.assertEqual(len(self.raster('small.tif', '--cell', '500').levels), 1)
 
     def test_bytes_do_not_depend_on_memory_and_threads(self):
@@ -197,7 +197,7 @@ class CogTest(unittest.TestCase):
             self.assertEqual(one.read(), other.read())
 
     @unittest.skipUnless(shutil.which('gdalinfo'), 'needs gdal-bin')
-    def test_gdal_takes_it_for_one(self):
+    def test_gdal_accepts_it_as_cloud_optimized(self):
         self.raster('heights.tif')
         info = json.loads(subprocess.run(['gdalinfo', '-json', self.path('heights.tif')], capture_output=True, check=True).stdout)
         self.assertEqual(info['metadata']['IMAGE_STRUCTURE']['LAYOUT'], 'COG')

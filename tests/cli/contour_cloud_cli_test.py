@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contour lines and rasters of points and of coarser levels, as their users ask for them.
+"""Tests contour lines and rasters of points and of coarser levels end to end.
 
 TERRACE=path/to/terrace contour_cloud_cli_test.py
 """
@@ -20,7 +20,7 @@ import unittest
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 
-# Reads points, answers by SciPy's triangulation.
+# Reads points and answers from SciPy's triangulation.
 ORACLE = '''
 import json, sys
 import numpy
@@ -85,7 +85,7 @@ class CloudTestCase(unittest.TestCase):
             # A lake.
             if math.hypot(x - 600, y - 300) > 120:
                 cls.points.append((x, y, smooth(x, y)))
-        # A position is the same number here and where it is read.
+        # Coordinates written to the file read back as the same numbers.
         cls.metres = cls.build('metres', [(500000 + x, 5200000 + y, z) for x, y, z in cls.points],
                                '--crs', 'EPSG:32632')
 
@@ -102,7 +102,7 @@ class CloudTestCase(unittest.TestCase):
         cloud, store = cls.path(name + '.xyz'), cls.path(name + '.terrace')
         with open(cloud, 'w') as file:
             file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
-        # Small clusters and blocks: several levels.
+        # Small clusters and blocks give several levels.
         cls.run_ok('build', cloud, '-o', store, '--block', 200, '--facility-cost', 1, *options)
         return store
 
@@ -129,7 +129,7 @@ class CloudTestCase(unittest.TestCase):
 
 
 class NoContourTest(CloudTestCase):
-    def test_no_lines_have_a_reason(self):
+    def test_the_note_on_no_lines_gives_the_reason(self):
         flat = self.build('flat', [(x, y, 5.5) for x in range(9) for y in range(9)])
         line = self.build('line', [(i, 2 * i, 7 * i) for i in range(9)])
         pair = self.build('pair', [(0, 0, 0), (9, 9, 99)])
@@ -154,8 +154,8 @@ class CloudContourTest(CloudTestCase):
         return json.loads(self.run_ok('contour', store, '-o', '-', *options))['features']
 
     @unittest.skipIf(SCIPY is None, 'no SciPy')
-    def test_lines_are_those_of_another_triangulation(self):
-        # In degrees, which are written as they are.
+    def test_lines_match_another_triangulation(self):
+        # In degrees, which are written unchanged.
         points = [(7 + x / 1e5, 46 + y / 1e5, z) for x, y, z in self.points]
         store = self.build('degrees', points, '--crs', 'EPSG:4326')
 
@@ -169,11 +169,11 @@ class CloudContourTest(CloudTestCase):
             places = feature['geometry']['coordinates']
             got |= {named(level, a, b) for a, b in zip(places, places[1:])}
         self.assertGreater(len(expected), 3000)
-        # A last digit may be rounded otherwise.
+        # A last digit may round differently.
         self.assertLessEqual(len(got ^ expected), 8)
 
     @unittest.skipIf(SCIPY is None, 'no SciPy')
-    def test_lines_in_the_stores_own_places_need_no_crs(self):
+    def test_lines_in_stored_coordinates_need_no_crs(self):
         store = self.build('local', self.points)
         refused = self.expect_error(1, 'contour', store, '--interval', 10, '-o', self.path('none.geojson'))
         self.assertIn('--own-crs', refused)
@@ -188,10 +188,10 @@ class CloudContourTest(CloudTestCase):
             places = feature['geometry']['coordinates']
             got |= {named(level, a, b) for a, b in zip(places, places[1:])}
         self.assertGreater(len(expected), 3000)
-        # A last digit may be rounded otherwise.
+        # A last digit may round differently.
         self.assertLessEqual(len(got ^ expected), 8)
 
-    def test_higher_ground_is_on_the_right_as_it_is_of_rasters(self):
+    def test_higher_ground_is_on_the_right_as_for_rasters(self):
         # A hill, as points and as a raster.
         hill = [(500000 + 30 * i, 5200000 + 30 * j, 100 - math.hypot(i - 10.3, j - 9.6))
                 for i in range(20) for j in range(20)]
@@ -251,7 +251,7 @@ class CloudContourTest(CloudTestCase):
             for interval in 1e-4, 10, 1e9:
                 self.assertEqual(self.lines(store, '--interval', interval), [])
 
-    def test_levels_without_number_are_told(self):
+    def test_too_many_levels_are_an_error(self):
         out = self.path('none.geojson')
         self.assertIn('too many levels', self.expect_error(1, 'contour', self.metres, '--interval',
                                                            1e-14, '-o', out))
@@ -266,7 +266,7 @@ class CloudContourTest(CloudTestCase):
 
 class CloudRasterTest(CloudTestCase):
     def samples(self, file):
-        """The samples of a GeoTIFF by rows, by GDAL."""
+        """The samples of a GeoTIFF by rows, read by GDAL."""
         raw = self.path('samples.raw')
         subprocess.run(['gdal_translate', '-q', '-of', 'ENVI', '-ot', 'Float32', file, raw], check=True)
         values = array.array('f')
@@ -283,7 +283,7 @@ class CloudRasterTest(CloudTestCase):
 
     @unittest.skipIf(SCIPY is None, 'no SciPy')
     @needs('gdal_translate', 'gdalinfo')
-    def test_cells_are_those_of_another_triangulation(self):
+    def test_cells_match_another_triangulation(self):
         out = self.path('cells.tif')
         self.run_ok('raster', self.metres, '--cell', 7, '-o', out)
         points = [(500000 + x, 5200000 + y, z) for x, y, z in self.points]
@@ -297,12 +297,12 @@ class CloudRasterTest(CloudTestCase):
                 self.assertEqual(ours, -9999)
             elif not abs(ours - theirs) < 1e-3:
                 differing += 1
-        # Where SciPy's hull is not quite convex.
+        # SciPy's hull is not quite convex there.
         self.assertLessEqual(differing, 3)
 
     @needs('gdal_translate', 'gdalinfo')
-    def test_a_raster_and_its_samples_as_points_are_one_surface(self):
-        # Such that both diagonals of a square give one height.
+    def test_a_raster_and_its_samples_as_points_give_the_same_surface(self):
+        # The heights are such that both diagonals of a square give the same surface.
         points = [(500000 + 30 * i, 5200000 + 30 * j, 200 + 40 * math.sin(i / 7) + 25 * math.cos(j / 5))
                   for j in range(60) for i in range(80)]
         cloud = self.build('lattice', points, '--crs', 'EPSG:32632')
@@ -327,8 +327,9 @@ class CloudRasterTest(CloudTestCase):
             self.assertAlmostEqual(x, y, delta=2e-4)
 
     @needs('gdaldem', 'gdal_translate')
-    def test_slope_aspect_and_hillshade_are_those_of_gdaldem(self):
-        # gdaldem takes the map's metres; those on the ground differ by the projection's scale.
+    def test_slope_aspect_and_hillshade_match_gdaldem(self):
+        # gdaldem uses metres of the map, which differ from metres on the ground by the projection's
+        # scale.
         heights = self.path('heights.tif')
         self.run_ok('raster', self.metres, '--cell', 10, '-o', heights)
         for value, nodata, tolerance in (('slope', -9999, 0.05), ('aspect', -9999, 0.5),
@@ -354,7 +355,7 @@ class CloudRasterTest(CloudTestCase):
             self.assertTrue(filecmp.cmp(one, two, shallow=False))
 
     @needs('gdalinfo')
-    def test_without_a_cell_size_there_are_about_as_many_cells_as_points(self):
+    def test_the_default_cell_size_gives_about_one_cell_per_point(self):
         for level in 0, 1:
             out = self.path(f'level{level}.tif')
             summary = json.loads(self.run_ok('raster', self.metres, '--level', level, '--json', '-o', out))
@@ -381,7 +382,7 @@ class CloudRasterTest(CloudTestCase):
         self.assertEqual(seen, {'lake', 'land'})
 
     @unittest.skipIf(SCIPY is None, 'no SciPy')
-    @unittest.skipIf('TERRACE_DATA' not in os.environ, 'TERRACE_DATA does not name the data')
+    @unittest.skipIf('TERRACE_DATA' not in os.environ, 'TERRACE_DATA is not set')
     @needs('gdal_translate', 'gdalinfo')
     def test_laser_data(self):
         with open(os.path.join(os.environ['TERRACE_DATA'], 'lidar/4_6_crop.las'), 'rb') as file:

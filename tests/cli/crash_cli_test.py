@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command dies at each write, sync, rename and removal in turn: the old or the new stands.
+"""Kills the command at each write, sync, rename and removal in turn; the old or the new output must remain.
 
 TERRACE=path/to/terrace FAULT_SHIM=path/to/libfault_shim.so crash_cli_test.py [CLASS...]
 """
@@ -16,11 +16,11 @@ import unittest
 from tile_case import TERRACE, NODATA, Dem, terrace
 
 SHIM = os.environ['FAULT_SHIM']
-ENDLESS = 2000  # steps: no command here has as many
+ENDLESS = 2000  # more steps than any command here has
 
 
 def everything(folder):
-    """Every file below a folder: bytes by name."""
+    """The bytes of every file below a folder, by name."""
     found = {}
     for path, _, names in os.walk(folder):
         for name in names:
@@ -63,8 +63,8 @@ class CrashCase(unittest.TestCase):
         return env
 
     def die_everywhere(self, start, command, check, exchange=True, least=8):
-        """Dies at each step of `command` in turn, each time in a copy of the folder `start`, and
-        calls check(step) in it. There must be so many steps, of all kinds."""
+        """Kills `command` at each step in turn, each time in a copy of the folder `start`, and calls
+        check(step) there. Asserts that there are more than `least` steps, of all kinds."""
         for kind in ('kill', 'power'):
             for step in range(1, ENDLESS):
                 shutil.rmtree(self.folder)
@@ -86,7 +86,7 @@ class CrashCase(unittest.TestCase):
             self.assertTrue({'rename', 'link'} & set(steps), steps)
 
     def start(self):
-        """An empty folder to be filled with what is there before the command."""
+        """Returns an empty folder for the files that exist before the command runs."""
         return tempfile.mkdtemp(dir=self.root)
 
 
@@ -101,7 +101,7 @@ class StoreCrashTest(CrashCase):
     def build(self, *options):
         return ('build', self.input('b.tif'), '-o', 's', *self.BLOCK, *options)
 
-    def test_a_build_leaves_a_whole_store_or_none(self):
+    def test_a_killed_build_leaves_a_complete_store_or_none(self):
         new = everything(self.built('b.tif'))
 
         def check(_):
@@ -116,7 +116,7 @@ class StoreCrashTest(CrashCase):
 
         self.die_everywhere(self.start(), self.build(), check)
 
-    def test_a_trial_leaves_nothing(self):
+    def test_a_killed_dry_run_leaves_no_files(self):
         def check(_):
             result = terrace(*self.build('--dry-run'), cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
@@ -133,8 +133,8 @@ class StoreCrashTest(CrashCase):
         self.assertGreater(step, 8)
 
     def replace(self, exchange):
-        """With `exchange` the name is never without a store; without it, opening the store, or the
-        next writer whatever comes of it, gives the old one its name back."""
+        """With `exchange`, the name always refers to a store. Without it, opening the store or starting the
+        next writer, even one that fails, restores the old store under its name."""
         start = self.built('a.tif')
         old, new = everything(start), everything(self.built('b.tif'))
         missing = []
@@ -144,7 +144,7 @@ class StoreCrashTest(CrashCase):
                 self.assertTrue(os.path.exists(self.path('s')))
             elif not os.path.exists(self.path('s')):
                 missing.append(step)
-                # Readers first, in copies; then a writer that fails.
+                # First readers, in copies, then a writer that fails.
                 for reader in (['info', 's'], ['verify', 's'], ['points', 's', '-o', '-'],
                                ['render', 's', '-o', 'p.png', '--size', '16x16']):
                     copy = os.path.join(self.start(), 'copy')
@@ -166,13 +166,13 @@ class StoreCrashTest(CrashCase):
         self.die_everywhere(start, self.build('--force'), check, exchange)
         self.assertEqual(len(missing), 0 if exchange else 2)
 
-    def test_a_replaced_store_is_the_old_or_the_new(self):
+    def test_a_killed_replacement_leaves_the_old_or_the_new_store(self):
         self.replace(exchange=True)
 
-    def test_a_store_replaced_without_exchange_is_the_old_or_the_new(self):
+    def test_a_killed_replacement_without_exchange_leaves_the_old_or_the_new_store(self):
         self.replace(exchange=False)
 
-    def test_force_on_a_link_replaces_the_store_that_it_leads_to(self):
+    def test_force_on_a_link_replaces_the_linked_store(self):
         start = self.built('a.tif')
         new = everything(self.built('b.tif'))
         os.mkdir(self.path('elsewhere'))
@@ -186,14 +186,14 @@ class StoreCrashTest(CrashCase):
         self.assertTrue(os.path.islink(self.path('s')))
         self.assertEqual(everything(self.path('elsewhere')), new)
         self.assertEqual(os.listdir(self.path('elsewhere')), ['s'])
-        # A link to a place where nothing stands yet is where it is made.
+        # If the target of a link does not exist, the store is created there.
         shutil.rmtree(self.path('elsewhere/s'))
         result = terrace(*self.build(), cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue(os.path.islink(self.path('s')))
         self.assertEqual(everything(self.path('elsewhere')), new)
 
-    def test_a_manifest_that_merely_names_the_format_is_no_store(self):
+    def test_a_manifest_that_only_names_the_format_is_not_a_store(self):
         os.mkdir(self.path('s'))
         for text in ('terrace-store', '{"note": "terrace-store"}', '{"format": ["terrace-store"]}',
                      '["format", "terrace-store"]'):
@@ -207,7 +207,7 @@ class StoreCrashTest(CrashCase):
 
 class FileCrashTest(CrashCase):
     def one_file(self, name, old_command, command, **expected):
-        """Commands that write the file `name`; the first one's is replaced by the second one's."""
+        """Checks two commands that write the file `name`; the second replaces the file of the first."""
         both = []
         for arguments in (old_command, command):
             folder = self.start()
@@ -280,7 +280,7 @@ class FileCrashTest(CrashCase):
 
 
 class TogetherTest(CrashCase):
-    """A run that fails, whatever step fails, leaves every name as it was; one that does not has replaced all."""
+    """A run that fails at any step leaves every output unchanged; a successful run replaces all of them."""
 
     @classmethod
     def setUpClass(cls):
@@ -368,14 +368,14 @@ class TogetherTest(CrashCase):
             with self.subTest(name):
                 self.die_everywhere(start, (*command, '--force'), check, least=6)
 
-    def test_one_name_is_not_given_to_two_outputs(self):
+    def test_two_outputs_cannot_have_the_same_name(self):
         result = terrace('cluster', self.input('p.xyz'), '-o', 'o.csv', '--labels', 'o.csv', cwd=self.folder)
         self.assertEqual(result.returncode, 2)
         self.assertIn("'o.csv' is named twice", result.stderr)
 
 
 class StrangerTest(CrashCase):
-    """--force looks at what has the name when it replaces it, not only when the run begins."""
+    """--force checks the output when it is replaced, not only when the run begins."""
 
     @classmethod
     def setUpClass(cls):
@@ -387,7 +387,7 @@ class StrangerTest(CrashCase):
             file.write('x,y\n1,1\n')
 
     def before_the_names(self, command):
-        """The number of the first step that gives a name."""
+        """The number of the first step that renames a file."""
         if os.path.exists(self.input('steps')):
             os.remove(self.input('steps'))
         result = terrace(*command, cwd=self.folder, env=self.environment())
@@ -397,7 +397,7 @@ class StrangerTest(CrashCase):
         return next(i + 1 for i, step in enumerate(steps) if step == 'rename')
 
     def run_while(self, command, change, fresh=False):
-        """Runs a command that pauses before it renames, and calls change() then. With `fresh`, in an empty folder."""
+        """Pauses a command before it renames and calls change() then; with `fresh`, in an empty folder."""
         step = self.before_the_names(command)
         if fresh:
             shutil.rmtree(self.folder)
@@ -430,7 +430,7 @@ class StrangerTest(CrashCase):
             'v.las': ('convert', points, '-o', 'v.las'),
         }
 
-    def test_a_file_that_has_taken_the_name_stays(self):
+    def test_another_file_under_the_name_is_kept(self):
         for name, command in self.commands().items():
             result = terrace(*command, cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
@@ -458,7 +458,7 @@ class StrangerTest(CrashCase):
             shutil.rmtree(self.folder)
             os.mkdir(self.folder)
 
-    def test_a_folder_that_has_taken_a_stores_name_stays(self):
+    def test_another_folder_under_the_name_is_kept(self):
         command = ('build', self.input('b.tif'), '-o', 's', '--block', '100', '--threads', '1')
         result = terrace(*command, cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -475,7 +475,7 @@ class StrangerTest(CrashCase):
         self.assertEqual(sorted(os.listdir(self.folder)), ['old', 's'])
         self.assertEqual(everything(self.path('s')), {'photos/1': b'precious'})
 
-    def test_a_store_with_a_strangers_file_stays(self):
+    def test_a_store_with_a_foreign_file_is_kept(self):
         command = ('build', self.input('b.tif'), '-o', 's', '--block', '100', '--threads', '1')
         self.assertEqual(terrace(*command, cwd=self.folder).returncode, 0)
         before = everything(self.folder)
@@ -486,7 +486,7 @@ class StrangerTest(CrashCase):
                     file.write('precious')
 
         before.update({'s/notes.txt': b'precious', 's/letter.txt': b'precious'})
-        # It comes while the run lasts, or is there from the beginning.
+        # The file is created during the run, or exists from the beginning.
         for code, error in (self.run_while((*command, '--force'), change),
                             (lambda run: (run.returncode, run.stderr))(terrace(*command, '--force', cwd=self.folder))):
             self.assertEqual(code, 1, error)
@@ -497,7 +497,7 @@ class StrangerTest(CrashCase):
             os.remove(self.path(name))
         self.assertEqual(terrace(*command, '--force', cwd=self.folder).returncode, 0)
 
-    def test_tiles_are_not_removed_from_a_folder_that_is_another_one(self):
+    def test_tiles_are_not_removed_from_another_folder_under_the_name(self):
         command = ('tile', self.input('tiles.terrace'), '-o', 't', '--vertical', 'ellipsoidal', '--threads', '1',
                    '--zoom', '7-8')
         Dem(40, 30, 10.13, 46.71, 0.02).write(self.input('tiles.tif'))
@@ -517,7 +517,7 @@ class StrangerTest(CrashCase):
 
 
 class DescriptorTest(CrashCase):
-    def test_runs_without_descriptors_leave_nothing_and_name_a_file(self):
+    def test_runs_out_of_descriptors_leave_no_files_and_name_a_file(self):
         store = self.input('a.terrace')
         self.run_ok('build', self.input('a.tif'), '-o', store)
         os.mkdir(self.input('many'))
@@ -566,12 +566,12 @@ class TileCrashTest(CrashCase):
 
     @staticmethod
     def served(folder):
-        """What a web server gives out."""
+        """The files that a web server would serve."""
         return {name: data for name, data in everything(folder).items()
                 if not os.path.basename(name).startswith('.')}
 
     def check_set(self, wholes, new):
-        """A set that is published is a whole one; one that is not goes on to be whole."""
+        """A published set is complete; an unpublished one can be resumed until it is complete."""
         result = terrace('verify', 't', cwd=self.folder)
         if os.path.exists(self.path('t/layer.json')):
             self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
@@ -584,21 +584,21 @@ class TileCrashTest(CrashCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(everything(self.folder), new)
 
-    def test_a_set_is_published_whole(self):
+    def test_a_set_is_published_as_a_whole(self):
         new = everything(self.made(self.stores[1]))
         self.assertGreater(len(new), 8)
         whole = {name: data for name, data in new.items() if '/.' not in name}
         self.die_everywhere(self.start(), self.tile(self.stores[1]),
                             lambda _: self.check_set((whole,), new), least=30)
 
-    def test_a_changed_set_is_whole_or_not_published(self):
+    def test_a_changed_set_is_complete_or_not_published(self):
         old, new = self.made(self.stores[0]), everything(self.made(self.stores[1]))
         wholes = self.served(old), {name: data for name, data in new.items() if '/.' not in name}
         self.assertNotEqual(*wholes)
         self.die_everywhere(old, self.tile(self.stores[1], '--force'),
                             lambda _: self.check_set(wholes, new), least=10)
 
-    def test_a_second_run_is_refused_while_the_first_one_lives(self):
+    def test_a_second_run_is_refused_while_the_first_is_running(self):
         new = everything(self.made(self.stores[0]))
         steps = 0
         for step in range(1, ENDLESS, 7):
@@ -613,7 +613,7 @@ class TileCrashTest(CrashCase):
                 break
             steps += 1
             self.assertTrue(os.WIFSTOPPED(status))
-            if step > 2:  # the folder and its lock are there
+            if step > 2:  # the folder and its lock exist
                 second = terrace(*self.tile(self.stores[1], '--force'), cwd=self.folder)
                 self.assertEqual(second.returncode, 1)
                 self.assertIn('another run is writing', second.stderr)
@@ -623,7 +623,7 @@ class TileCrashTest(CrashCase):
             self.assertEqual(everything(self.folder), new)
         self.assertGreater(steps, 5)
 
-    def test_what_killed_runs_left_is_no_damage_and_goes(self):
+    def test_leftovers_of_killed_runs_are_not_damage_and_are_removed(self):
         start = self.made(self.stores[0])
         new = everything(start)
         shutil.rmtree(self.folder)
@@ -645,7 +645,7 @@ class TileCrashTest(CrashCase):
             os.remove(self.path(left))
         self.assertEqual(everything(self.folder), new)
 
-    def test_tiles_go_where_a_link_leads(self):
+    def test_tiles_are_written_to_the_target_of_a_link(self):
         new = everything(os.path.join(self.made(self.stores[0]), 't'))
         os.symlink('real', self.path('t'))
         for options in ((), ('--force',)):
@@ -654,7 +654,7 @@ class TileCrashTest(CrashCase):
             self.assertEqual(everything(self.path('real')), new)
             self.assertTrue(os.path.islink(self.path('t')))
 
-    def test_a_run_that_fails_leaves_no_folder(self):
+    def test_a_failed_run_leaves_no_folder(self):
         result = terrace('tile', self.stores[0], '-o', 't', '--geoid', 'none.pgm', cwd=self.folder)
         self.assertEqual(result.returncode, 1)
         self.assertEqual(os.listdir(self.folder), [])

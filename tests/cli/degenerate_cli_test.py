@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every verb on degenerate stores and files: without points, with one, with
-points on one line, at one place, or so far apart that squares overflow. Each run ends by itself, with
-a result or one line of error. The sanitizers' build runs this too, where no cast or index may be wrong.
+"""Runs every verb on degenerate stores and files: without points, with one point, with points on one line,
+at one position, or so far apart that squares overflow. Each run must end by itself with a result or a
+one-line error. Sanitizer builds run this too, to find invalid casts and indices.
 
 TERRACE=path/to/terrace STORES=libstream/tests/data/stores degenerate_cli_test.py
 """
@@ -33,7 +33,7 @@ PLACES = 'x,y\n500000,5200000\n500003.5,5200007\n0,0\n1e300,-1e300\nnan,5\n-1e-3
 
 
 def on_store(store):
-    """Arguments for each verb, without -o and what follows; and the endings of outputs."""
+    """Arguments for each verb up to -o, and the endings of its outputs."""
     yield '', 'info', store
     yield '', 'info', store, '--json'
     yield '', 'verify', store
@@ -95,7 +95,7 @@ class DegenerateTest(unittest.TestCase):
         return os.path.join(self.folder, name)
 
     def run_verb(self, ending, *args):
-        """The run ends by itself: done, or with one line that says why not."""
+        """Checks that the run ends by itself, with success or a one-line error."""
         output = ['-o', 'out' + ending] if ending else []
         with self.subTest(args=args):
             result = subprocess.run([TERRACE, *args, *output, '-q'], capture_output=True, text=True,
@@ -126,7 +126,7 @@ class DegenerateTest(unittest.TestCase):
             if self.run_verb('', 'build', file, '-o', name, *crs) == 0:
                 self.try_store(name)
 
-    @unittest.skipUnless(STORES, 'STORES names no folder of stores')
+    @unittest.skipUnless(STORES, 'STORES is not set')
     def test_a_store_without_points(self):
         self.try_store(os.path.abspath(os.path.join(STORES, 'empty')))
 

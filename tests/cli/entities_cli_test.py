@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""build --entities: triangles and lines go into a store and come out again.
+"""Tests build --entities: triangles and lines survive a store unchanged.
 
 TERRACE=path/to/terrace entities_cli_test.py
 """
@@ -18,7 +18,7 @@ TERRACE = os.environ.get('TERRACE', 'terrace')
 
 
 def triangles_of(path):
-    """How often each triangle, three corners in the order of the file, is in an OBJ."""
+    """Counts each triangle, three corners in the order of the file, of an OBJ."""
     vertices, triangles = [], collections.Counter()
     with open(path, encoding='ascii') as file:
         for line in file:
@@ -73,7 +73,7 @@ class TrianglesTest(EntitiesCase):
         seed = 5
         print('seed', seed)
         rng = random.Random(seed)
-        # Shared vertices, twins, triangles without area and a zero with a sign, in no order.
+        # Shared vertices, duplicates, triangles without area and a negative zero, in no order.
         cls.vertices = [(rng.uniform(-1e3, 1e3), rng.uniform(0, 2e3), rng.choice([-0.0, 0.0, rng.random()]))
                         for _ in range(4000)]
         near = sorted(range(len(cls.vertices)), key=lambda v: (cls.vertices[v][0] // 100, cls.vertices[v][1]))
@@ -90,7 +90,7 @@ class TrianglesTest(EntitiesCase):
         cls.summary = json.loads(cls.run_ok('build', cls.file, '--entities', 'triangles', '-o', cls.store, '--block', 1000,
                                             '--crs', 'EPSG:25832', '--json'))
 
-    def test_all_come_back_to_the_last_bit(self):
+    def test_triangles_come_back_bit_for_bit(self):
         self.assertEqual(self.summary['points'], len(self.faces))
         self.assertGreater(self.summary['levels'], 1)
         self.run_ok('verify', self.store)
@@ -100,7 +100,7 @@ class TrianglesTest(EntitiesCase):
         self.assertTrue(triangles == triangles_of(self.file)[1])
         self.assertEqual((summary['vertices'], summary['triangles']), (len(vertices), len(self.faces)))
         self.assertEqual(len(set(vertices)), len(vertices))
-        # As a table, corners are columns; a zero loses its sign there.
+        # In a table the corners are columns, which do not keep the sign of a zero.
         unsigned = collections.Counter()
         for corners, count in triangles.items():
             unsigned[tuple(struct.pack('<3d', *(x + 0.0 for x in struct.unpack('<3d', c))) for c in corners)] += count
@@ -112,7 +112,7 @@ class TrianglesTest(EntitiesCase):
             table[tuple(struct.pack('<3d', *(x + 0.0 for x in values[k:k + 3])) for k in (0, 3, 6))] += 1
         self.assertTrue(table == unsigned)
 
-    def test_levels_and_regions_are_parts(self):
+    def test_levels_and_regions_are_subsets(self):
         out = self.path('part.obj')
         whole = triangles_of(self.file)[1]
         self.run_ok('mesh', self.store, '--level', 1, '-o', out)
@@ -128,7 +128,7 @@ class TrianglesTest(EntitiesCase):
         self.assertTrue(triangles_of(out)[1] == inside)
         self.assertGreater(len(inside), 100)
 
-    def test_a_bounding_volume_hierarchy(self):
+    def test_match_tree_builds_a_bounding_volume_hierarchy(self):
         out = self.path('tree.csv')
         summary = json.loads(self.run_ok('match', self.file, '--tree', '--entities', 'triangles', '-o', out, '--json',
                                          '--method', 'monotone', '--iterations', 3))
@@ -136,7 +136,7 @@ class TrianglesTest(EntitiesCase):
             self.assertEqual(file.readline().strip(), 'a,b,distance,size,level,minx,miny,minz,maxx,maxy,maxz')
             rows = [line.strip().split(',') for line in file]
         self.assertEqual((summary['pairs'], len(rows)), (len(self.faces) - 1,) * 2)
-        # Every node is a child once, and its box is that of the triangles below, to the last bit.
+        # Every node is a child once, and its box bounds the triangles below exactly.
         below = [frozenset([t]) for t in range(len(self.faces))]
         seen = collections.Counter()
         for row in rows:
@@ -158,7 +158,7 @@ class TrianglesTest(EntitiesCase):
         self.expect_error('--entities triangles is for --tree', 'match', self.file, '--entities', 'triangles',
                           '-o', self.path('x.csv'))
 
-    def test_threads_and_pipes_change_nothing(self):
+    def test_the_store_does_not_depend_on_threads_and_pipes(self):
         for name, source, options in (('threads.st', self.file, ['--threads', 1]),
                                       ('pipe.st', '-', ['--input-format', 'obj'])):
             with open(self.file, encoding='ascii') as file:
@@ -167,7 +167,7 @@ class TrianglesTest(EntitiesCase):
                             stdin=file)
             self.assertTrue(self.content(self.path(name)) == self.content(self.store), name)
 
-    def test_what_needs_points_says_so(self):
+    def test_options_that_need_points_say_so(self):
         for args in (['mesh', self.store, '--max-error', 1, '-o', self.path('x.ply')],
                      ['raster', self.store, '--cell', 10, '-o', self.path('x.tif')],
                      ['contour', self.store, '--interval', 1, '-o', self.path('x.geojson')],
@@ -186,7 +186,7 @@ class TrianglesTest(EntitiesCase):
             self.assertEqual(summary['triangles'], len(self.faces))
             self.assertIn('(of the first corners)\n', self.run_ok('info', name))
 
-    def test_what_cannot_be_built_says_so(self):
+    def test_unusable_inputs_say_so(self):
         out = self.path('no.st')
         triangles = ['--entities', 'triangles', '-o', out]
         for options in (['--metric', 'squared'], ['--channel', 'x2:1'], ['--outlier-price', 1]):
@@ -231,12 +231,12 @@ class LinesTest(EntitiesCase):
 
     @staticmethod
     def lines_of(text):
-        """As text, so that a zero has its sign; and the number of each."""
+        """Counts lines as text, so that zeros keep their sign."""
         features = json.loads(text)['features']
         return ([repr([list(map(float, p)) for p in feature['geometry']['coordinates']]) for feature in features],
                 [feature['properties']['line'] for feature in features])
 
-    def test_all_come_back_to_the_last_bit(self):
+    def test_lines_come_back_bit_for_bit(self):
         for entities, store in self.stores.items():
             with self.subTest(entities):
                 self.run_ok('verify', store)
@@ -245,7 +245,7 @@ class LinesTest(EntitiesCase):
                 self.assertTrue(lines == [repr([list(map(float, p)) for p in line]) for line in self.lines])
                 self.assertEqual(numbers, list(range(len(self.lines))))
                 self.assertIn('EPSG::2056', text)
-        # They can be read again: the same store.
+        # Reading them again gives the same store.
         again = self.path('again.geojson')
         self.run_ok('points', self.stores['segments'], '-o', again)
         self.run_ok('build', again, '--entities', 'segments', '-o', self.path('again.st'), '--block', 1000)
@@ -253,7 +253,7 @@ class LinesTest(EntitiesCase):
         self.assertTrue({k: v for k, v in first.items() if k != 'manifest.json'} ==
                         {k: v for k, v in second.items() if k != 'manifest.json'})
 
-    def test_a_region_has_the_pieces_that_begin_in_it(self):
+    def test_a_region_has_the_segments_that_begin_in_it(self):
         box = (2603000, 1203000, 2607000, 1206000)
         lines, _ = self.lines_of(self.run_ok('points', self.stores['segments'], '-o', '-', '--format', 'geojson',
                                              '--region', ','.join(map(str, box))))
@@ -278,11 +278,11 @@ class LinesTest(EntitiesCase):
             summary = json.loads(self.run_ok('render', self.stores['polylines'], '-o', picture, '--size', '300x300',
                                              '--force', '--json', *options))
             self.assertGreaterEqual(summary['lines'], lines)
-            # Larger, the lighter.
+            # A larger value means a lighter picture.
             light.append(json.loads(self.run_ok('info', picture, '--rgb', 'mapbox', '--json'))['height']['mean'])
         self.assertLess(light[0], light[2])
 
-    def test_levels_are_parts(self):
+    def test_levels_are_subsets(self):
         all_lines = [repr([list(map(float, p)) for p in line])[1:-1] for line in self.lines]
         lines, numbers = self.lines_of(self.run_ok('points', self.stores['polylines'], '-o', '-', '--format', 'geojson',
                                                    '--level', 'top'))
@@ -296,13 +296,13 @@ class LinesTest(EntitiesCase):
         x, y = json.loads(text)['features'][0]['geometry']['coordinates'][0][:2]
         self.assertTrue(7 < x < 8 and 46 < y < 47, (x, y))
 
-    def test_threads_and_pipes_change_nothing(self):
+    def test_the_store_does_not_depend_on_threads_and_pipes(self):
         with open(self.file, encoding='ascii') as file:
             self.run_ok('build', '-', '--entities', 'polylines', '-o', self.path('pipe.st'), '--block', 1000, '--threads', 1,
                         stdin=file)
         self.assertTrue(self.content(self.path('pipe.st')) == self.content(self.stores['polylines']))
 
-    def test_what_is_refused(self):
+    def test_unsupported_options_are_refused(self):
         store = self.stores['segments']
         self.expect_error('holds segments', 'mesh', store, '-o', self.path('x.ply'))
         self.expect_error('holds segments', 'raster', store, '--cell', 10, '-o', self.path('x.tif'))

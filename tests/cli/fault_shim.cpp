@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Loaded into the command by LD_PRELOAD: stops it at a chosen step of what it does to the disk.
+// Preloaded into the command by LD_PRELOAD: stops it at a chosen step of its disk operations.
 //
 // A step is a call that changes files or folders. Environment:
 //   FAULT_STEP     the number, from 1, of the step at which to stop
-//   FAULT_KIND     kill: dies by SIGKILL, a write half done, any other step not done
+//   FAULT_KIND     kill: dies by SIGKILL with a write half done, or before any other step
 //                  power: the same, and bytes that were not synced are lost
-//                  pause: sends itself SIGSTOP before the step, and goes on when continued
-//                  fail: a sync, rename or link reports EIO and does nothing; other steps are done
-//   FAULT_LOG      a file that gets the name of each step, one per line
-//   FAULT_NO_EXCHANGE  no renameat2(), as on some network disks (EINVAL)
-// Each name of a function is defined here, not one mapped to the other.
+//                  pause: sends itself SIGSTOP before the step, and continues on SIGCONT
+//                  fail: a sync, rename or link reports EIO and does nothing; other steps succeed
+//   FAULT_LOG      a file to which the name of each step is appended, one per line
+//   FAULT_NO_EXCHANGE  renameat2() fails with EINVAL, as on some network disks
+// Defines both variants of each function name instead of mapping one to the other.
 #undef _FILE_OFFSET_BITS
 #include <cerrno>
 #include <csignal>
@@ -37,17 +37,17 @@ int real_open(const char* path, int flags, mode_t mode = 0) {
   return next<int(const char*, int, ...)>("open")(path, flags, mode);
 }
 
-/// A file with bytes that are not synced yet.
+/// A file with bytes that are not yet synced.
 struct Unsynced {
   dev_t device;
   ino_t inode;
-  off_t safe;      // bytes that are
-  int descriptor;  // of our own
+  off_t safe;      // synced bytes
+  int descriptor;  // our own duplicate
 };
 
 std::recursive_mutex mutex;
 std::vector<Unsynced>& unsynced() {
-  static auto* files = new std::vector<Unsynced>;  // outlives all that may still write
+  static auto* files = new std::vector<Unsynced>;  // never destroyed: others may still write
   return *files;
 }
 long steps = 0;
@@ -81,7 +81,7 @@ void log_step(const char* name) {
   abort();
 }
 
-/// Counts a step; true if it is the one at which to die, which then calls die().
+/// Counts a step. Returns true if the command must die at it; the caller then calls die().
 bool last_step(const char* name) {
   log_step(name);
   const char* wanted = getenv("FAULT_STEP");
@@ -97,7 +97,7 @@ void step(const char* name) {
   if (last_step(name)) die();
 }
 
-/// The same for a call that may be told to fail; then true, with errno set.
+/// The same for a call that can be made to fail. Returns true, with errno set, if it must fail.
 bool step_fails(const char* name) {
   step(name);
   const char* wanted = getenv("FAULT_STEP");
@@ -131,7 +131,7 @@ void synced(int descriptor) {
   });
 }
 
-/// A write of which the last step does half.
+/// Performs half of a write if the command must die at it.
 template <class Whole, class Half>
 ssize_t do_write(const char* name, int descriptor, const Whole& whole, const Half& half) {
   if (!is_file(descriptor)) return whole();
@@ -196,11 +196,11 @@ int fsync(int fd) {
   return result;
 }
 
-/// Taken to sync all file systems: the test's folder is on one of them.
+/// Treated as a sync of all files, because the test's folder is on one of the file systems.
 int syncfs(int fd) {
   if (step_fails("sync")) return -1;
   const std::lock_guard lock(mutex);
-  // Not the real one, which waits for what others write.
+  // The real sync would wait for the writes of other programs.
   static_cast<void>(fd);
   for (const Unsynced& file : unsynced()) forget(file);
   unsynced().clear();

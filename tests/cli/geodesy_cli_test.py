@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reference systems as users meet them: build, info, points and mesh.
+"""Tests reference systems end to end: build, info, points, mesh and others.
 
 TERRACE=path/to/terrace geodesy_cli_test.py
-What compares with PROJ (cs2cs) or GDAL is skipped where those are not installed.
+Comparisons with PROJ (cs2cs) or GDAL are skipped if they are not installed.
 """
 
 import json
@@ -30,7 +30,7 @@ def terrace(*args):
     return subprocess.run([TERRACE, *map(str, args)], capture_output=True, text=True, timeout=120)
 
 
-# On a datum that nobody knows.
+# A CRS on an unknown datum.
 OWN_DATUM = ('PROJCS["own grid",GEOGCS["own",DATUM["own datum",SPHEROID["Airy 1830",6377563.396,299.3249646]],'
              'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],PROJECTION["Transverse_Mercator"],'
              'PARAMETER["latitude_of_origin",49],PARAMETER["central_meridian",-2],'
@@ -73,7 +73,7 @@ class GeodesyTest(unittest.TestCase):
         return [tuple(map(float, line.split()[:3])) for line in text.splitlines()]
 
     def raster(self, keys, name='dem.tif', corner=(500000, 5200000), cell=10.0, matrix=None):
-        """Six by six samples, 0 to 35."""
+        """Writes a raster of six by six samples, 0 to 35."""
         write_tiff(self.path(name), 6, 6, range(36), corner, cell, keys, matrix)
         return self.path(name)
 
@@ -119,7 +119,7 @@ class GeodesyTest(unittest.TestCase):
             self.assertAlmostEqual(x, a, delta=1e-9)
             self.assertAlmostEqual(y, b, delta=1e-9)
 
-    def test_a_prj_file_beside_the_source_counts(self):
+    def test_a_prj_file_next_to_the_source_is_used(self):
         raster = self.raster({1025: 1})
         with open(self.path('dem.prj'), 'w', encoding='utf-8') as file:
             file.write(ESRI_UTM)
@@ -127,9 +127,9 @@ class GeodesyTest(unittest.TestCase):
         places = self.cloud([(500000 + 3 * i, 5200000 + i * i) for i in range(20)])
         shutil.copy(self.path('dem.prj'), self.path('points.prj'))
         self.assertEqual(self.info(self.build(places))['crs']['epsg'], 32632)
-        # --crs goes before it.
+        # --crs overrides it.
         self.assertEqual(self.info(self.build(places, '--crs', 'EPSG:25832'))['crs']['epsg'], 25832)
-        # One that says something else than the file's own keys is a contradiction.
+        # It must not contradict the file's own keys.
         other = self.raster({1024: 1, 1025: 1, 3072: 32633, 3076: 9001}, name='dem.tif')
         error = self.refused(1, 'build', other, '-o', self.path('none'))
         self.assertIn('EPSG:32633', error)
@@ -140,7 +140,7 @@ class GeodesyTest(unittest.TestCase):
         self.assertIn('points.prj', error)
         self.assertEqual(error.count('--crs'), 1, error)
 
-    def test_a_local_system_has_a_unit_and_no_place(self):
+    def test_a_local_system_has_a_unit_but_no_position_on_the_earth(self):
         local = 'LOCAL_CS["site",UNIT["foot",0.3048]]'
         raster = self.raster({1025: 1})
         stores = [self.build(raster, '--crs', local)]
@@ -169,7 +169,7 @@ class GeodesyTest(unittest.TestCase):
         degrees = self.build(self.cloud([(10, 10), (20, 20)]), '--crs', 'EPSG:4326')
         self.assertIn('local', self.refused(2, 'points', degrees, '-o', '-', '--to-crs', local))
 
-    def test_contradictory_keys_are_an_error_that_names_them(self):
+    def test_contradictory_keys_are_named_in_the_error(self):
         for keys, words in (
                 ({1024: 1, 3072: 32632, 3076: 9002}, ['EPSG:32632', 'metres', '--crs']),
                 ({1024: 1, 2048: 4269, 3072: 32632, 3076: 9001}, ['EPSG:4269', '--crs']),
@@ -185,7 +185,7 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(2, 'build', self.raster({1025: 1}), '-o', self.path('none'), '--crs',
                              'EPSG:32299')
         self.assertIn('EPSG:32299', error)
-        # A projection method that is not there. Distances can be measured in its unit all the same.
+        # An unknown projection method; distances can still be measured in its unit.
         unknown = {1024: 1, 1025: 1, 2048: 4326, 3072: 32767, 3075: 2}
         metres = self.raster({**unknown, 3076: 9001})
         result = terrace('build', metres, '-o', self.path('unknown'))
@@ -196,7 +196,7 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(1, 'build', self.raster(unknown), '-o', self.path('none'))
         self.assertIn('unit', error)
 
-    def test_national_grids_go_to_wgs84_by_one_operation_that_is_named(self):
+    def test_national_grids_go_to_wgs84_by_one_named_operation(self):
         for code, x, y in ((5514, -742000, -1043000), (27700, 530000, 180000), (28992, 155000, 463000),
                            (2056, 2600000, 1200000), (31370, 150000, 170000)):
             raster = self.raster({1024: 1, 1025: 1, 3072: code, 3076: 9001}, corner=(x, y))
@@ -229,13 +229,13 @@ class GeodesyTest(unittest.TestCase):
             wanted = 'epsg' if expected.startswith('EPSG') else 'proj4'
             result = subprocess.run(['gdalsrsinfo', '-o', wanted, out], capture_output=True, text=True)
             self.assertIn(expected, result.stdout, crs)
-            # And for ourselves.
+            # Our own reader accepts it too.
             again, name = self.build(out), self.path('again.tif')
             self.ok('raster', again, '-o', name, '--force')
             result = subprocess.run(['gdalsrsinfo', '-o', wanted, name], capture_output=True, text=True)
             self.assertIn(expected, result.stdout, crs)
 
-    def test_the_command_line_takes_codes_names_and_files(self):
+    def test_the_command_line_accepts_codes_names_and_files(self):
         cloud = self.cloud([(500000 + 3 * i, 5200000 + i * i) for i in range(20)])
         json_file = self.path('utm.json')
         if shutil.which('projinfo'):
@@ -249,18 +249,18 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(2, 'build', cloud, '-o', self.path('none'), '--crs', 'UTM')
         self.assertIn('EPSG:n', error)
 
-    def test_without_proj_db_the_remedy_is_told(self):
+    def test_a_missing_proj_db_is_an_error_with_a_remedy(self):
         cloud = self.cloud([(1, 2), (3, 4)])
         environment = {**os.environ, 'PROJ_DATA': self.folder.name, 'PROJ_LIB': self.folder.name}
         result = subprocess.run([TERRACE, 'build', cloud, '--crs', 'EPSG:32632', '-o', self.path('none')],
                                 capture_output=True, text=True, env=environment)
         if result.returncode == 0:
-            self.skipTest('PROJ finds its database all the same')
+            self.skipTest('PROJ finds its database elsewhere')
         self.assertIn('proj.db', result.stderr)
         self.assertIn('PROJ_DATA', result.stderr)
 
-    def test_a_database_that_cannot_be_read_is_an_error(self):
-        """A failed read must not be taken for a CRS that is not known."""
+    def test_an_unreadable_database_is_an_error(self):
+        """A failed read must not be reported as an unknown CRS."""
         database = '/usr/share/proj/proj.db'
         if not os.path.exists(database):
             self.skipTest('proj.db is elsewhere')
@@ -276,7 +276,7 @@ class GeodesyTest(unittest.TestCase):
                 part.flush()
                 result = subprocess.run([TERRACE, 'build', raster, '-o', self.path('none'), '--force', '-q'],
                                         capture_output=True, text=True, env=environment, timeout=120)
-                if result.returncode == 0:  # what it needs is in the part that is kept
+                if result.returncode == 0:  # the remaining part contains all that is needed
                     self.assertEqual(self.info(self.path('none'))['crs']['epsg'], 32632)
                     self.assertIn('Transverse Mercator', self.info(self.path('none'))['crs']['wkt'])
                     continue
@@ -284,7 +284,7 @@ class GeodesyTest(unittest.TestCase):
                 self.assertIn('proj.db', result.stderr)
                 self.assertIn('cannot be read', result.stderr)
 
-    def test_a_geocentric_cloud_is_points_in_space(self):
+    def test_a_geocentric_cloud_supports_only_queries_in_space(self):
         cloud = self.cloud([(4027893.75 + 3 * i, 307041.99 + 2 * i) for i in range(50)])
         store = self.path('space')
         result = terrace('build', cloud, '--crs', 'EPSG:4978', '-o', store)
@@ -311,7 +311,7 @@ class GeodesyTest(unittest.TestCase):
             file.write('x,y\n4027893,307041\n')
         return self.path('places.csv')
 
-    def test_info_says_what_counts_as_wgs84(self):
+    def test_info_says_which_systems_count_as_wgs84(self):
         etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
         self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))
         self.assertEqual(self.info(etrs)['vertical'], 'orthometric')
@@ -323,7 +323,7 @@ class GeodesyTest(unittest.TestCase):
         wrong = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9002})
         self.assertIn('contradict', self.ok('info', wrong))
 
-    def test_without_a_system_nothing_is_converted(self):
+    def test_data_without_a_crs_cannot_be_converted(self):
         store = self.build(self.raster({1025: 1}))
         self.assertIsNone(self.info(store)['crs'])
         for option in (('--to-crs', 'EPSG:4326'),
@@ -352,7 +352,7 @@ class GeodesyTest(unittest.TestCase):
                      f'--towgs84={shift}')
         self.refused(2, 'build', cloud, '-o', self.path('none'), '--crs', 'EPSG:27700',
                      '--towgs84', '1,2')
-        # The shift may come as late as the other system does.
+        # The shift may be given later, together with the other CRS.
         late = f'--towgs84={shift}'
         self.assertEqual(self.points(bare, '--to-crs', 'EPSG:4326', late), found)
         x, y, _ = found[7]
@@ -405,7 +405,7 @@ class GeodesyTest(unittest.TestCase):
 
     def test_contours_of_a_region_on_another_datum(self):
         store = self.build(self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}))
-        # Some hundred metres away.
+        # A shift of a few hundred metres.
         shift = '-87,-98,-121'
         own = ('GEOGCS["own",DATUM["own datum",SPHEROID["International 1924",6378388,297]],'
                'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]')
@@ -419,7 +419,7 @@ class GeodesyTest(unittest.TestCase):
         most = max(x for f in whole for x, *_ in f['geometry']['coordinates'])
         self.assertLess(east, most)
 
-    def test_heights_come_from_the_keys_or_from_what_is_said(self):
+    def test_the_vertical_reference_comes_from_keys_or_options(self):
         utm = {1024: 1, 1025: 1, 3072: 25832, 3076: 9001}
         self.assertIsNone(self.info(self.build(self.raster(utm)))['vertical'])
         raster = self.raster({**utm, 4096: 5783, 4099: 9001})
@@ -436,7 +436,7 @@ class GeodesyTest(unittest.TestCase):
         store = self.build(self.raster(utm), '--crs', 'EPSG:25832+7837')
         self.assertEqual(self.info(store)['vertical'], 'orthometric')
 
-    def test_a_rotated_raster_lands_where_gdal_says(self):
+    def test_a_rotated_raster_is_placed_like_in_gdal(self):
         matrix = [8.0, 6.0, 0.0, 500000.0, 6.0, -8.0, 0.0, 5200000.0, 0.0, 0.0, 0.0, 0.0,
                   0.0, 0.0, 0.0, 1.0]
         raster = self.raster({1024: 1, 1025: 1, 3072: 32632, 3076: 9001}, matrix=matrix)
@@ -497,7 +497,8 @@ class GeodesyTest(unittest.TestCase):
         self.assertIn('on both sides of the antimeridian', result.stderr)
         low, high = (self.info(store)['bounds'][end][0] for end in ('min', 'max'))
         self.assertTrue(179.9 <= low < 179.91 and 180.09 < high <= 180.1)
-        # The neighbours of a place at the seam are on both sides of it, whichever way it is written.
+        # The nearest points of a position on the antimeridian are on both sides, for both
+        # longitudes.
         for place in '180,-16.95', '-180,-16.95':
             near = self.points(store, f'--near={place}', '-k', 20)
             self.assertEqual({x > 180 for x, _, _ in near}, {True, False})
@@ -506,11 +507,11 @@ class GeodesyTest(unittest.TestCase):
             file.write('0,-16.95\n180,-16.95\n-179.95,-16.95\n')
         heights = [line.split(',')[2] for line in self.ok('sample', store, '--points', places).splitlines()]
         self.assertEqual([height != '' for height in heights], [False, True, True])
-        # Counted from 0 to 360, the seam is at Greenwich.
+        # With longitudes from 0 to 360, the seam is at Greenwich.
         cloud = self.cloud([(west + random.random(), 50 + random.random()) for west in (0, 359) for _ in range(99)])
         low, high = (self.info(self.build(cloud, '--crs', 'EPSG:4326'))['bounds'][end][0] for end in ('min', 'max'))
         self.assertTrue(-1 <= low < high <= 1)
-        # What goes around the globe stays as it is.
+        # A cloud that surrounds the globe is not changed.
         cloud = self.cloud([(random.uniform(-180, 180), random.uniform(-60, 60)) for _ in range(900)])
         low, high = (self.info(self.build(cloud, '--crs', 'EPSG:4326'))['bounds'][end][0] for end in ('min', 'max'))
         self.assertTrue(-180 <= low < -170 and 170 < high <= 180)
@@ -522,7 +523,7 @@ class GeodesyTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn('on both sides of the antimeridian', result.stderr)
 
-    def test_what_is_wrong_with_longitudes_is_said(self):
+    def test_unusual_longitudes_are_noted(self):
         for longitudes, words in (((15, 415), 'whole turns apart (15 to 415)'), ((179.5, -179.5), 'sides of the antimeridian'),
                                   ((0.5, 359.5), 'both sides of the meridian of 0')):
             cloud = self.cloud([(x, 10 + i / 100) for i in range(100) for x in longitudes])
@@ -544,7 +545,7 @@ class GeodesyTest(unittest.TestCase):
         dem = self.path('metres.tif')
         write_tiff(dem, 4, 4, range(16), corner=(500000, 5200000), cell=10.0, keys=GEOGRAPHIC)
         self.assertIn('is beyond a pole', self.refused(1, 'build', dem, '-o', self.path('metres')))
-        # The pole itself is a place, to the rounding of what was written.
+        # The pole itself is valid, within the rounding of the input.
         self.build(self.cloud([(i, 89 + j / 9) for i in range(9) for j in range(10)] + [(3, 90.0000000001)]),
                    '--crs', 'EPSG:4326')
         store = self.build(self.cloud([(5e5 + i, 5.2e6 + i * i) for i in range(9)]), '--crs', 'EPSG:32632')
@@ -554,7 +555,7 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(1, 'sample', store, '--points', places, '--points-crs', 'EPSG:4326')
         self.assertIn('line 3: the latitude 146.9 is beyond a pole', error)
 
-    def test_requests_beyond_a_pole_are_refused(self):
+    def test_queries_beyond_a_pole_are_refused(self):
         random.seed(2)
         degrees = self.build(self.cloud([(9 + random.random(), 45 + random.random()) for _ in range(200)]),
                              '--crs', 'EPSG:4326')
@@ -573,7 +574,7 @@ class GeodesyTest(unittest.TestCase):
             for verb, *how in wanted:
                 error = self.refused(1, verb, store, *how, '-o', self.path(outputs[verb]))
                 self.assertRegex(error, 'the latitude -?95 is beyond a pole', (verb, how))
-        # Half a cell of a raster of the globe may be beyond.
+        # A global raster may extend beyond the poles by half a cell.
         self.ok('points', degrees, '--region', '-180.5,-90.5,180.5,90.5', '-o', self.path('all.ply'))
 
     def geojson(self, name, ring, **members):
@@ -585,7 +586,7 @@ class GeodesyTest(unittest.TestCase):
                  'geometry': {'type': 'Polygon', 'coordinates': [ring + ring[:1]]}}]}, file)
         return path
 
-    def test_geojson_is_in_the_crs_that_it_names_or_else_in_longitude_and_latitude(self):
+    def test_geojson_is_in_its_named_crs_or_in_longitude_and_latitude(self):
         random.seed(4)
         places = [(random.uniform(3e5, 7e5), random.uniform(5e6, 6e6)) for _ in range(3000)]
         cloud = self.cloud(places)
@@ -622,7 +623,7 @@ class GeodesyTest(unittest.TestCase):
                     self.assertEqual(len(file.read().splitlines()) - 1, len(expected))
         result = terrace('points', store, '--region', self.path('metres.geojson'), '-o', self.path('m.csv'))
         self.assertIn('has no crs, and its places are read in the CRS of the data, EPSG:32632', result.stderr)
-        # What --region-crs says counts before what the file says.
+        # --region-crs overrides the file.
         self.assertEqual({z for _, _, z in self.points(store, '--region', self.geojson('wrong.geojson', metres,
                                                        crs=crs('EPSG:4326')), '--region-crs', 'EPSG:32632')}, within)
         for members, words in (({'crs': crs('EPSG:0')}, 'its crs "EPSG:0" is not known'),
@@ -636,7 +637,7 @@ class GeodesyTest(unittest.TestCase):
         self.assertIn('the CRS of the data is not known', self.refused(
             1, 'points', without, '--region', self.path('84.geojson'), '-o', '-'))
 
-    def test_a_line_of_geojson_is_in_longitude_and_latitude(self):
+    def test_a_geojson_line_is_in_longitude_and_latitude(self):
         dem = self.path('dem.tif')
         write_tiff(dem, 30, 30, [i % 30 for i in range(900)], corner=(500000, 5200000), cell=30.0,
                    keys={1024: 1, 1025: 1, 3072: 32632})
@@ -696,7 +697,7 @@ class GeodesyTest(unittest.TestCase):
         error = self.refused(2, 'points', store, '--region=179,-18,-179,-17', '-o', '-')
         self.assertIn('170 to 190', error)
 
-    def test_what_is_written_across_the_antimeridian_stays_together(self):
+    def test_outputs_across_the_antimeridian_stay_together(self):
         dem = self.path('fiji.tif')
         write_tiff(dem, 40, 40, [(i % 40) * (i // 40) for i in range(1600)], corner=(800000, 8240000), cell=1000.0,
                    keys={1024: 1, 1025: 1, 3072: 32760})
@@ -704,7 +705,7 @@ class GeodesyTest(unittest.TestCase):
         self.ok('contour', store, '--interval', 300, '-o', self.path('lines.geojson'))
         with open(self.path('lines.geojson'), encoding='utf-8') as file:
             lines = [line['geometry'] for line in json.load(file)['features']]
-        # GeoJSON alone wants what crosses cut in two (RFC 7946, 3.1.9).
+        # Only GeoJSON requires lines to be cut there (RFC 7946, 3.1.9).
         kinds = {line['type'] for line in lines}
         self.assertEqual(kinds, {'LineString', 'MultiLineString'})
         for line in lines:
@@ -732,8 +733,8 @@ class GeodesyTest(unittest.TestCase):
                 '--region-crs', 'EPSG:4326', '--force')
         self.assertGreater(self.info(raster)['points'], 300)
 
-    def test_beside_the_area_of_all_operations_one_without_a_grid_is_taken(self):
-        # South of Germany, where the grid of DHDN ends.
+    def test_an_operation_without_a_grid_is_used_outside_the_area_of_all_operations(self):
+        # South of Germany, beyond the grid of DHDN.
         store = self.build(self.cloud([(500000 + i, 5100000 + i * i) for i in range(9)]), '--crs', 'EPSG:32632')
         x, y, _ = self.points(store, '--to-crs', 'EPSG:31467')[0]
         self.assertAlmostEqual(x, 3500000, delta=200)
@@ -741,7 +742,7 @@ class GeodesyTest(unittest.TestCase):
         self.assertIn('geocentric', self.refused(2, 'points', store, '--to-crs', 'EPSG:4978', '-o', '-'))
 
     def test_heights_keep_an_assumed_unit_in_another_crs(self):
-        """Heights without a unit are taken in that of the store's own x and y, or metres, wherever they go."""
+        """Heights without a unit use the unit of the store's own x and y, or metres, in any output CRS."""
         rows = [100 + 3 * (i % 40) + (i // 40) % 7 for i in range(1600)]
         for own, other, corner in ((32611, 2229, (380000, 3760000)), (2229, 32611, (6500000, 1800000))):
             dem = self.path(f'unit{own}.tif')
@@ -764,7 +765,7 @@ class GeodesyTest(unittest.TestCase):
             self.assertAlmostEqual(heights[0], heights[1], delta=0.01 * heights[0])
             self.assertAlmostEqual(heights[0], 123 * (1 if own == 32611 else 1200 / 3937), delta=0.1)
 
-    def test_a_point_that_has_no_place_there_is_named(self):
+    def test_a_point_that_cannot_be_converted_is_named(self):
         cloud = self.cloud([(10, 10), (20, 20), (30, 90), (40, 40)])
         store = self.build(cloud, '--crs', 'EPSG:4326')
         error = self.refused(1, 'points', store, '--to-crs', 'EPSG:3857', '-o', '-')

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The golden stores, read by the command: the points of the texts beside them, to the last digit.
+"""Reads the golden stores with the command and compares every digit with the text files next to them.
 
 TERRACE=path/to/terrace STORES=libstream/tests/data/stores golden_store_cli_test.py
 """
@@ -25,7 +25,7 @@ def terrace(*args):
 
 
 def value(text, kind):
-    """Integers as they are; float32 is written with fewer digits than the double that it is."""
+    """Parses a value; float32 is written with fewer digits than its double."""
     if not kind.startswith('float'):
         return text
     number = float(text)
@@ -34,7 +34,7 @@ def value(text, kind):
 
 class GoldenStoreTest(unittest.TestCase):
     def expected(self, name, level):
-        """The points of `level` and above, in the coordinates of the CRS."""
+        """The points of `level` and above in coordinates of the CRS."""
         manifest = json.loads((STORES / name / 'manifest.json').read_text())
         xy, z = manifest['world'], manifest['coordinates'][2]
         for line in lzma.decompress((STORES / f'{name}.txt.xz').read_bytes()).decode().splitlines():
@@ -80,7 +80,7 @@ class GoldenStoreTest(unittest.TestCase):
         self.check('empty', 1)
 
     def test_an_overlay(self):
-        """Points with the overlay's heights: as many as it has are others than without."""
+        """With the overlay, as many heights differ as the overlay has."""
         with tempfile.TemporaryDirectory() as folder:
             rows = []
             for more in ((), ('--overlay', STORES / 'grid.overlay')):

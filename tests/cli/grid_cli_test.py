@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Elevation grids of every format from the command line: what is told of them, and what is built.
+"""Tests info and build on elevation grids of every format.
 
 TERRACE=path/to/terrace grid_cli_test.py
 """
@@ -19,7 +19,7 @@ import zipfile
 import zlib
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
-# WGS 84 / UTM zone 32N as programs of ESRI write it.
+# WGS 84 / UTM zone 32N as written by ESRI's programs.
 PRJ = ('PROJCS["WGS_1984_UTM_Zone_32N",GEOGCS["GCS_WGS_1984",DATUM["D_WGS_1984",SPHEROID["WGS_1984",'
        '6378137.0,298.257223563]],PRIMEM["Greenwich",0.0],UNIT["Degree",0.0174532925199433]],'
        'PROJECTION["Transverse_Mercator"],PARAMETER["False_Easting",500000.0],'
@@ -70,7 +70,7 @@ class GridTest(unittest.TestCase):
         return self.path('a.asc')
 
     def check(self, path, form, *options, world=True, nodata=True):
-        """info and build of a file that holds the heights."""
+        """Checks info and build on a file with the expected heights."""
         info = self.json_of('info', path, *options)
         self.assertEqual(info['format'], form)
         values = list(self.heights())
@@ -96,7 +96,8 @@ class GridTest(unittest.TestCase):
         self.assertEqual(stored['crs']['epsg'], 32632)
 
     def test_ascii_grids_from_pipes_give_the_same_store(self):
-        # In degrees: the cells are not square on the ground, which orders the points.
+        # In degrees, so cells are not square on the ground, which determines the order of the
+        # points.
         path = self.ascii_grid(8, 60, 0.01)
         self.json_of('build', path, '-o', self.path('file.terrace'), '--crs', 'EPSG:4326')
         with open(path, 'rb') as file:
@@ -133,7 +134,7 @@ class GridTest(unittest.TestCase):
         shutil.rmtree(self.path('a.png.terrace'))
         self.check(self.path('a.png'), 'png', nodata=False)
 
-    def test_what_gdal_keeps_beside_a_file(self):
+    def test_gdal_aux_xml_files_are_read(self):
         samples = self.heights('H')
         if sys.byteorder == 'little':
             samples.byteswap()
@@ -160,19 +161,19 @@ class GridTest(unittest.TestCase):
         for found, due in zip(info['transform'], [25, 0, 500012.5, 0, -25, 5200737.5]):
             self.assertAlmostEqual(found, due, 6)
         self.assertEqual(info['channels'][2]['unit'], 'metre')
-        # Each has its own CRS.
+        # Both have their own CRS.
         side('right.png', half, 33)
         result = self.terrace('build', left, right, '-o', self.path('none.terrace'))
         self.assertEqual(result.returncode, 1)
         self.assertIn(b'33N', result.stderr)
-        # What cannot be read is told of.
+        # An unreadable file is reported.
         with open(left + '.aux.xml', 'w') as file:
             file.write('<PAMDataset><SRS>')
         told = self.terrace('info', left)
         self.assertEqual(told.returncode, 0)
         self.assertIn(b'left.png.aux.xml', told.stdout + told.stderr)
 
-    def test_an_empty_prj_says_nothing(self):
+    def test_an_empty_prj_gives_no_crs(self):
         path = self.ascii_grid()
         for content in (b'', b' \r\n', b'\xef\xbb\xbf'):
             with open(self.path('a.prj'), 'wb') as file:
@@ -185,7 +186,7 @@ class GridTest(unittest.TestCase):
             file.write('not a CRS')
         self.assertEqual(self.terrace('build', path, '-o', self.path('b.terrace')).returncode, 1)
 
-    def test_cells_that_cannot_be_told_apart(self):
+    def test_indistinguishable_cells_are_an_error(self):
         for x, cell in ((0, 1e-300), (500000, 1e-12), (0, 1e200)):
             path = self.ascii_grid(x, 0, cell)
             result = self.terrace('build', path, '-o', self.path('a.terrace'))
@@ -194,7 +195,7 @@ class GridTest(unittest.TestCase):
             self.assertNotIn(b'tmp', result.stderr.replace(self.folder.encode(), b''))
             self.assertEqual(sorted(os.listdir(self.folder)), ['a.asc'])
 
-    def test_pictures_of_tiny_cells_end(self):
+    def test_rendering_tiny_cells_terminates(self):
         for cell in (1e-160, 1e-155, 1e-300):
             path = self.ascii_grid(0, 0, cell)
             result = self.terrace('render', path, '-o', self.path('tiny.png'), '--size', '40x30', '--force')
@@ -213,7 +214,8 @@ class GridTest(unittest.TestCase):
         self.assertIn(b"--where 'z > -1e30'", result.stderr)
         self.assertEqual(self.json_of('convert', self.path('a.csv'), '-o', self.path('c.csv'), '--where',
                                       'z > -1e30')['points'], 2)
-        # Usual values for no data, far from all others; -9999 among such depths is one of them.
+        # Common nodata values far from all other heights are noted; -9999 among similar depths is
+        # not.
         for void, others, noted in (('-9999', '1 2', True), ('-32768', '1 2', True), ('-99999', '1 2', True),
                                     ('-9999', '-9998 -9600', False)):
             with open(self.path('v.asc'), 'w') as file:
@@ -223,7 +225,7 @@ class GridTest(unittest.TestCase):
                 result = self.terrace(verb, self.path('v.asc'), '-o', self.path(void + others[:2] + name))
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertEqual(f'1 cell has the height {void}'.encode() in result.stderr, noted, (verb, void))
-        # With the remedy there are none.
+        # The remedy in the note removes them.
         with open(self.path('a.asc')) as file:
             text = file.read()
         with open(self.path('a.asc'), 'w') as file:
@@ -237,7 +239,7 @@ class GridTest(unittest.TestCase):
                 if name != 'manifest.json':
                     self.assertEqual(a.read(), b.read(), name)
 
-    def test_cells_of_maps_that_do_not_say_it(self):
+    def test_cell_gives_the_cell_size_of_height_maps_without_one(self):
         samples = self.heights('H')
         if sys.byteorder == 'little':
             samples.byteswap()
@@ -251,7 +253,7 @@ class GridTest(unittest.TestCase):
             rows = [tuple(map(float, line.split(',')[:2])) for line in file.readlines()[1:]]
         self.assertEqual((min(rows)[0], max(rows)[0]), (0, 0.5 * (self.columns - 1)))
         self.assertEqual(min(y for _, y in rows), -0.5 * (self.rows - 1))
-        # Through a pipe it has no world file, and is set aside on disk.
+        # A pipe has no world file, and its content is copied to a temporary file.
         with open(self.path('a.png'), 'rb') as file:
             result = self.terrace('build', '-', '-o', self.path('pipe.terrace'), '--cell', 25, input=file.read())
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -266,7 +268,7 @@ class GridTest(unittest.TestCase):
             self.assertEqual(result.returncode, 1)
             self.assertIn(b'leave --cell out', result.stderr)
 
-    def test_what_gzip_holds_and_what_pipes_bring(self):
+    def test_gzip_and_pipes_give_the_same_store(self):
         self.json_of('build', self.ascii_grid(), '-o', self.path('plain.terrace'))
         self.json_of('raster', self.path('plain.terrace'), '-o', self.path('a.tif'), '--cell', 25)
         for name in ('a.asc', 'a.tif'):
@@ -280,7 +282,7 @@ class GridTest(unittest.TestCase):
             for given in (content, gzip.compress(content)):
                 self.json_of('build', '-', '-o', self.path('pipe.terrace'), '--force', input=given)
                 self.same_store('file.terrace', 'pipe.terrace')
-        # What is cut off is named as the user does, not as its copy.
+        # Errors about truncated input name the user's input and not its copy.
         result = self.terrace('build', '-', '-o', self.path('no.terrace'), input=content[:len(content) // 2])
         self.assertEqual(result.returncode, 1)
         self.assertTrue(result.stderr.startswith(b'terrace: standard input: '), result.stderr)
@@ -288,13 +290,13 @@ class GridTest(unittest.TestCase):
         result = self.terrace('build', '-', '-o', self.path('no.terrace'), input=b'\x1f\x8b' + b'z' * 100)
         self.assertEqual(result.returncode, 1)
         self.assertIn(b'damaged gzip', result.stderr)
-        # Tiles of SRTM are known by their names.
+        # SRTM tiles are recognised by name.
         result = self.terrace('build', '-', '-o', self.path('no.terrace'), '--input-format', 'hgt',
                               input=bytes(2 * 1201 * 1201))
         self.assertEqual(result.returncode, 1)
         self.assertIn(b'hgt cannot be read from a pipe', result.stderr)
 
-    def test_colours_that_mean_heights(self):
+    def test_colours_that_encode_heights(self):
         for name, number in (('mapbox', lambda z: (z + 10000) * 10),
                              ('terrarium', lambda z: (z + 32768) * 256)):
             path = self.path(name + '.png')
@@ -330,7 +332,7 @@ class GridTest(unittest.TestCase):
         side = 121
         tiles = []
         for latitude in (46, 47):
-            # Rows from the north; neighbours share one.
+            # Rows from the north; neighbours share a row.
             rows = range((47 - latitude) * (side - 1), (47 - latitude) * (side - 1) + side)
             samples = array.array('h', [height(c, r) for r in rows for c in range(side)])
             samples[5] = -32768
@@ -345,14 +347,14 @@ class GridTest(unittest.TestCase):
         self.assertEqual(info['vertical'], 'orthometric')
         self.assertEqual(info['nodata'], 1)
         built = self.json_of('build', *tiles, '-o', self.path('both.terrace'))
-        # Of the shared row the other tile has the sample that one lacks.
+        # Where the shared row has no sample in one tile, the other tile's sample is used.
         self.assertEqual((built['points'], built['nodata']), (side * (2 * side - 1) - 1, 1))
         stored = self.json_of('info', self.path('both.terrace'))
         self.assertEqual((stored['columns'], stored['rows']), (side, 2 * side - 1))
         self.assertEqual(stored['bounds']['min'][:2], [8.0, 46.0])
         self.assertEqual([round(v, 9) for v in stored['bounds']['max'][:2]], [9.0, 48.0])
 
-    def test_a_region_that_begins_at_a_row_has_that_row(self):
+    def test_a_region_includes_the_row_at_its_edge(self):
         side = 1201
         samples = array.array('h', [1]) * (side * side)
         with open(self.path('N46E008.hgt'), 'wb') as file:
@@ -426,7 +428,7 @@ class GridTest(unittest.TestCase):
         self.json_of('build', self.path('a.dem'), '-o', self.path('a.terrace'))
         self.json_of('build', '-', '-o', self.path('b.terrace'), input=text)
 
-    def test_grids_that_promise_too_much_end_in_one_line(self):
+    def test_truncated_grids_give_a_one_line_error(self):
         cases = {'a.asc': b'ncols 1000000000\nnrows 1000000000\ncellsize 1\n1 2 3\n',
                  'b.asc': b'ncols 3\nnrows 3\ncellsize 1\n1 2 3\n',
                  'N46E008.hgt': bytes(1000), 'N46E008.hgt.gz': b'\x1f\x8b\x08\0' + bytes(30),

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Laser scans: LAS and LAZ through `info`, `convert`, `build`, `points` and back, record by record.
+"""Tests LAS and LAZ with `info`, `convert`, `build` and `points`, record by record.
 
 TERRACE=path/to/terrace las_cli_test.py [CLASS...]
 """
@@ -57,7 +57,7 @@ class LasCase(unittest.TestCase):
         return json.loads(self.run_ok('info', *args, '--json'))
 
     def refused(self, *args, **more):
-        """The one line of an error."""
+        """Runs a failing command and returns its one-line error."""
         result = terrace(*args, **more)
         self.assertEqual(result.returncode, 1, result.stderr)
         lines = result.stderr.decode().splitlines()
@@ -71,9 +71,9 @@ class LasCase(unittest.TestCase):
 
 
 class LasFormatTest(LasCase):
-    """Every point format, made here."""
+    """Synthetic files of every point format."""
 
-    def test_every_point_format_comes_out_as_it_was(self):
+    def test_every_point_format_survives_a_store(self):
         for point_format in range(11):
             records = random_records(point_format, 3000)
             path = self.put('in.las', las(point_format, records, scale=(0.01, 0.25, 0.001),
@@ -91,7 +91,7 @@ class LasFormatTest(LasCase):
                     for name, value in values.items():
                         wanted = value * 0.006 if name == 'scan_angle' else value
                         self.assertEqual(type(wanted)(row[name]), wanted)
-                # Waveforms stay behind, so their packets' fields become extra bytes.
+                # Waveform data is not stored, so the fields of waveform packets become extra bytes.
                 plain = {4: 1, 5: 3, 9: 6, 10: 8}.get(point_format, point_format)
                 self.run_ok('convert', path, '-o', self.path('out.laz'), '--force')
                 self.assertEqual(self.info(self.path('out.laz'))['format'], 'laz')
@@ -115,7 +115,7 @@ class LasFormatTest(LasCase):
                     self.assertEqual(list(copy.returns), [returns.count(n) for n in range(1, 16)])
                     self.assertEqual(copy.old_count, 3000 if plain < 6 else 0)
 
-    def test_extra_bytes_are_attributes_of_their_type(self):
+    def test_extra_bytes_become_attributes_of_their_type(self):
         rows = [('count', 1, 0, 0, 0), ('height', 4, 8 + 16, 0.25, -10), ('double', 10, 0, 0, 0),
                 ('big', 7, 0, 0, 0), ('pair', 16, 0, 0, 0), ('opaque', 0, 2, 0, 0)]
         records = [record + struct.pack('<BhdQiibbB', 7 + i, -3 * i, i / 7, 2**64 - 1 - i, i, -i, 1, 2, 200)
@@ -130,7 +130,7 @@ class LasFormatTest(LasCase):
             self.assertEqual(float(row['height']), -0.75 * i - 10)
             self.assertEqual(float(row['double']), i / 7)
             self.assertEqual(int(row['big']), 2**64 - 1 - i)
-            # A pair is type 16 of LAS 1.4's deprecated ones: two of type 6.
+            # A pair is type 16, which LAS 1.4 deprecates: two values of type 6.
             self.assertEqual((int(row['pair_0']), int(row['pair_1'])), (i, -i))
             self.assertEqual((int(row['opaque_0']), int(row['opaque_1']), int(row['extra_0'])), (1, 2, 200))
         copy = self.through_store(path)
@@ -141,7 +141,7 @@ class LasFormatTest(LasCase):
                                  'extra_0'])
         self.assertEqual(struct.unpack_from('<d16xd', copy.vlrs['LASF_Spec', 4], 192 + 112), (0.25, -10))
 
-    def test_time_of_the_week_stays_apart_from_adjusted_time(self):
+    def test_week_time_and_adjusted_time_are_not_mixed(self):
         records = random_records(6, 20)
         week, adjusted = (self.put(f'{bit}.las', las(6, records, encoding=bit)) for bit in (0, 1))
         self.assertEqual(self.through_store(week).encoding & 1, 0)
@@ -159,7 +159,7 @@ class LasFormatTest(LasCase):
         self.assertEqual(json.loads(result.stdout)['withheld'], withheld)
         self.assertEqual(self.info(self.path('w.st'))['points'], 200)
 
-    def test_withheld_points_of_files_that_differ_are_counted(self):
+    def test_withheld_points_of_different_formats_are_counted(self):
         due = {'': 0, 'intensity < 30000': 0}
         paths = []
         for point_format in (1, 3):
@@ -183,8 +183,8 @@ class LasFormatTest(LasCase):
         only = self.put('only.las', las(1, records, vlrs=[wkt(UTM_WKT)]))
         self.assertEqual(self.info(only)['crs']['epsg'], 32633)
 
-    def test_the_unit_of_heights_survives(self):
-        """From the header of a CSV to a store, LAS, LAZ and COPC, with a CRS and without."""
+    def test_the_unit_of_heights_is_kept(self):
+        """From the header of a CSV file to a store, LAS, LAZ and COPC, with and without a CRS."""
         def metres(path):
             return {'metre': 1, None: 1, 'foot': 0.3048, 'US survey foot': 1200 / 3937}[
                 (self.info(path)['crs'] or {'vertical_unit': None})['vertical_unit']]
@@ -219,7 +219,7 @@ class LasFormatTest(LasCase):
         strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')
         self.assertIn(b"'NAVD88' in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
 
-    def test_wkt_behind_the_points_is_read_and_in_a_pipe_asked_for(self):
+    def test_wkt_after_the_points_is_read_from_files_and_requested_for_pipes(self):
         records = random_records(6, 20)
         data = las(6, records, encoding=16, evlrs=[
             evlr(b'other', 1, bytes(1000)), evlr(b'LASF_Projection', 2112, UTM_WKT.encode())])
@@ -231,7 +231,7 @@ class LasFormatTest(LasCase):
         self.run_ok('build', '-', '-o', self.path('p.st'), '--crs', 'EPSG:32633', input=data)
         self.assertEqual(self.info(self.path('p.st'))['points'], 20)
 
-    def test_a_pipe_gives_what_the_file_gives(self):
+    def test_a_pipe_gives_the_same_store_as_the_file(self):
         data = las(3, random_records(3, 30000), vlrs=[geo_keys(UTM)])
         self.run_ok('build', self.put('a.las', data), '-o', self.path('a.st'))
         self.run_ok('build', '-', '-o', self.path('b.st'), input=data)
@@ -242,7 +242,7 @@ class LasFormatTest(LasCase):
 
 
 class LasOctreeTest(LasCase):
-    """COPC as output, made here."""
+    """COPC as output."""
 
     def test_records_come_back_in_any_order(self):
         for point_format in (6, 7, 8):
@@ -262,7 +262,7 @@ class LasOctreeTest(LasCase):
                 self.assertLess(coarse['points'], 50000)
 
     def test_points_of_a_store(self):
-        """By its ending or its name; the same bytes each time, for any number of threads and memory."""
+        """COPC is chosen by the ending or by name; the bytes do not depend on threads and memory."""
         self.run_ok('synth', 'surface', '--points', 50000, '-o', self.path('s.ply'))
         self.run_ok('build', self.path('s.ply'), '-o', self.path('s.st'))
         self.run_ok('points', self.path('s.st'), '-o', self.path('a.copc.laz'), '--threads', 1)
@@ -271,7 +271,7 @@ class LasOctreeTest(LasCase):
             self.assertEqual(a.read(), b.read())
         self.assertEqual(self.info(self.path('b.laz'))['format'], 'copc')
         self.assertEqual(self.info(self.path('b.laz'))['points'], 50000)
-        # What another program wrote is not replaced, and nothing goes to a pipe.
+        # Files of other programs are not replaced, and COPC cannot go to a pipe.
         with open(self.path('b.laz'), 'r+b') as file:
             file.seek(58)
             file.write(b'other')
@@ -282,7 +282,7 @@ class LasOctreeTest(LasCase):
 class LasSurveyTest(LasCase):
     """Several files, and other formats to LAS."""
 
-    def test_files_with_other_offsets_come_onto_the_first_ones_lattice(self):
+    def test_files_with_other_offsets_move_to_the_first_files_lattice(self):
         first, second = random_records(1, 2000), random_records(1, 2000, seed=2)
         a = self.put('a.las', las(1, first, offset=(500000, 5200000, 0)))
         b = self.put('b.las', las(1, second, offset=(500012.34, 5199000, -7)))
@@ -311,7 +311,7 @@ class LasSurveyTest(LasCase):
             rows = sorted(tuple(round(float(value), 6) for value in line.split(',')[:3]) for line in list(file)[1:])
         self.assertEqual(rows, sorted(Las(first).places() + Las(odd).places()))
 
-    def test_files_that_spell_one_crs_in_their_ways_make_a_store(self):
+    def test_files_with_different_spellings_of_a_crs_make_one_store(self):
         records = random_records(1, 20)
         esri = re.sub(r',AUTHORITY\[[^]]*\]', '', UTM_WKT)
         names = [self.put(f'{i}.las', las(1, records, vlrs=vlrs)) for i, vlrs in enumerate((
@@ -325,7 +325,7 @@ class LasSurveyTest(LasCase):
         other = self.put('other.las', las(1, records, vlrs=[geo_keys({1024: 1, 3072: 32632})]))
         self.assertIn('reference system differs from that of', self.refused('build', names[0], other, '-o', self.path('no.st')))
 
-    def test_text_becomes_las_with_as_many_decimals_as_it_has(self):
+    def test_text_becomes_las_with_its_number_of_decimals(self):
         with open(self.path('p.csv'), 'w') as file:
             file.write('x,y,z,intensity,red,green,blue,classification,quality\n')
             for i in range(100):
@@ -339,11 +339,11 @@ class LasSurveyTest(LasCase):
             self.assertAlmostEqual(values['X'] * 0.001 + copy.offset[0], 691000 + i / 1000, places=9)
             self.assertEqual([values[name] for name in ('intensity', 'red', 'green', 'blue', 'classification')],
                              [i, i, 2 * i, 3 * i, 2])
-            # What nothing is said of is a single return.
+            # Missing return fields mean a single return.
             self.assertEqual((values['return_number'], values['number_of_returns']), (1, 1))
             self.assertEqual(struct.unpack_from('<d', record, 36), (i / 3,))
 
-    def test_rounding_is_told(self):
+    def test_the_summary_reports_rounding(self):
         with open(self.path('p.xyz'), 'w') as file:
             file.writelines(f'{i / 7} {1e6 + i * 3000 + 1 / 3} 0\n' for i in range(1000))
         result = terrace('convert', self.path('p.xyz'), '-o', self.path('p.las'), '--json')
@@ -355,7 +355,7 @@ class LasSurveyTest(LasCase):
         with open(self.path('p.las'), 'rb') as a, open(self.path('q.las'), 'rb') as b:
             self.assertEqual(a.read(), b.read())
 
-    def test_values_that_a_field_cannot_have_are_refused(self):
+    def test_values_outside_a_fields_range_are_refused(self):
         with open(self.path('p.csv'), 'w') as file:
             file.write('x,y,z,intensity\n1,2,3,4\n1,2,3,70000\n')
         error = self.refused('convert', self.path('p.csv'), '-o', self.path('p.las'))
@@ -363,7 +363,7 @@ class LasSurveyTest(LasCase):
         self.assertIn('intensity', error)
         self.assertFalse(os.path.exists(self.path('p.las')))
 
-    def test_force_replaces_only_what_terrace_wrote(self):
+    def test_force_replaces_only_files_written_by_terrace(self):
         records = random_records(1, 50)
         a = self.put('a.las', las(1, records))
         self.run_ok('convert', a, '-o', self.path('b.las'))
@@ -388,11 +388,11 @@ class LasSurveyTest(LasCase):
 
 
 class LasTwinTest(LasCase):
-    """A store of whole steps and one of the same places as doubles are the same terrain."""
+    """A store of integer coordinates and a store of the same positions as doubles are the same terrain."""
 
     @staticmethod
     def triangles(file):
-        """Those of an OBJ file, whatever the order of points and corners; places to a micrometre."""
+        """The triangles of an OBJ file in canonical order, with positions rounded to a micrometre."""
         places, found = [], []
         for line in file:
             kind, *words = line.split()
@@ -404,7 +404,7 @@ class LasTwinTest(LasCase):
                 found.append(corners[least:] + corners[:least])
         return sorted(found)
 
-    def test_what_is_made_of_a_lattice_is_what_is_made_of_its_places(self):
+    def test_integer_and_double_coordinates_give_the_same_results(self):
         source = random.Random(7)
         places = {(source.randrange(1600), source.randrange(1200)) for _ in range(3000)}
         points = [(x, y, (x * x // 900 + 3 * y) // 8) for x, y in sorted(places)]
@@ -447,7 +447,7 @@ class LasTwinTest(LasCase):
 
 
 class LasHostileTest(LasCase):
-    """One line, at once and in little memory."""
+    """Damaged files give a one-line error, at once and in little memory."""
 
     def refused_at_once(self, data, *parts):
         path = self.put('h.las', data)
@@ -457,7 +457,7 @@ class LasHostileTest(LasCase):
                 self.assertIn(part, error)
         self.assertLess(time.monotonic() - started, 4)
 
-    def test_headers_that_promise_what_is_not_there(self):
+    def test_headers_that_announce_missing_data(self):
         records = random_records(1, 10)
         good = las(1, records)
         self.refused_at_once(good[:100], 'ends in its header')
@@ -488,7 +488,7 @@ class LasHostileTest(LasCase):
             error = self.refused('build', self.path('b.laz'), '-o', self.path('b.st'), '--threads', threads)
             self.assertRegex(error, r'b\.laz: chunk 1, byte [0-9]+: ')
             self.assertFalse(os.path.exists(self.path('b.st')))
-            # The other chunks are kept on request, and what is lost is told.
+            # On request, the other chunks are kept and the loss is reported.
             built = terrace('build', self.path('b.laz'), '-o', self.path('b.st'), '--threads', threads, '--skip-damaged',
                             '--json')
             self.assertEqual(built.returncode, 0, built.stderr)
@@ -500,7 +500,7 @@ class LasHostileTest(LasCase):
                                              '--threads', threads, '--skip-damaged', '--json'))
             self.assertEqual((summary['points'], summary['lost']), (70000, 50000))
             self.assertEqual(Las(self.path('b.las')).records, records[:50000] + records[100000:])
-        # Of several files each is opened twice; what is damaged about it is told once.
+        # Each of several files is opened twice, but its damage is reported once.
         self.put('e.laz', good[:first] + struct.pack('<Q', 2**62) + good[first + 8:])
         result = terrace('convert', self.path('e.laz'), self.path('a.laz'), '-o', self.path('two.las'), '--skip-damaged')
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -510,14 +510,14 @@ class LasHostileTest(LasCase):
         lost = self.put('l.laz', good[:first] + struct.pack('<Q', 2**62) + good[first + 8:])
         self.assertIn('chunk table is outside', self.refused('info', lost))
         self.refused_at_once(good[:247] + struct.pack('<Q', 2**60) + good[255:], 'chunk')
-        # Without a table, as when the writer was a pipe, the chunks tell their sizes.
+        # Without a chunk table, as when the writer was a pipe, the chunks give their sizes.
         streamed = good[:first] + struct.pack('<Q', first) + good[first + 8:]
         self.assertEqual(self.info(self.put('s.laz', streamed))['points'], 120000)
         for data in (good, streamed, good[:first] + b'\xff' * 8 + good[first + 8:] + struct.pack('<Q', table)):
             self.run_ok('convert', '-', '-o', self.path('p.las'), '--force', input=data)
             self.assertEqual(Las(self.path('p.las')).records, records)
 
-    def test_records_that_are_miscounted_do_not_matter(self):
+    def test_a_wrong_number_of_vlrs_is_tolerated(self):
         records = random_records(1, 10)
         good = las(1, records, vlrs=[geo_keys(UTM)])
         for count in (0, 2, 2**32 - 1):
@@ -527,9 +527,9 @@ class LasHostileTest(LasCase):
 
 @unittest.skipUnless(DATA, 'no TERRACE_DATA')
 class LasDataTest(LasCase):
-    """Surveys of others."""
+    """Real surveys."""
 
-    def test_surveys_come_out_of_a_store_record_by_record(self):
+    def test_surveys_survive_a_store_record_by_record(self):
         for name in ('1.2-with-color.las', '4_6_crop.las', 'autzen_trim_7.las', 'extrabytes.las',
                      'coromandel_points_test.las', 'hexbin-crop.las', 'laspy_simple1_3.las', 'mvk-thin.las'):
             with self.subTest(name=name):
@@ -543,7 +543,7 @@ class LasDataTest(LasCase):
                 self.assertEqual((after.scale, after.offset), (before.scale, before.offset))
                 self.assertEqual(sorted(after.records), sorted(before.records))
 
-    def test_colour_and_intensity_come_out_in_ply_and_csv(self):
+    def test_colour_and_intensity_are_written_to_ply_and_csv(self):
         path = os.path.join(DATA, 'lidar', '1.2-with-color.las')
         self.run_ok('build', path, '-o', self.path('s.st'))
         self.run_ok('points', self.path('s.st'), '-o', self.path('p.csv'))
@@ -553,7 +553,8 @@ class LasDataTest(LasCase):
         wanted = []
         for record in before.records:
             values = unpack_record(3, record)
-            # Text from a lattice has its decimals, text from the doubles of a PLY all digits.
+            # Text from LAS has the decimals of its scale; text from the doubles of a PLY file has
+            # all digits.
             wanted.append([*(round(values[axis] * s + o, 2) for axis, s, o in zip('XYZ', before.scale, before.offset)),
                            *(values[name] for name in ('intensity', 'red', 'green', 'blue', 'gps_time'))])
         for name in ('p.csv', 'q.csv'):
@@ -569,7 +570,7 @@ class LasDataTest(LasCase):
             self.run_ok('build', os.path.join(DATA, 'lidar', f'autzen_trim.{kind}'), '-o', self.path(kind),
                         '--crs', crs, '--threads', 2)
         for name in os.listdir(self.path('las')):
-            if name != 'manifest.json':  # which names the format
+            if name != 'manifest.json':  # the manifest names the format
                 with open(os.path.join(self.path('las'), name), 'rb') as a, \
                         open(os.path.join(self.path('laz'), name), 'rb') as b:
                     self.assertEqual(a.read(), b.read())
@@ -583,7 +584,7 @@ class LasDataTest(LasCase):
         self.assertEqual(self.info(self.path('c.laz'))['points'], 1065)
 
     def test_region_and_resolution_of_cloud_optimised_files(self):
-        """The counts of the nodes are those that Python reads from the hierarchy."""
+        """The counts match those that Python reads from the hierarchy's nodes."""
         copc = os.path.join(DATA, 'lidar', 'lone-star.copc.laz')
         with open(copc, 'rb') as file:
             data = file.read()
@@ -624,7 +625,7 @@ class LasDataTest(LasCase):
         self.assertLess(summary['points'], len(wanted))
 
     def test_entwine_folders(self):
-        """A folder of EPT is one input; its nodes are counted by Python."""
+        """A folder of EPT is one input; Python counts its nodes."""
         folder = os.path.join(DATA, 'lidar', 'ept-lone-star')
         nodes = {}
         for name in os.listdir(os.path.join(folder, 'ept-hierarchy')):
@@ -649,7 +650,7 @@ class LasDataTest(LasCase):
                  for i, name in enumerate((folder, copc))]
         self.assertGreater(parts[0]['points'], 1000)
         self.assertEqual(parts[0]['points'], parts[1]['points'])
-        # A damaged one ends at once.
+        # A damaged folder gives an error at once.
         shutil.copytree(folder, self.path('damaged'))
         os.truncate(os.path.join(self.path('damaged'), 'ept-data', '2-2-2-1.laz'), 1000)
         self.assertIn('2-2-2-1.laz', self.refused('build', self.path('damaged'), '-o', self.path('d.st')))
@@ -658,7 +659,7 @@ class LasDataTest(LasCase):
         self.assertIn('ept.json', self.refused('info', self.path('damaged')))
 
     def test_cloud_optimised_files_among_others(self):
-        """From a pipe and beside LAZ, where all share what is left out."""
+        """From a pipe and together with LAZ; excluded points are counted over all files."""
         copc = os.path.join(DATA, 'lidar', '1.2-with-color.copc.laz')
         box = '636000,849500,637800,852000'
         with open(copc, 'rb') as pipe:
@@ -682,8 +683,8 @@ class LasDataTest(LasCase):
                                                                '--region', '0,0,1,1'))
         self.assertFalse(os.path.exists(self.path('none.csv')))
 
-    def test_copies_with_an_octree(self):
-        """The records are those of the scan, in whatever order, and each depth has more of them."""
+    def test_copies_as_copc(self):
+        """The copy has the records of the scan in any order and is not much larger than the original."""
         copc = os.path.join(DATA, 'lidar', 'lone-star.copc.laz')
         self.run_ok('convert', copc, '-o', self.path('all.las'))
         self.run_ok('convert', self.path('all.las'), '-o', self.path('made.copc.laz'))
@@ -693,7 +694,7 @@ class LasDataTest(LasCase):
         self.assertEqual(sorted(Las(self.path('back.las')).records), sorted(Las(self.path('all.las')).records))
         self.assertLess(os.path.getsize(self.path('made.copc.laz')), 1.2 * os.path.getsize(copc))
 
-    def test_damaged_files_end_at_once(self):
+    def test_damaged_files_give_an_error_at_once(self):
         folder = os.path.join(DATA, 'lidar', 'hostile')
         for name in sorted(os.listdir(folder)):
             with self.subTest(name=name):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb `match` as its users meet it.
+"""Tests the verb `match` end to end.
 
 TERRACE=path/to/terrace match_cli_test.py
 """
@@ -22,7 +22,7 @@ def terrace(*args):
 
 
 def optimum(points):
-    """The least total distance over all pairings, by trying them all."""
+    """The least total distance, found by trying all pairings."""
     if not points:
         return 0.0
     first, rest = points[0], points[1:]
@@ -77,7 +77,7 @@ class MatchTest(unittest.TestCase):
             self.assertAlmostEqual(summary['cost'], optimum(points), places=6)
             self.assertAlmostEqual(summary['lower_bound'], summary['cost'], places=6)
 
-    def test_of_an_odd_number_one_is_left_over(self):
+    def test_an_odd_number_of_points_leaves_one_over(self):
         points = self.points(9)
         summary, rows = self.match('--method', 'exact')
         self.check(points, summary, rows)
@@ -87,7 +87,7 @@ class MatchTest(unittest.TestCase):
         summary, rows = self.match()
         self.assertEqual((summary['pairs'], summary['left_over'], rows), (0, 0, []))
 
-    def test_halving_comes_near_and_never_below(self):
+    def test_halving_is_close_to_the_optimum_and_never_below(self):
         points = self.points(101)
         exact, _ = self.match()
         monotone, rows = self.match('--method', 'monotone')
@@ -122,7 +122,7 @@ class MatchTest(unittest.TestCase):
         points = self.points(301)
         exact, _ = self.match()
         self.assertTrue(exact['optimal'])
-        # -1 stands for no cluster.
+        # -1 means no cluster.
         labels = self.labels(-1 if x < 20 else int(x > 50) * 4000000000 for x, _, _ in points)
         summary, rows = self.match('--labels', labels)
         self.check(points, summary, rows)
@@ -130,7 +130,7 @@ class MatchTest(unittest.TestCase):
         self.assertAlmostEqual(summary['cost'], exact['cost'], places=6)
 
     def tree_of(self, points, *options):
-        """The rows of a tree, checked: each node is used once, levels rise, midpoints are weighted."""
+        """Returns the rows of a tree after checking it: each node is used once, levels increase, midpoints are weighted."""
         summary, rows = self.match('--tree', *options)
         n = len(points)
         self.assertEqual(len(rows), n - 1)
@@ -177,7 +177,7 @@ class MatchTest(unittest.TestCase):
                 self.assertEqual(len(both), 1)
                 clusters.append(both)
 
-    def test_labels_must_be_those_of_the_points(self):
+    def test_labels_must_match_the_points(self):
         self.points(4)
         out = self.path('none.csv')
         for text, where in (('0\n1\n', '2 labels for 4 points'), ('0\n1\nx\n1\n', 'line 3'),
@@ -193,7 +193,7 @@ class MatchTest(unittest.TestCase):
             self.assertIn(where, result.stderr)
             self.assertFalse(os.path.exists(out))
 
-    def test_too_little_memory_is_said_before_the_work(self):
+    def test_too_little_memory_is_an_error_before_the_work(self):
         self.points(60000)
         result = terrace('match', self.path('points.csv'), '-o', self.path('none.csv'),
                          '--memory', '40M')
@@ -218,7 +218,7 @@ class MatchTest(unittest.TestCase):
         self.assertEqual(len(result.stdout.splitlines()), 6)
         self.assertIn('the optimum', result.stderr)
 
-    def test_heights_count_as_much_as_their_weight(self):
+    def test_z_weight_scales_the_influence_of_heights(self):
         points = self.points(10, 3)
         for weight in (0, 0.5, 4):
             weighed = [[x, y, weight * z] for x, y, z in points]

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures of what `match` finds, as its users meet them.
+"""Tests pictures of the results of `match` end to end.
 
 TERRACE=path/to/terrace match_picture_cli_test.py
 """
@@ -51,7 +51,7 @@ class MatchPictureTest(unittest.TestCase):
         return result.stderr
 
     def square(self):
-        """Four points on a square, two pairs, and their tree."""
+        """Writes four points on a square, two pairs, and their tree."""
         return (self.write('points.csv', 'x,y,z', '0,0,0', '10,0,0', '0,10,0', '10,10,0'),
                 self.write('pairs.csv', 'a,b,distance', '0,1,10', '2,3,10'),
                 self.write('tree.csv', 'a,b,distance,size,level', '0,1,10,2,1', '2,3,10,2,1',
@@ -65,7 +65,7 @@ class MatchPictureTest(unittest.TestCase):
         summary, rows = self.render(pairs, '--points', points)
         self.assertEqual((summary['points'], summary['lines'], summary['levels']), (4, 2, 1))
         red = sum(row[3 * x] > 200 and row[3 * x + 1] < 60 for row in rows for x in range(200))
-        # Two sides of 192 pixels, some pixels wide, less the dots at their ends.
+        # Two sides of 192 pixels, a few pixels wide, without the dots at their ends.
         self.assertGreater(red, 2 * 180)
         self.assertLess(red, 2 * 192 * 6)
         self.assertEqual(bytes(rows[100][300:303]), b'\xff\xff\xff')
@@ -104,7 +104,7 @@ class MatchPictureTest(unittest.TestCase):
             result = terrace('render', pairs, '--points', '-', '-o', out, stdin=file)
         self.assertEqual(result.returncode, 0, result.stderr)
 
-    def test_what_is_wrong_is_said(self):
+    def test_errors_name_the_problem(self):
         points, pairs, tree = self.square()
         self.assertIn('--points', self.refused(2, pairs))
         self.assertIn('--points', self.refused(2, points, '--points', points))

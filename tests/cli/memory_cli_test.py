@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""--memory caps the peak of a run, whatever the layout of the input; what cannot fit says so first.
+"""--memory limits the peak of a run for any layout of the input; runs that cannot fit say so first.
 
 TERRACE=path/to/terrace memory_cli_test.py
 """
@@ -23,7 +23,7 @@ NODATA = -9999
 
 
 def run(*args, limits=()):
-    """Runs terrace: its exit code, both outputs, and its largest resident set in bytes."""
+    """Runs terrace; returns its exit code, both outputs, and its peak resident set in bytes."""
     def confine():
         for kind, size in limits:
             resource.setrlimit(kind, (size, size))
@@ -31,7 +31,7 @@ def run(*args, limits=()):
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         child = subprocess.Popen([TERRACE, *map(str, args)], stdout=out, stderr=err,
                                  preexec_fn=confine if limits else None)
-        # Of this child alone, where getrusage() would give the largest of all children.
+        # wait4() reports this child only; getrusage() would report the largest of all children.
         _, status, usage = os.wait4(child.pid, 0)
         child.returncode = os.waitstatus_to_exitcode(status)
         out.seek(0)
@@ -60,7 +60,7 @@ def rows_with_few_heights(columns, rows, bands=1):
 
 
 class Tiff:
-    """Writes GeoTIFFs of one size and place apart: the blocks are made once and shared."""
+    """Writes GeoTIFFs that differ only in position: the blocks are made once and shared."""
 
     def __init__(self, columns, rows, strip_rows=None, tile=None, deflate=True, bands=1):
         self.columns, self.rows, self.tile, self.deflate, self.bands = columns, rows, tile, deflate, bands
@@ -92,7 +92,7 @@ class Tiff:
         return blocks
 
     def write(self, path, x, y):
-        """Its upper left corner at x, y; cells of 30 m in UTM zone 32N."""
+        """Writes a file with its upper left corner at x, y and cells of 30 m in UTM zone 32N."""
         places, at = [], 8
         for block in self.blocks:
             places.append(at)
@@ -143,7 +143,7 @@ class MemoryCase(unittest.TestCase):
 
     @classmethod
     def mosaic(cls, name, count, columns, rows, across=6, **layout):
-        """So many files side by side, each overlapping its neighbours by a cell; their names."""
+        """Writes `count` adjacent files, each overlapping its neighbours by a cell; returns their names."""
         tiff = Tiff(columns, rows, **layout)
         names = []
         for i in range(count):
@@ -153,7 +153,7 @@ class MemoryCase(unittest.TestCase):
         return names
 
     def within(self, memory, *args):
-        """The run succeeds and keeps within so many MiB, by its own account and the system's."""
+        """Checks that the run succeeds within `memory` MiB, as reported by itself and by the system."""
         code, out, err, peak = run(*args, '--memory', f'{memory}M', '--json')
         self.assertEqual(code, 0, err)
         summary = json.loads(out)
@@ -164,7 +164,7 @@ class MemoryCase(unittest.TestCase):
         return summary
 
     def needed(self, memory, output, *args):
-        """The run stops before it starts; what it says that it needs, in MiB, is enough."""
+        """Checks that the run is refused before it starts; returns the MiB that it says it needs."""
         code, out, err, peak = run(*args, '-o', output, '--memory', f'{memory}M', '--json')
         self.assertEqual((code, out), (1, ''), err)
         self.assertEqual(len(err.splitlines()), 1, err)
@@ -187,7 +187,7 @@ class BuildMemoryTest(MemoryCase):
         files = self.mosaic('strip', 24, 3601, 3601)
         summary = self.build('strip', files)
         self.assertEqual(summary['points'] + summary['nodata'], (6 * 3600 + 1) * (4 * 3600 + 1))
-        # Memory keeps more files open and changes no byte.
+        # More memory keeps more files open but changes no byte.
         self.build('more', files, 700)
         for name in sorted(os.listdir(self.path('strip.store'))):
             with open(self.path(f'strip.store/{name}'), 'rb') as one, \
@@ -204,7 +204,7 @@ class BuildMemoryTest(MemoryCase):
         self.build('plain', self.mosaic('plain', 6, 3601, 3601, deflate=False))
 
     def test_mosaic_of_single_strips_that_do_not_compress(self):
-        # Of two bands the second is noise: as many bytes in the file as decoded.
+        # The second band is noise, so the file is as large as its decoded data.
         files = self.mosaic('noise', 6, 2400, 2400, across=3, bands=2)
         self.assertGreater(os.path.getsize(files[0]), 8 * MIB)
         self.build('noise', files)
@@ -213,7 +213,7 @@ class BuildMemoryTest(MemoryCase):
         # 288 MB decoded
         self.build('large', self.mosaic('large', 1, 12000, 12000))
 
-    def test_tiles_that_do_not_fit_are_refused_with_what_they_need(self):
+    def test_tiles_that_do_not_fit_are_refused_with_the_memory_needed(self):
         # 128 MB each, decoded
         files = self.mosaic('wide', 2, 8192, 8192, across=2, tile=8192)
         store = self.path('wide.store')
@@ -223,7 +223,7 @@ class BuildMemoryTest(MemoryCase):
 
 
 class LongFeatureTest(MemoryCase):
-    def test_memory_makes_room_for_a_long_feature(self):
+    def test_a_long_feature_fits_into_enough_memory(self):
         """A million positions in one feature: 17 MB of text."""
         points = self.path('long.geojson')
         with open(points, 'w') as file:
@@ -242,7 +242,7 @@ class LongFeatureTest(MemoryCase):
 
 class ManyFilesTest(MemoryCase):
     def test_thousands_of_files_of_one_point(self):
-        """What is held while the order is judged counts by its points, not by its blocks."""
+        """While the order is being determined, memory depends on points and not on blocks."""
         folder = self.path('many')
         os.mkdir(folder)
         for i in range(2000):
@@ -254,7 +254,7 @@ class ManyFilesTest(MemoryCase):
 
 class VirtualRasterTest(MemoryCase):
     def test_a_mosaic_of_many_files(self):
-        """60,000 places of one file: 13 MB of description."""
+        """60,000 references to one file: a VRT of 13 MB."""
         Tiff(400, 400, tile=256).write(self.path('one.tif'), 400000, 5000000)
         vrt = self.path('many.vrt')
         with open(vrt, 'w') as file:
@@ -270,7 +270,7 @@ class VirtualRasterTest(MemoryCase):
 
 
 class WidePointsTest(MemoryCase):
-    """Points of 18 columns, not in order, take several times the memory of x, y and z."""
+    """Unordered points of 18 columns take several times the memory of x, y and z."""
 
     @classmethod
     def setUpClass(cls):
@@ -303,7 +303,7 @@ class WidePointsTest(MemoryCase):
 
 
 class StoreMemoryTest(MemoryCase):
-    """The verbs on a store whose points take more than is allowed."""
+    """The verbs on a store whose points take more memory than allowed."""
 
     @classmethod
     def setUpClass(cls):
@@ -315,7 +315,7 @@ class StoreMemoryTest(MemoryCase):
             assert code == 0, err
 
     def test_points(self):
-        # 2.25 million points: 54 MB and more in memory, 50 MB as text
+        # 2.25 million points: 54 MB or more in memory, 50 MB as text
         self.within(40, 'points', self.store, '-o', self.path('all.xyz'))
         self.within(40, 'points', self.store, '-o', self.path('all.ply'))
 
@@ -335,7 +335,7 @@ class StoreMemoryTest(MemoryCase):
         self.assertLessEqual(peak, needs * MIB)
 
     def test_an_octree(self):
-        """Points on a surface, and as many that fill space, whose nodes are the largest there are."""
+        """Points on a surface, and as many points in space, whose octree nodes are the largest."""
         points = self.path('many.las')
         code, _, err, _ = run('synth', 'surface', '--points', 1000000, '-o', points)
         self.assertEqual(code, 0, err)
@@ -385,7 +385,7 @@ class StoreMemoryTest(MemoryCase):
         code, _, err, peak = run('cluster', points, '-o', self.path('none.xyz'), '--memory', '1M')
         self.assertEqual(code, 1, err)
         self.assertIn('--memory', err)
-        # What is written counts beside the table.
+        # The output counts in addition to the table.
         octree = self.path('table.copc.laz')
         clustering = ('cluster', points, '--method', 'k-means', '-k', '5', '--threads', 2)
         needs = self.needed(64, octree, *clustering)
@@ -451,7 +451,7 @@ class PromiseTest(MemoryCase):
                 ['convert', self.las, *out('out.xyz')], ['convert', self.dem, *out('out.laz')],
                 ['build', self.las, *out('out')], ['build', self.dem, *out('out')]]
 
-    def test_every_verb_keeps_it_or_refuses(self):
+    def test_every_verb_keeps_the_limit_or_refuses(self):
         for command in self.commands():
             for memory in (1, 8, 32, 64, 128):
                 with self.subTest(command=command, memory=memory):
@@ -470,14 +470,14 @@ class PromiseTest(MemoryCase):
 
 
 class MachineMemoryTest(MemoryCase):
-    def test_a_limit_of_the_process_is_the_memory_there_is(self):
+    def test_a_limit_of_the_process_is_the_available_memory(self):
         points = self.path('points.csv')
         with open(points, 'w') as file:
             file.write('x,y,z\n')
             for i in range(300000):
                 file.write(f'{i % 600},{i // 600},0\n')
         args = ('match', points, '--method', 'exact', '-o', self.path('pairs.csv'))
-        # 240 MB for an exact matching; half of what there is would be 200
+        # An exact matching needs 240 MB; half of the available memory is 200.
         for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA):
             code, _, err, _ = run(*args, limits=[(kind, 400 * MIB)])
             self.assertEqual(code, 1, err)

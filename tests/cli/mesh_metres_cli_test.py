@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes in metres: GLB of stores in degrees and feet, and error-bounded meshes in another reference system.
+"""Tests meshes in metres: GLB of stores in degrees and feet, and error-bounded meshes in another CRS.
 
 TERRACE=path/to/terrace mesh_metres_cli_test.py
 """
@@ -27,7 +27,7 @@ def terrace(*args):
 
 
 class Glb:
-    """The one mesh of a file, by the specification of glTF 2.0: vertices where the node puts them."""
+    """The single mesh of a file, read by the specification of glTF 2.0, with the node's transformation applied."""
 
     def __init__(self, path):
         with open(path, 'rb') as file:
@@ -54,18 +54,18 @@ class Glb:
                 for at in range(begin, begin + stride * accessor['count'], stride)]
 
     def coordinates(self):
-        """As asset.extras says that they are got back."""
+        """The coordinates in the CRS, computed as asset.extras prescribes."""
         origin, metres = self.extras['origin'], self.extras['metres_per_unit']
         return [(origin[0] + x / metres[0], origin[1] - z / metres[1], y / metres[2]) for x, y, z in self.scene]
 
     def to_scene(self, place):
-        """East, north and up of coordinates, likewise."""
+        """East, north and up of coordinates in the CRS, the inverse."""
         origin, metres = self.extras['origin'], self.extras['metres_per_unit']
         return tuple((p - o) * m for p, o, m in zip(place, origin, metres))
 
 
 def read_ply(path):
-    """Vertices and faces of an ASCII PLY file of ours."""
+    """Vertices and faces of an ASCII PLY file written by terrace."""
     with open(path, encoding='ascii') as file:
         head, body = file.read().split('end_header\n')
     lines, counts = body.splitlines(), {}
@@ -78,7 +78,7 @@ def read_ply(path):
 
 
 def east_north_up(origin, place):
-    """Of a place (longitude, latitude, height) about another, by geocentric coordinates: EPSG 9602 and 9837."""
+    """East, north and up of (longitude, latitude, height) about an origin, by EPSG 9602 and 9837."""
     def geocentric(longitude, latitude, height):
         longitude, latitude = math.radians(longitude), math.radians(latitude)
         n = A / math.sqrt(1 - E2 * math.sin(latitude) ** 2)
@@ -92,7 +92,7 @@ def east_north_up(origin, place):
 
 
 def utm_32(longitude, latitude):
-    """By Krueger's series in the third flattening, to a millimetre (EPSG Guidance Note 7-2)."""
+    """UTM zone 32 by Krueger's series in the third flattening, to a millimetre (EPSG Guidance Note 7-2)."""
     n = F / (2 - F)
     radius = A / (1 + n) * (1 + n ** 2 / 4 + n ** 4 / 64)
     alpha = (n / 2 - 2 * n ** 2 / 3 + 5 * n ** 3 / 16 + 41 * n ** 4 / 180, 13 * n ** 2 / 48 - 3 * n ** 3 / 5 + 557 * n ** 4 / 1440,
@@ -107,8 +107,8 @@ def utm_32(longitude, latitude):
 
 
 def measure(vertices, faces, samples):
-    """The largest vertical distance of samples from a mesh, and how many are on no triangle. By a grid of lists of
-    triangles over x and y."""
+    """Returns the largest vertical distance of samples from a mesh, and the samples that are on no triangle.
+    Finds triangles through a grid over x and y."""
     low = [min(v[k] for v in vertices) for k in (0, 1)]
     high = [max(v[k] for v in vertices) for k in (0, 1)]
     side = 64
@@ -153,19 +153,19 @@ class MetresTest(unittest.TestCase):
         return os.path.join(self.folder.name, name)
 
     def raster(self, keys, corner, cell, columns=90, rows=80, void=lambda x, y: False, name='dem'):
-        """A store of hills, and its samples in the CRS."""
+        """Builds a store of hills; returns it and its samples in the CRS."""
         heights = [-9999.0 if void(x, y) else hill(x, y) for y in range(rows) for x in range(columns)]
         write_tiff(self.path(name + '.tif'), columns, rows, heights, corner, cell, keys, nodata='-9999')
         result = terrace('build', self.path(name + '.tif'), '-o', self.path(name), '--block', 500, '-q')
         self.assertEqual(result.returncode, 0, result.stderr)
-        # Heights as float32 has them.
+        # Heights rounded to float32.
         heights = array.array('f', heights)
         samples = [(corner[0] + (x + 0.5) * cell, corner[1] - (y + 0.5) * cell, heights[y * columns + x])
                    for y in range(rows) for x in range(columns) if not void(x, y)]
         return self.path(name), samples
 
     def mesh(self, store, name, *args, verb='mesh'):
-        """The summary, the messages, and the path of the mesh."""
+        """Makes a mesh; returns the summary, the messages and the path."""
         out = self.path(name)
         quiet = terrace(verb, store, '-o', out, *args, '--force', '--json')
         self.assertEqual(quiet.returncode, 0, quiet.stderr)
@@ -174,7 +174,7 @@ class MetresTest(unittest.TestCase):
     KINDS = (('--level', 0), ('--level', 1), ('--focus', '8.02,46.02,8.04,46.04:0'), ('--max-error', 4),
              ('--max-points', 600), ('--max-error', 4, '--region', '8.02,46.02,8.06,46.06'))
 
-    def test_glb_of_degrees_is_in_metres_about_its_middle(self):
+    def test_glb_from_degrees_is_in_metres_about_its_centre(self):
         store, samples = self.raster(GEOGRAPHIC, (8, 46.1), 0.001)
         places = {(round(x, 6), round(y, 6)): z for x, y, z in samples}
         for how in self.KINDS:
@@ -188,10 +188,11 @@ class MetresTest(unittest.TestCase):
                 self.assertTrue(8 < origin[0] < 8.09 and 46.02 < origin[1] < 46.1 and origin[2] == 0, origin)
                 self.assertEqual([glb.translation[k] for k in (0, 2)], [0, 0])
                 for (x, y, z), back in zip(glb.vertices, glb.coordinates()):
-                    # Samples, with their heights as they were; to a millimetre on the ground.
+                    # Samples keep their heights; positions are within a millimetre on the ground.
                     self.assertLess(abs(places[round(back[0], 6), round(back[1], 6)] - z), 1e-3)
                     self.assertLess(abs(back[0] - round(back[0], 6)), 1e-8)
-                    # As the ellipsoid has it. Beside the middle's parallel lengths change by 0.1 %.
+                    # Compared with the ellipsoid: away from the central parallel, lengths change by
+                    # 0.1 %.
                     e, n, u = east_north_up(origin, back)
                     self.assertLess(abs(x - e), 4)
                     self.assertLess(abs(y - n), 4)
@@ -200,7 +201,7 @@ class MetresTest(unittest.TestCase):
                 if how in (('--level', 0), ('--max-error', 4)):
                     self.assertAlmostEqual(width, 6884, delta=10)
 
-    def test_the_bound_holds_on_the_numbers_of_the_file(self):
+    def test_the_bound_holds_for_the_rounded_file(self):
         store, samples = self.raster(GEOGRAPHIC, (8, 46.1), 0.001)
         for bound in 0.02, 4, 60:
             summary, _, path = self.mesh(store, 'dem.glb', '--max-error', bound)
@@ -210,7 +211,7 @@ class MetresTest(unittest.TestCase):
             self.assertLessEqual(largest, summary['max_error'] + 1e-3)
             self.assertLess(len(uncovered), 300)  # at the border, by rounding
 
-    def test_feet_become_metres_at_their_place(self):
+    def test_feet_become_metres_in_place(self):
         feet = {1024: 1, 1025: 1, 3072: 2229}
         store, samples = self.raster(feet, (6400000, 1900000), 30.0)
         for how in ('--level', 0), ('--max-error', 4):
@@ -226,17 +227,17 @@ class MetresTest(unittest.TestCase):
                 self.assertAlmostEqual(x, back[0] * SURVEY_FOOT, delta=1e-6)
                 self.assertAlmostEqual(z, back[2] * SURVEY_FOOT, delta=1e-6)
 
-    def test_a_map_that_stretches_lengths_is_shown_in_metres(self):
+    def test_a_map_that_stretches_lengths_is_scaled_to_metres(self):
         store, _ = self.raster({1024: 1, 1025: 1, 3072: 3857}, (1000000, 8400000), 60.0)
         _, notes, path = self.mesh(store, 'dem.glb', '--max-error', 4)
         self.assertIn('in metres', notes)
         glb = Glb(path)
-        # At 60 degrees north a metre of the map is half a metre.
+        # At 60 degrees north, a metre on the map is half a metre on the ground.
         self.assertAlmostEqual(glb.extras['metres_per_unit'][0], 0.5, delta=0.02)
         _, notes, _ = self.mesh(store, 'dem.ply', '--max-error', 4)
         self.assertIn('a map that stretches lengths to', notes)
 
-    def test_metres_and_what_has_no_crs_stay_as_they_are(self):
+    def test_metres_and_data_without_a_crs_are_unchanged(self):
         for name, keys in ('utm', utm(32)), ('none', None):
             store, samples = self.raster(keys, (500000, 5100000), 30.0, name=name)
             places = {(x, y): z for x, y, z in samples}
@@ -255,7 +256,7 @@ class MetresTest(unittest.TestCase):
             glb = Glb(self.mesh(store, 'dem.glb', *how)[2])
             self.assertLess(max(abs(v[0]) for v in glb.vertices), 5000)
             self.assertAlmostEqual(glb.extras['origin'][0], 180.015, delta=1e-3)
-        # Of a store in metres, written in degrees.
+        # A store in metres, written in degrees.
         store, _ = self.raster(utm(60), (815000, 1700000), 100.0, name='fiji')
         for how in ('--max-error', 4), ('--level', 0):
             glb = Glb(self.mesh(store, 'dem.glb', '--to-crs', 'EPSG:4326', *how)[2])
@@ -283,7 +284,7 @@ class MetresTest(unittest.TestCase):
         largest, _ = measure(glb.vertices, glb.faces, [glb.to_scene(s) for s in samples])
         self.assertLessEqual(largest, 20.0001)
         self.assertAlmostEqual(largest, summary['max_error'], delta=1e-3)
-        # In another CRS they are meshed there.
+        # With another CRS they are meshed in that CRS.
         there = [(*utm_32(x, y), z) for x, y, z in samples]
         for name in 'cloud.ply', 'cloud.glb':
             summary, _, path = self.mesh(cloud, name, '--max-error', 20, '--to-crs', 'EPSG:32632', '--format',
@@ -296,7 +297,7 @@ class MetresTest(unittest.TestCase):
             self.assertLess(len(uncovered), 30 if glb else 5)
 
     def test_heights_become_metres(self):
-        """Heights in feet over a map in metres, or over none; of an unknown unit they stay, and a note says so."""
+        """Heights in feet become metres, for a map in metres and without a CRS."""
         rows = '\n'.join(f'{i % 20 * 50},{i // 20 * 50},{i % 7 * 10}' for i in range(400))
         for unit, crs, most, note in (('ft', 'EPSG:32632', 60 * 0.3048, 'heights are converted from feet to metres'),
                                       ('ft', '', 60 * 0.3048, 'heights are converted from feet to metres'),
@@ -323,7 +324,7 @@ class MetresTest(unittest.TestCase):
                 notes = self.mesh(store, name, *how, verb=verb)[1]
                 self.assertEqual(notes.count('the unit of heights, "furlong", is not known'), 1, (verb, how, notes))
 
-    def test_other_formats_say_that_units_differ(self):
+    def test_other_formats_note_that_units_differ(self):
         store, _ = self.raster(GEOGRAPHIC, (8, 46.1), 0.001)
         for name in 'dem.ply', 'dem.obj':
             for how in ('--level', 1), ('--max-error', 4):
@@ -337,7 +338,7 @@ class MetresTest(unittest.TestCase):
     def test_a_bound_in_another_crs(self):
         def void(x, y):
             return math.hypot(x - 60, y - 30) < 12 or (x * 7 + y * 13) % 97 == 0
-        # Half a degree east to west: lines of samples are curves there.
+        # Half a degree from east to west, where lines of samples are curved.
         for cell in 0.001, 0.02:
             for holes in False, True:
                 store, samples = self.raster(GEOGRAPHIC, (8, 60), cell, 130, 120, void if holes else lambda x, y: False,
@@ -354,13 +355,13 @@ class MetresTest(unittest.TestCase):
                         if how[0] == '--max-error':
                             self.assertLessEqual(largest, how[1] + 1e-3)
                         self.assertLessEqual(largest, summary['max_error'] + 1e-3)
-                        # Only at the border, which is straight between its vertices.
+                        # Only at the border, where mesh edges are straight.
                         edge = {i for i, (x, y, _) in enumerate(samples)
                                 if not (8 + cell < x < 8 + 129 * cell and 60 - 119 * cell < y < 60 - cell)}
                         off = {i for i, place in enumerate(there) if place in set(uncovered)} if uncovered else set()
                         if not holes:
                             self.assertLessEqual(off, edge)
-                        # All triangles face up, and none is over the lake.
+                        # All triangles face up, and none covers the lake.
                         middle = (*utm_32(8 + 60.5 * cell, 60 - 30.5 * cell), 0)
                         for face in faces:
                             a, b, c = (vertices[i] for i in face)

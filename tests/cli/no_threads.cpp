@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Preloaded by tests: the system grants no thread.
+// Preloaded by tests; makes every attempt to start a thread fail.
 #include <cerrno>
 
 #include <pthread.h>

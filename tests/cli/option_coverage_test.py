@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Every option of every verb is in a test: of each verb in a golden command or a test of the command
-line, and of any verb in a test that checks what the option does and not only that bytes stay.
+"""Every option of every verb is tested: for each verb by a golden command or a command-line test, and for at
+least one verb by a test that checks the effect of the option and not only that bytes stay the same.
 
 TERRACE=path/to/terrace option_coverage_test.py
 """
@@ -18,14 +18,14 @@ TERRACE = os.environ.get('TERRACE', 'terrace')
 HERE = os.path.dirname(os.path.abspath(__file__))
 GOLDEN = os.path.join(HERE, '..', 'golden', 'golden.txt')
 
-# Options of verbs that no test need have, and why.
+# Options of verbs that need no test, with the reason.
 EXCEPTIONS = {
-    ('match', '--seconds'): 'what is done in a given time is not the same twice',
+    ('match', '--seconds'): 'the result of a time limit is not reproducible',
 }
-# Options that are read in one place for all verbs: a test with any verb counts.
+# Options that all verbs read in one place: a test with any verb counts.
 COMMON = {'--threads', '--memory', '--seed', '--json', '--force', '--progress', '--quiet', '--verbose',
           '--help'}
-# How else an option may be written.
+# Other spellings of options.
 SHORT = {'-o': '--output', '-q': '--quiet', '-v': '--verbose', '-h': '--help'}
 
 OPTION = re.compile(r'--?[a-z][a-z0-9-]*')
@@ -63,7 +63,7 @@ def text(node):
 
 
 def verb_of(node, verbs):
-    """The verb with which the arguments of a call, a list or a tuple begin; None if none."""
+    """The verb at the beginning of a call's arguments, a list or a tuple, or None."""
     parts = node.args if isinstance(node, ast.Call) else getattr(node, 'elts', [])
     if parts and isinstance(parts[0], ast.Name) and parts[0].id == 'TERRACE':
         parts = parts[1:]
@@ -71,7 +71,7 @@ def verb_of(node, verbs):
 
 
 def uses_in_tests(verbs):
-    """(verb, option) where one call or one list has both; (None, option) for each that is there."""
+    """Yields (verb, option) for each call or list that has both, and (None, option) for each option found."""
     def words_below(node):
         if text(node) is not None:
             yield text(node)
@@ -108,18 +108,18 @@ class OptionCoverageTest(unittest.TestCase):
         self.assertIn('--output', self.options['cluster'])
         self.assertTrue(all(COMMON <= options for options in self.options.values()))
 
-    def test_every_option_of_every_verb_is_in_a_test(self):
+    def test_every_option_of_every_verb_is_tested(self):
         missing = [f'{verb} {option}' for verb, options in self.options.items()
                    for option in sorted(options - COMMON)
                    if (verb, option) not in self.uses | self.golden | set(EXCEPTIONS)]
-        self.assertEqual(missing, [], 'add a golden command, or better a test of what it does')
+        self.assertEqual(missing, [], 'add a golden command, or better a test of its effect')
 
-    def test_what_every_option_does_is_in_a_test(self):
+    def test_the_effect_of_every_option_is_tested(self):
         known = set().union(*self.options.values())
         missing = sorted(option for option in known if (None, option) not in self.uses)
         self.assertEqual(missing, [], 'add a test in tests/cli that fails if the option does nothing')
 
-    def test_exceptions_are_options_without_a_test(self):
+    def test_exceptions_are_untested_options(self):
         for verb, option in EXCEPTIONS:
             self.assertIn(option, self.options[verb])
             self.assertNotIn((verb, option), self.uses | self.golden)

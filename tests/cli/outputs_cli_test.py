@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Names of outputs and inputs that promise another format, and what the command answers to slips.
+"""Tests file names that imply another format, and the answers to typing mistakes.
 
 TERRACE=path/to/terrace FAULT_SHIM=path/to/libfault_shim.so outputs_cli_test.py
 """
@@ -88,12 +88,12 @@ class FormatNameTest(OutputCase):
         self.refuse(2, '--format glb', 'mesh', self.store, '-o', self.path('x.ply'), '--format', 'glb')
         self.refuse(2, 'no ending', 'convert', self.points, '-o', self.path('x'))
 
-    def test_standard_output_only_of_what_streams(self):
+    def test_standard_output_is_only_for_formats_that_stream(self):
         for command in (('raster', self.store), ('synth', 'dem', '--size', '8x8'), ('build', self.path('a.tif')),
                         ('surface', self.store, '--tetrahedra'), ('publish', self.store)):
             self.refuse(2, 'standard output', *command, '-o', '-')
 
-    def test_names_without_an_ending_of_a_format_are_fine(self):
+    def test_names_without_a_known_ending_are_accepted(self):
         for number, command in enumerate((('raster', self.store), ('render', self.store, '--size', '9x9'),
                                           ('contour', self.store, '--interval', '9'))):
             self.ok(*command, '-o', self.path(f'plain{number}'))
@@ -106,7 +106,7 @@ class InputTest(OutputCase):
             file.write(data)
         return self.path(name)
 
-    def test_places_that_are_not_a_table(self):
+    def test_points_files_that_are_not_tables(self):
         point = {'type': 'Feature', 'properties': {}, 'geometry': {'type': 'Point', 'coordinates': [10.3, 46.5]}}
         text = json.dumps({'type': 'FeatureCollection', 'features': [point, point]}).encode()
         self.refuse(2, '.geojson|.csv', 'sample', self.store, '--points', self.put('p.geojson', text))
@@ -123,7 +123,7 @@ class InputTest(OutputCase):
         broken = self.put('r.geojson', b'{"type": "Polygon",\n "coordinates": [[[0, 0], [1, 0]')
         self.refuse(1, 'line 2, column|cut off', 'points', self.store, '--region', broken, '-o', '-')
 
-    def test_a_region_without_end_is_bounded(self):
+    def test_an_endless_region_is_refused(self):
         result = subprocess.run(f'yes "[" | {TERRACE} points {self.store} --region /dev/stdin -o -', shell=True,
                                 capture_output=True, text=True, timeout=300, check=False)
         self.assertEqual(result.returncode, 1)
@@ -139,7 +139,7 @@ class AnswerTest(OutputCase):
         self.refuse(2, '--labels is empty', 'cluster', self.points, '--labels', '')
         self.refuse(2, ' is empty', 'info', '')
 
-    def test_slips_are_answered_with_the_nearest_name(self):
+    def test_typing_mistakes_are_answered_with_the_nearest_name(self):
         self.refuse(2, "'--regoin': no such argument or option; did you mean --region?", 'points', self.store, '--regoin', '1,2',
                     '-o', '-')
         self.refuse(2, 'did you mean --max-error?', 'mesh', self.store, '--maxerror=5', '-o', '-')
@@ -149,7 +149,7 @@ class AnswerTest(OutputCase):
         self.assertEqual(result.returncode, 2)
         self.assertNotIn('did you mean', result.stderr)
 
-    def test_faults_of_data_end_with_1(self):
+    def test_errors_in_data_exit_with_1(self):
         Dem(9, 1, 10.13, 46.71, 0.02).write(self.path('row.tif'))
         self.ok('build', self.path('row.tif'), '-o', self.path('row.terrace'))
         self.refuse(1, 'row.terrace: the raster is one line of samples', 'mesh', self.path('row.terrace'),
@@ -158,7 +158,7 @@ class AnswerTest(OutputCase):
     def test_the_version_names_no_driver(self):
         self.assertNotIn('driver', self.ok('--version').stdout)
 
-    def test_interrupted_tiles_name_the_option_that_goes_on(self):
+    def test_interrupted_tiles_name_the_option_that_resumes(self):
         folder = tempfile.mkdtemp(dir=self.folder)
         env = dict(os.environ, LD_PRELOAD=os.environ['FAULT_SHIM'], FAULT_STEP='8', FAULT_KIND='pause')
         process = subprocess.Popen([TERRACE, 'tile', self.store, '-o', 't', '--vertical', 'ellipsoidal', '--zoom',

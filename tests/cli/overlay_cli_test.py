@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Overlays as their users meet them: mesh --save-overlay, and --overlay of mesh and points.
+"""Tests overlays end to end: mesh --save-overlay, and --overlay of mesh and points.
 
 TERRACE=path/to/terrace overlay_cli_test.py
 """
@@ -85,18 +85,18 @@ class OverlayTest(unittest.TestCase):
         return result.stderr
 
     def changed(self):
-        """Heights by place that the overlay changes, told by the smoothed mesh."""
+        """Heights that the overlay changes, by position, taken from the smoothed mesh."""
         smooth = self.heights_in(self.smoothed)
         return {place: z for place, z in smooth.items() if z != self.raw[place]}
 
-    def test_the_mesh_with_the_overlay_is_the_smoothed_mesh_and_the_store_unchanged(self):
+    def test_the_overlay_gives_the_smoothed_mesh_and_the_store_is_unchanged(self):
         again = self.path('again.obj')
         self.run_ok('mesh', self.store, '--region', self.region, '--overlay', self.overlay, '-o', again)
         self.assertEqual(read(again), read(self.smoothed))
         self.assertEqual(self.bytes_of_store(), self.before)
         changed = self.changed()
         self.assertGreater(len(changed), SIZE * SIZE // 8)
-        # Places in a text have fewer digits than heights in the overlay.
+        # Positions in text have fewer digits than heights in the overlay.
         self.assertGreaterEqual(self.summary['overlay_values'], len(changed))
         self.assertLessEqual(self.summary['overlay_values'], (SIZE // 2 + 1) ** 2)
 
@@ -114,7 +114,7 @@ class OverlayTest(unittest.TestCase):
             self.assertEqual(over, {place: changed.get(place, z) for place, z in plain.items()})
             self.assertNotEqual(over, plain)
 
-    def test_smoothing_goes_on_from_an_overlay(self):
+    def test_smoothing_continues_from_an_overlay(self):
         second = self.path('second.overlay')
         both = self.heights('both.obj', '--overlay', self.overlay, '--smooth', 'laplacian:3',
                             '--region', self.region, '--save-overlay', second)
@@ -163,7 +163,7 @@ class OverlayTest(unittest.TestCase):
         smooth = self.heights_in(self.smoothed)
         self.assertLessEqual(set(self.changed()), changed)
         for place in changed:
-            # The mesh is text of fewer digits.
+            # The mesh is text with fewer digits.
             self.assertAlmostEqual(over[place], smooth[place], delta=1e-3)
         for options in [('--level', 1), ('--region', self.region), ('--level', 'top'),
                         ('--level', 1, '--focus', f'{self.region}:0')]:
@@ -205,7 +205,7 @@ class OverlayTest(unittest.TestCase):
         self.assertNotEqual(read(file), before)
         stranger = self.path('stranger.bin')
         with open(stranger, 'w') as letter:
-            letter.write('Dear reader, this is a letter: nothing of it is ours.\n')
+            letter.write('Dear reader, this is a letter and not an overlay.\n')
         self.assertIn('not written by', self.expect_error(
             1, *mesh, '--save-overlay', stranger, '-o', out, '--force'))
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The command as a process among others: pipes, closed descriptors, signals, full disks, names that
-a terminal would obey, and resources that the system refuses.
+"""Tests the command as a process: pipes, closed descriptors, signals, full disks, names with control
+characters, and resources that the system denies.
 
 TERRACE=path/to/terrace process_cli_test.py [CLASS...]
 """
@@ -25,12 +25,12 @@ import unittest
 from small_tiff import utm, write_tiff
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
-# A library that makes each start of a thread fail; preloaded.
+# A library to preload that makes every start of a thread fail.
 NO_THREADS = os.environ.get('NO_THREADS')
 
 
 def terrace(*args, **kwargs):
-    """Runs the command; output is text unless text=False."""
+    """Runs the command; the output is text unless text=False."""
     kwargs.setdefault('text', True)
     kwargs.setdefault('stdout', subprocess.PIPE)
     kwargs.setdefault('stderr', subprocess.PIPE)
@@ -38,7 +38,7 @@ def terrace(*args, **kwargs):
 
 
 def wait_until(condition):
-    """Returns what the condition gives once it is true; waits for a minute at most."""
+    """Waits up to a minute until the condition is true; returns its value."""
     end = time.monotonic() + 60
     while time.monotonic() < end:
         value = condition()
@@ -49,7 +49,7 @@ def wait_until(condition):
 
 
 def catches_signals(process):
-    """True once SIGTERM has a handler."""
+    """Returns true once SIGTERM has a handler."""
     with open(f'/proc/{process.pid}/status') as status:
         caught = int(re.search(r'SigCgt:\s*(\w+)', status.read()).group(1), 16)
     return caught >> (signal.SIGTERM - 1) & 1
@@ -73,7 +73,7 @@ class ProcessTest(unittest.TestCase):
         return result
 
     def start(self, *args, **kwargs):
-        """A process that the test ends if it does not end itself."""
+        """Starts a process; the test kills it if it does not end by itself."""
         kwargs.setdefault('stdout', subprocess.PIPE)
         kwargs.setdefault('stderr', subprocess.PIPE)
         process = subprocess.Popen([TERRACE, *args], **kwargs)
@@ -91,7 +91,7 @@ class ProcessTest(unittest.TestCase):
         return process
 
     def end_of(self, process):
-        """Exit code and messages, without closing what the process reads from."""
+        """Returns the exit code and the messages; keeps the process's input open."""
         try:
             code = process.wait(timeout=60)
         except subprocess.TimeoutExpired:
@@ -121,7 +121,7 @@ class ClosedPipeTest(ProcessTest):
         finally:
             os.close(write_end)
 
-    def test_a_failure_stays_a_failure(self):
+    def test_errors_keep_their_exit_code(self):
         store = self.store()
         for args in (['info', self.path('none')], ['info', self.path('none'), '--json'],
                      ['points', store, '-o', self.path('missing/x.xyz')],
@@ -132,7 +132,7 @@ class ClosedPipeTest(ProcessTest):
                 self.assertEqual(result.returncode, 1, result.stderr)
                 self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
 
-    def test_a_fault_that_was_found_stays_one(self):
+    def test_problems_found_by_verify_keep_their_exit_code(self):
         store = self.store()
         level = os.path.join(store, sorted(n for n in os.listdir(store) if 'manifest' not in n)[0])
         data = bytearray(open(level, 'rb').read())
@@ -140,7 +140,7 @@ class ClosedPipeTest(ProcessTest):
         open(level, 'wb').write(data)
         self.assertEqual(self.run_without_reader('verify', store, '--json').returncode, 1)
 
-    def test_output_that_nobody_reads_ends_quietly(self):
+    def test_output_to_a_closed_pipe_ends_quietly(self):
         points, store = self.points_file(), self.store()
         places = self.path('places.csv')
         open(places, 'w').write('x,y\n5,5\n')
@@ -154,7 +154,7 @@ class ClosedPipeTest(ProcessTest):
                 result = self.run_without_reader(*args)
                 self.assertEqual((result.returncode, result.stderr), (0, ''))
 
-    def test_standard_output_on_a_full_disk_is_a_failure(self):
+    def test_standard_output_on_a_full_disk_is_an_error(self):
         points, store = self.points_file(), self.store()
         for args in (['--version'], ['info', points], ['info', points, '--json'],
                      ['convert', points, '-o', '-'], ['points', store, '-o', '-'],
@@ -166,7 +166,7 @@ class ClosedPipeTest(ProcessTest):
                 self.assertEqual(result.returncode, 1)
                 self.assertIn('standard output: cannot write: No space left', result.stderr)
 
-    def test_a_picture_goes_to_standard_output(self):
+    def test_pictures_can_go_to_standard_output(self):
         result = self.run_ok('render', self.store(), '-o', '-', '--size', '64x64', text=False,
                              cwd=self.folder)
         self.assertTrue(result.stdout.startswith(b'\x89PNG'))
@@ -174,7 +174,7 @@ class ClosedPipeTest(ProcessTest):
 
 
 class ClosedDescriptorTest(ProcessTest):
-    def test_no_file_gets_the_number_of_a_standard_stream(self):
+    def test_no_file_uses_the_descriptor_of_a_standard_stream(self):
         fifo = self.path('fifo')
         os.mkfifo(fifo)
         for closed in ((0,), (1,), (2,), (0, 1), (1, 2), (0, 1, 2)):
@@ -188,14 +188,14 @@ class ClosedDescriptorTest(ProcessTest):
                 with open(fifo, 'w') as producer:
                     producer.write(self.points(3000))
                     producer.flush()
-                    # The output is open from here on.
+                    # From here on the output is open.
                     wait_until(lambda: any('.tmp-' in name for name in os.listdir(self.folder)))
                     for descriptor in closed:
                         self.assertEqual(os.readlink(f'/proc/{process.pid}/fd/{descriptor}'),
                                          '/dev/null')
                 self.assertEqual(process.wait(timeout=60), 0)
 
-    def test_to_use_a_closed_stream_is_a_failure(self):
+    def test_using_a_closed_stream_is_an_error(self):
         points, store = self.points_file(), self.store()
         for args in (['info', points], ['info', points, '--json'], ['--version'],
                      ['convert', points, '-o', '-'], ['points', store, '-o', '-'],
@@ -213,7 +213,7 @@ class ClosedDescriptorTest(ProcessTest):
 
 
 class WaitTest(ProcessTest):
-    """What waits for another program ends at once by a signal, and by a failure elsewhere."""
+    """A wait for another program ends at once on a signal or on an error elsewhere."""
 
     def readers(self, source):
         store = self.store()
@@ -248,7 +248,7 @@ class WaitTest(ProcessTest):
         os.mkfifo(fifo)
         for args in self.readers(fifo):
             if args[0] == 'render':
-                continue  # a pipe is drawn by its content; see the test with data
+                continue  # render detects a pipe's format from its content; see the test with data
             with self.subTest(args=args):
                 process = self.start(*args)
                 wait_until(lambda: catches_signals(process))
@@ -260,7 +260,7 @@ class WaitTest(ProcessTest):
                      ['convert', self.points_file(count=100000), '-o', '-']):
             with self.subTest(args=args):
                 process = self.start(*args)
-                # Full: the process waits for room.
+                # The pipe is full, so the process waits for space.
                 wait_until(lambda: unread_bytes(process.stdout) >= 60000)
                 process.send_signal(signal.SIGTERM)
                 self.assert_interrupted(process)
@@ -279,7 +279,7 @@ class WaitTest(ProcessTest):
         self.assertEqual(code, 0, error)
         self.assertEqual(open(self.path('out.xyz')).read(), '1 2 3\n4 5 6\n')
 
-    def test_a_pipe_without_blocking_is_waited_for(self):
+    def test_a_non_blocking_pipe_is_waited_for(self):
         read_end, write_end = os.pipe()
         os.set_blocking(read_end, False)
         process = self.start('convert', '-', '-o', self.path('out.xyz'), stdin=read_end)
@@ -290,7 +290,7 @@ class WaitTest(ProcessTest):
         code, error = self.end_of(process)
         self.assertEqual(code, 0, error)
 
-    def test_a_full_disk_is_told_while_the_producer_idles(self):
+    def test_a_full_disk_is_reported_while_the_producer_is_idle(self):
         def small_files():
             resource.setrlimit(resource.RLIMIT_FSIZE, (40000, 40000))
         for args in (['convert', '-', '-o', self.path('out.ply')],
@@ -313,7 +313,7 @@ class WaitTest(ProcessTest):
                 self.assertFalse([n for n in os.listdir(self.folder)
                                   if n.startswith(('out', 'built', '.'))])
 
-    def test_a_raster_in_a_pipe_is_set_aside(self):
+    def test_a_raster_in_a_pipe_is_copied_to_a_temporary_file(self):
         raster, fifo = self.path('dem.tif'), self.path('fifo')
         self.run_ok('synth', 'dem', '--size', '64x64', '-o', raster)
         os.mkfifo(fifo)
@@ -334,7 +334,7 @@ class WaitTest(ProcessTest):
 
 
 class StopTest(ProcessTest):
-    """Long work ends soon after a signal, whatever loop it is in, and leaves no files."""
+    """Long work ends soon after a signal, in any loop, and leaves no files."""
 
     def cloud(self):
         if not os.path.exists(self.path('cloud')):
@@ -353,7 +353,7 @@ class StopTest(ProcessTest):
         return self.path('dem')
 
     def sparse(self):
-        """Two small rasters far apart: 400 million cells, nearly all without data."""
+        """Builds a store of two small rasters far apart: 400 million cells, nearly all without data."""
         if not os.path.exists(self.path('sparse')):
             for name, away in (('a.tif', 0), ('b.tif', 19900)):
                 write_tiff(self.path(name), 100, 100, [float(i % 97) for i in range(10000)],
@@ -365,8 +365,8 @@ class StopTest(ProcessTest):
         with self.subTest(args=args):
             process = self.start(*args, '-o', self.path(output), '-q')
             wait_until(lambda: any(name.startswith('.' + output) for name in os.listdir(self.folder)))
-            time.sleep(0.5)  # into its work
-            self.assertIsNone(process.poll(), 'it has ended by itself')
+            time.sleep(0.5)  # until it is at work
+            self.assertIsNone(process.poll(), 'it ended by itself')
             process.send_signal(signal.SIGTERM)
             code, error = self.end_of(process)
             self.assertEqual(code, 130, error)
@@ -403,7 +403,7 @@ class StopTest(ProcessTest):
         self.assert_stopped('out.csv', 'profile', self.dem(), '--line', '400000,5200000,405000,5195000',
                             '--step', '0.00001')
 
-    def test_what_would_never_end_is_refused(self):
+    def test_endless_work_is_refused(self):
         line = ['--line', '400000,5200000,405000,5195000']
         for args, what in ((['profile', self.dem(), *line, '--step', '1e-17'], '--step is too small'),
                            (['profile', self.dem(), *line, '--step', '1e-300'], '--step is too small'),
@@ -417,14 +417,14 @@ class StopTest(ProcessTest):
                 self.assertIn(what, result.stderr)
                 self.assertFalse([name for name in os.listdir(self.folder) if 'out' in name])
 
-    def test_work_that_looks_for_no_signal_is_cut_short(self):
-        """A linkage in one piece."""
+    def test_work_that_never_checks_for_signals_is_killed(self):
+        """Linkage does not check for stops."""
         cloud = self.path('large.las')
         self.run_ok('synth', 'uniform', '--points', '3M', '-o', cloud)
         process = self.start('cluster', cloud, '--method', 'single', '-o', self.path('out.csv'), '-k', '2')
         wait_until(lambda: catches_signals(process))
         time.sleep(3)
-        self.assertIsNone(process.poll(), 'it has ended by itself')
+        self.assertIsNone(process.poll(), 'it ended by itself')
         process.send_signal(signal.SIGTERM)
         code, error = self.end_of(process)
         self.assertEqual(code, 130, error)
@@ -432,15 +432,15 @@ class StopTest(ProcessTest):
 
 
 class OptionTest(ProcessTest):
-    """Every option of every verb, as its help has it."""
+    """Every option of every verb, as listed in its help."""
 
     def setUp(self):
         super().setUp()
         self.addCleanup(os.chdir, os.getcwd())
-        os.chdir(self.folder)  # an option may take what it is given for the name of an output
+        os.chdir(self.folder)  # an option may take its value for the name of an output
 
     def commands(self):
-        """Each verb with arguments that work, but for its output."""
+        """Each verb with valid arguments, except its output."""
         points, store, dem = self.points_file(), self.store(), self.path('dem.tif')
         self.run_ok('synth', 'dem', '--size', '64x64', '-o', dem)
         self.run_ok('build', dem, '-o', self.path('raster'))
@@ -471,17 +471,17 @@ class OptionTest(ProcessTest):
             if found:
                 yield found.group(1)
 
-    def test_every_verb_is_tried(self):
+    def test_every_verb_is_covered(self):
         listed = re.findall(r'^  (\w+) +\S', self.run_ok('--help').stdout.split('Verbs:')[1], re.M)
         tried = {name.split()[0] for name in self.commands()}
-        # `view` serves until it is stopped: see view_cli_test.py.
+        # `view` serves until it is stopped; view_cli_test.py tests it.
         self.assertEqual(set(listed) - {'terrace', 'view'}, tried)
 
-    def test_no_number_is_nan_or_infinite(self):
+    def test_nan_and_infinity_are_refused(self):
         numeric = set()
         for name, command in self.commands().items():
             for option in self.options_of(command[0]):
-                # What does not take a word takes numbers, or names of its own.
+                # Options that reject a word take numbers or fixed names.
                 word = terrace(*command, f'{option}=bogus' if option[1] == '-' else option + 'bogus')
                 if word.returncode != 2:
                     for out in ('out', 'built', 'tiles'):
@@ -503,7 +503,7 @@ class OptionTest(ProcessTest):
                               '--max-edge', '--seconds', '--hurst', '--roughness', '--threads',
                               '--memory', '--seed', '-k', '--band', '--block'}, numeric)
 
-    def test_no_count_is_negative_or_zero(self):
+    def test_negative_and_zero_counts_are_refused(self):
         counts = {'-k', '--band', '--batch', '--block', '--threads'}
         tried = set()
         for name, command in self.commands().items():
@@ -522,7 +522,7 @@ class OptionTest(ProcessTest):
             self.assertEqual(result.returncode, 2, result.stderr)
             self.assertIn('-k: Value', result.stderr)
 
-    def test_json_is_refused_where_the_output_wants_standard_output(self):
+    def test_json_is_refused_if_the_output_goes_to_standard_output(self):
         for name, command in self.commands().items():
             if '-o' not in command:
                 continue
@@ -532,7 +532,7 @@ class OptionTest(ProcessTest):
                 result = terrace(*there)
                 self.assertEqual((result.returncode, result.stdout), (2, ''))
                 self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
-        # Without -o its lines go there.
+        # Without -o, the lines go to standard output.
         self.assertEqual(terrace('sample', self.store(), '--json').returncode, 2)
         for option in ('--labels', '--dendrogram'):
             result = terrace('cluster', self.points_file(), '--method', 'single', '-k', '3', option,
@@ -540,7 +540,7 @@ class OptionTest(ProcessTest):
             self.assertEqual((result.returncode, result.stdout), (2, ''))
 
 
-    def test_what_is_to_come_is_not_available_yet(self):
+    def test_planned_features_are_not_available_yet(self):
         for args in (['merge', 'a.terrace', 'b.terrace', '-o', 'c.terrace'], ['build', 'a.xyz', '--append'],
                      ['build', 'a.xyz', '-o', 'b', '--part=1/2'], ['build', 'a.xyz', '-o', 'b', '--resume'],
                      ['mesh', 'a.terrace', '--base', '-o', 'b.ply'],
@@ -557,7 +557,7 @@ class NameTest(ProcessTest):
     def assert_plain(self, text):
         self.assertNotRegex(text, '[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]')
 
-    def test_control_characters_of_names_are_shown_not_sent(self):
+    def test_control_characters_in_names_are_escaped(self):
         name = f'a{self.ESCAPE}\r\u009b2J\u202e.xyz'
         points = self.points_file(name)
         for args in (['info', points], ['info', points + 'x'], ['cluster', points, '-o', 'x.csv', '-v'],
@@ -581,12 +581,12 @@ class NameTest(ProcessTest):
                 self.assertTrue(result.stderr.startswith(f'terrace: standard input: {cause}; '),
                                 result.stderr)
 
-    def test_a_line_end_in_a_name_makes_no_line_of_its_own(self):
+    def test_a_newline_in_a_name_does_not_start_a_line(self):
         result = terrace('info', self.path('none\nterrace: all is well'))
         self.assertEqual(result.returncode, 1)
         self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
 
-    def test_foreign_text_is_shown_not_sent(self):
+    def test_control_characters_in_file_contents_are_escaped(self):
         hostile = self.path('hostile.ply')
         with open(hostile, 'w') as file:
             file.write(f'ply\nformat ascii 1.0\ncomment {self.ESCAPE}red\x07\u009b\n'
@@ -606,7 +606,7 @@ class NameTest(ProcessTest):
         self.assertIn(self.ESCAPE, ' '.join(
             json.loads(self.run_ok('info', hostile, '--json').stdout)['comments']))
 
-    def test_names_that_are_no_utf_8(self):
+    def test_names_that_are_not_utf_8(self):
         name = os.fsencode(self.folder) + b'/caf\xe9.xyz'
         with open(name, 'w') as file:
             file.write('1 2 3\n')
@@ -631,9 +631,9 @@ class NameTest(ProcessTest):
         self.assertFalse([n for n in os.listdir(self.folder) if n.startswith('.')])
 
 
-@unittest.skipUnless(NO_THREADS, 'NO_THREADS names no library to preload')
+@unittest.skipUnless(NO_THREADS, 'NO_THREADS is not set')
 class NoThreadTest(ProcessTest):
-    """Where the system grants no threads the one there is does the work."""
+    """If the system denies new threads, the main thread does all the work."""
 
     def test_results_are_the_same(self):
         points, dem, raster = self.points_file(count=4000), self.path('dem.tif'), self.path('raster')

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A reader of quantized-mesh tiles and their checks, independent of terrace's own: for tests."""
+"""Reads and checks quantized-mesh tiles, independently of terrace's code."""
 
 import gzip
 import itertools
@@ -13,7 +13,7 @@ A, B = 6378137.0, 6356752.3142451793
 
 
 def box_of(zoom, x, y):
-    """west, south, east, north of a tile in degrees."""
+    """West, south, east and north of a tile in degrees."""
     width = 180 / 2 ** zoom
     return -180 + x * width, -90 + y * width, -180 + (x + 1) * width, -90 + (y + 1) * width
 
@@ -101,13 +101,13 @@ class Tile:
         return [oct_decode(a, b) for a, b in zip(codes[::2], codes[1::2])]
 
     def side(self, name):
-        """Sorted places along a side, and heights there."""
+        """Sorted positions along a side, with their heights."""
         along, across, at = {'west': (self.v, self.u, 0), 'east': (self.v, self.u, UNITS),
                              'south': (self.u, self.v, 0), 'north': (self.u, self.v, UNITS)}[name]
         return sorted((along[i], self.metres(i)) for i in range(len(along)) if across[i] == at)
 
     def check(self):
-        """Asserts what a client relies on."""
+        """Asserts the properties on which clients rely."""
         n = len(self.u)
         assert self.low <= self.high
         assert all(0 <= c <= UNITS for c in self.u + self.v + self.h)
@@ -116,12 +116,12 @@ class Tile:
             a, b, c = t
             area = ((self.u[b] - self.u[a]) * (self.v[c] - self.v[a]) -
                     (self.u[c] - self.u[a]) * (self.v[b] - self.v[a]))
-            assert area > 0, 'a triangle that is turned or without area'
+            assert area > 0, 'a triangle is turned or degenerate'
             total += area
             for edge in ((a, b), (b, c), (c, a)):
                 assert edge not in edges
                 edges[edge] = True
-        assert total == 2 * UNITS * UNITS, 'not the whole tile'
+        assert total == 2 * UNITS * UNITS, 'the triangles do not fill the tile'
         for a, b in edges:
             if (b, a) not in edges:
                 assert any(c[a] == c[b] and c[a] in (0, UNITS) for c in (self.u, self.v)), 'a hole'
@@ -138,13 +138,13 @@ class Tile:
             self.check_horizon(p)
 
     def check_horizon(self, point):
-        """Whoever stands on the horizon point's own horizon sees no vertex over it: the cones from
-        both along which the ellipsoid is touched lie one in the other."""
+        """Asserts that an observer at the horizon point sees no vertex above the horizon. From the point and
+        from each vertex, the ellipsoid is touched along a cone; one cone must contain the other."""
         p = (point[0] / A, point[1] / A, point[2] / B)
         far, near = math.sqrt(dot(self.horizon, self.horizon)), math.sqrt(dot(p, p))
         angle = math.acos(max(-1.0, min(1.0, dot(p, self.horizon) / far / near)))
         reach = math.acos(1 / far) - math.acos(1 / max(near, 1))
-        assert angle <= reach + 1e-7 or far > 1e5, 'a vertex is seen while the horizon point is not'
+        assert angle <= reach + 1e-7 or far > 1e5, 'a vertex is visible while the horizon point is hidden'
 
 
 class TileSet:
@@ -168,7 +168,7 @@ class TileSet:
             return file.read()
 
     def files(self):
-        """Every file under the folder but layer.json and the journal: bytes by name."""
+        """The bytes of every file in the folder except layer.json and the journal, by name."""
         found = {}
         for folder, _, names in os.walk(self.folder):
             for name in names:
@@ -185,7 +185,7 @@ class TileSet:
         self.check_sides()
 
     def check_metadata(self):
-        """Each tile names those of the next zoom below it that there are."""
+        """Asserts that the metadata of each tile lists the existing tiles below it at the next zoom."""
         for (zoom, x, y), tile in self.tiles.items():
             text = tile.extensions[4]
             assert struct.unpack_from('<I', text)[0] == len(text) - 4
@@ -209,8 +209,8 @@ class TileSet:
                 assert all(abs(p[1] - q[1]) < 1e-3 + rounding for p, q in zip(a, b)), 'a step'
 
     def errors(self, samples):
-        """Per zoom the largest distance of samples (lon, lat, height) from the tiles, and the
-        number that no tile covers."""
+        """Returns, by zoom, the largest distance of samples (lon, lat, height) from the tiles, and the
+        number of samples that no tile covers."""
         result = {}
         for zoom in range(self.layer['minzoom'], self.layer['maxzoom'] + 1):
             by_tile, missed, largest = {}, 0, 0.0
@@ -231,7 +231,7 @@ class TileSet:
 
 
 def measure(tile, places):
-    """Largest error of (u, v, height) on a tile's triangles, and how many lie in none."""
+    """Returns the largest error of (u, v, height) on a tile's triangles, and the number on no triangle."""
     cells = {}
     for i, (u, v, _) in enumerate(places):
         cells.setdefault((int(u) >> 10, int(v) >> 10), []).append(i)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Questions to a store as their users ask them: sample, raster, profile, contour.
+"""Tests queries of a store end to end: sample, raster, profile, contour.
 
 TERRACE=path/to/terrace query_cli_test.py
 """
@@ -68,7 +68,7 @@ class QueryTest(unittest.TestCase):
         return result.stderr
 
     def samples(self, file):
-        """The samples of a GeoTIFF by rows, by GDAL."""
+        """The samples of a GeoTIFF by rows, read by GDAL."""
         raw = self.path('samples.raw')
         subprocess.run(['gdal_translate', '-q', '-of', 'ENVI', '-ot', 'Float32', file, raw], check=True)
         values = array.array('f')
@@ -104,31 +104,31 @@ class SampleTest(QueryTest):
         self.assertEqual(lines[6].split(',')[-4:], lines[2].split(',')[-4:])
         self.assertEqual(lines[7:], [''])
 
-    def test_no_two_columns_have_one_name(self):
+    def test_column_names_are_unique(self):
         x, y = self.low[0] + 100, self.low[1] + 100
         places, answers = self.path('named.csv'), self.path('answered.csv')
         for head, due in (('x,y,Height,slope,slope_2', 'height_2,gradient,slope_3,aspect'),
                           ('x;y;aspect', 'height;gradient;slope;aspect_2')):
             with open(places, 'w', encoding='ascii') as file:
                 file.write(head + '\n' + head[1].join(map(str, (x, y, 1, 2, 3)[:len(head.split(head[1]))])) + '\n')
-            # Known as a table of ours, which may be replaced.
+            # Recognised as a table of terrace, which may be replaced.
             self.run_ok('sample', self.store, '--points', places, '-o', answers, '--force')
             with open(answers, encoding='ascii') as file:
                 self.assertEqual(file.readline(), head + head[1] + due + '\n')
 
-    def test_slope_and_aspect_belong_to_the_gradient(self):
+    def test_slope_and_aspect_match_the_gradient(self):
         for row in self.answers('\n'.join(f'{x},{y}' for x, y in self.somewhere(1, 200))):
             gradient, slope, aspect = map(float, row[3:])
             self.assertAlmostEqual(math.degrees(math.atan(gradient)), slope, places=5)
             self.assertTrue(0 <= aspect < 360)
 
-    def test_the_gradient_is_that_of_the_heights(self):
+    def test_the_gradient_matches_the_heights(self):
         step = 1e-3
         for x, y in self.somewhere(2, 60):
             text = '\n'.join(f'{x + dx},{y + dy}' for dx, dy in ((0, 0), (step, 0), (0, step)))
             rows = [[float(cell) for cell in row] for row in self.answers(text)]
             east, north = ((rows[i][2] - rows[0][2]) / step for i in (1, 2))
-            # Heights have five decimals; a step over an edge of a triangle is rare.
+            # Heights have five decimals; a step across an edge of a triangle is rare.
             if abs(math.hypot(east, north) - rows[0][3]) > 0.02:
                 continue
             if rows[0][3] > 0.3:
@@ -137,7 +137,7 @@ class SampleTest(QueryTest):
                 self.assertLess(min(turn, 360 - turn), 5)
 
     @needs('gdal_translate')
-    def test_on_samples_every_method_gives_the_sample(self):
+    def test_every_method_returns_the_sample_at_a_sample(self):
         values = self.samples(self.dem)
         cells = [(random.Random(3 + i).randrange(SIZE), random.Random(900 + i).randrange(SIZE))
                  for i in range(100)] + [(0, 0), (SIZE - 1, SIZE - 1)]
@@ -154,7 +154,7 @@ class SampleTest(QueryTest):
                                               '--memory', '64M', text=text))
             self.assertEqual(one.count('\n'), 30001)
 
-    def test_places_are_written_in_another_reference_system(self):
+    def test_positions_are_written_in_another_crs(self):
         places = self.somewhere(6, 50)
         text = 'easting;name;northing\n' + ''.join(f'{x:.4f};"a;b";{y:.4f}\n' for x, y in places)
         plain = [row.split(';') for row in self.run_ok('sample', self.store, text=text).splitlines()]
@@ -171,12 +171,12 @@ class SampleTest(QueryTest):
             self.assertAlmostEqual(east, x, delta=2e-4)
             self.assertAlmostEqual(north, y, delta=2e-4)
             self.assertAlmostEqual(height, float(row[4]), delta=1e-3)
-        # The sea of the plane ends: no place, no height.
+        # Outside the area of the projection, there is neither a position nor a height.
         far = self.run_ok('sample', self.store, '--points-crs', 'EPSG:4326', '--to-crs', 'EPSG:3857',
                           text='0,90\n')
         self.assertEqual(far, ',,,,,\n')
 
-    def test_places_in_another_reference_system(self):
+    def test_positions_in_another_crs(self):
         inside = self.somewhere(5, 1)[0]
         there = self.answers('%f,%f\n' % inside)[0]
         lonlat = subprocess.run(['cs2cs', '-f', '%.12f', 'EPSG:32632', '+to', '+proj=longlat',
@@ -188,7 +188,7 @@ class SampleTest(QueryTest):
         row = self.answers(f'lon,lat\n{lonlat[0]},{lonlat[1]}\n', '--points-crs', 'EPSG:4326')[1]
         self.assertAlmostEqual(float(row[2]), float(there[2]), places=3)
 
-    def test_bad_lines_name_the_line(self):
+    def test_errors_name_the_line(self):
         self.assertIn('line 3', self.expect_error(1, 'sample', self.store, text='x,y\n1,2\n1,two\n'))
         self.assertIn('columns', self.expect_error(1, 'sample', self.store, text='x,y\n1\n'))
         self.assertIn('one column', self.expect_error(1, 'sample', self.store, text='just words\n'))
@@ -197,12 +197,12 @@ class SampleTest(QueryTest):
         self.expect_error(2, 'sample', self.store, '--json', text='1,2\n')
         self.expect_error(2, 'sample', self.store, '--level', 99, text='1,2\n')
 
-    def test_a_place_without_a_coordinate_has_no_height(self):
+    def test_a_position_without_a_coordinate_has_no_height(self):
         for missing in ('', 'NA', 'nan', '"NA"'):
             lines = self.run_ok('sample', self.store, text=f'x,y\n{missing},2\n1,{missing}\n').split('\n')
             self.assertEqual(lines[1:3], [f'{missing},2,,,,', f'1,{missing},,,,'])
 
-    def test_nothing_in_nothing_out(self):
+    def test_empty_input_gives_empty_output(self):
         self.assertEqual(self.run_ok('sample', self.store, text=''), '')
 
     def test_summary(self):
@@ -216,7 +216,7 @@ class SampleTest(QueryTest):
 
 class RasterTest(QueryTest):
     @needs('gdal_translate', 'gdalinfo')
-    def test_the_lattice_itself_comes_back(self):
+    def test_the_default_lattice_is_the_rasters_own(self):
         out = self.path('same.tif')
         self.run_ok('raster', self.store, '-o', out)
         self.assertEqual(self.samples(out), self.samples(self.dem))
@@ -227,8 +227,9 @@ class RasterTest(QueryTest):
         self.assertIn('32632', ours['coordinateSystem']['wkt'])
 
     @needs('gdaldem', 'gdal_translate')
-    def test_slope_aspect_and_hillshade_are_those_of_gdaldem(self):
-        # gdaldem takes the map's metres; those on the ground differ by the projection's scale.
+    def test_slope_aspect_and_hillshade_match_gdaldem(self):
+        # gdaldem uses metres of the map, which differ from metres on the ground by the projection's
+        # scale.
         for value, nodata, tolerance in (('slope', -9999, 0.03), ('aspect', -9999, 0.5),
                                          ('hillshade', 0, 1)):
             ours, theirs = self.path(value + '.tif'), self.path(value + '-gdal.tif')
@@ -242,11 +243,11 @@ class RasterTest(QueryTest):
                 if value == 'aspect':
                     d = min(d, 360 - d)
                 off += d > tolerance
-            # The direction of what is nearly level is anybody's.
+            # On nearly level ground the aspect is arbitrary.
             self.assertLessEqual(off, SIZE * SIZE // 500 if value == 'aspect' else 0, value)
 
     @needs('gdallocationinfo')
-    def test_cells_are_what_sample_answers(self):
+    def test_cells_match_the_answers_of_sample(self):
         out = self.path('coarse.tif')
         self.run_ok('raster', self.store, '--cell', 97, '-o', out)
         text, cells = '', [(1, 1), (3, 5), (40, 17), (91, 91)]
@@ -268,7 +269,7 @@ class RasterTest(QueryTest):
                         '--memory', '64M', '-o', two)
             self.assertTrue(filecmp.cmp(one, two, shallow=False))
 
-    def test_regions_whose_rings_cross_are_refused(self):
+    def test_regions_with_crossing_rings_are_refused(self):
         path = self.path('bow.geojson')
         with open(path, 'w') as file:
             json.dump({'type': 'Polygon', 'coordinates': [[[0, 0], [4, 4], [4, 0], [0, 4], [0, 0]]]}, file)
@@ -293,7 +294,7 @@ class RasterTest(QueryTest):
 
     @staticmethod
     def grid(path):
-        """Origin, cell and size, as GDAL tells them."""
+        """Origin, cell and size, as reported by GDAL."""
         info = json.loads(subprocess.run(['gdalinfo', '-json', path], capture_output=True, text=True, check=True).stdout)
         return info['geoTransform'], info['size']
 
@@ -311,7 +312,7 @@ class RasterTest(QueryTest):
                 self.assertAlmostEqual(a, b, delta=1e-7)
 
     @needs('gdalinfo')
-    def test_rasters_of_one_cell_size_fit_each_other_whatever_is_selected(self):
+    def test_rasters_with_the_same_cell_size_are_aligned_for_any_selection(self):
         rng = random.Random(5)
         cloud, store = self.path('returns.csv'), self.path('returns.terrace')
         with open(cloud, 'w', encoding='ascii') as file:
@@ -345,7 +346,7 @@ class RasterTest(QueryTest):
         self.expect_error(1, 'raster', store, '--align', cloud, '-o', out)
 
     @needs('gdalinfo')
-    def test_a_raster_is_aligned_with_one_of_another_crs(self):
+    def test_a_raster_can_be_aligned_with_one_in_another_crs(self):
         theirs, out = self.path('theirs-degrees.tif'), self.path('aligned-degrees.tif')
         self.run_ok('raster', self.store, '--to-crs', 'EPSG:4326', '--cell', 0.001, '-o', theirs, '--force')
         self.run_ok('raster', self.store, '--align', theirs, '-o', out, '--force')
@@ -353,7 +354,7 @@ class RasterTest(QueryTest):
         self.assertEqual(self.samples(theirs), self.samples(out))
 
     @needs('gdalinfo')
-    def test_another_reference_system(self):
+    def test_a_raster_in_another_crs(self):
         out = self.path('degrees.tif')
         self.run_ok('raster', self.store, '--to-crs', 'EPSG:4326', '-o', out)
         info = json.loads(subprocess.run(['gdalinfo', '-json', out], capture_output=True,
@@ -369,8 +370,9 @@ class ContourTest(QueryTest):
             return json.load(file)['features']
 
     @needs('gdal_contour')
-    def test_lengths_are_those_of_gdal_contour(self):
-        # On smooth ground: where it is rough, lines across squares and lines across triangles differ.
+    def test_lengths_match_gdal_contour(self):
+        # On smooth ground. On rough ground, lines across squares differ from lines across
+        # triangles.
         smooth, store, theirs = (self.path(name) for name in ('smooth.tif', 'smooth.terrace',
                                                               'gdal.geojson'))
         box = [self.low[0] + 1000, self.low[1] + 1000, self.low[0] + 2800, self.low[1] + 2800]
@@ -387,7 +389,7 @@ class ContourTest(QueryTest):
             other = json.load(file)['features']
 
         def metres(points):
-            # On a sphere: within half a per cent, and so is the map's scale.
+            # Computed on a sphere, to within half a per cent, like the map's scale.
             for (x0, y0), (x1, y1) in zip(points, points[1:]):
                 degree = math.pi / 180 * 6371000
                 yield math.hypot((x1 - x0) * degree * math.cos(math.radians((y0 + y1) / 2)),
@@ -399,14 +401,14 @@ class ContourTest(QueryTest):
             ours[elev] = ours.get(elev, 0) + sum(metres(feature['geometry']['coordinates']))
         for feature in other:
             elev, points = feature['properties']['elev'], feature['geometry']['coordinates']
-            # GDAL writes the raster's CRS or degrees, as its version has it.
+            # GDAL writes the raster's CRS or degrees, depending on its version.
             length = (sum(metres(points)) if abs(points[0][0]) <= 180 else
                       sum(math.dist(p, q) for p, q in zip(points, points[1:])))
             gdal[elev] = gdal.get(elev, 0) + length
         self.assertEqual(set(ours), set(gdal))
         self.assertAlmostEqual(sum(ours.values()) / sum(gdal.values()), 1, delta=0.03)
 
-    def test_lines_lie_at_their_height_and_end_at_the_border_only(self):
+    def test_lines_are_at_their_height_and_end_only_at_the_border(self):
         features = self.lines('--interval', 100)
         self.assertGreater(len(features), 5)
         for feature in features:
@@ -427,7 +429,7 @@ class ContourTest(QueryTest):
             found = set(re.findall(r'"elev":([^}]*)', text))
             self.assertLessEqual(found, {repr(i * step / power).removesuffix('.0') for i in range(1200)})
             self.assertGreater(len(found), 3)
-        # Without a crs member GeoJSON is in longitude and latitude.
+        # GeoJSON without a crs member is in longitude and latitude.
         self.assertIn('"crs":null', text)
         text = self.run_ok('contour', self.store, '--interval', 500, '--own-crs', '-o', '-')
         self.assertIn('"crs":{"type":"name","properties":{"name":"urn:ogc:def:crs:EPSG::', text)
@@ -472,10 +474,10 @@ class ProfileTest(QueryTest):
         rows = self.rows('--line', f'{x0},{y0},{x1},{y1}', '--step', 100)
         for i, row in enumerate(rows[:-1]):
             self.assertAlmostEqual(row[0], 100 * i, places=3)
-        # A UTM zone's scale is within 0.1 per cent.
+        # The scale of a UTM zone is within 0.1 per cent.
         self.assertAlmostEqual(rows[-1][0] / math.hypot(x1 - x0, y1 - y0), 1, delta=0.001)
 
-    def test_lines_of_files_and_bad_ones(self):
+    def test_lines_from_files_and_invalid_lines(self):
         (x0, y0), (x1, y1) = self.somewhere(10, 2)
         name = self.path('line.geojson')
         with open(name, 'w') as file:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The commands of README.md run as they are printed, in a folder that has what a clone has.
+"""Runs the commands of README.md as printed, in a folder with the contents of a clone.
 
 TERRACE=path/to/terrace readme_test.py
 """
@@ -27,11 +27,11 @@ class ReadmeTest(unittest.TestCase):
         self.folder = tempfile.mkdtemp(prefix='terrace-readme-')
         self.addCleanup(shutil.rmtree, self.folder)
 
-    def test_the_block_of_use_runs_in_a_clone(self):
+    def test_the_commands_run_in_a_clone(self):
         block = re.search(r'## Use\n.*?```sh\n(.*?)```', readme(), re.DOTALL).group(1)
         lines = block.splitlines()
         self.assertGreater(len(lines), 10)
-        # What a clone has, and what ./dev makes in it.
+        # The contents of a clone, and the output of ./dev in it.
         os.makedirs(os.path.join(self.folder, 'libterrain'))
         shutil.copytree(os.path.join(ROOT, 'libterrain/examples'), os.path.join(self.folder, 'libterrain/examples'))
         os.makedirs(os.path.join(self.folder, 'build/tools/src'))
@@ -46,7 +46,7 @@ class ReadmeTest(unittest.TestCase):
         self.view(lines[0], last.partition('#')[0])
 
     def view(self, path, command):
-        """It serves until it is interrupted."""
+        """Runs the viewer, which serves until it is interrupted."""
         viewer = subprocess.Popen(['bash', '-eu', '-c', f'{path}\nexec {command} --no-open --port 0'], cwd=self.folder,
                                   stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
         try:
@@ -54,7 +54,7 @@ class ReadmeTest(unittest.TestCase):
                 if 'http://' in line:
                     break
             else:
-                self.fail('the viewer ended without an address')
+                self.fail('the viewer ended without printing an address')
             viewer.send_signal(signal.SIGINT)
             viewer.stdout.read()
             viewer.wait(timeout=60)
@@ -63,7 +63,7 @@ class ReadmeTest(unittest.TestCase):
             viewer.wait()
             viewer.stdout.close()
 
-    def test_links_of_the_readme_lead_somewhere(self):
+    def test_links_in_the_readme_exist(self):
         links = re.findall(r'\]\(([^)#:]+)(?:#[^)]*)?\)', readme())
         for wanted in ('tools/README.md', 'tools/viewer/README.md', 'libterrain/python/README.md'):
             self.assertIn(wanted, links)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bodies in space, coarse in one part and fine in another, as the users of `points`, `mesh` and
-`render` meet them. (`surface` has a file of its own.)
+"""Tests bodies in space, coarse in one part and fine in another, with `points`, `mesh` and `render`.
+surface_cli_test.py tests `surface`.
 
 TERRACE=path/to/terrace scan_cli_test.py
 """
@@ -32,7 +32,7 @@ class ScanTest(unittest.TestCase):
         with open(cls.path('ball.xyz'), 'w') as file:
             file.writelines(f'{x} {y} {z}\n' for x, y, z in cls.all)
         cls.store = cls.path('ball.terrace')
-        # Small clusters: the coarse levels, too, have points enough for a surface that is a ball.
+        # Small clusters, so that coarse levels also have enough points for a spherical surface.
         cls.run_ok('build', cls.path('ball.xyz'), '-o', cls.store, '--block', 2000, '--facility-cost', 1)
 
     @classmethod
@@ -59,8 +59,8 @@ class ScanTest(unittest.TestCase):
         with open(out) as file:
             return {tuple(map(float, line.split()[1:4])) for line in file if line.startswith('v ')}
 
-    def test_a_focus_in_space_has_all_points_inside_and_few_above_and_below(self):
-        # One eighth of the ball; what has the same x and y on the other side stays coarse.
+    def test_a_focus_in_space_has_all_points_inside_and_few_outside(self):
+        # One eighth of the ball; the opposite side with the same x and y stays coarse.
         box = (0, 0, 0, 11, 11, 11)
         inside = {p for p in self.all if min(p) >= 0}
         opposite = {p for p in self.all if p[0] > 4 and p[1] > 4 and p[2] < -4}
@@ -85,11 +85,11 @@ class ScanTest(unittest.TestCase):
         self.assertEqual(summary['vertices'], len(top))
         summary, _ = self.picture(*focus)
         self.assertEqual(summary['vertices'], len(top))
-        # Without a focus, or with a level, it is as it was.
+        # Without a focus, or with a level, nothing changes.
         self.assertEqual(len(self.points()), POINTS)
         self.assertEqual(self.points('--level', 0, *focus), self.points())
 
-    def test_focuses_of_several_levels_lie_in_each_other(self):
+    def test_focuses_of_several_levels_are_nested(self):
         focuses = ['--focus', '0,0,0,11,11,11:0', '--focus', '-11,-11,0,11,11,11:1']
         one = self.points('--level', 1)
         found = self.points('--level', 'top', *focuses)
@@ -105,8 +105,8 @@ class ScanTest(unittest.TestCase):
         return summary, rows
 
     def covered(self, rows, share):
-        """Whether nothing shines through the ball, out to a share of its radius, and how many
-        colours there are."""
+        """Asserts that the ball has no gaps within a share of its radius; returns the number of colours
+        there."""
         background = rows[0][:3]
         reach = share * 150 * 0.96
         colours = set()
@@ -126,7 +126,7 @@ class ScanTest(unittest.TestCase):
         mixed, rows = self.picture('--focus', '0,0,0,11,11,11:0')
         self.assertLess(mixed['vertices'], POINTS // 3)
         self.covered(rows, 0.9)
-        # Fine points keep their size: they do not grow out of the silhouette.
+        # Fine points keep their size and do not extend beyond the silhouette.
         background = rows[0][:3]
         self.assertTrue(all(rows[y][3 * x:3 * x + 3] == background
                             for x, y in ((5, 5), (294, 5), (5, 294), (294, 294))))
@@ -146,7 +146,7 @@ class ScanTest(unittest.TestCase):
             rim = [rows[0], rows[-1]] + [row[:3] + row[-3:] for row in rows]
             self.assertTrue(all(row[x:x + 3] == background for row in rim for x in range(0, len(row), 3)), count)
 
-    def test_a_region_shows_what_is_inside(self):
+    def test_a_region_shows_only_its_inside(self):
         summary, _ = self.picture('--region', '0,0,0,11,11,11')
         self.assertEqual(summary['vertices'], sum(min(p) >= 0 for p in self.all))
         result = terrace('render', self.path('ball.xyz'), '-o', self.path('none.png'), '--region',
@@ -156,14 +156,14 @@ class ScanTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn('no point is selected; give another --where', result.stderr)
 
-    def test_wires_are_those_of_the_surface(self):
+    def test_wire_draws_the_edges_of_the_surface(self):
         summary, rows = self.picture('--wire')
         self.assertEqual((summary['vertices'], summary['triangles']), (POINTS, 2 * POINTS - 4))
         mixed, _ = self.picture('--wire', '--focus', '0,0,0,11,11,11:0')
         self.assertEqual(mixed['triangles'], 2 * mixed['vertices'] - 4)
         self.assertLess(mixed['vertices'], POINTS // 3)
 
-    def test_a_sheet_stays_a_height_field(self):
+    def test_a_sheet_is_drawn_as_a_height_field(self):
         with open(self.path('sheet.xyz'), 'w') as file:
             file.writelines(f'{x} {y} {math.sin(x / 5) + math.cos(y / 7)}\n'
                             for x in range(60) for y in range(60))

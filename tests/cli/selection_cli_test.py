@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""--where, --region, --keep and --drop: what comes out is what Python's own filter leaves.
+"""Compares --where, --region, --keep and --drop with filters in Python.
 
 TERRACE=path/to/terrace selection_cli_test.py
 """
@@ -79,7 +79,7 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(rows, sorted(tuple(float(p[c]) for c in columns)
                                       for p in self.points if wanted(p)))
 
-    def test_points_with_nan_are_left_out_and_counted(self):
+    def test_points_with_nan_are_skipped_and_counted(self):
         def write(name, text):
             with open(self.path(name), 'w', encoding='ascii') as file:
                 file.write(text)
@@ -123,11 +123,11 @@ class SelectionTest(unittest.TestCase):
             self.assertIn('4 attributes without a value are NaN', result.stderr)
             out = self.run_ok('points', store, '--level', '0', '--where', 'colour == 4', '-o', '-', '--format', 'xyz')
             self.assertEqual(out, '0 7 3 nan 4\n')
-            # An attribute that is left out is no loss.
+            # A dropped attribute does not count as lost.
             result = self.terrace('build', self.path(name), '-o', store, '--force', '--drop', 'colour')
             self.assertIn('2 attributes have no value', result.stderr)
 
-    def test_build_takes_folders_lists_and_patterns(self):
+    def test_build_accepts_folders_lists_and_patterns(self):
         folder = self.path('parts')
         os.makedirs(os.path.join(folder, 'more'))
         with open(self.file, encoding='ascii') as file:
@@ -149,7 +149,7 @@ class SelectionTest(unittest.TestCase):
                     self.assertEqual(one.read(), other.read(), name)
             told = json.loads(self.run_ok('info', *names, '--json'))
             self.assertEqual((told['points'], told['files']), (20000, 2))
-            # One file of them all, point by point.
+            # One file with all of them gives the same points.
             self.run_ok('convert', *names, '-o', self.path(f'parts{number}.csv'))
             with open(self.file, encoding='ascii') as one, \
                     open(self.path(f'parts{number}.csv'), encoding='ascii') as other:
@@ -157,7 +157,7 @@ class SelectionTest(unittest.TestCase):
                 self.assertEqual(first[0], second[0])
                 self.assertEqual([list(map(float, row)) for row in first[1:]],
                                  [list(map(float, row)) for row in second[1:]])
-        # A folder of several formats.
+        # A folder with several formats.
         self.run_ok('convert', self.file, '-o', os.path.join(folder, 'more', 'all.ply'))
         self.assertIn('or select files of a folder by --input-format', self.terrace('info', folder).stderr)
         told = json.loads(self.run_ok('info', folder, '--input-format', 'ply', '--json'))
@@ -166,7 +166,7 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn('no file matches', result.stderr)
 
-    def test_names_with_commas_are_given_in_quotes(self):
+    def test_names_with_commas_can_be_quoted(self):
         with open(self.path('names.csv'), 'w') as file:
             file.write('x,y,z,"c,d",e\r1,2,3,4,5\r6,7,9,8,9\r')
         for options in (['--keep', '"c,d"'], ['--drop', 'e'], ['--keep', '"c,d",e', '--drop', 'e']):
@@ -176,7 +176,7 @@ class SelectionTest(unittest.TestCase):
         result = self.terrace('build', self.path('names.csv'), '-o', self.path('n.st'), '--keep', '"c,d"e')
         self.assertEqual(result.returncode, 2, result.stderr)
 
-    def test_build_takes_the_points_and_attributes_that_are_wanted(self):
+    def test_build_selects_points_and_attributes(self):
         summary = json.loads(self.run_ok(
             'build', self.file, '-o', self.path('ground.st'), '--block', '1000', '--json',
             '--where', LAST_ON_THE_GROUND, '--keep', 'classification,red'))
@@ -188,7 +188,7 @@ class SelectionTest(unittest.TestCase):
         self.run_ok('points', self.path('bare.st'), '-o', self.path('bare.csv'), '-q')
         self.expect('bare.csv', lambda p: True, NAMES[:-2])
 
-    def test_convert_too(self):
+    def test_convert_selects_points_and_attributes(self):
         summary = json.loads(self.run_ok(
             'convert', self.file, '-o', self.path('c.csv'), '--json',
             '--where', 'not (z < 12.5 or x >= 300) and red > 1.5 * green', '--keep', 'red,green',
@@ -199,7 +199,7 @@ class SelectionTest(unittest.TestCase):
         self.run_ok('convert', self.file, '-o', self.path('none.csv'), '--keep', 'none', '-q')
         self.expect('none.csv', lambda p: True, ['x', 'y', 'z'])
 
-    def test_region_of_what_is_read(self):
+    def test_region_selects_points_of_files(self):
         wanted = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and 5 <= p['z'] <= 25
         summary = json.loads(self.run_ok('convert', self.file, '-o', self.path('r.csv'), '--json',
                                          '--region', '100,100,5,400,500.5,25'))
@@ -212,7 +212,7 @@ class SelectionTest(unittest.TestCase):
         self.expect('r2.csv', wanted, NAMES[:-1])
 
     def raster(self, name, side=10, prj=None):
-        """40 x 30 cells from the origin on, one row void. Returns the cells by their centres."""
+        """Writes 40 x 30 cells from the origin, one row void; returns the cells by their centres."""
         with open(self.path(name), 'w', encoding='ascii') as file:
             file.write(f'ncols 40\nnrows 30\nxllcorner 0\nyllcorner 0\ncellsize {side}\nNODATA_value -9\n')
             for row in range(30):
@@ -229,16 +229,16 @@ class SelectionTest(unittest.TestCase):
                 [ring + ring[:1] for ring in polygon] for polygon in polygons]}, file)
         return self.path(name)
 
-    def test_region_of_a_raster_takes_the_cells_whose_centres_are_inside(self):
+    def test_region_of_a_raster_selects_the_cells_with_centres_inside(self):
         centres = self.raster('r.asc')
         wanted = sorted(c for c in centres if 95 <= c[0] <= 201 and 50 <= c[1] <= 165)
         summary = json.loads(self.run_ok('convert', self.path('r.asc'), '-o', self.path('cells.csv'), '--json',
                                          '--region', '95,50,201,165'))
         self.assertEqual(self.rows('cells.csv')[1], wanted)
-        # Of what is not read it is not known whether it holds data.
+        # Whether cells that are not read have data is unknown.
         self.assertEqual(summary['points'] + summary['nodata'] + summary['excluded'], 40 * 30)
         self.assertTrue(11 <= summary['nodata'] <= 15, summary)
-        # The store of a part is the raster of a part.
+        # The store of a part gives the raster of that part.
         summary = json.loads(self.run_ok('build', self.path('r.asc'), '-o', self.path('cropped.st'), '--json',
                                          '--region', '95,50,201,165'))
         self.assertEqual(summary['points'] + summary['nodata'] + summary['excluded'], 40 * 30)
@@ -252,9 +252,9 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(trial['points'], len(wanted))
 
     def test_region_of_polygons(self):
-        """Closed, as a region of a store is: what lies on a ring is inside, of a hole's too."""
+        """Regions are closed, as for stores: points on a ring are inside, also on the ring of a hole."""
         box = lambda x, y, side: [[x, y], [x + side, y], [x + side, y + side], [x, y + side]]
-        # A square with a hole, two triangles that overlap, and a square outside.
+        # A square with a hole, two overlapping triangles, and a square outside.
         region = self.geojson('region.geojson', [box(55, 55, 200), box(105, 105, 50)],
                               [[[205, 205], [395, 205], [205, 395]]], [[[205, 205], [395, 205], [395, 395]]],
                               [box(5000, 5000, 10)])
@@ -274,13 +274,13 @@ class SelectionTest(unittest.TestCase):
                 self.run_ok('build', self.path(name), '-o', self.path('p.st'), '--force', '-q', '--region', region)
                 self.run_ok('points', self.path('p.st'), '-o', self.path('p.csv'), '--force', '-q')
                 self.assertEqual(self.rows('p.csv')[1], wanted)
-                # The same of a store of all of it.
+                # The same region of a store of everything.
                 self.run_ok('build', self.path(name), '-o', self.path('w.st'), '--force', '-q')
                 self.run_ok('points', self.path('w.st'), '-o', self.path('p.csv'), '--force', '-q', '--region', region)
                 self.assertEqual(self.rows('p.csv')[1], wanted)
 
     def test_region_in_another_crs(self):
-        """Law: what a region takes of a file it takes of a store of the file."""
+        """A region selects the same points of a file and of its store."""
         self.raster('utm.asc', 1000, UTM_32)
         corners = [[4.52, 0.02], [4.77, 0.05], [4.83, 0.21], [4.6, 0.26]]
         hole = [[4.6, 0.1], [4.7, 0.12], [4.66, 0.17]]
@@ -303,8 +303,8 @@ class SelectionTest(unittest.TestCase):
                                     '--region', region, '--region-crs', 'EPSG:4326')
                         self.assertEqual(self.rows('found.csv')[1], wanted)
 
-    def test_border_cells_whatever_turn_their_longitudes_have(self):
-        """Law: a box whose sides are rows and columns of cells has them, for each verb, of a file and of stores."""
+    def test_border_cells_are_selected_for_longitudes_in_any_turn(self):
+        """A box whose sides run through rows and columns of cells includes them, for each verb, in files and stores."""
         write_tiff(self.path('degrees.tif'), 60, 60, range(3600), (8.1, 46.6), 1 / 1200, GEOGRAPHIC, kind='h')
         whole, part = self.path('degrees.st'), self.path('degrees-part.st')
         self.run_ok('build', self.path('degrees.tif'), '-o', whole, '-q')
@@ -325,7 +325,7 @@ class SelectionTest(unittest.TestCase):
                 self.assertEqual((said['columns'], said['rows']), (37, 37))
         self.assertGreater(lost, 0)
 
-    def test_longitudes_of_points_may_be_whole_turns_away(self):
+    def test_longitudes_of_points_may_differ_by_whole_turns(self):
         places = [(lon, lat) for lon in range(0, 360, 5) for lat in range(-80, 81, 5)]
         with open(self.path('globe.csv'), 'w', encoding='ascii') as file:
             file.write('lon,lat,height\n' + ''.join(f'{lon},{lat},{lon + lat}\n' for lon, lat in places))
@@ -339,14 +339,14 @@ class SelectionTest(unittest.TestCase):
                 self.run_ok(*command, box, '-o', self.path('lon.csv'), '-q', '--force')
                 self.assertEqual(sorted(self.rows('lon.csv')[1]), wanted, (command, box))
 
-    def test_points_of_a_store(self):
+    def test_where_selects_points_of_a_store(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
                     '--where', 'classification != 2', '--region', '100,100,400,500.5')
         self.expect('p.csv', lambda p: p['classification'] != 2 and 100 <= p['x'] <= 400 and
                     100 <= p['y'] <= 500.5, NAMES)
 
-    def test_nearest_of_those_that_meet_a_condition(self):
-        """Law: the nearest points that meet a condition are the nearest of a store of these points alone."""
+    def test_near_finds_the_nearest_points_that_meet_a_condition(self):
+        """The nearest points that meet a condition are the nearest in a store of only these points."""
         self.run_ok('build', self.file, '-o', self.path('n.st'), '-q', '--where', 'classification == 2')
         for how in (['-k', '12'], ['--within', '60']):
             for store, more in (('n.st', []), ('all.st', ['--where', 'classification == 2'])):
@@ -356,8 +356,8 @@ class SelectionTest(unittest.TestCase):
             self.assertGreaterEqual(len(wanted[1]), 5)
             self.assertEqual(self.rows('near-all.st.csv'), wanted)
 
-    def test_mesh_of_a_part_is_that_of_a_store_of_the_part(self):
-        """Law: what does not meet the condition has no influence at all."""
+    def test_mesh_of_a_part_equals_the_mesh_of_its_store(self):
+        """Points that do not meet the condition have no influence."""
         self.run_ok('build', self.file, '-o', self.path('part.st'), '-q', '--where', 'return_number == first')
         found = [json.loads(self.run_ok('mesh', self.path(store), '-o', self.path(name), '--max-error', '2',
                                         '--duplicates', 'mean', '--json', *more))
@@ -371,8 +371,8 @@ class SelectionTest(unittest.TestCase):
         with open(self.path(name), 'rb') as file:
             return file.read()
 
-    def test_every_query_of_a_part_is_that_of_a_store_of_the_part(self):
-        """Law: what does not meet the condition has no influence at all."""
+    def test_every_query_of_a_part_equals_the_query_of_its_store(self):
+        """Points that do not meet the condition have no influence."""
         self.run_ok('build', self.file, '-o', self.path('ground.alone.st'), '-q', '--where', LAST_ON_THE_GROUND,
                     '--crs', 'EPSG:32632', '--block', '1000')
         self.run_ok('build', self.file, '-o', self.path('ground.all.st'), '-q', '--crs', 'EPSG:32632', '--block', '1000')
@@ -397,7 +397,7 @@ class SelectionTest(unittest.TestCase):
                 self.run_ok(verb, self.path('ground.all.st'), '-o', self.path('whole' + name), '-q', *options[:-2])
                 self.assertNotEqual(self.bytes_of('whole' + name), self.bytes_of('all' + name))
 
-    def test_tiles_of_a_part_hold_for_a_store_of_the_part(self):
+    def test_tiles_of_a_part_are_valid_for_its_store(self):
         self.run_ok('build', self.file, '-o', self.path('t.alone.st'), '-q', '--where', LAST_ON_THE_GROUND,
                     '--crs', 'EPSG:32632')
         self.run_ok('build', self.file, '-o', self.path('t.all.st'), '-q', '--crs', 'EPSG:32632')
@@ -414,7 +414,7 @@ class SelectionTest(unittest.TestCase):
             self.assertEqual(sum(zoom['uncovered'] for zoom in checked['zooms']), 0)
         self.assertEqual(self.terrace('verify', self.path('tiles'), '--vertical', 'ignore',
                                       '--store', self.path('t.all.st')).returncode, 1)
-        # The same again is up to date; of another condition it is not.
+        # The same tiles are up to date; for another condition they are not.
         again = json.loads(self.run_ok('tile', self.path('t.all.st'), '-o', self.path('tiles'), '--json', '--force',
                                        *options, '--where', where))
         self.assertEqual(again['made'], 0)
@@ -422,8 +422,8 @@ class SelectionTest(unittest.TestCase):
                                        *options, '--where', 'classification == 2'))
         self.assertGreater(other['made'], 0)
 
-    def test_mesh_of_detail_too(self):
-        """At level 0 the triangles are those of a store of the part; a coarser level has its points that qualify."""
+    def test_mesh_with_detail_selects_points(self):
+        """At level 0 the triangles equal those of the part's store; a coarser level has its points that qualify."""
         where = 'classification == 2'
         self.run_ok('build', self.file, '-o', self.path('d.st'), '-q', '--where', where)
         counts = [json.loads(self.run_ok(*query, '-o', self.path('d.ply'), '--json', '--force'))
@@ -455,7 +455,7 @@ class SelectionTest(unittest.TestCase):
         for key in ('vertices', 'triangles'):
             self.assertEqual(found[0][key], found[1][key])
 
-    def test_a_raster_is_asked_by_heights_alone(self):
+    def test_a_condition_on_a_raster_can_only_use_heights(self):
         self.raster('h.asc')
         self.run_ok('build', self.path('h.asc'), '-o', self.path('h.st'), '-q')
         self.run_ok('build', self.path('h.asc'), '-o', self.path('h.alone.st'), '-q', '--where', 'z > 600')
@@ -468,7 +468,7 @@ class SelectionTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1)
         self.assertIn("no 'classification'; known are x, y, z", result.stderr)
 
-    def test_says_what_is_wrong(self):
+    def test_errors_name_the_problem(self):
         for args, code, text in (
                 (['build', self.file, '-o', self.path('e.st'), '--where', 'klass == 2'], 1, "no 'klass'; known are x, y, z, classification"),
                 (['build', self.file, '-o', self.path('e.st'), '--where', 'classification = 2'], 1, 'for equality write =='),

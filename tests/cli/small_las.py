@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small LAS files, written and read without a library (ASPRS, LAS specification 1.4 - R15)."""
+"""Writes and reads small LAS files without a library (ASPRS, LAS specification 1.4 - R15)."""
 
 import random
 import struct
 
-# What follows X, Y and Z in a record: (name, format) or (((part, bits), ...), 'B') for bits from the
-# lowest on.
+# The fields after X, Y and Z in a record: (name, format), or (((part, bits), ...), 'B') for bit
+# fields, starting at the lowest bit.
 OLD_RETURNS = ((('return_number', 3), ('number_of_returns', 3), ('scan_direction_flag', 1),
                 ('edge_of_flight_line', 1)), 'B')
 OLD_CLASS = ((('classification', 5), ('synthetic', 1), ('key_point', 1), ('withheld', 1)), 'B')
@@ -38,7 +38,7 @@ def names_of(point_format):
 
 
 def unpack_record(point_format, record):
-    """{name: value} of a record, bit fields apart, extra bytes aside."""
+    """{name: value} of a record, with bit fields separated and without extra bytes."""
     size = struct.calcsize(record_format(point_format))
     values = list(struct.unpack(record_format(point_format), record[:size]))
     out = dict(zip('XYZ', values[:3]))
@@ -53,7 +53,7 @@ def unpack_record(point_format, record):
 
 
 def random_records(point_format, count, seed=1):
-    """Any records, but with floats of few digits."""
+    """Random records; floats have few digits."""
     source = random.Random(seed * 100 + point_format)
 
     def record():
@@ -77,7 +77,7 @@ def evlr(user, number, data):
 
 
 def geo_keys(keys):
-    """The VLR of {key: number}."""
+    """The VLR of GeoKeys {key: number}."""
     shorts = [1, 1, 0, len(keys)]
     for key, value in sorted(keys.items()):
         shorts += [key, 0, 1, value]
@@ -89,7 +89,7 @@ def wkt(text):
 
 
 def extra_bytes(rows):
-    """The VLR of [(name, type, options, scale, offset)], types by the specification's number."""
+    """The VLR of extra bytes [(name, type, options, scale, offset)], with the specification's type numbers."""
     data = b''
     for name, kind, options, scale, offset in rows:
         data += struct.pack('<2xBB32s4x24x24x24xd16xd16x32s', kind, options, name.encode(), scale,
@@ -100,7 +100,7 @@ def extra_bytes(rows):
 
 def las(point_format, records, minor=None, scale=(0.01, 0.01, 0.01), offset=(0.0, 0.0, 0.0), vlrs=(),
         evlrs=(), encoding=0, points=None, record_bytes=None):
-    """The bytes of a file; the parts are as they stand in it, whether they fit each other or not."""
+    """The bytes of a file; the parts are written unchanged, even if they contradict each other."""
     if minor is None:
         minor = 4 if point_format >= 6 else 2
     header_bytes = 375 if minor == 4 else 235 if minor == 3 else 227
@@ -124,7 +124,7 @@ def las(point_format, records, minor=None, scale=(0.01, 0.01, 0.01), offset=(0.0
 
 
 class Las:
-    """A file that was read: header, VLRs and raw records."""
+    """A file read from disk: header, VLRs and raw records."""
 
     def __init__(self, path):
         with open(path, 'rb') as file:
@@ -156,7 +156,7 @@ class Las:
         assert len(data) >= first + count * self.record_bytes
 
     def places(self):
-        """The places of the records, in the CRS, to a millionth, sorted."""
+        """The positions of the records in the CRS, rounded to a millionth and sorted."""
         return sorted(tuple(round(step * scale + offset, 6) for step, scale, offset
                             in zip(struct.unpack_from('<iii', record), self.scale, self.offset))
                       for record in self.records)

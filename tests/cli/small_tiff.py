@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small GeoTIFFs, written and read without a library: inputs whose bytes depend on nothing that is
-installed, and samples of outputs that do not depend on how they were compressed."""
+"""Writes and reads small GeoTIFFs without a library: inputs whose bytes do not depend on installed
+software, and samples of outputs regardless of their compression."""
 
 import array
 import struct
 import zlib
 
-# GeoKeys of WGS 84 in degrees, samples in the middle of cells.
+# GeoKeys of WGS 84 in degrees, with samples at the centres of cells.
 GEOGRAPHIC = {1024: 2, 1025: 1, 2048: 4326, 2054: 9102}
 
 # By array's type code: the bits of a sample and TIFF's number for the kind.
@@ -17,15 +17,15 @@ PLACES_OF_PIECES = (273, 279, 324, 325)
 
 
 def utm(zone):
-    """GeoKeys of a UTM zone of the northern half."""
+    """GeoKeys of a northern UTM zone."""
     return {1024: 1, 1025: 1, 3072: 32600 + zone}
 
 
 def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=30.0, keys=None,
                matrix=None, kind='f', bands=1, nodata=None):
-    """A raster in one strip.
+    """Writes a raster in one strip.
 
-    samples: by rows, bands beside each other. corner: the upper left one, cell: its side; or
+    samples: by rows, with interleaved bands. corner: the upper left one, cell: its side; or
     matrix: the sixteen numbers of a transformation. keys: {GeoKey: integer, float or text}.
     nodata: as text.
     """
@@ -79,7 +79,7 @@ def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=
 
 
 def read_directory(data):
-    """{tag: (type, the bytes of its values)} of the first directory of a little-endian TIFF."""
+    """{tag: (type, bytes of its values)} of the first directory of a little-endian TIFF."""
     mark, magic, at = struct.unpack('<2sHI', data[:8])
     assert (mark, magic) == (b'II', 42), 'no little-endian TIFF'
     tags = {}
@@ -93,8 +93,8 @@ def read_directory(data):
 
 
 def tiff_content(path):
-    """What a GeoTIFF says: its tags but for the places and sizes of its pieces, then the bytes of
-    each strip or tile without their compression."""
+    """The content of a GeoTIFF: its tags except the offsets and sizes of strips and tiles, then the
+    decompressed bytes of each strip or tile."""
     with open(path, 'rb') as file:
         data = file.read()
     tags = read_directory(data)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verbs on stores as their users meet them: build, info, verify, points, mesh.
+"""Tests the verbs on stores end to end: build, info, verify, points, mesh.
 
 TERRACE=path/to/terrace store_cli_test.py
 """
@@ -87,7 +87,7 @@ class StoreTest(unittest.TestCase):
         self.assertIn('--force', self.expect_error(1, 'build', self.dem, '-o', store))
         self.run_ok('build', self.dem, '-o', store, '--force')
 
-    def test_force_spares_what_terrace_did_not_write(self):
+    def test_force_keeps_files_that_terrace_did_not_write(self):
         folder = self.path('mine')
         os.mkdir(folder)
         open(os.path.join(folder, 'letter.txt'), 'w').close()
@@ -128,8 +128,8 @@ class StoreTest(unittest.TestCase):
         self.assertFalse(verdict['ok'])
         self.assertIn('level-0.0.clusters', verdict['problems'][0]['file'])
 
-    def test_a_store_that_lies_about_its_raster_is_read_by_no_verb(self):
-        """Points outside of the columns that the manifest tells, with checksums that are right."""
+    def test_every_verb_rejects_a_store_with_a_wrong_raster_size(self):
+        """Points beyond the columns of the manifest, with correct checksums."""
         store = self.path('lies.terrace')
         shutil.copytree(self.store, store)
         manifest = os.path.join(store, 'manifest.json')
@@ -155,14 +155,14 @@ class StoreTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn('outside the bounds of the store', result.stdout + result.stderr)
 
-    def test_points_of_every_level_are_as_many_as_info_says(self):
+    def test_points_of_every_level_match_the_counts_of_info(self):
         for level in json.loads(self.run_ok('info', self.store, '--json'))['levels']:
             out = self.path(f'level{level["level"]}.xyz')
             self.run_ok('points', self.store, '--level', level['level'], '-o', out)
             with open(out) as file:
                 self.assertEqual(sum(1 for _ in file), level['points'])
 
-    def test_points_of_a_region_are_those_inside(self):
+    def test_a_region_selects_the_points_inside(self):
         low = json.loads(self.run_ok('info', self.store, '--json'))['bounds']['min']
         box = [low[0] + 300, low[1] + 600, low[0] + 1200, low[1] + 1800]
         text = self.run_ok('points', self.store, '--region', ','.join(map(str, box)), '-o', '-')
@@ -171,7 +171,7 @@ class StoreTest(unittest.TestCase):
         for x, y, _ in points:
             self.assertTrue(box[0] <= x <= box[2] and box[1] <= y <= box[3])
 
-    def test_points_near_a_place(self):
+    def test_points_near_a_position(self):
         low = json.loads(self.run_ok('info', self.store, '--json'))['bounds']['min']
         x, y = low[0] + 1234, low[1] + 777
         everything = [tuple(map(float, line.split()))
@@ -223,7 +223,7 @@ class StoreTest(unittest.TestCase):
         self.expect_error(2, 'points', self.store, '-o', '-', '--cluster', '0:0', '--region', '0,0,1,1')
 
     def test_mesh_of_a_cluster(self):
-        """The vertices are the points of the cluster, the triangles cover their hull."""
+        """The vertices are the points of the cluster, and the triangles cover their hull."""
         for cluster, *args in ('1:0',), ('1:0', '--level', 0), ('0:3',):
             out = self.path('cluster.obj')
             summary = json.loads(self.run_ok('mesh', self.store, '--cluster', cluster, *args, '-o', out, '--json', '--force'))
@@ -255,14 +255,14 @@ class StoreTest(unittest.TestCase):
             self.assertEqual(json.loads(drawn)['triangles'], summary['triangles'])
 
     def heights(self, *options):
-        """Heights by place, of the mesh that these options make."""
+        """Heights by position of the mesh made with these options."""
         out = self.path('heights.obj')
         self.run_ok('mesh', self.store, '-o', out, '--force', *options)
         with open(out) as file:
             vertices = [line.split()[1:4] for line in file if line.startswith('v ')]
         return {(x, y): float(z) for x, y, z in vertices}
 
-    def test_smoothing_moves_heights_alone(self):
+    def test_smoothing_changes_only_heights(self):
         def roughness(heights):
             values = [heights[place] for place in sorted(heights)]
             return sum((a - b) ** 2 for a, b in zip(values, values[1:]))
@@ -275,7 +275,7 @@ class StoreTest(unittest.TestCase):
         low, high = min(raw.values()), max(raw.values())
         flat = self.heights('--smooth', 'laplacian:50')
         self.assertTrue(all(low <= z <= high for z in flat.values()))
-        # Inside the region alone, whose border stays.
+        # Only inside the region, whose border stays fixed.
         xs, ys = sorted({float(x) for x, _ in raw}), sorted({float(y) for _, y in raw})
         box = (xs[len(xs) // 4], ys[len(ys) // 4], xs[len(xs) // 2], ys[len(ys) // 2])
         part = self.heights('--region', ','.join(map(str, box)), '--smooth', 'laplacian')
@@ -295,7 +295,7 @@ class StoreTest(unittest.TestCase):
         return {frozenset(vertices[int(word.split('/')[0]) - 1] for word in line[1:4])
                 for line in lines if line[:1] == ['f']}
 
-    def test_an_elliptical_metric_changes_triangles_inside_its_region_alone(self):
+    def test_an_elliptical_metric_changes_triangles_only_inside_its_region(self):
         plain = self.triangles()
         xs = sorted(x for triangle in plain for x, _ in triangle)
         ys = sorted(y for triangle in plain for _, y in triangle)
@@ -311,7 +311,7 @@ class StoreTest(unittest.TestCase):
         self.assertTrue(all(inside(point) for triangle in changed for point in triangle))
 
         def east(triangles):
-            """How far edges turn towards 30 degrees from +x: mean cosine of the doubled angle."""
+            """Alignment of edges with 30 degrees from +x: the mean cosine of the doubled angle."""
             turns = [math.cos(2 * (math.atan2(q[1] - p[1], q[0] - p[0]) - math.radians(30)))
                      for triangle in triangles for p, q in itertools.combinations(triangle, 2)]
             return sum(turns) / len(turns)
@@ -319,13 +319,13 @@ class StoreTest(unittest.TestCase):
         self.assertGreater(east(changed), east(plain - slanted) + 0.3)
         self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--metric', 'squared')
 
-    def test_a_metric_clusters_its_boxes_alone_in_the_crs(self):
-        """Under a projection whose scale depends on the direction, and for a turned raster."""
+    def test_a_metric_affects_clusters_only_in_its_boxes_of_the_crs(self):
+        """For a projection whose scale depends on the direction, and for a rotated raster."""
         columns, rows, cell = 500, 500, 2048.0
         noise = random.Random(1)
         heights = [noise.uniform(0, 100) for _ in range(columns * rows)]
-        # Lambert's equal-area projection of Europe, 3,000 km off its centre: what is true to scale
-        # in x and y is 3 % longer along one diagonal than along the other.
+        # Lambert's equal-area projection of Europe, 3,000 km off its centre. Lengths that are true
+        # along x and y are 3 % longer along one diagonal than along the other.
         laea = {1024: 1, 1025: 1, 3072: 3035}
         turned = [0.6 * cell, 0.8 * cell, 0, 6.5e6, 0.8 * cell, -0.6 * cell, 0, 2.2e6,
                   0, 0, 0, 0, 0, 0, 0, 1]
@@ -344,7 +344,7 @@ class StoreTest(unittest.TestCase):
                     column, row = column + 0.5, row + 0.5
                     return (m[0] * column + m[1] * row + m[3], m[4] * column + m[5] * row + m[7])
 
-                # A box in the CRS about a place far from the raster's corner, 160 cells wide.
+                # A box in the CRS about a point far from the raster's corner, 160 cells wide.
                 middle = place(380.3, 380.3)
                 half = 80 * cell
                 box = [middle[0] - half, middle[1] - half, middle[0] + half, middle[1] + half]
@@ -375,13 +375,13 @@ class StoreTest(unittest.TestCase):
                 self.assertEqual(len(plain), 8)
                 for side, where in plain:
                     share = wider[side, where] / plain[side, where]
-                    # A third of the distance takes 3^(-2/3) as many clusters.
+                    # A third of the distance gives 3^(-2/3) times as many clusters.
                     if where == 'in':
                         self.assertLess(share, 0.7, side)
                     else:
-                        # About 1; a box that is shifted gives about a half on one side.
+                        # About 1; a shifted box gives about 0.5 on one side.
                         self.assertGreater(share, 0.75, side)
-                # What is in blocks that do not meet the box stays as it is.
+                # Blocks that do not meet the box are unchanged.
                 far = 225 * cell
                 apart = [{p for p in points
                           if max(abs(p[0] - middle[0]), abs(p[1] - middle[1])) > far}
@@ -389,19 +389,19 @@ class StoreTest(unittest.TestCase):
                 self.assertGreater(len(apart[0]), 3000)
                 self.assertEqual(*apart)
 
-    def test_levels_that_are_not_there_are_wrong_usage(self):
+    def test_missing_levels_are_usage_errors(self):
         self.assertIn('top', self.expect_error(2, 'mesh', self.store, '--level', 9, '-o',
                                                self.path('none.ply')))
         self.assertFalse(os.path.exists(self.path('none.ply')))
 
-    def test_what_is_no_store_is_said(self):
+    def test_files_that_are_not_stores_are_errors(self):
         for verb in ('verify', 'info'):
             self.expect_error(1, verb, self.path('nothing'))
         self.expect_error(1, 'mesh', self.dem, '-o', self.path('none.ply'))
 
 
 class BuildOptionTest(unittest.TestCase):
-    """Options of build, by what they do to the points of the levels."""
+    """Tests options of build by their effect on the points of the levels."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -434,7 +434,7 @@ class BuildOptionTest(unittest.TestCase):
         return [tuple(generator.uniform(0, 100) for _ in range(3)) for _ in range(count)]
 
     def shuffled(self, count):
-        """A binary PLY of places of a grid in random order, numbered."""
+        """Writes a binary PLY of numbered grid positions in random order."""
         side = math.isqrt(count)
         numbers = list(range(side * side))
         random.Random(count).shuffle(numbers)
@@ -446,7 +446,7 @@ class BuildOptionTest(unittest.TestCase):
             file.writelines(pack(n % side, n // side, n % 7, n) for n in numbers)
         return self.path('shuffled.ply'), side
 
-    def test_points_without_order_are_put_in_order(self):
+    def test_unordered_points_are_sorted(self):
         cloud, side = self.shuffled(640000)
         stores, summaries = {}, {}
         for order in ('auto', 'stream', 'spatial'):
@@ -468,7 +468,7 @@ class BuildOptionTest(unittest.TestCase):
             with open(os.path.join(stores['auto'], name), 'rb') as one, \
                     open(os.path.join(stores['spatial'], name), 'rb') as other:
                 self.assertEqual(one.read(), other.read(), name)
-        # Every point with its number, from a pipe as from the file.
+        # Every point keeps its number, from a pipe as from the file.
         with open(cloud, 'rb') as file:
             piped = self.path('piped.terrace')
             result = subprocess.run([TERRACE, 'build', '-', '-o', piped], stdin=file,
@@ -479,7 +479,7 @@ class BuildOptionTest(unittest.TestCase):
                        if not line.startswith('#')), key=lambda row: row[3])
         self.assertEqual(rows, [(n % side, n // side, n % 7, n) for n in range(side * side)])
 
-    def test_a_trial_tells_the_temporary_disk(self):
+    def test_a_dry_run_reports_the_temporary_disk_space(self):
         cloud, side = self.shuffled(640000)
         result = terrace('build', cloud, '-o', self.path('no.terrace'), '--dry-run', '--json')
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -490,7 +490,7 @@ class BuildOptionTest(unittest.TestCase):
 
     def test_more_effort_finds_cheaper_clusters(self):
         cost = dict.fromkeys(('fast', 'default', 'fine', 'full'), 0.0)
-        # Two blocks of one town each; blocks below 2500 points are searched in full anyway.
+        # Two blocks of one town each; blocks below 2500 points are searched exhaustively anyway.
         towns = [self.somewhere(1, 3000), [(x + 1e6, y, z) for x, y, z in self.somewhere(2, 2700)]]
         cloud = self.write('towns.xyz', towns[0] + towns[1])
         for effort in cost:
@@ -505,7 +505,7 @@ class BuildOptionTest(unittest.TestCase):
         self.assertLess(cost['full'], cost['default'])
         self.assertLess(cost['default'], cost['fast'])
 
-    def test_heights_count_as_much_as_their_weight(self):
+    def test_z_weight_scales_the_influence_of_heights(self):
         points = self.somewhere(1, 700)
         mixed = [(x, y, z) for (x, y, _), z in zip(points, reversed([p[2] for p in points]))]
         tall = [(x, y, 2 * z) for x, y, z in points]
@@ -521,7 +521,7 @@ class BuildOptionTest(unittest.TestCase):
         self.assertEqual(chosen(mixed, '--z-weight', 0), flat)
         self.assertEqual(chosen(tall), chosen(points, '--z-weight', 2))
 
-    def test_the_band_that_was_asked_for_is_the_heights(self):
+    def test_the_requested_band_gives_the_heights(self):
         raster = self.path('bands.tif')
         write_tiff(raster, 7, 5, [value for i in range(35) for value in (i, 1000 - i, 7)],
                    kind='h', bands=3, keys=utm(32))
@@ -540,7 +540,7 @@ class BuildOptionTest(unittest.TestCase):
         self.assertEqual(result.returncode, 1, result.stderr)
         self.assertIn('leave --band out', result.stderr)
 
-    def test_a_format_that_cannot_be_told_can_be_named(self):
+    def test_input_format_names_an_unrecognised_format(self):
         points = self.somewhere(3, 40)
         cloud = self.path('cloud.dat')
         with open(cloud, 'w') as file:
@@ -563,7 +563,7 @@ class BuildOptionTest(unittest.TestCase):
                     self.assertEqual(sum(1 for _ in file), 1 + (20 if verb == 'match' else 40))
                 os.remove(out)
 
-    def test_standard_input_makes_the_store_of_the_file(self):
+    def test_standard_input_gives_the_same_store_as_the_file(self):
         points = self.somewhere(4, 2000)
         cloud = self.write('cloud.xyz', points)
         with open(cloud) as file:

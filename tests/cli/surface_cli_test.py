@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The verb `surface` as its users meet it.
+"""Tests the verb `surface` end to end.
 
 TERRACE=path/to/terrace surface_cli_test.py
 """
@@ -23,7 +23,7 @@ def terrace(*args):
 
 
 def sphere(count):
-    """Points spread evenly, on a spiral."""
+    """Evenly spread points of a unit sphere, on a spiral."""
     points = []
     for k in range(count):
         z = 1 - (2 * k + 1) / count
@@ -68,7 +68,7 @@ class SurfaceTest(unittest.TestCase):
                     faces.append([int(word.split('/')[0]) - 1 for word in words[1:4]])
         return vertices, faces
 
-    def test_a_ball_comes_back_closed_and_outward(self):
+    def test_the_surface_of_a_ball_is_closed_and_faces_outward(self):
         summary, out = self.surface('ball.obj')
         vertices, faces = self.read_obj(out)
         self.assertEqual((summary['vertices'], summary['triangles']), (len(vertices), len(faces)))
@@ -103,7 +103,7 @@ class SurfaceTest(unittest.TestCase):
         self.assertIn('open, 1 part, without the faces over the gaps of the scan', result.stderr)
         closed, _ = self.surface('ball.obj')
         self.assertEqual((closed['open_scan'], closed['samples_off'], closed['lids']), (False, 0, 0))
-        # A small opening is closed, and the summary does not keep that back.
+        # A small opening is closed, and the summary says so.
         with open(self.path('jar.xyz'), 'w') as file:
             file.writelines(f'{x} {y} {z}\n' for x, y, z in sphere(6000) if z < 9)
         self.assertEqual(terrace('build', self.path('jar.xyz'), '-o', self.path('jar.terrace')).returncode, 0)
@@ -153,7 +153,7 @@ class SurfaceTest(unittest.TestCase):
         return 'elliptical:' + self.path(name)
 
     def test_samples_of_a_stretched_torus_need_its_metric(self):
-        # Thirty times as far apart along one of the turned axes.
+        # Thirty times as far apart along one of the rotated axes.
         count, stretch, c, s = 3000, 30, 0.6, 0.8
         with open(self.path('torus.xyz'), 'w') as file:
             for i in range(count):
@@ -190,8 +190,8 @@ class SurfaceTest(unittest.TestCase):
         with open(self.path('plain.obj')) as plain, open(self.path('metric.obj')) as other:
             self.assertEqual(plain.read(), other.read())
 
-    def test_other_systems_for_regions_and_for_what_is_written(self):
-        # The ball lies on the central meridian of a UTM zone, 47 degrees north.
+    def test_regions_and_outputs_in_another_crs(self):
+        # The ball is on the central meridian of a UTM zone, at 47 degrees north.
         north, scale = 5205000.0, 111170.0
         with open(self.path('utm.xyz'), 'w') as file:
             file.writelines(f'{500000 + x} {north + y} {z}\n' for x, y, z in sphere(3000))
@@ -245,7 +245,7 @@ class SurfaceTest(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn("the points enclose no volume, as if all were in one plane; 'terrace mesh'", result.stderr)
 
-    def test_points_on_a_line_and_at_one_place_are_told(self):
+    def test_collinear_and_coincident_points_are_reported(self):
         for name, place, message in (('line', lambda i: (i / 10, -i / 10, i / 3), 'all are on a line'),
                                      ('place', lambda i: (0.1, 0.2, 0.3), 'all are at one place')):
             with open(self.path(name + '.xyz'), 'w') as file:
@@ -257,7 +257,7 @@ class SurfaceTest(unittest.TestCase):
                 self.assertEqual(result.returncode, 0, result.stderr)
                 self.assertIn('the points enclose no volume, ' + message, result.stderr)
 
-    def test_an_empty_surface_is_not_called_closed_and_its_samples_are_counted(self):
+    def test_an_empty_surface_is_not_closed_and_its_samples_are_counted(self):
         with open(self.path('pair.xyz'), 'w') as file:
             file.write('0 0 0\n1 2 3\n1 2 3\n')
         self.assertEqual(terrace('build', self.path('pair.xyz'), '-o', self.path('pair.terrace')).returncode, 0)
@@ -268,7 +268,7 @@ class SurfaceTest(unittest.TestCase):
         result = terrace('render', self.path('pair.terrace'), '--where', 'x == 0', '-o', self.path('one.png'))
         self.assertIn('1 point, 0 triangles', result.stderr)
 
-    def test_samples_at_one_place_count_once_whatever_the_criterion(self):
+    def test_coincident_samples_count_once_for_every_criterion(self):
         with open(self.path('twice.xyz'), 'w') as file:
             file.writelines(f'{x} {y} {z}\n' for x, y, z in 2 * sphere(500))
         self.assertEqual(terrace('build', self.path('twice.xyz'), '-o', self.path('twice.terrace')).returncode, 0)
@@ -277,7 +277,7 @@ class SurfaceTest(unittest.TestCase):
                              '--criterion', criterion)
             self.assertEqual(json.loads(result.stdout)['samples_off'], 0, criterion)
 
-    def test_a_factor_that_keeps_nothing_is_not_taken_for_a_plane(self):
+    def test_a_factor_that_keeps_nothing_is_not_reported_as_a_plane(self):
         with open(self.path('block.xyz'), 'w') as file:
             file.writelines(f'{x} {y} {z}\n' for x in range(5) for y in range(5) for z in range(5))
         self.assertEqual(terrace('build', self.path('block.xyz'), '-o', self.path('block.terrace')).returncode, 0)
@@ -286,12 +286,12 @@ class SurfaceTest(unittest.TestCase):
         self.assertIn('--criterion edge keeps no tetrahedron', result.stderr)
         self.assertNotIn('plane', result.stderr)
 
-    def test_a_mesh_of_a_scan_points_to_the_surface(self):
+    def test_mesh_of_a_scan_suggests_surface(self):
         result = terrace('mesh', self.store, '-o', self.path('over_xy.ply'))
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("'terrace surface' makes the surface of a scan", result.stderr)
 
-    def test_no_points_are_no_surface(self):
+    def test_an_empty_selection_is_an_error(self):
         store = self.path('plane0.terrace')
         with open(self.path('plane0.xyz'), 'w') as file:
             file.writelines(f'{x} {y} {x * y % 7}\n' for x in range(20) for y in range(20))

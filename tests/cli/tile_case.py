@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Small rasters with known places, and what the tests of tiles have in common."""
+"""Small rasters with known positions, and helpers shared by the tests of tiles."""
 
 import array
 import json
@@ -29,7 +29,7 @@ def write_tiff(path, columns, rows, heights, west, north, cell, keys, matrix=Non
 
 
 def utm_to_degrees(x, y, zone):
-    """Krueger's series to n^4 of the transverse Mercator projection, northern half."""
+    """Converts northern UTM coordinates by Krueger's series to n^4."""
     f = (A - B) / A
     n = f / (2 - f)
     radius = A / (1 + n) * (1 + n * n / 4 + n ** 4 / 64)
@@ -53,7 +53,7 @@ def utm_to_degrees(x, y, zone):
 
 
 class Dem:
-    """A small raster, of cells in degrees or in metres of UTM."""
+    """A small raster with cells in degrees or in metres of UTM."""
 
     def __init__(self, columns, rows, west, north, cell, zone=None, height=None, seed=1):
         self.columns, self.rows, self.west, self.north = columns, rows, west, north

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tile sets that are made again after something changed: the same as made anew, with little work.
+"""Tests updates of tile sets after changes: they equal fresh sets and touch few tiles.
 
 TERRACE=path/to/terrace tile_change_cli_test.py
 """
@@ -17,7 +17,7 @@ VERTICAL = ('--vertical', 'ellipsoidal')
 
 
 def everything(folder):
-    """Every file of a folder: bytes by name."""
+    """The bytes of every file in a folder, by name."""
     found = {}
     for path, _, names in os.walk(folder):
         for name in names:
@@ -31,7 +31,7 @@ def smooth(column, row):
 
 
 class ChangeTest(TileTestCase):
-    """Whatever changed, the folder is that of a fresh run, byte for byte, journal and all."""
+    """After any change, the folder equals that of a fresh run byte for byte, journal included."""
     COLUMNS, ROWS = 200, 150
 
     def dem(self, *place):
@@ -43,7 +43,7 @@ class ChangeTest(TileTestCase):
         return everything(self.path('fresh'))
 
     def again(self, store, *options):
-        """Tiles into the folder 'set' once more; returns the summary and the tiles touched."""
+        """Tiles into the folder 'set' again; returns the summary and the tiles touched."""
         def times():
             return {name: os.stat(os.path.join(self.path('set'), name)).st_mtime_ns
                     for name in everything(self.path('set')) if name.endswith('.terrain')}
@@ -62,7 +62,7 @@ class ChangeTest(TileTestCase):
         return summary
 
     def check_changes(self, dem, name, options):
-        """Changes of all kinds one after the other."""
+        """Applies changes of all kinds one after another."""
         store = self.build(dem, name)
         shutil.rmtree(self.path('set'), ignore_errors=True)
         first = self.tile(store, 'set', '--name', 'fresh', *options)
@@ -98,7 +98,7 @@ class ChangeTest(TileTestCase):
         # The lattice of heights becomes coarser.
         change('a peak', every, lambda: put([150], [30], 9000.0))
 
-        # With other options nothing stays.
+        # With other options all tiles change.
         for other in (('--quality', 'greedy'), ('--fill', 'flat'), ('--gzip',), ()):
             with self.subTest(other):
                 summary = self.again(store, *options, *other)
@@ -116,7 +116,7 @@ class ChangeTest(TileTestCase):
         self.check_changes(dem, 'metres', ('--zoom', '0-12', '--normals', '--water', 'nodata',
                                            '--max-error', '4'))
 
-    def test_voids_across_the_line_of_180_degrees(self):
+    def test_voids_across_the_antimeridian(self):
         dem = self.dem(179.86, -16.2, 0.002)
         noise = random.Random(3)
         for _ in range(25):
@@ -129,7 +129,7 @@ class ChangeTest(TileTestCase):
         verdict = self.verify('set', '--store', self.path('voids.terrace'), *VERTICAL)
         self.assertEqual(verdict['problems'], [])
 
-    def test_a_small_change_makes_few_of_many_tiles(self):
+    def test_a_small_change_rewrites_few_of_many_tiles(self):
         dem = Dem(480, 400, 10.13, 46.71, 0.002, height=smooth)
         options = ('--zoom', '0-12', '--max-error', '20')
         store = self.build(dem, 'many')
@@ -148,7 +148,7 @@ class ChangeTest(TileTestCase):
         options = ('--zoom', '0-10')
         shutil.rmtree(self.path('set'), ignore_errors=True)
         first = self.tile(store, 'set', '--name', 'fresh', *options)
-        # The bound of a zoom is its own unless it is said: tiles of both sets are kept.
+        # Unless it is given, each zoom has its own bound, so tiles of both sets are kept.
         summary = self.again(store, '--zoom', '0-9')
         self.assertEqual(summary['made'], 0)
         self.assertEqual(summary['removed'], first['zooms'][10]['tiles'])
@@ -158,7 +158,7 @@ class ChangeTest(TileTestCase):
                      (150, 120, 652000, 5210000, 160, 32)):
             self.again(self.build(Dem(*size, height=smooth), 'wide'), *options)
 
-    def test_damage_is_mended(self):
+    def test_damage_is_repaired(self):
         store = self.build(self.dem(10.13, 46.71, 0.002), 'damage')
         options = ('--max-error', '2')
         shutil.rmtree(self.path('fresh'), ignore_errors=True)
@@ -180,7 +180,7 @@ class ChangeTest(TileTestCase):
             summary = self.tile(store, 'fresh', mend, *options)
             self.assertEqual((summary['made'], summary['kept']), (4, whole['tiles'] - 4))
             self.assertEqual(everything(self.path('fresh')), expected)
-        # Without the journal nothing is known of the tiles, nor with one that cannot be read.
+        # Without a journal, or with an unreadable one, nothing is known about the tiles.
         for text in (None, '', 'terrace tiles 1\n'):
             if text is None:
                 os.remove(self.path('fresh/.terrace-tiles'))
@@ -191,7 +191,7 @@ class ChangeTest(TileTestCase):
             self.assertEqual((summary['made'], summary['kept']), (whole['tiles'], whole['tiles']))
             self.assertEqual(everything(self.path('fresh')), expected)
 
-    def test_resume_of_what_is_finished(self):
+    def test_resume_of_a_finished_set(self):
         dem = Dem(90, 70, 10.13, 46.71, 0.01)
         store = self.build(dem, 'done')
         whole = self.tile(store, 'done', '--max-error', 2)
@@ -206,14 +206,14 @@ class ChangeTest(TileTestCase):
         self.build(dem, 'done')
         self.refuse(1, '--force', *command, '--max-error', 2)
         self.assertEqual(everything(self.path('done')), before)
-        # An interrupted run goes on with the samples that there are now.
+        # An interrupted run continues with the current samples.
         os.remove(self.path('done/layer.json'))
         summary = self.tile(store, 'done', '--max-error', 2, '--resume')
         self.assertTrue(0 < summary['made'] < whole['tiles'], summary)
-        self.tile(store, 'anew/done', '--max-error', 2)
-        self.assertEqual(everything(self.path('done')), everything(self.path('anew/done')))
+        self.tile(store, 'again/done', '--max-error', 2)
+        self.assertEqual(everything(self.path('done')), everything(self.path('again/done')))
 
-    def test_stores_of_other_clusters(self):
+    def test_stores_with_other_clusters(self):
         dem = self.dem(10.13, 46.71, 0.002)
         store = self.build(dem, 'clusters')
         self.tile(store, 'set', '--name', 'fresh', '--force')
@@ -221,7 +221,7 @@ class ChangeTest(TileTestCase):
             result = terrace('build', self.path('clusters.tif'), '-o', store, '--force', *options)
             self.assertEqual(result.returncode, 0, result.stderr)
             summary = self.again(store)
-            # What fills beyond the border is made of some of the samples: others now.
+            # The fill beyond the border is made from some of the samples, which are now others.
             self.assertLess(summary['made'], summary['tiles'])
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tile sets that are interrupted, damaged and verified.
+"""Tests interrupted, damaged and verified tile sets.
 
 TERRACE=path/to/terrace tile_check_cli_test.py
 """
@@ -31,8 +31,8 @@ class ResumeTest(TileTestCase):
         cls.store = cls.build(Dem(420, 300, 10.13, 46.71, 0.0005), 'dem')
 
     def interrupt(self, name, number):
-        """Starts a run, stops it by a signal when some tiles are finished, and returns the exit
-        code and the names of the finished tiles."""
+        """Starts a run and stops it by a signal when some tiles are finished. Returns the exit code and the
+        names of the finished tiles."""
         run = subprocess.Popen([TERRACE, 'tile', self.store, '-o', self.path(name), *VERTICAL,
                                 *self.OPTIONS], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         journal = self.path(name + '/.terrace-tiles')
@@ -57,15 +57,15 @@ class ResumeTest(TileTestCase):
     def resume(self, name):
         return self.tile(self.store, name, *self.OPTIONS, '--resume')
 
-    def test_a_killed_run_goes_on(self):
+    def test_a_killed_run_can_be_resumed(self):
         whole = self.tile(self.store, 'whole', *self.OPTIONS)
         code, finished = self.interrupt('killed', signal.SIGKILL)
         self.assertEqual(code, -signal.SIGKILL)
-        # Half written, it is no set for any verb, and not overwritten by accident.
+        # A half-written set is not a set for any verb and is not overwritten by accident.
         self.refuse(1, '--resume', 'verify', self.path('killed'))
         self.refuse(1, '--resume', 'tile', self.store, '-o', self.path('killed'), *VERTICAL)
-        # Damage: a tile cut short, one with a flipped bit, one gone, a journal that ends in a line
-        # that a crash cut, and a file that was being written.
+        # Damage: a truncated tile, one with a flipped bit, a missing one, a journal that ends in a
+        # truncated line, and a temporary file.
         def name(i):
             return os.path.join(self.path('killed'), finished[i])
 
@@ -91,10 +91,10 @@ class ResumeTest(TileTestCase):
         self.assertEqual(left, right)
         self.assertEqual(self.verify('killed', '--store', self.store, *VERTICAL)['problems'], [])
 
-    def test_a_stopped_run_says_how_to_go_on(self):
+    def test_a_stopped_run_says_how_to_resume(self):
         code, finished = self.interrupt('stopped', signal.SIGINT)
         self.assertEqual(code, 130, self.errors)
-        # With other options the finished tiles are worth nothing.
+        # With other options the finished tiles are useless.
         summary = self.tile(self.store, 'stopped', '--max-error', 4, '--resume')
         self.assertLess(summary['kept'], len(finished))
         self.assertEqual(self.verify('stopped', '--store', self.store, *VERTICAL)['problems'], [])
@@ -116,7 +116,7 @@ class VerifyTest(TileTestCase):
     def setUp(self):
         self.dir = self.path('damaged')
         shutil.copytree(self.path('sound'), self.dir)
-        # It knows every byte: what the other checks find is to be seen.
+        # Remove the journal, which knows every byte, to test the other checks.
         os.remove(os.path.join(self.dir, '.terrace-tiles'))
 
     def tearDown(self):
@@ -138,7 +138,7 @@ class VerifyTest(TileTestCase):
         return path
 
     def found(self, *texts, also=(), store=False):
-        """Every text is in a problem, and every problem has one of them or of `also`."""
+        """Asserts that every text is in a problem, and that every problem has one of them or of `also`."""
         options = ('--store', self.store, *VERTICAL) if store else ()
         problems = self.verify('damaged', *options)['problems']
         words = [f'{problem["file"]}: {problem["what"]}' for problem in problems]
@@ -163,7 +163,7 @@ class VerifyTest(TileTestCase):
         assert at == 92 + 6 * n
         return bytes(data)
 
-    def test_a_sound_set_has_no_problem(self):
+    def test_a_valid_set_has_no_problems(self):
         self.set.check()
         for threads in (1, 4):
             verdict = self.verify('damaged', '--store', self.store, *VERTICAL, '--threads', threads)
@@ -172,7 +172,7 @@ class VerifyTest(TileTestCase):
             self.assertEqual([line['zoom'] for line in verdict['zooms']], list(range(10)))
             self.assertEqual(verdict['samples'], sum(line['samples'] for line in verdict['zooms']))
 
-    def test_a_tile_that_begins_as_gzip_does(self):
+    def test_a_tile_that_starts_like_gzip(self):
         key = self.inner_tile()
         # The last bits of the centre: less than a millionth of a metre.
         self.change(key, b'\x1f\x8b\x08' + self.set.tiles[key].data[3:])
@@ -185,12 +185,12 @@ class VerifyTest(TileTestCase):
         self.found()
         key = self.inner_tile()
         data = bytearray(self.set.tiles[key].data)
-        data[3] ^= 1  # of the centre: no other check can know
+        data[3] ^= 1  # a byte of the centre, which no other check can find
         self.change(key, bytes(data))
         problems = self.found('/'.join(map(str, key)) + '.terrain: not the bytes')
         self.assertEqual(len(problems), 1)
 
-    def test_a_step_on_the_line_of_180_degrees(self):
+    def test_a_step_at_the_antimeridian(self):
         tile = self.set.tiles[0, 0, 0]
         # Flat, far from the data.
         self.assertEqual((tile.low, tile.high), (0, 0))
@@ -213,7 +213,7 @@ class VerifyTest(TileTestCase):
                               '9/0/07.terrain: its path does not name a tile',
                               also=('9/0/7.terrain: ',))
         self.assertGreaterEqual(len(problems), 3)
-        # What a killed run was writing is beside the set.
+        # The temporary files of a killed run are not part of the set.
         self.assertEqual(self.verify('damaged')['left_over'], 1)
 
     def test_an_absent_tile_with_samples(self):
@@ -265,7 +265,7 @@ class VerifyTest(TileTestCase):
         for number in range(len(tile.triangles)):
             at = tile.triangles_at + 6 * number
             codes = struct.unpack_from('<3H', data, at)
-            if 0 not in codes and turned < 2:  # no vertex is met first here
+            if 0 not in codes and turned < 2:  # no vertex occurs first here
                 struct.pack_into('<3H', data, at, codes[0], codes[2], codes[1])
                 first = at if turned == 0 else first
                 turned += 1
@@ -303,7 +303,7 @@ class VerifyTest(TileTestCase):
         header = ('bounding sphere', 'horizon occlusion')
         problems = self.found('its southern side', also=header)
         self.assertIn('heights that differ by up to', problems[-1]['what'])
-        # Inside, only the samples tell.
+        # In the interior, only the samples show it.
         vertex = next(i for i in range(len(tile.u)) if 0 < tile.u[i] < UNITS
                       and 0 < tile.v[i] < UNITS and 100 / 150 * UNITS > tile.h[i])
         step = (tile.high - tile.low) / UNITS
@@ -312,7 +312,7 @@ class VerifyTest(TileTestCase):
         self.change(key, self.columns(tile, h=h))
         self.found('m off the tile, more than 4 m', also=header, store=True)
 
-    def test_a_header_has_the_tiles_own_heights(self):
+    def test_a_header_must_have_the_tiles_heights(self):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         self.assertEqual((min(tile.h), max(tile.h)), (0, UNITS))
@@ -335,7 +335,7 @@ class VerifyTest(TileTestCase):
                 (64, '<d', float('nan'), 'horizon occlusion point is not finite'),
                 (64, '<d', tile.horizon[0] * 0.99, 'is hidden while a vertex is not'),
                 (64, '<d', tile.horizon[0] * 1.01, 'are needed'),
-                # Both numbers are little above 1, and seen to differ.
+                # Both numbers are slightly above 1, and their difference is found.
                 (64, '<d', tile.horizon[0] * (1 - 1e-5), re.compile(r'is (1\.\d+) radii out, (?!\1)1\.\d+ are'))):
             with self.subTest(f'{text} at byte {at}'):
                 data = bytearray(tile.data)
@@ -344,7 +344,7 @@ class VerifyTest(TileTestCase):
                 words = [p['what'] for p in self.verify('damaged')['problems']]
                 self.assertTrue(any(re.search(text, word) for word in words), words)
 
-    def test_every_cut_is_found(self):
+    def test_every_truncation_is_found(self):
         key = self.inner_tile()
         data = self.set.tiles[key].data
         chance = random.Random(7)
@@ -355,7 +355,7 @@ class VerifyTest(TileTestCase):
                 self.assertIn(path, [p['file'] for p in problems])
                 self.assertLessEqual(problems[0]['offset'], length)
 
-    def test_flipped_bits_do_no_harm(self):
+    def test_flipped_bits_do_not_crash_verify(self):
         key = self.inner_tile()
         data = self.set.tiles[key].data
         chance, found = random.Random(8), 0
@@ -368,7 +368,7 @@ class VerifyTest(TileTestCase):
                 found += not self.verify('damaged', '--store', self.store, *VERTICAL)['ok']
         self.assertGreater(found, 10)
 
-    def test_a_tighter_bound_is_not_kept(self):
+    def test_a_tighter_bound_is_violated(self):
         verdict = self.verify('sound', '--store', self.store, *VERTICAL, '--max-error', '0.5')
         self.assertGreater(len(verdict['problems']), 5)
         self.assertTrue(all('m off the tile' in p['what'] for p in verdict['problems']))

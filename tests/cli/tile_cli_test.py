@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tiles for web globes as their users meet them, read and checked by other code.
+"""Tests tiles for web globes end to end with an independent reader.
 
 TERRACE=path/to/terrace tile_cli_test.py
 """
@@ -59,7 +59,7 @@ class TileTest(TileTestCase):
                         self.assertAlmostEqual(line['max_error'], errors[line['zoom']][0],
                                                delta=1e-3)
 
-    def test_the_layer_says_what_is_there(self):
+    def test_layer_json_describes_the_tiles(self):
         self.tile(self.stores['degrees'], 'layer', '--zoom', '2-8', '--name', 'Alps')
         tiles = TileSet(self.path('layer'))
         layer, dem = tiles.layer, self.dems['degrees']
@@ -92,7 +92,7 @@ class TileTest(TileTestCase):
         self.assertEqual(found[0], found[1])
         self.assertEqual(found[0], found[2])
 
-    def test_holes_are_filled_and_empty_tiles_absent(self):
+    def test_holes_are_filled_and_empty_tiles_are_omitted(self):
         def height(column, row):
             hole = 20 <= column < 32 and 15 <= row < 30
             sea = column + row > 90
@@ -114,7 +114,7 @@ class TileTest(TileTestCase):
                           for lon, lat, _ in samples}
                 deepest = {key for key in tiles.tiles if key[0] == 9}
                 self.assertEqual(deepest, inside)
-                # No spikes where nothing is known, and no land beyond the outline.
+                # No spikes in voids, and no land beyond the outline.
                 for key in deepest:
                     tile = tiles.tiles[key]
                     heights = [tile.metres(i) for i in range(len(tile.u))]
@@ -139,7 +139,7 @@ class TileTest(TileTestCase):
         self.assertAlmostEqual(lowest, -20, delta=4)
 
     def check_water(self, tiles, dem):
-        """A mask's cell says what the sample nearest to it says."""
+        """Each cell of a mask must match its nearest sample."""
         wet = dry = 0
         for (zoom, x, y), tile in tiles.tiles.items():
             mask = tile.extensions[2]
@@ -162,8 +162,8 @@ class TileTest(TileTestCase):
         self.assertGreater(wet, 100)
         self.assertGreater(dry, 100)
 
-    def test_normals_are_those_of_the_slope(self):
-        # Rises eastward by 500 m per sample, northward by 300 m.
+    def test_normals_match_the_slope(self):
+        # Rises by 500 m per sample eastward and by 300 m northward.
         dem = Dem(60, 60, 10.0, 46.6, 0.01, height=lambda c, r: 500 * c - 300 * r)
         self.tile(self.build(dem, 'slope'), 'slope', '--normals', '--max-error', 1, '--zoom', '9-9')
         tiles = TileSet(self.path('slope'))
@@ -189,11 +189,11 @@ class TileTest(TileTestCase):
                 checked += 1
         self.assertGreater(checked, 10)
 
-    def test_metadata_names_the_tiles_below(self):
+    def test_metadata_lists_the_tiles_below(self):
         self.tile(self.stores['degrees'], 'metadata', '--metadata', '--zoom', '0-9')
         TileSet(self.path('metadata')).check_metadata()
 
-    def test_gzip_packs_the_same_tiles(self):
+    def test_gzip_compresses_the_same_tiles(self):
         self.tile(self.stores['degrees'], 'plain')
         summary = self.tile(self.stores['degrees'], 'packed', '--gzip')
         plain, packed = (TileSet(self.path(name)).files() for name in ('plain', 'packed'))
@@ -204,7 +204,7 @@ class TileTest(TileTestCase):
                          os.path.getsize(self.path('packed/layer.json')))
         self.assertEqual(self.verify('packed')['problems'], [])
 
-    def test_force_touches_only_what_changed(self):
+    def test_force_rewrites_only_changed_tiles(self):
         dem = Dem(90, 70, 10.13, 46.71, 0.01)
         store = self.build(dem, 'again')
         first = self.tile(store, 'again', '--max-error', 2)
@@ -222,14 +222,14 @@ class TileTest(TileTestCase):
         changed = self.tile(store, 'again', '--max-error', 2, '--force')
         touched = [name for name, at in times().items() if at != before[name]]
         self.assertEqual(changed['tiles'] - changed['kept'], len(touched))
-        # The height step of a zoom may not change with one sample.
+        # The height step of a zoom must not change with a single sample.
         self.assertTrue(0 < len([t for t in touched if t.startswith('9/')]) <= 4, touched)
         fewer = self.tile(store, 'again', '--max-error', 2, '--zoom', '0-5', '--force')
         self.assertGreater(fewer['removed'], 0)
         self.assertFalse(os.path.exists(self.path('again/9')))
         TileSet(self.path('again')).check()
 
-    def test_force_leaves_what_strangers_put_into_the_folder(self):
+    def test_force_keeps_foreign_files_in_the_folder(self):
         store, folder = self.stores['degrees'], self.path('shared')
         self.tile(store, 'shared')
         zoom = max(int(name) for name in os.listdir(folder) if name.isdigit())
@@ -248,7 +248,7 @@ class TileTest(TileTestCase):
             with open(os.path.join(folder, name)) as file:
                 self.assertEqual(file.read(), 'precious')
 
-    def test_what_cannot_be_tiled_is_refused(self):
+    def test_unsuitable_stores_and_folders_are_refused(self):
         store, out = self.stores['degrees'], self.path('none')
         tile = ('tile', store, '-o', out)
         vertical = ('--vertical', 'ellipsoidal')
@@ -270,7 +270,7 @@ class TileTest(TileTestCase):
                                  self.path('bare.terrace')).returncode, 0)
         self.refuse(1, '--crs', 'tile', self.path('bare.terrace'), '-o', out, *vertical)
         self.assertFalse(os.path.exists(out))
-        # Folders that are not ours.
+        # Folders that terrace did not write.
         os.mkdir(self.path('full'))
         with open(self.path('full/letter.txt'), 'w') as file:
             file.write('dear')
@@ -287,7 +287,7 @@ class TileTest(TileTestCase):
         self.tile(store, 'once')
         self.refuse(1, '--force', 'tile', store, '-o', self.path('once'), *vertical)
 
-    def test_heights_that_are_none_on_a_globe_are_refused(self):
+    def test_impossible_heights_are_refused(self):
         dem = Dem(20, 20, 10, 46, 0.01, height=lambda c, r: -3e38 if c == r else 300.0)
         store = self.build(dem, 'far')
         result = terrace('tile', store, '--vertical', 'ellipsoidal', '-o', self.path('far'))
@@ -300,7 +300,7 @@ class TileTest(TileTestCase):
                          'flat:1e300', '-o', self.path('far'))
         self.assertEqual(result.returncode, 2, result.stderr)
 
-    def test_deeper_than_the_data_is_said(self):
+    def test_zooms_deeper_than_the_data_give_a_note(self):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('deep'), '--vertical',
                          'ellipsoidal', '--zoom', '10-10')
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -308,7 +308,7 @@ class TileTest(TileTestCase):
         self.assertEqual(self.verify('deep', '--store', self.stores['degrees'], '--vertical',
                                      'ellipsoidal')['problems'], [])
 
-    def test_an_error_below_the_steps_is_said(self):
+    def test_a_bound_below_the_height_steps_gives_a_note(self):
         result = terrace('tile', self.stores['degrees'], '-o', self.path('tiny'), '--vertical',
                          'ellipsoidal', '--zoom', '9-9', '--max-error', '1e-6')
         self.assertEqual(result.returncode, 0, result.stderr)
@@ -317,7 +317,7 @@ class TileTest(TileTestCase):
                                      'ellipsoidal')['problems'], [])
 
     def write_geoid(self, name, undulation):
-        """A grid in GeographicLib's format, five degrees apart; undulation(lat) in hundredths."""
+        """Writes a grid in GeographicLib's format, five degrees apart; undulation(lat) in hundredths."""
         with open(self.path(name), 'wb') as file:
             file.write(b'P5\n# Description test\n# DateTime 2020-01-01 00:00:00\n'
                        b'# MaxBilinearError 0.1\n# RMSBilinearError 0.1\n# MaxCubicError 0.1\n'
@@ -327,7 +327,7 @@ class TileTest(TileTestCase):
         return self.path(name)
 
     def test_a_geoid_is_added_to_the_heights(self):
-        # Straight in latitude, so that every interpolation of the grid gives the same.
+        # Linear in latitude, so that every interpolation of the grid gives the same.
         geoid = self.write_geoid('slope.pgm', lambda lat: 5000 + 40 * lat)
         other = self.write_geoid('level.pgm', lambda lat: 5000)
         for name, store in self.stores.items():
@@ -346,7 +346,7 @@ class TileTest(TileTestCase):
                 self.assertFalse(self.verify(out, '--store', store, '--geoid', other)['ok'])
                 self.assertFalse(self.verify(out, '--store', store, '--vertical', 'ignore')['ok'])
 
-    def test_beyond_the_edge_of_a_map_the_globe_goes_on(self):
+    def test_tiles_continue_beyond_the_edge_of_a_map(self):
         side, cell, west, north = 40, 10000.0, 20037508 - 200000, -1.9e6
         heights = [500 + 200 * math.sin(i % side / 7) * math.cos(i // side / 5) for i in range(side * side)]
         write_tiff(self.path('edge.tif'), side, side, heights, west, north, cell, {1024: 1, 1025: 1, 3072: 3857})
@@ -366,7 +366,7 @@ class TileTest(TileTestCase):
         verdict = self.verify('edge', '--store', self.path('edge.terrace'), '--vertical', 'ellipsoidal')
         self.assertEqual(verdict['problems'], [])
 
-    def test_longitudes_may_lead_around_the_globe_many_times(self):
+    def test_longitudes_may_go_around_the_globe_many_times(self):
         side, cell, west, north = 40, 0.1, 1000, 10
         heights = [500 + 200 * math.sin(i % side / 7) * math.cos(i // side / 5) for i in range(side * side)]
         write_tiff(self.path('many.tif'), side, side, heights, west, north, cell, {1024: 2, 1025: 1, 2048: 4326})
@@ -432,7 +432,7 @@ class TileTest(TileTestCase):
             self.assertEqual(missed, 0)
             self.assertLessEqual(error, 3 * 2 ** (tiles.layer['maxzoom'] - zoom) * (1 + 1e-6))
 
-    def test_the_line_of_180_degrees_and_longitudes_to_360(self):
+    def test_the_antimeridian_and_longitudes_to_360(self):
         for name, west in (('fiji', 179.6), ('pacific', -180.4), ('greenwich', 359.7)):
             with self.subTest(name):
                 dem = Dem(80, 60, west, -16.2, 0.01)

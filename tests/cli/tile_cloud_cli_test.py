@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tiles of irregular points, read and checked by other code.
+"""Tests tiles of irregular points with an independent reader.
 
 TERRACE=path/to/terrace tile_cloud_cli_test.py
 """
@@ -53,8 +53,8 @@ class Cloud:
         return (x + 180) % 360 - 180 if not -180 <= x <= 180 else x, y
 
     def samples(self, nudge=0.0):
-        """nudge: degrees inward, for points on the northern and the eastern outline that lie on
-        borders of tiles: the tiles beyond do not exist."""
+        """nudge: degrees inward, for points on the northern and eastern outline that are on borders of
+        tiles, because the tiles beyond do not exist."""
         found = [(*self.place(x, y), z) for x, y, z in self.points]
         east, north = max(p[0] for p in found), max(p[1] for p in found)
         return [(lon - nudge * (lon == east), lat - nudge * (lat == north), z)
@@ -62,7 +62,7 @@ class Cloud:
 
 
 def read_las(path):
-    """The points of a LAS file, whatever its point format."""
+    """The points of a LAS file of any point format."""
     with open(path, 'rb') as file:
         data = file.read()
     at, = struct.unpack_from('<I', data, 96)
@@ -137,7 +137,7 @@ class TileCloudTest(TileTestCase):
         self.assertEqual(found[0], found[2])
 
     def test_points_on_the_borders_of_tiles(self):
-        # A lattice of points as a cloud; at 11.25 degrees and on its own outline they lie on the
+        # A lattice of points as a cloud. At 11.25 degrees and on its own outline they are on
         # borders of tiles.
         step = 180 / 2 ** 13 / 16
         points = [(11.25 + i * step, 45 + j * step,
@@ -157,7 +157,7 @@ class TileCloudTest(TileTestCase):
             with self.subTest(name):
                 self.check(Cloud(points, 32), name, bound=0.5)
 
-    def test_of_points_at_one_place_one_counts(self):
+    def test_one_of_several_points_at_a_position_counts(self):
         cloud = Cloud.scattered(1500, 500, 500, 3)
         tops = [(x, y, z + 30) for x, y, z in cloud.points[::3]]
         both = Cloud(cloud.points + tops + cloud.points[:400], 32)
@@ -173,8 +173,8 @@ class TileCloudTest(TileTestCase):
         last = tiles.layer['maxzoom']
         tiles.tiles = {key: tile for key, tile in tiles.tiles.items() if key[0] == last}
         tiles.layer['minzoom'] = last
-        # Each place is within what is stated of one of its heights. On slopes so steep rounding the
-        # places takes some of the bound.
+        # Each position is within the stated bound of one of its heights. On slopes this steep,
+        # rounding the positions takes part of the bound.
         stated = summary['zooms'][-1]['max_error']
         self.assertLess(stated, 3)
         twice = [(place, values) for place, values in heights.items() if len(values) > 1][:60]
@@ -192,7 +192,7 @@ class TileCloudTest(TileTestCase):
         cloud.points = [p for p in cloud.points
                         if math.hypot(p[0] - 480600, p[1] - 5200500) > 250]
         tiles = self.check(cloud, 'void', bound=1)
-        # The triangles of the points around it, no spikes.
+        # The triangles of the points around it, without spikes.
         for key, tile in tiles.tiles.items():
             if key[0] == tiles.layer['maxzoom']:
                 # 0 is the height beyond the outline.
@@ -204,12 +204,12 @@ class TileCloudTest(TileTestCase):
         near = Cloud.scattered(2000, 60, 60, 8, noise=0.05)
         far = Cloud.scattered(1000, 60, 60, 9, west=630000, south=5290000, noise=0.05)
         tiles = self.check(Cloud(near.points + far.points, 32), 'apart', bound=0.5)
-        # There are no tiles between.
+        # There are no tiles in between.
         self.assertLess(len(tiles.tiles), 200)
 
-    def test_more_points_than_a_leaf_should_have(self):
-        # All in less than a unit of the tiles of zoom 0, and many in one of those of zoom 4; a
-        # bound that they must be read for.
+    def test_more_points_than_fit_a_leaf(self):
+        # All within one unit of the tiles of zoom 0, and many within one unit of a tile of zoom 4;
+        # the bound requires all of them to be read.
         chance = random.Random(11)
         points = []
         for _ in range(300000):
@@ -217,7 +217,7 @@ class TileCloudTest(TileTestCase):
             points.append((round(500000 + x, 2), round(5200000 + y, 2), round(hills(x, y), 2)))
         cloud = Cloud(points, 32, block=4000)
         store = self.build(cloud, 'crowd')
-        # The tool's own check takes all of them.
+        # The command's own check reads all of them.
         samples = [(*cloud.place(x, y), z) for x, y, z in points[::10]]
         for zooms, bound in (('0-0', 300), ('5-5', 70), ('10-10', 20)):
             with self.subTest(zooms):
@@ -234,7 +234,7 @@ class TileCloudTest(TileTestCase):
                 self.assertEqual(verdict['problems'], [])
                 self.assertGreaterEqual(verdict['samples'], len(set(p[:2] for p in points)))
 
-    def test_the_line_of_180_degrees(self):
+    def test_the_antimeridian(self):
         chance = random.Random(12)
         points = []
         for _ in range(2000):
@@ -243,8 +243,8 @@ class TileCloudTest(TileTestCase):
                            round(hills(x * 100000, y * 110000), 2)))
         self.check(Cloud(points), 'east', bound=1)
         self.check(Cloud([(x - 360, y, z) for x, y, z in points]), 'west', bound=1)
-        # In spatial order other clusters at zoom 7 leave 74 m for 64, which is stated: there samples
-        # lie within a step of 15 bits of one another.
+        # In spatial order, different clusters leave 74 m instead of 64 at zoom 7, which the summary
+        # states: there, samples are within a step of 15 bits of each other.
         self.check(Cloud([(x - 360 if x > 180 else x, y, z) for x, y, z in points]), 'both',
                    bound=1, order='stream')
         # UTM zone 1 begins there.
@@ -309,7 +309,7 @@ class TileCloudTest(TileTestCase):
         self.assertEqual(wet, 3)
         self.assertGreater(dry, 2)
 
-    def test_beyond_the_hull_it_is_flat_if_asked(self):
+    def test_fill_flat_is_flat_beyond_the_hull(self):
         cloud = Cloud.scattered(500, 300, 300, 16)
         store = self.build(cloud, 'flat')
         self.tile(store, 'flat', '--fill', 'flat:-40', '--max-error', 1)
@@ -342,7 +342,7 @@ class TileCloudTest(TileTestCase):
                 for stated, line in zip(summary['zooms'], verdict['zooms']):
                     self.assertLessEqual(line['max_error'], stated['max_error'] + 1e-4)
                     if filtered:
-                        # One return per place.
+                        # One return per position.
                         self.assertLessEqual(stated['max_error'], 77067.34 / 2 ** stated['zoom'])
                 if filtered:
                     for zoom, (error, missed) in tiles.errors(cloud.samples()).items():

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tiles of a raster with voids that lie across the borders of tiles keep their bound.
+"""Tiles of a raster whose voids cross the borders of tiles keep their bound.
 
 TERRACE=path/to/terrace tile_void_cli_test.py
 """
@@ -17,7 +17,7 @@ from quantized_mesh import TileSet
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 NODATA = -9999.0
-CELL = 1 / 1200  # degrees; borders of tiles at 8.4375 and 46.40625 have columns and rows on them
+CELL = 1 / 1200  # degrees; the tile borders at 8.4375 and 46.40625 coincide with a column and a row
 WEST, NORTH = 8.4375 - 60 * CELL, 46.40625 + 60 * CELL
 COUNT = 151
 
@@ -27,13 +27,13 @@ def terrace(*args):
 
 
 def write_tiff(path, heights):
-    """WGS 84, samples on the corners of cells."""
+    """Writes WGS 84 with samples on the corners of cells."""
     keys = {1024: 2, 1025: 2, 2048: 4326}
     small_tiff.write_tiff(path, COUNT, COUNT, heights, (WEST, NORTH), CELL, keys, nodata='-9999')
 
 
 def steep_with_voids(seed):
-    """Ridges of some 1000 m, and discs without data, most of them on the borders of tiles."""
+    """Ridges of some 1000 m, with discs without data, most of them on borders of tiles."""
     rng = random.Random(seed)
     heights = [1500 + 30 * abs((3 * c + 5 * r) % 80 - 40) + rng.uniform(-2, 2)
                for r in range(COUNT) for c in range(COUNT)]
@@ -50,7 +50,7 @@ def steep_with_voids(seed):
 
 
 class TileVoidTest(unittest.TestCase):
-    def test_samples_beside_voids_are_kept(self):
+    def test_samples_next_to_voids_are_within_the_bound(self):
         for seed in (1, 2, 3):
             for error in (20, 5):
                 with self.subTest(seed=seed, error=error), tempfile.TemporaryDirectory() as folder:
@@ -65,9 +65,9 @@ class TileVoidTest(unittest.TestCase):
                     for zoom in zooms:
                         self.assertLessEqual(zoom['max_error'], error * 2 ** (12 - zoom['zoom']))
 
-    def test_fill_may_leave_the_heights_of_all_samples_of_a_tile(self):
-        """Plateaus apart: tiles are written anew with larger steps of height, and still know which
-        are below them."""
+    def test_fill_may_exceed_the_height_range_of_a_tiles_samples(self):
+        """Separated plateaus: tiles are rewritten with larger height steps and still list the tiles
+        below them."""
         heights = [0.0 if c < 40 else 3000.0 if c > 80 else NODATA
                    for r in range(COUNT) for c in range(COUNT)]
         with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""terrace view and publish: the server against hostile requests by raw sockets, and what is published.
+"""Tests terrace view with hostile requests over raw sockets, and the output of terrace publish.
 
 TERRACE=path/to/terrace view_cli_test.py [CLASS...]
 """
@@ -30,7 +30,7 @@ def terrace(*args, **kwargs):
 
 
 def view(*stores):
-    """Starts the server; returns it, its port and the query that has the token."""
+    """Starts the server; returns it, its port and the query with the token."""
     server = subprocess.Popen([TERRACE, 'view', *stores, '--no-open'], stderr=subprocess.PIPE, text=True)
     port, query = re.search(r'http://127\.0\.0\.1:(\d+)/(\?token=[0-9a-f]{32}) ', server.stderr.readline()).groups()
     return server, int(port), query
@@ -76,7 +76,7 @@ class ViewTest(Stores):
         return connection
 
     def answer(self, raw):
-        """Sends bytes and returns all that comes until the server closes, or is silent for a while."""
+        """Sends bytes; returns everything received until the server closes or is silent for a while."""
         connection = self.connect()
         try:
             connection.sendall(raw)
@@ -92,7 +92,7 @@ class ViewTest(Stores):
         return data
 
     def get(self, path, method='GET', query=None, host=None, **headers):
-        """With the token and the right Host, unless others are given."""
+        """Sends a request with the token and the right Host, unless others are given."""
         lines = ''.join(f'{name.replace("_", "-")}: {value}\r\n' for name, value in headers.items())
         target = path + (self.query if query is None else query)
         host = f'127.0.0.1:{self.port}' if host is None else host
@@ -135,8 +135,8 @@ class ViewTest(Stores):
         self.assertEqual(self.get(self.URL, Range='bytes=0-1', If_Range='"x"')[0], 200)
         self.assertEqual(self.get(self.URL, If_None_Match=tag)[::2], (304, b''))
 
-    def test_pages_of_other_origins(self):
-        """They get no leave to read, and one that a name server has led here has another Host."""
+    def test_pages_of_other_origins_cannot_read(self):
+        """They get no permission to read; a page redirected here by DNS has another Host."""
         self.assertEqual(self.get('/', 'OPTIONS', Origin='http://evil.example', Access_Control_Request_Method='GET')[0], 405)
         for path in ['/', '/stores.json', self.URL, '/nothing']:
             headers = self.get(path, Origin='http://evil.example')[1]
@@ -151,19 +151,20 @@ class ViewTest(Stores):
                 self.assertEqual((host, self.get(path, host=host)[0]), (host, 403))
         self.assertIn(b' 403 ', self.answer(f'GET /stores.json{self.query} HTTP/1.0\r\n\r\n'.encode()).split(b'\r\n')[0])
 
-    def test_others_who_reach_the_port(self):
-        """Stores need the token of the address; the viewer's own files do not."""
+    def test_other_users_of_the_port_need_the_token(self):
+        """Stores need the token in the address; the viewer's own files do not."""
         token = self.query.removeprefix('?token=')
         for query in ['', '?', '?token', '?token=', f'?token={token[:-1]}', f'?token={token}0', f'?token={token.upper()}x', f'?x={token}',
                       f'?tokens={token}', '?token=' + '0' * 32, f'#?token={token}', f'?x=1&token={token[1:]}']:
             for path in ['/stores.json', '/stores/alps.start', '/stores/alps/manifest.json', self.URL, '/stores/alps/nothing', '/nothing']:
-                # As a browser asks: programs of this session need no token.
+                # Requests like a browser's, because programs of this session need no token.
                 status, _, body = self.get(path, query=query, Sec_Fetch_Site='none')
                 self.assertEqual((query, path, status, body), (query, path, 403, b'no token\n'))
         for path in ['/', '/index.html', '/viewer.js', '/viewer.css', '/worker.js', '/core.wasm', '/body.wasm']:
             self.assertEqual((path, self.get(path, query='')[0]), (path, 200))
         self.assertEqual(self.get('/stores.json', query=f'?x=1&token={token}')[0], 200)
-        # Programs of the same session, as a command typed in the same terminal, are served; others are not.
+        # Programs of the same session, such as a command typed in the same terminal, are served;
+        # others are not.
         ask = [sys.executable, '-c', 'import sys, urllib.request; print(urllib.request.urlopen(sys.argv[1]).status)',
                f'http://127.0.0.1:{self.port}/stores.json']
         for strange in False, True:
@@ -178,8 +179,8 @@ class ViewTest(Stores):
         other.stderr.close()
         self.assertNotEqual(query, self.query)
 
-    def test_what_the_page_may_run(self):
-        """The page and the server say the same: nothing from elsewhere, and no script in the page itself."""
+    def test_the_content_security_policy(self):
+        """The page and the server have the same policy: nothing from elsewhere, and no inline script."""
         _, headers, page = self.get('/')
         policy = re.search(r'<meta http-equiv="Content-Security-Policy" content="([^"]*)">', page.decode()).group(1)
         self.assertEqual(headers['Content-Security-Policy'], policy)
@@ -213,13 +214,13 @@ class ViewTest(Stores):
         self.assertEqual(self.get('/', 'POST', Content_Length='5')[0], 413)
         self.assertEqual(self.get('/', 'DELETE')[0], 405)
         self.assertIsNone(status(b'GET / HT'))
-        # And it still serves.
+        # It still serves.
         self.assertEqual(self.get('/')[0], 200)
 
     def test_one_connection_serves_many_requests(self):
         connection = self.connect()
         data = self.data()
-        # All at once, and answered in order.
+        # Sent all at once, and answered in order.
         connection.sendall(b''.join(
             f'GET {self.URL}{self.query} HTTP/1.1\r\nHost: localhost:{self.port}\r\nRange: bytes={i}-{i + 9}\r\n\r\n'.encode()
             for i in range(50)))
@@ -231,32 +232,32 @@ class ViewTest(Stores):
             self.assertEqual(stream.read(10), data[i:i + 10])
         stream.close()
 
-    def test_several_hosts_are_no_request(self):
+    def test_several_host_headers_are_rejected(self):
         for hosts in ([self.port, self.port], [self.port, 1], [1, self.port]):
             lines = ''.join(f'Host: localhost:{port}\r\n' for port in hosts)
             answer = self.answer(f'GET /{self.query} HTTP/1.1\r\n{lines}Connection: close\r\n\r\n'.encode())
             self.assertIn(b' 400 ', answer.split(b'\r\n')[0])
 
-    def test_slow_clients_do_not_hold_it(self):
+    def test_slow_clients_do_not_block_others(self):
         idle = [self.connect() for _ in range(60)]
         for i, connection in enumerate(idle):
             if i % 3 == 0:
-                connection.sendall(b'GET / HT')  # and no more
+                connection.sendall(b'GET / HT')  # and nothing else
             elif i % 3 == 1:
-                # And never reads.
+                # This one never reads.
                 connection.sendall(f'GET {self.URL}{self.query} HTTP/1.1\r\nHost: localhost:{self.port}\r\n\r\n'.encode())
         begin = time.monotonic()
         self.assertEqual(len(self.get(self.URL)[2]), len(self.data()))
         self.assertLess(time.monotonic() - begin, 5)
 
-    def test_idle_connections_keep_nobody_out(self):
-        """They are limited; those that have waited longest for a request end."""
+    def test_idle_connections_do_not_lock_others_out(self):
+        """Their number is limited; those that have waited longest for a request are closed."""
         crowd = []
         try:
             for i in range(300):
                 crowd.append(socket.create_connection(('127.0.0.1', self.port), timeout=20))
                 if i % 2:
-                    crowd[-1].sendall(b'GET / HT')  # and no more
+                    crowd[-1].sendall(b'GET / HT')  # and nothing else
             for _ in range(3):
                 self.assertEqual(len(self.get(self.URL)[2]), len(self.data()))
             self.assertEqual(crowd[0].recv(100), b'')
@@ -273,8 +274,8 @@ class ViewTest(Stores):
 
 
 class ReplacedTest(Stores):
-    def test_a_store_that_is_replaced(self):
-        """The new one is served, to connections that are open too; a download under way goes on with the old one."""
+    def test_a_replaced_store_is_served(self):
+        """The new store is served, also to open connections; a running download continues with the old one."""
         def build(*args):
             done = terrace('build', ALPS, '-o', self.store, '-q', '--force', *args)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -323,7 +324,7 @@ class ReplacedTest(Stores):
             _, head = ask(first, '/stores.json')
             checksum = json.loads(receive(first, int(head['Content-Length'])))['stores'][0]['checksum']
             self.assertTrue(fresh['ETag'].startswith(f'"{checksum}-'))
-            # While there is none, or a damaged one, the last one is served; and then the next.
+            # While the store is missing or damaged the last one is served, and then the next one.
             os.rename(self.store, self.path('away'))
             self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fresh['ETag'])
             self.assertEqual(receive(second, 100), new[:100])
@@ -343,8 +344,8 @@ class ReplacedTest(Stores):
         self.assertEqual(code, 0)
 
 
-    def test_a_store_that_is_copied_over(self):
-        """Its files become those of another, one after the other: that one is served once it is whole, whichever file comes first."""
+    def test_a_store_overwritten_in_place_is_served_once_complete(self):
+        """Its files are overwritten one by one in any order; the new store is served once it is complete."""
         def made(name, *args):
             done = terrace('build', ALPS, '-o', self.path(name), '-q', *args)
             self.assertEqual(done.returncode, 0, done.stderr)
@@ -363,7 +364,7 @@ class ReplacedTest(Stores):
                 names = sorted(target, key=lambda name: (name == 'manifest.json') != manifest_first)
                 for name in names:
                     fetch('stores.json')  # finds files of two stores
-                    with open(self.path('shown.store', name), 'wb') as file:  # as cp does
+                    with open(self.path('shown.store', name), 'wb') as file:  # like cp
                         file.write(target[name])
                 for name in set(os.listdir(self.path('shown.store'))) - set(target):
                     os.remove(self.path('shown.store', name))
@@ -391,8 +392,8 @@ class ViewErrorTest(Stores):
             self.assertEqual(done.returncode, 1)
             self.assertIn('another port', done.stderr)
 
-    def test_words_of_a_manifest(self):
-        """One whose checksum is right but whose words are unknown, as markup for a page is, is refused by all."""
+    def test_a_manifest_with_unknown_words_is_rejected(self):
+        """Every verb rejects a manifest with a correct checksum but unknown words, such as markup."""
         for key, value in [('"vertical": "', '<b>x</b>'), ('"kind": "', '<i>'), ('"parameters": [', None)]:
             store = self.path('words.store')
             shutil.copytree(self.store, store)
@@ -441,7 +442,7 @@ class PublishTest(Stores):
         for name in os.listdir(self.store):
             self.assertEqual(self.digest('site', 'stores', 'alps', name), self.digest('alps.store', name))
         self.assertEqual(terrace('verify', self.path('site', 'stores', 'alps')).returncode, 0)
-        # The viewer's own files are within their bars.
+        # The viewer's own files are within their size limits.
         own = ['body.wasm', 'core.wasm', 'index.html', 'viewer.css', 'viewer.js', 'worker.js']
         packed = {}
         for name in own:
@@ -451,11 +452,11 @@ class PublishTest(Stores):
         self.assertLessEqual(sum(packed.values()), 400_000)
         self.assertLessEqual(max(packed.values()), 200_000)
         self.assertLess(os.path.getsize(self.path('site', 'stores', 'alps.start')), 300_000)
-        # Nothing else is left beside it.
+        # Nothing else is left next to it.
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
 
-    def test_names_that_would_meet(self):
-        """A store is a folder and a start file next to it: x and x.start get other names, in view too."""
+    def test_colliding_names_are_changed(self):
+        """A store is a folder and a start file next to it, so x and x.start get other names, in view too."""
         for name in 'x', 'x.start':
             shutil.copytree(self.store, self.path(f'{name}.store'))
         for number, order in enumerate([['x', 'x.start'], ['x.start', 'x']]):
@@ -468,8 +469,8 @@ class PublishTest(Stores):
                 self.assertEqual(terrace('verify', os.path.join(site, 'stores', name)).returncode, 0)
                 self.assertTrue(os.path.isfile(os.path.join(site, 'stores', f'{name}.start')))
 
-    def test_classes_of_a_cloud(self):
-        """The start file names those of all points, for the legend, not only of the coarsest."""
+    def test_the_start_file_lists_the_classes_of_a_cloud(self):
+        """The start file lists the classes of all points for the legend, not only of the coarsest."""
         rows = ['x,y,z,classification'] + [f'{i % 100},{i // 100},0,{7 if i == 5000 else 18 if i == 7777 else 2 + i % 2}' for i in range(20_000)]
         with open(self.path('cloud.csv'), 'w') as file:
             file.write('\n'.join(rows) + '\n')
@@ -477,8 +478,8 @@ class PublishTest(Stores):
         self.assertEqual(terrace('publish', self.path('cloud.store'), '-o', self.path('classes'), '-q').returncode, 0)
         self.assertEqual(json.loads(self.read('classes', 'stores', 'cloud.start').partition(b'\n')[0])['classes'], [2, 3, 7, 18])
 
-    def test_repacked(self):
-        """The same points, in a store that is valid and does not depend on threads, under the name it would have anyway."""
+    def test_repack_keeps_the_points(self):
+        """The repacked store has the same points and name, is valid, and does not depend on threads."""
         for threads in '1', '3':
             done = terrace('publish', self.store, self.store, '-o', self.path(f'repacked{threads}'), '--repack', '--json',
                            '--threads', threads)
@@ -505,7 +506,7 @@ class PublishTest(Stores):
             points.append(sorted(done.stdout.splitlines()))
         self.assertEqual(*points)
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
-        # A fault on the way leaves nothing.
+        # A failure on the way leaves no files.
         damaged = self.path('damaged.store')
         shutil.copytree(self.store, damaged)
         with open(os.path.join(damaged, 'level-0.0.clusters'), 'r+b') as file:
@@ -548,7 +549,7 @@ class PublishTest(Stores):
         self.assertEqual(os.listdir(other), ['stores.json'])
         self.assertEqual(terrace('publish', self.store, '-o', self.path('no', 'parent')).returncode, 1)
 
-    def test_a_published_folder_with_a_strangers_file_is_kept(self):
+    def test_a_published_folder_with_a_foreign_file_is_kept(self):
         site = self.path('shared')
         self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 0)
         self.assertEqual(terrace('publish', self.store, self.store, '-o', site, '-q', '--force').returncode, 0)
