@@ -231,7 +231,7 @@ class CloudContourTest(CloudTestCase):
                                                          '--region', '0,0,9,9', '-o', out))
         self.assertFalse(os.path.exists(out))
 
-    def test_max_edge(self):
+    def test_triangles_with_long_edges_have_no_lines(self):
         count = lambda lines: sum(len(f['geometry']['coordinates']) for f in lines)
         without, far, near = (count(self.lines(self.metres, '--interval', 10, *options))
                               for options in ((), ('--max-edge', 1e6), ('--max-edge', 30)))

@@ -18,7 +18,7 @@ TERRACE = os.environ.get('TERRACE', 'terrace')
 
 
 def triangles_of(path):
-    """Counts each triangle, three corners in the order of the file, of an OBJ."""
+    """The vertices of an OBJ, and the number of each triangle of three corners in file order."""
     vertices, triangles = [], collections.Counter()
     with open(path, encoding='ascii') as file:
         for line in file:

@@ -42,7 +42,7 @@ struct Unsynced {
   dev_t device;
   ino_t inode;
   off_t safe;      // synced bytes
-  int descriptor;  // our own duplicate
+  int descriptor;  // opened by this library
 };
 
 std::recursive_mutex mutex;

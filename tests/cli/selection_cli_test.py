@@ -339,7 +339,7 @@ class SelectionTest(unittest.TestCase):
                 self.run_ok(*command, box, '-o', self.path('lon.csv'), '-q', '--force')
                 self.assertEqual(sorted(self.rows('lon.csv')[1]), wanted, (command, box))
 
-    def test_where_selects_points_of_a_store(self):
+    def test_points_of_a_store_are_selected(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
                     '--where', 'classification != 2', '--region', '100,100,400,500.5')
         self.expect('p.csv', lambda p: p['classification'] != 2 and 100 <= p['x'] <= 400 and

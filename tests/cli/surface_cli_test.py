@@ -23,7 +23,7 @@ def terrace(*args):
 
 
 def sphere(count):
-    """Evenly spread points of a unit sphere, on a spiral."""
+    """Evenly spread points of a sphere, on a spiral."""
     points = []
     for k in range(count):
         z = 1 - (2 * k + 1) / count
@@ -110,14 +110,14 @@ class SurfaceTest(unittest.TestCase):
         result = terrace('surface', self.path('jar.terrace'), '-o', self.path('jar.obj'))
         self.assertRegex(result.stderr, r'triangles \(\d+ over gaps of the scan\), closed, 1 part')
 
-    def test_coarse_with_a_fine_part(self):
+    def test_a_focus_makes_one_part_fine(self):
         coarse, _ = self.surface('coarse.ply', '--level', 'top')
         mixed, _ = self.surface('mixed.ply', '--level', 'top', '--focus', '0,0,0,11,11,11:0')
         fine, _ = self.surface('fine.ply')
         self.assertLess(coarse['vertices'], mixed['vertices'])
         self.assertLess(mixed['vertices'], fine['vertices'])
 
-    def test_the_other_criteria(self):
+    def test_other_criteria_find_the_same_surface(self):
         for criterion in ('gabriel', 'edge:1', 'advancing-front', 'alpha-wrap', 'alpha-wrap:2'):
             summary, _ = self.surface('other.ply', '--criterion', criterion)
             self.assertGreater(summary['triangles'], 100)

@@ -172,7 +172,7 @@ class VerifyTest(TileTestCase):
             self.assertEqual([line['zoom'] for line in verdict['zooms']], list(range(10)))
             self.assertEqual(verdict['samples'], sum(line['samples'] for line in verdict['zooms']))
 
-    def test_a_tile_that_starts_like_gzip(self):
+    def test_a_tile_may_start_like_gzip(self):
         key = self.inner_tile()
         # The last bits of the centre: less than a millionth of a metre.
         self.change(key, b'\x1f\x8b\x08' + self.set.tiles[key].data[3:])
@@ -190,7 +190,7 @@ class VerifyTest(TileTestCase):
         problems = self.found('/'.join(map(str, key)) + '.terrain: not the bytes')
         self.assertEqual(len(problems), 1)
 
-    def test_a_step_at_the_antimeridian(self):
+    def test_a_step_at_the_antimeridian_is_found(self):
         tile = self.set.tiles[0, 0, 0]
         # Flat, far from the data.
         self.assertEqual((tile.low, tile.high), (0, 0))
@@ -200,7 +200,7 @@ class VerifyTest(TileTestCase):
         self.found('0/1/0.terrain: its eastern side and that of 0/0/0.terrain have heights',
                    also=('sphere', 'horizon'))
 
-    def test_missing_and_stray_tiles(self):
+    def test_missing_and_stray_tiles_are_found(self):
         key = self.inner_tile()
         os.remove(os.path.join(self.dir, '/'.join(map(str, key)) + '.terrain'))
         stray = os.path.join(self.dir, '9', '0')
@@ -216,7 +216,7 @@ class VerifyTest(TileTestCase):
         # The temporary files of a killed run are not part of the set.
         self.assertEqual(self.verify('damaged')['left_over'], 1)
 
-    def test_an_absent_tile_with_samples(self):
+    def test_an_absent_tile_with_samples_is_found(self):
         key = self.inner_tile()
         os.remove(os.path.join(self.dir, '/'.join(map(str, key)) + '.terrain'))
         path = os.path.join(self.dir, 'layer.json')
@@ -229,7 +229,7 @@ class VerifyTest(TileTestCase):
         self.found()
         self.found('no tile where the store has', store=True)
 
-    def test_layers_that_claim_too_much(self):
+    def test_layers_that_claim_too_much_are_found(self):
         path = os.path.join(self.dir, 'layer.json')
         with open(path) as file:
             layer = json.load(file)
@@ -257,7 +257,7 @@ class VerifyTest(TileTestCase):
                 file.write(text)
             self.refuse(1, 'layer.json', 'verify', self.dir)
 
-    def test_turned_triangles(self):
+    def test_turned_triangles_are_found(self):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         data = bytearray(tile.data)
@@ -276,7 +276,7 @@ class VerifyTest(TileTestCase):
         places = {p['what'].split()[0]: p['offset'] for p in problems}
         self.assertEqual(places['triangle'], first)
 
-    def test_moved_border_vertices(self):
+    def test_moved_border_vertices_are_found(self):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         vertex = next(i for i in range(len(tile.u)) if tile.u[i] == UNITS and 0 < tile.v[i] < UNITS)
@@ -292,7 +292,7 @@ class VerifyTest(TileTestCase):
         self.found('list of vertices on the east side', 'vertices at other places',
                    'times the area', 'only one triangle')
 
-    def test_shifted_heights(self):
+    def test_shifted_heights_are_found(self):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         vertex = next(i for i in range(len(tile.u)) if tile.v[i] == 0 and 0 < tile.u[i] < UNITS)
@@ -321,7 +321,7 @@ class VerifyTest(TileTestCase):
             self.change(key, self.columns(tile, h=scaled))
             self.found(text, also=('bounding sphere', 'horizon occlusion', 'heights that differ', 'the centre'))
 
-    def test_headers(self):
+    def test_wrong_headers_are_found(self):
         key = self.inner_tile()
         tile = self.set.tiles[key]
         for at, code, value, text in (

@@ -107,7 +107,7 @@ class ViewTest(Stores):
 
     URL = '/stores/alps/level-0.0.clusters'
 
-    def test_files_and_types(self):
+    def test_files_have_their_types_and_lengths(self):
         for path, kind in [('/', 'text/html; charset=utf-8'), ('/viewer.js', 'text/javascript; charset=utf-8'),
                            ('/core.wasm', 'application/wasm'), ('/stores.json', 'application/json'),
                            ('/viewer.css', 'text/css; charset=utf-8'), (self.URL, 'application/octet-stream')]:
@@ -118,7 +118,7 @@ class ViewTest(Stores):
         self.assertEqual(self.get(self.URL)[2], self.data())
         self.assertEqual(json.loads(self.get('/stores.json')[2])['stores'][0]['name'], 'alps')
 
-    def test_ranges(self):
+    def test_ranges_are_served(self):
         data = self.data()
         size = len(data)
         for text, begin, end in [('0-0', 0, 1), ('5-99', 5, 100), (f'{size - 3}-', size - 3, size), ('-7', size - 7, size),
@@ -200,7 +200,7 @@ class ViewTest(Stores):
         for path in ['/%00', '/%zz', 'etc/passwd', '*']:
             self.assertEqual((path, self.get(path)[0]), (path, 400))
 
-    def test_hostile_requests(self):
+    def test_hostile_requests_are_rejected(self):
         def status(raw):
             data = self.answer(raw)
             return int(data.split()[1]) if data else None
@@ -383,7 +383,7 @@ class ReplacedTest(Stores):
 
 
 class ViewErrorTest(Stores):
-    def test_errors(self):
+    def test_wrong_usage_and_taken_ports_are_errors(self):
         self.assertEqual(terrace('view').returncode, 2)
         self.assertEqual(terrace('view', self.path('nothing')).returncode, 1)
         self.assertEqual(terrace('view', self.store, '--port', '70000').returncode, 2)
@@ -518,7 +518,7 @@ class PublishTest(Stores):
         self.assertFalse(os.path.exists(self.path('spoiled')))
         self.assertEqual([name for name in os.listdir(self.folder) if name.startswith('.')], [])
 
-    def test_start_file(self):
+    def test_the_start_file_has_parts_of_the_store(self):
         terrace('publish', self.store, '-o', self.path('started'), '-q')
         with open(self.path('started', 'stores', 'alps.start'), 'rb') as file:
             head, _, data = file.read().partition(b'\n')
@@ -532,7 +532,7 @@ class PublishTest(Stores):
             data = data[size:]
         self.assertEqual(data, b'')
 
-    def test_replacing(self):
+    def test_force_replaces_only_published_folders(self):
         site = self.path('again')
         self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 0)
         self.assertEqual(terrace('publish', self.store, '-o', site, '-q').returncode, 1)

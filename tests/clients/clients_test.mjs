@@ -107,7 +107,7 @@ for (const name of NAMES) {
     // therefore sampled, one on each side; without it, positions on borders too.
     const places = [
       ...sets[name].layer.metadataAvailability ? [] : placesOf(sets[name], 80),
-      ...placesOf(sets[name], 80, {beside: true})
+      ...placesOf(sets[name], 80, {offBorder: true})
     ];
     assert.ok(places.length >= 200, `${places.length} places`);
     // At the pole, the client's triangles are so large that they cut through the globe, so the
@@ -133,7 +133,7 @@ Object.entries(FAULTS).forEach(([name, {complaint, drawn, of = 'plain'}], i) => 
   test(`the survey finds: ${name}`, async () => {
     const set = sets[of];
     const pictures = drawn ? join(packages, `globe-fault${i}`) : undefined;
-    const places = placesOf(set, 20, {beside: true});
+    const places = placesOf(set, 20, {offBorder: true});
     const {complaints} = await survey(browser, base, `fault${i}`, set, places, {pictures});
     assert.match(complaints.join('\n'), new RegExp(complaint, 'm'));
   });

@@ -13,13 +13,13 @@ export function* numbers(seed) {
 }
 
 /// Distance in degrees from a border to a position next to it: a hundredth of a millimetre.
-const BESIDE = 1e-10;
+const OFF_BORDER = 1e-10;
 
 /// Returns `count` random positions in tiles of the deepest zoom, count / 2 on borders between
 /// them, and count / 2 where four of them meet: {place: [longitude, latitude], tiles}, with the
-/// tiles that touch it. With `beside`, each position on a border is replaced by one in each of its
+/// tiles that touch it. With `offBorder`, each position on a border is replaced by one in each of its
 /// tiles, at the very edge. These share a `border` number, because their heights must be equal.
-export function placesOf(set, count, {beside = false} = {}) {
+export function placesOf(set, count, {offBorder = false} = {}) {
   const random = numbers(7);
   const next = () => random.next().value;
   const z = set.deepest, side = 180 / 2 ** z, around = 2 ** (z + 1);
@@ -49,11 +49,11 @@ export function placesOf(set, count, {beside = false} = {}) {
       if (!tiles.every(tile => set.has(tile.z, tile.x, tile.y))) continue;
       --wanted;
       ++border;
-      if (!beside) {
+      if (!offBorder) {
         places.push({place: [-180 + (x + i) * side, -90 + (y + j) * side], tiles});
         continue;
       }
-      const inward = fraction => fraction === 0 ? BESIDE : fraction === 1 ? -BESIDE : 0;
+      const inward = fraction => fraction === 0 ? OFF_BORDER : fraction === 1 ? -OFF_BORDER : 0;
       for (const tile of tiles) {
         const longitude = -180 + (tile.x + tile.i) * side + inward(tile.i);
         const latitude = -90 + (tile.y + tile.j) * side + inward(tile.j);

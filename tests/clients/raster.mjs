@@ -20,11 +20,11 @@ export function writeRaster(path, {columns, rows, west, north, cell, keys, heigh
     }
   }
   const body = Buffer.from(heights.buffer);
-  const beside = [];
+  const external = [];
   let end = 8 + body.length;
   const put = bytes => {
     const at = end;
-    beside.push(bytes);
+    external.push(bytes);
     end += bytes.length;
     return at;
   };
@@ -48,7 +48,7 @@ export function writeRaster(path, {columns, rows, west, north, cell, keys, heigh
   head.write('II');
   head.writeUInt16LE(42, 2);
   head.writeUInt32LE(end, 4);
-  writeFileSync(path, Buffer.concat([head, body, ...beside, directory]));
+  writeFileSync(path, Buffer.concat([head, body, ...external, directory]));
 }
 
 /// Hills and ridges some hundred metres high: the height at a column and row.

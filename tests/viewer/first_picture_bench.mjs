@@ -46,10 +46,10 @@ try {
   const store = process.argv[3] ?? made(), rounds = Number(process.argv[4] ?? 7);
   server = spawn(process.env.TERRACE, ['view', store, '--no-open']);
   const url = await new Promise(resolve => {
-    let told = '';
+    let output = '';
     const hear = text => {
-      told += text;
-      const found = /http:\/\/\S+/.exec(told);
+      output += text;
+      const found = /http:\/\/\S+/.exec(output);
       if (found) resolve(found[0]);
     };
     server.stdout.on('data', hear);

@@ -222,8 +222,8 @@ function distanceTo(p, [a, b, c]) {
 /// Returns whether p is less than `reach` from a triangle.
 function isNear(p, triangle, reach) {
   const [a, b, c] = triangle;
-  const beside = k => p[k] < Math.min(a[k], b[k], c[k]) - reach || p[k] > Math.max(a[k], b[k], c[k]) + reach;
-  return !beside(0) && !beside(1) && !beside(2) && distanceTo(p, triangle) < reach;
+  const outside = k => p[k] < Math.min(a[k], b[k], c[k]) - reach || p[k] > Math.max(a[k], b[k], c[k]) + reach;
+  return !outside(0) && !outside(1) && !outside(2) && distanceTo(p, triangle) < reach;
 }
 
 test('a surface: new vertices start on the previous surface', async () => {
