@@ -73,7 +73,7 @@ class Maker:
         return ','.join(map(str, sum(self.part(low, high, begin, end, axes), [])))
 
     def regions(self, low, high, ratio):
-        """Three boxes in the plane with ellipses across, along and diagonal, as in figure 7.15."""
+        """Three boxes in the plane with ellipses across, along and diagonal to them, as in figure 7.15."""
         list_ = []
         for begin, end, angle in (((.08, .55), (.42, .92), 45), ((.58, .55), (.92, .92), -45),
                                   ((.3, .08), (.7, .42), 0)):

@@ -344,7 +344,7 @@ class ClusterTest(unittest.TestCase):
                                         *(['-k', 2] if method in LINKAGE else []))
             self.assertRegex(message, r'\d+ (bytes|MiB|GiB|B)')
 
-    def test_ctrl_c_stops_work_that_never_checks_for_signals(self):
+    def test_ctrl_c_stops_long_work(self):
         many = self.path('interrupted.ply')
         self.run_ok('synth', 'uniform', '--points', 200000, '-o', many)
         tree = self.path('interrupted.csv')

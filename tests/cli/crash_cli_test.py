@@ -64,7 +64,7 @@ class CrashCase(unittest.TestCase):
 
     def die_everywhere(self, start, command, check, exchange=True, least=8):
         """Kills `command` at each step in turn, each time in a copy of the folder `start`, and calls
-        check(step) there. Asserts that there are more than `least` steps, of all kinds."""
+        check(step) there. Asserts that it has more than `least` steps, of all kinds."""
         for kind in ('kill', 'power'):
             for step in range(1, ENDLESS):
                 shutil.rmtree(self.folder)

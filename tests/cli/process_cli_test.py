@@ -417,8 +417,8 @@ class StopTest(ProcessTest):
                 self.assertIn(what, result.stderr)
                 self.assertFalse([name for name in os.listdir(self.folder) if 'out' in name])
 
-    def test_work_that_never_checks_for_signals_is_killed(self):
-        """Linkage does not check for stops."""
+    def test_a_long_linkage_is_cut_short(self):
+        """Single linkage of three million points runs as one step."""
         cloud = self.path('large.las')
         self.run_ok('synth', 'uniform', '--points', '3M', '-o', cloud)
         process = self.start('cluster', cloud, '--method', 'single', '-o', self.path('out.csv'), '-k', '2')

@@ -130,7 +130,7 @@ class StoreTest(unittest.TestCase):
 
     def test_every_verb_rejects_a_store_with_a_wrong_raster_size(self):
         """Points beyond the columns of the manifest, with correct checksums."""
-        store = self.path('lies.terrace')
+        store = self.path('wrong.terrace')
         shutil.copytree(self.store, store)
         manifest = os.path.join(store, 'manifest.json')
         with open(manifest, encoding='utf-8') as file:
@@ -142,7 +142,7 @@ class StoreTest(unittest.TestCase):
         checksum = '%08x' % zlib.crc32(text.encode())
         with open(manifest, 'w', encoding='utf-8') as file:
             file.write(text.replace('"checksum": "00000000"', f'"checksum": "{checksum}"'))
-        out = self.path('lies')
+        out = self.path('wrong')
         for verb in (('tile', '--vertical', 'ignore'),
                      ('tile', '--vertical', 'ignore', '--fill', 'flat'),
                      ('points', '--format', 'csv'), ('mesh', '--format', 'ply'), ('mesh', '--format', 'ply', '--max-error', 5),
