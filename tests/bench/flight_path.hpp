@@ -33,7 +33,7 @@ class Flight {
                       static_cast<double>(store.points()));
     radius_ = 0.22 * side;
     const double ground = view.in_view_frame({0, 0, store.mean_height()})[2];
-    // The visible width is proportional to the size of the store.
+    // The visible ground has about as many cells as points are wanted, whatever the store's size.
     const double seen = std::sqrt(points_) * cell_;
     above_ = 0.3 * seen;
     height_ = kind == Kind::perspective ? ground + above_ : box.max[2] + 1.0;

@@ -70,7 +70,7 @@ class Orbit {
       side += (high[k] - low[k]) / 3.0;
       middle_[k] = (high[k] + low[k]) / 2.0;
     }
-    // The visible width is proportional to the size of the body.
+    // The visible area has about active() points of the body, whatever its size.
     const double area = std::numbers::pi * side * side;
     above_ =
         0.3 * std::sqrt(area * static_cast<double>(active()) / static_cast<double>(store.points()));

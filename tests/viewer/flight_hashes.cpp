@@ -34,8 +34,8 @@ int fly(const stream::Store& store, std::size_t max_points) {
   box.include(view.in_view_frame(store.bounds().max));
   const double size =
       std::sqrt(std::pow(box.max[0] - box.min[0], 2) + std::pow(box.max[1] - box.min[1], 2));
-  // Offset from the centre and height above the highest point as fractions of the size, direction of
-  // view, pixels of error.
+  // Offset from the centre and height above the highest point as fractions of the size, direction
+  // of view, pixels of error.
   struct Stop {
     double east, north, above;
     tri::Point3 direction;
