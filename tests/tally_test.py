@@ -86,7 +86,7 @@ class TallyTest(unittest.TestCase):
         lacks_data = '[       OK ] A.B (0 ms)\n../a.cpp:1: Skipped\nTERRACE_DATA is not set\n\n' \
                      '[  SKIPPED ] A.C (0 ms)\n'
         self.assertEqual(tally(('OK', lacks_data), required=True)[0], 0)
-        sanitized = lacks_data.replace('TERRACE_DATA is not set', "the sanitizer's memory is no input's")
+        sanitized = lacks_data.replace('TERRACE_DATA is not set', "the sanitizer's memory is not an input's")
         self.assertEqual(tally(('OK', sanitized), required=True)[0], 0)
 
 

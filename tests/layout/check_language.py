@@ -15,9 +15,8 @@ import sys
 import tokenize
 
 # Rooms whose prose is finished; the others are checked only when named.
-FINISHED = ['libbase', 'libmatching', 'libcluster', 'libtri', 'libstream', 'libterrain/include', 'libterrain/src', 'libterrain/tests',
-            'libterrain/examples', 'libterrain/fuzz', 'libterrain/README.md', 'tests/layout', 'ARCHITECTURE.md', 'CONTRIBUTING.md', 'CHANGELOG.md',
-            'SECURITY.md']
+FINISHED = ['libbase', 'libstream', 'libcluster', 'libmatching', 'libtri', 'libterrain', 'tools', 'tests', 'cmake', 'docs', '.ci/run', 'dev',
+            'meson.build', 'meson_options.txt', 'README.md', 'ARCHITECTURE.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md']
 
 # What to avoid and what to write instead. Verbs and nouns that have correct uses are narrowed by what follows.
 PATTERNS = [
@@ -31,7 +30,7 @@ PATTERNS = [
     (r'\bso (?:many|much)\b(?!(?:\W+\w+){0,9}?\W+(?:that|as)\b)', 'that many, N'),
     (r'\b(?:tells|is told|are told|was told|be told|told by)\b', 'reports, is given by, determined from'),
     (r'\banew\b', 'again, re-...'),
-    (r'\bbehind\b', 'after'),
+    (r'(?<!nothing )\bbehind\b', 'after'),
     (r'\bbut for\b', 'except for'),
     (r'\b(?:fit|fits|fitting) to\b', 'match'),
     (r'\bgo(?:es)? before\b', 'overrides, takes precedence over'),
@@ -49,7 +48,7 @@ PATTERNS = [
     (r'\bas good as\b(?! (?:with|if|the|those|that|any|in|when)\b)', 'nearly, almost'),
     (r'\b(?:of no use|is of use|are of use)\b', 'is not useful, helps'),
     (r'\b(?:come|comes|came) out of\b', 'is the result of, is thrown by'),
-    (r'\bno (?:\w+ )?that (?:is|are) (?:none|no)\b|(?<!there )\b(?:is|are) none\b', 'is not one, there is none'),
+    (r'\bno (?:\w+ )?that (?:is|are) (?:none|no)\b|(?<!there )\b(?:is|are) (?-i:none)\b', 'is not one, there is none'),
     (r'\bones? of (?:one|two|three) kinds?\b|\bsuch as are\b', 'name the kinds'),
 ]
 COMPILED = [(re.compile(pattern, re.IGNORECASE if not pattern.startswith('^Lets') else 0), advice)
