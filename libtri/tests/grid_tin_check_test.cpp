@@ -145,11 +145,12 @@ TEST(GridTinCheck, AgreesWithBruteForce) {
 template <class T>
 void expect_same_on_every_processor(const GridWindow<T>& window, const Tangle& any) {
   for (const double tolerance : {0.0, 0.3}) {
-    const GridTinCheck expected = tin::check_grid_tin_by(window, any.points, any.triangles,
-                                                         tolerance, base::SimdPath::portable);
+    const GridTinCheck expected = tin::check_grid_tin_by(
+        window, any.points, any.triangles, tolerance, terrace::base::SimdPath::portable);
     EXPECT_GT(expected.covered, 0U);
-    for (const base::SimdPath set : {base::SimdPath::avx2, base::SimdPath::avx512}) {
-      if (!base::supports(set)) continue;
+    for (const terrace::base::SimdPath set :
+         {terrace::base::SimdPath::avx2, terrace::base::SimdPath::avx512}) {
+      if (!terrace::base::supports(set)) continue;
       const GridTinCheck check =
           tin::check_grid_tin_by(window, any.points, any.triangles, tolerance, set);
       EXPECT_EQ(check.max_error, expected.max_error);
@@ -188,11 +189,13 @@ TEST(GridTinCheck, RejectsInvalidArguments) {
 
 // The tests of all instruction sets skip those that the machine lacks; this test reports it.
 TEST(InstructionSets, Avx2IsTested) {
-  if (!base::supports(base::SimdPath::avx2)) GTEST_SKIP() << "the processor lacks AVX2";
+  if (!terrace::base::supports(terrace::base::SimdPath::avx2))
+    GTEST_SKIP() << "the processor lacks AVX2";
 }
 
 TEST(InstructionSets, Avx512IsTested) {
-  if (!base::supports(base::SimdPath::avx512)) GTEST_SKIP() << "the processor lacks AVX-512";
+  if (!terrace::base::supports(terrace::base::SimdPath::avx512))
+    GTEST_SKIP() << "the processor lacks AVX-512";
 }
 
 }  // namespace

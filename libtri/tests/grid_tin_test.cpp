@@ -98,9 +98,10 @@ TEST(GridTin, SameBytesOnEveryProcessor) {
         const auto all_paths = [&](const auto& any) {
           const GridSides sides = settle_sides(any.window(), options.max_error);
           const GridTin expected =
-              tin::make_grid_tin(any.window(), sides, options, base::SimdPath::portable);
-          for (const base::SimdPath set : {base::SimdPath::avx2, base::SimdPath::avx512}) {
-            if (!base::supports(set)) continue;
+              tin::make_grid_tin(any.window(), sides, options, terrace::base::SimdPath::portable);
+          for (const terrace::base::SimdPath set :
+               {terrace::base::SimdPath::avx2, terrace::base::SimdPath::avx512}) {
+            if (!terrace::base::supports(set)) continue;
             const GridTin found = tin::make_grid_tin(any.window(), sides, options, set);
             EXPECT_EQ(found.vertices, expected.vertices);
             EXPECT_EQ(found.triangles, expected.triangles);
