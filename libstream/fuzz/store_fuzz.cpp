@@ -24,24 +24,23 @@ void require(bool condition) {
   if (!condition) std::abort();
 }
 
-StoreSchema schema_for(bool grid, int version) {
+StoreSchema schema_for(bool grid) {
   StoreSchema schema;
   schema.grid = grid;
-  std::vector<ScalarType> types{ScalarType::u8, ScalarType::f32, ScalarType::f64};
   // A column of kind "beside" needs a preceding column of integers.
-  if (version > 1) types.insert(types.begin(), {ScalarType::u64, ScalarType::i16});
-  for (const ScalarType type : types) {
+  for (const ScalarType type :
+       {ScalarType::u64, ScalarType::i16, ScalarType::u8, ScalarType::f32, ScalarType::f64}) {
     schema.attributes.push_back({std::string(name_of(type)), type, 1.0, 0.0, {}});
   }
   return schema;
 }
 
 /// Returns tables in which every symbol is likely, so that input reaches far into the decoder. All
-/// levels have the same contexts.
-Tables even_tables(const Layout& layout, ColumnKind kind) {
+/// levels have the same contexts. The first attribute may be the guide.
+Tables even_tables(const Layout& layout, ColumnKind kind, bool guided) {
   Tables tables;
-  if (layout.version > 2) tables.guide.attribute = 0;
-  for (unsigned c = 0; layout.version > 1 && c < layout.columns(); ++c) {
+  if (guided) tables.guide.attribute = 0;
+  for (unsigned c = 0; c < layout.columns(); ++c) {
     const bool possible = c == tables.guide.attribute
                               ? kind == ColumnKind::recent
                               : along_line(kind) != ColumnKind::beside || layout.may_lie_beside(c);
@@ -53,18 +52,15 @@ Tables even_tables(const Layout& layout, ColumnKind kind) {
   return tables;
 }
 
-const DecodingTables& tables_of(int version, ColumnKind kind) {
-  static std::map<std::pair<int, ColumnKind>, DecodingTables> made;
-  return made
-      .try_emplace({version, kind},
-                   even_tables(Layout(schema_for(false, version), 0, version), kind))
+const DecodingTables& tables_of(ColumnKind kind, bool guided) {
+  static std::map<std::pair<ColumnKind, bool>, DecodingTables> made;
+  return made.try_emplace({kind, guided}, even_tables(Layout(schema_for(false), 0), kind, guided))
       .first->second;
 }
 
-void decode_cluster(ByteReader in, bool grid, unsigned level, int version = 1,
-                    ColumnKind kind = ColumnKind::plain) {
-  const Layout layout(schema_for(grid, version), level, version);
-  const DecodingTables& tables = tables_of(version, kind);
+void decode_cluster(ByteReader in, bool grid, unsigned level, ColumnKind kind, bool guided) {
+  const Layout layout(schema_for(grid), level);
+  const DecodingTables& tables = tables_of(kind, guided);
   Entry entry;
   entry.points = in.get<std::uint16_t>() % 4096u;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -87,49 +83,45 @@ void decode_cluster(ByteReader in, bool grid, unsigned level, int version = 1,
   require(points.children.size() == points.size() * level);
 }
 
-void decode_page(ByteReader in, int version, bool grid = false) {
-  const Layout layout(schema_for(grid, version), 0, version);
+void decode_page(ByteReader in, bool grid) {
+  const Layout layout(schema_for(grid), 0);
+  const DecodingTables& tables = tables_of(ColumnKind::plain, false);
   const auto clusters =
       static_cast<std::uint32_t>(1 + in.get<std::uint8_t>() % layout.page_clusters());
   const ByteView rest = in.take(in.left());
   Bytes bytes(rest.begin(), rest.end());
   // Sets the checksum, which a fuzzer cannot guess, to test the parser after it.
-  if (version < 5) {
-    put(bytes, crc32(bytes));
-  } else {
-    put(bytes, crc16(bytes));
-  }
-  const IndexPage page(bytes, clusters, layout, &tables_of(version, ColumnKind::plain));
-  const RangeColumns ranges = page.ranges(layout, &tables_of(version, ColumnKind::plain));
+  put(bytes, crc16(bytes));
+  const IndexPage page(bytes, clusters, layout, tables);
+  const RangeColumns ranges = page.ranges(layout, tables);
   std::vector<Entry> entries;
   for (std::uint32_t i = 0; i < clusters; ++i) entries.push_back(page.entry(i));
   static_cast<void>(page.end(clusters - 1));
-  if (version < 5) return;
   // They are the same after rewriting.
   Bytes again;
   PageContent{page.offset(0), PageColumns(entries), ranges}.write(
-      layout, EncodingTables(even_tables(layout, ColumnKind::plain)), again);
-  const IndexPage second(again, clusters, layout, &tables_of(version, ColumnKind::plain));
-  const RangeColumns after = second.ranges(layout, &tables_of(version, ColumnKind::plain));
+      layout, EncodingTables(even_tables(layout, ColumnKind::plain, false)), again);
+  const IndexPage second(again, clusters, layout, tables);
+  const RangeColumns after = second.ranges(layout, tables);
   for (std::uint32_t i = 0; i < clusters; ++i) {
     const Entry entry = second.entry(i);
     require(second.offset(i) == page.offset(i) && entry.points == entries[i].points);
     require(entry.forms == entries[i].forms && entry.low == entries[i].low);
     require(entry.size == entries[i].size && entry.error == entries[i].error);
     require(entry.descendants == entries[i].descendants && entry.checksum == entries[i].checksum);
-    for (std::size_t a = 0; a < layout.ranges(); ++a) {
+    for (std::size_t a = 0; a < layout.attributes.size(); ++a) {
       require(after.range(i, a).low == ranges.range(i, a).low);
       require(after.range(i, a).high == ranges.range(i, a).high);
     }
   }
 }
 
-void read_tables(ByteReader in, int version) {
-  const Layout layout(schema_for(true, version), 0, version);
+void read_tables(ByteReader in) {
+  const Layout layout(schema_for(true), 0);
   const Tables tables = Tables::read(in.take(in.left()), layout);
   const DecodingTables decoding(tables);
   Bytes again;
-  tables.write(again, version);
+  tables.write(again);
   const Tables second = Tables::read(again, layout);
   require(second.guide.attribute == tables.guide.attribute);
   require(second.kinds == tables.kinds);
@@ -152,72 +144,45 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size < 1) return 0;
   try {
     const ByteReader rest({data + 1, size - 1});
-    switch (data[0] % 23) {
+    switch (data[0] % 14) {
       case 0:
-        decode_cluster(rest, true, 0);
+        decode_cluster(rest, true, 0, ColumnKind::plain, false);
         break;
       case 1:
-        decode_cluster(rest, false, 0);
+        decode_cluster(rest, true, 2, ColumnKind::recent, false);
         break;
       case 2:
-        decode_cluster(rest, true, 2);
+        decode_cluster(rest, false, 0, ColumnKind::plain, false);
         break;
       case 3:
-        decode_page(rest, 1);
+        decode_cluster(rest, false, 1, ColumnKind::recent, false);
         break;
       case 4:
-        read_tables(rest, 1);
+        decode_cluster(rest, false, 0, ColumnKind::beside, false);
         break;
       case 6:
-        decode_cluster(rest, false, 0, 2, ColumnKind::plain);
+        decode_cluster(rest, false, 0, ColumnKind::plain, true);
         break;
       case 7:
-        decode_cluster(rest, false, 1, 2, ColumnKind::recent);
+        decode_cluster(rest, false, 0, ColumnKind::line_recent, true);
         break;
       case 8:
-        decode_cluster(rest, false, 0, 2, ColumnKind::beside);
+        decode_cluster(rest, false, 1, ColumnKind::line_beside, true);
         break;
       case 9:
-        decode_page(rest, 2);
+        decode_cluster(rest, false, 0, ColumnKind::line_trend, true);
         break;
       case 10:
-        read_tables(rest, 2);
+        decode_cluster(rest, false, 0, ColumnKind::line_median, true);
         break;
       case 11:
-        decode_cluster(rest, false, 0, 3, ColumnKind::plain);
+        decode_page(rest, /*grid=*/false);
         break;
       case 12:
-        decode_cluster(rest, false, 0, 3, ColumnKind::line_recent);
+        decode_page(rest, /*grid=*/true);
         break;
       case 13:
-        decode_cluster(rest, false, 1, 3, ColumnKind::line_beside);
-        break;
-      case 14:
-        decode_cluster(rest, false, 0, 3, ColumnKind::line_trend);
-        break;
-      case 15:
-        decode_cluster(rest, false, 0, 3, ColumnKind::line_median);
-        break;
-      case 16:
-        read_tables(rest, 3);
-        break;
-      case 17:
-        decode_cluster(rest, true, 0, 5);
-        break;
-      case 18:
-        decode_cluster(rest, true, 1, 5, ColumnKind::recent);
-        break;
-      case 19:
-        decode_cluster(rest, false, 0, 5, ColumnKind::line_recent);
-        break;
-      case 20:
-        decode_page(rest, 5);
-        break;
-      case 21:
-        read_tables(rest, 5);
-        break;
-      case 22:
-        decode_page(rest, 5, /*grid=*/true);
+        read_tables(rest);
         break;
       default: {
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);

@@ -100,13 +100,10 @@ class Bytes:
 
 
 class Tables:
-    def __init__(self, data, schema, version):
-        columns = len(schema) + (3 if version > 1 else 0)
-        self.version = version
-        self.per_column = 18 if version > 2 else 10
-        contexts = self.border = 148 + self.per_column * columns
-        if version > 4:
-            contexts += 50 + 96 + 1 + 2 * len(schema)
+    def __init__(self, data, schema):
+        columns = len(schema) + 3
+        self.border = 148 + 18 * columns
+        contexts = self.border + 50 + 96 + 1 + 2 * len(schema)
         source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
         given = source.number(8)
         self.coefficients = {}
@@ -119,11 +116,11 @@ class Tables:
                 self.coefficients[pattern] = {0: 256, 1: 256, 2: -256}
             elif pattern:
                 self.coefficients[pattern] = {neighbours[0]: 256}
-        self.guide = source.varint() - 1 if version > 2 else -1
+        self.guide = source.varint() - 1
         require(self.guide < len(schema), "guide")
-        self.kinds = [source.number(1) for _ in range(columns)] if version > 1 else None
+        self.kinds = [source.number(1) for _ in range(columns)]
         integers = [not channel['type'].startswith('float') for channel in schema]
-        for k, kind in enumerate(self.kinds or []):
+        for k, kind in enumerate(self.kinds):
             possible = (10 if k != self.guide else 2) if self.guide >= 0 else 3
             beside = 0 < k < len(schema) and integers[k] and integers[k - 1]
             require(kind < possible and (kind % 5 != 2 or beside), "kind")
@@ -131,7 +128,7 @@ class Tables:
         while len(self.symbols) < contexts:
             slots, symbol = [], 0
             used = source.varint()
-            if used == 0 and version > 4:
+            if used == 0:
                 self.symbols += [[(ESCAPE, 0, 2048)] * 2048] * (1 + source.varint())
                 continue
             for _ in range(used):
@@ -149,7 +146,7 @@ class Symbols:
     """Reads symbols and raw bits from the two ends of a cluster's bytes."""
 
     def __init__(self, data, tables):
-        require(len(data) >= (4 if tables.version < 5 else 1), "too few bytes")
+        require(len(data) >= 1, "too few bytes")
         self.data, self.tables = data, tables
         self.front = min(4, len(data))
         self.state = int.from_bytes(data[:self.front], "little")
@@ -166,7 +163,7 @@ class Symbols:
     def symbol(self, context):
         symbol, start, frequency = self.tables.symbols[context][self.state % 2048]
         self.state = frequency * (self.state // 2048) + self.state % 2048 - start
-        if self.state < 65536 and (self.tables.version < 5 or self.front < len(self.data)):
+        if self.state < 65536 and self.front < len(self.data):
             self.state = self.state * 65536 + struct.unpack_from("<H", self.data, self.front)[0]
             self.front += 2
         return self.raw(8) if symbol == ESCAPE else symbol
@@ -188,7 +185,7 @@ class Symbols:
     def end(self):
         rest = self.left - 8 * self.front
         require(0 <= rest < 8 and self.bits >> 8 * self.front & ((1 << rest) - 1) == 0, "the two ends do not meet")
-        if self.tables.version > 4 and self.left == 8 * len(self.data):
+        if self.left == 8 * len(self.data):
             require(self.state < 65536, "rANS state")
             return self.state
         require(65536 <= self.state < 131072, "rANS state")
@@ -222,7 +219,7 @@ def rows(source, size, points):
             elif begin is None:
                 first = source.number(9)[0]
                 at = first + 1 + source.number(15)[0]
-            elif source.tables.version > 4:
+            else:
                 steps[0] = outwards(steps[0], row, begin)
                 first = begin - steps[0]
                 if row == size[1] - 1 and count == 1:
@@ -230,10 +227,6 @@ def rows(source, size, points):
                 else:
                     steps[1] = outwards(steps[1], row, size[0] - end)
                     at = end + steps[1]
-            else:
-                steps[0] = unzigzag(source.number(6 + clamp(steps[0], -2, 2))[0])
-                steps[1] = unzigzag(source.number(12 + clamp(steps[1], -2, 2))[0])
-                first, at = begin + steps[0], end + steps[1]
             if run == 0:
                 begin, end = first, at
             require(0 <= first < at <= size[0], "runs")
@@ -293,16 +286,6 @@ def split(source, low, size, n, out):
         split(source, part_low, part_size, count, out)
 
 
-def attribute(source, context, count, kind):
-    form = source.symbol(context) if kind.startswith("float") else None
-    values, value, c = [], 0, None
-    for _ in range(count):
-        difference, c = source.number(context + 1 if c is None else context + 2 + step_of(c))
-        value = signed(value + unzigzag(difference))
-        values.append(value)
-    return typed(kind, form, values)
-
-
 class Recent:
     """Reads differences that are often one of the most recent ones."""
 
@@ -338,7 +321,7 @@ ALONG, SAME, BEGINS = range(3)
 
 def guide(source, number, count, floating):
     """Returns the number form and the integers of the guide, and the step to each point from the previous one."""
-    c = 148 + source.tables.per_column * number
+    c = 148 + 18 * number
     form, several, value, last, divisor = head(source, c, floating)
     values, steps = [value], [BEGINS]
     recent = Recent(source, c, 7) if source.tables.kinds[number] == 1 else None
@@ -361,8 +344,8 @@ def guide(source, number, count, floating):
 
 
 def column(source, number, count, floating, before, steps=None):
-    """Returns the number form (None except for floats) and the integers of a column from version 2 on. steps: of the guide."""
-    c, kind = 148 + source.tables.per_column * number, source.tables.kinds[number]
+    """Returns the number form (None except for floats) and the integers of a column. steps: of the guide."""
+    c, kind = 148 + 18 * number, source.tables.kinds[number]
     form, several, value, last, divisor = head(source, c, floating)
     values, recent = [value], Recent(source, c, 3)
     line, along = 0, [0, 0, 0]
@@ -430,7 +413,7 @@ class Cluster:
 next), and the position of the representative (None in the root)."""
 
     def __init__(self, data, entry, tables, schema, level, root, grid):
-        small = grid and level == 0 and tables.version > 4
+        small = grid and level == 0
         require((crc8 if small else crc16)(data) == entry["checksum"], "cluster checksum")
         source = Symbols(data, tables)
         count = entry["points"]
@@ -447,8 +430,7 @@ next), and the position of the representative (None in the root)."""
         if form & 1:
             places = []
             split(source, (0, 0, 0), size, count, places)
-        elif not grid or level > 0 and tables.version > 4:
-            require(tables.kinds is not None, "columns in version 1")
+        elif not small:
             guided = follow() if tables.guide >= 0 else None
             distances = [column(source, len(schema) + axis, count, False, None, guided and guided[2])[1] for axis in range(3)]
             places = [tuple(value % WORD for value in place) for place in zip(*distances)]
@@ -459,20 +441,15 @@ next), and the position of the representative (None in the root)."""
         require(all(0 <= p[axis] < size[axis] for p in places for axis in range(3)), "a point outside of its box")
         forms = (entry["forms"] // 484, entry["forms"] // 22 % 22, entry["forms"] % 22)
         self.points = [tuple(real(f, signed(a + k)) for f, a, k in zip(forms, low, p)) for p in places]
-        if tables.kinds is None:
-            self.attributes = [attribute(source, 148 + 10 * a, count, channel["type"]) for a, channel in enumerate(schema)]
-        else:
-            guided = guided or (follow() if tables.guide >= 0 else None)
-            self.attributes = columns(source, count, schema, guided)
+        guided = guided or (follow() if tables.guide >= 0 else None)
+        self.attributes = columns(source, count, schema, guided)
         for (lowest, highest), channel, values in zip(entry["ranges"], schema, self.attributes):
             require(all(lowest <= key(channel["type"], value) <= highest for value in values), "range")
         self.children = [ordinals(source, below == level - 1, count) for below in reversed(range(level))]
         upper = source.raw(16) if count >= 65536 else 0
         place = upper << 16 | source.end()
         require(place < count and (not root or place == 0), "representative")
-        if tables.version > 4:
-            place = count // 2 + unzigzag(place)
-        self.representative = None if root else place
+        self.representative = None if root else count // 2 + unzigzag(place)
 
     def members(self):
         return [k for k in range(len(self.points)) if k != self.representative]
@@ -490,33 +467,20 @@ class Level:
         index, data = files["index"], files["data"]
         directory = Bytes(index[-segment["directory_bytes"]:], "directory checksum")
         clusters = segment["clusters"]
-        version, bounds = manifest["version"], manifest["bounds"]
-        each = 128 if version < 5 else 4 if number > 0 else 16 if grid else 64
+        each = 4 if number > 0 else 16 if grid else 64
         pages = (clusters + each - 1) // each
-        start = len(index) - segment["directory_bytes"]
-        if version > 4:
-            offsets, boxes, at = self.chapters(index, directory, pages, bounds)
-        else:
-            offsets, boxes = [directory.number(8) for _ in range(pages + 1)], None
-            require(offsets[0] == 0 and offsets[-1] == start, "page offsets")
+        offsets, boxes, at = self.chapters(index, directory, pages, manifest["bounds"])
         sets = []
-        for _ in range(directory.varint() if version > 4 else directory.number(4)):
+        for _ in range(directory.varint()):
             first, size = directory.varint(), directory.varint()
-            if version > 4:
-                data_of = Bytes(index[at:at + size + 4], "tables checksum").data
-                at += size + 4
-            else:
-                data_of = directory.take(size)
-            sets.append((first, Tables(data_of, schema, version)))
-        require(version < 5 or at == start, "tables")
+            sets.append((first, Tables(Bytes(index[at:at + size + 4], "tables checksum").data, schema)))
+            at += size + 4
+        require(at == len(index) - segment["directory_bytes"], "tables")
         directory.done()
         for page in range(pages):
             data_of, count = index[offsets[page]:offsets[page + 1]], min(each, clusters - each * page)
-            if version > 4:
-                tables = [tables for first, tables in sets if first <= each * page][-1]
-                self.entries += self.page(data_of, count, tables, len(schema), grid and number == 0)
-            else:
-                self.entries += self.old_page(data_of, count, len(schema) if version > 1 else 0)
+            tables = [tables for first, tables in sets if first <= each * page][-1]
+            self.entries += self.page(data_of, count, tables, len(schema), grid and number == 0)
         self.clusters = []
         for ordinal, entry in enumerate(self.entries):
             tables = [each for first, each in sets if first <= ordinal]
@@ -525,7 +489,7 @@ class Level:
             self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
 
         for ordinal, cluster in enumerate(self.clusters):
-            if version > 4 and cluster:
+            if cluster:
                 for box in boxes[ordinal // each]:
                     require(all(low <= place <= high for point in cluster.points
                                 for place, low, high in zip(point, *box)), "a page's box")
@@ -631,40 +595,13 @@ class Level:
             offset += rows[6][k]
         return entries
 
-    @staticmethod
-    def old_page(data, count, ranges):
-        source = Bytes(data, "page checksum")
-        offset = source.varint()
-        columns = []
-        for column in range(12 + 2 * ranges):
-            base = source.signed_varint() if column in (3, 4, 5) else source.varint()
-            columns.append((base, source.number(1), source.number(1)))
-        bits = source.take((count * sum(width for _, width, _ in columns) + 7) // 8)
-        source.done()
-        bits, rows = int.from_bytes(bits, "little"), [[] for _ in range(count)]
-        for base, width, shift in columns:
-            for row in rows:
-                row.append(base + ((bits & ((1 << width) - 1)) << shift))
-                bits >>= width
-        require(bits == 0, "page padding")
-        entries = []
-        for row in rows:
-            keys = [min(key, WORD - 1) for key in row[12:]]
-            row = [value % WORD for value in row[:12]]
-            entries.append({"offset": offset, "bytes": row[0], "points": row[1], "forms": row[2],
-                            "low": [signed(low) for low in row[3:6]], "size": row[6:9],
-                            "error": struct.unpack("<d", (row[9] << 47).to_bytes(8, "little"))[0],
-                            "descendants": row[10], "checksum": row[11], "ranges": list(zip(keys[::2], keys[1::2]))})
-            offset += row[0]
-        return entries
-
 
 class Store:
     def __init__(self, folder):
         folder = pathlib.Path(folder)
         text = (folder / "manifest.json").read_bytes()
         self.manifest = json.loads(text)
-        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] in (1, 2, 3, 5), "not a store")
+        require(self.manifest["format"] == "terrace-store" and self.manifest["version"] == 1, "not a store")
         self.checksum = self.manifest["checksum"]
         require(text[-12:] == b"%s\"\n}\n" % self.checksum.encode(), "end of the manifest")
         self.checksum = int(self.checksum, 16)

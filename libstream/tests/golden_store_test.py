@@ -34,14 +34,13 @@ class GoldenStoreTest(unittest.TestCase):
     def test_cloud_with_attributes_of_every_type(self):
         self.check_points('cloud')
 
-    def test_version_2(self):
+    def test_raster_with_equal_blocks(self):
+        self.check_points('island')
+
+    def test_columns_of_points(self):
         self.check_points('survey')
 
-    def test_version_3(self):
-        self.check_points('lines')
-
-    def test_version_5(self):
-        self.check_points('island')
+    def test_columns_that_follow_scan_lines(self):
         self.check_points('swath')
 
     def test_store_without_points(self):
@@ -53,7 +52,7 @@ class GoldenStoreTest(unittest.TestCase):
 
     def test_points_head_their_clusters(self):
         """A point of highest level h heads a cluster on every level below, as its representative."""
-        for name in ('grid', 'cloud', 'survey', 'lines', 'island', 'swath', 'int64', 'uint64'):
+        for name in ('grid', 'cloud', 'survey', 'island', 'swath', 'int64', 'uint64'):
             levels = decode_store.Store(STORES / name).levels
             headed = [set() for _ in levels]
             for number, level in enumerate(levels):

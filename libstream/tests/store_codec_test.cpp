@@ -280,7 +280,7 @@ TEST(StoreCodec, RoundTripsIndexPages) {
     for (const ScalarType type : {ScalarType::u8, ScalarType::f32, ScalarType::i64}) {
       if (round % 2 == 0) schema.attributes.push_back({.name = "a", .type = type});
     }
-    const Layout layout(schema, round % 3 == 0 ? 0 : 1, kVersion);
+    const Layout layout(schema, round % 3 == 0 ? 0 : 1);
     Tables tables;
     tables.kinds.assign(layout.columns(), ColumnKind::plain);
     tables.frequencies = some_frequencies(random, layout.contexts());
@@ -309,12 +309,12 @@ TEST(StoreCodec, RoundTripsIndexPages) {
     const std::uint64_t offset = any_number(random, 50);
     PageContent{offset, PageColumns(entries), RangeColumns(ranges, layout.attributes)}.write(
         layout, EncodingTables(tables), bytes);
-    ASSERT_LE(bytes.size(), most_page_bytes(layout.ranges()));
+    ASSERT_LE(bytes.size(), most_page_bytes(layout.attributes.size()));
     const DecodingTables decoding(tables);
     const auto n = static_cast<std::uint32_t>(entries.size());
-    const IndexPage page(bytes, n, layout, &decoding);
+    const IndexPage page(bytes, n, layout, decoding);
     EXPECT_EQ(page.offset(0), offset);
-    const RangeColumns found = page.ranges(layout, &decoding);
+    const RangeColumns found = page.ranges(layout, decoding);
     for (std::uint32_t i = 0; i < n; ++i) {
       const Entry entry = page.entry(i), &wanted = entries[i];
       ASSERT_EQ(entry.bytes, wanted.bytes);
@@ -325,8 +325,8 @@ TEST(StoreCodec, RoundTripsIndexPages) {
       ASSERT_EQ(entry.error, wanted.error);
       ASSERT_EQ(entry.descendants, wanted.descendants);
       ASSERT_EQ(entry.checksum, wanted.checksum);
-      for (std::size_t a = 0; a < layout.ranges(); ++a) {
-        const KeyRange before = ranges[i * layout.ranges() + a], after = found.range(i, a);
+      for (std::size_t a = 0; a < layout.attributes.size(); ++a) {
+        const KeyRange before = ranges[i * layout.attributes.size() + a], after = found.range(i, a);
         ASSERT_LE(after.low, before.low);
         ASSERT_GE(after.high, before.high);
       }
@@ -336,8 +336,8 @@ TEST(StoreCodec, RoundTripsIndexPages) {
       wrong.resize(longer ? wrong.size() + 1 : wrong.size() - 1);
       put(wrong, crc16(wrong));
       try {
-        const IndexPage damaged(wrong, n, layout, &decoding);
-        static_cast<void>(damaged.ranges(layout, &decoding));
+        const IndexPage damaged(wrong, n, layout, decoding);
+        static_cast<void>(damaged.ranges(layout, decoding));
         ++accepted;
       } catch (const Damage&) {
       }

@@ -134,12 +134,21 @@ TEST(StoreDamage, ReportsStoresOfANewerVersion) {
   const auto path = folder.path() / "s";
   write_small(path, 4);
   std::string text = bytes_of(path / "manifest.json");
-  const std::size_t at = text.find("\"version\": ");
+  const std::size_t at = text.find("\"version\": 1");
   ASSERT_NE(at, std::string::npos);
-  write_bytes(path / "manifest.json", text.replace(at, 12, "\"version\": 9"));
+  // Development versions before the first release wrote 2 to 5.
+  for (const char digit : {'2', '5', '9'}) {
+    text[at + 11] = digit;
+    write_bytes(path / "manifest.json", text);
+    const std::string words = error_of([&] { Store::open(path); });
+    EXPECT_TRUE(contains(words, "newer terrace")) << words;
+    EXPECT_TRUE(contains(words, "development version before the first release")) << words;
+    EXPECT_TRUE(contains(words, "update, or rebuild the store from its source")) << words;
+  }
+  text[at + 11] = '0';
+  write_bytes(path / "manifest.json", text);
   const std::string words = error_of([&] { Store::open(path); });
-  EXPECT_TRUE(contains(words, "newer terrace")) << words;
-  EXPECT_TRUE(contains(words, "update")) << words;
+  EXPECT_TRUE(contains(words, "the version is impossible")) << words;
 }
 
 TEST(StoreDamage, RefusesWrongOrdinalsAndLevels) {

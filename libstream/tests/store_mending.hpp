@@ -64,10 +64,9 @@ struct LevelBytes {
   std::string& index;
   std::size_t clusters = 0, directory_bytes = 0;
   store::Layout layout;
-  std::vector<Part> page_parts{}, contents{}, sets{};  ///< before version 5 sets have no checksums
-  std::vector<std::uint64_t> set_firsts{};             ///< the first clusters of the sets
+  std::vector<Part> page_parts{}, contents{}, sets{};
+  std::vector<std::uint64_t> set_firsts{};  ///< the first clusters of the sets
 
-  [[nodiscard]] bool old() const { return layout.version < 5; }
   [[nodiscard]] std::size_t pages() const {
     return (clusters + layout.page_clusters() - 1) / layout.page_clusters();
   }
@@ -86,13 +85,12 @@ struct LevelBytes {
     while (set + 1 < sets.size() && set_firsts[set + 1] <= layout.page_clusters() * page) ++set;
     if (sets.empty()) throw store::Damage("no tables");
     const store::ByteView found = bytes(sets[set]);
-    return store::Tables::read(found.first(found.size() - (old() ? 0 : 4)), layout);
+    return store::Tables::read(found.first(found.size() - 4), layout);
   }
 
   /// Writes the checksum of a page.
   void sign_page(std::size_t page) {
     const Part part = page_parts[page];
-    if (old()) return sign(index, part.begin, part.end);
     const std::uint16_t checksum = store::crc16(bytes({part.begin, part.end - 2}));
     std::memcpy(&index[part.end - 2], &checksum, 2);
   }
@@ -100,7 +98,7 @@ struct LevelBytes {
   void find() {
     try {
       store::ByteReader in(bytes({directory(), index.size()}));
-      old() ? find_old(in) : find_new(in);
+      find_parts(in);
     } catch (const store::Damage&) {
     }
   }
@@ -111,22 +109,7 @@ struct LevelBytes {
       throw store::Damage("not in the file");
     return {static_cast<std::size_t>(begin), static_cast<std::size_t>(begin + bytes)};
   }
-  void find_old(store::ByteReader& in) {
-    auto begin = in.get<std::uint64_t>();
-    for (std::size_t p = 0; p < pages(); ++p) {
-      const auto end = in.get<std::uint64_t>();
-      if (end < begin || end > directory()) throw store::Damage("not in the file");
-      page_parts.push_back(part(begin, end - begin, 4));
-      begin = end;
-    }
-    for (auto left = in.get<std::uint32_t>(); left > 0; --left) {
-      set_firsts.push_back(in.varint());
-      const std::size_t size = store::memory_size(in.varint());
-      sets.push_back(part(directory() + in.offset(), size, 0));
-      in.take(size);
-    }
-  }
-  void find_new(store::ByteReader& in) {
+  void find_parts(store::ByteReader& in) {
     const std::size_t chapters = (pages() + store::kChapterPages - 1) / store::kChapterPages;
     std::uint64_t at = 0;
     std::vector<std::uint64_t> of_contents;
@@ -156,7 +139,7 @@ struct LevelBytes {
   }
 };
 
-/// The parts of an index of the current version, which can be changed and put together again.
+/// The parts of an index, which can be changed and put together again.
 struct IndexParts {
   struct Page {
     std::string bytes, box;
@@ -226,64 +209,29 @@ struct IndexParts {
   }
 };
 
-/// Sets the checksums of an old page. Their column, the twelfth, is 16 bits wide in all stores that
-/// the library wrote.
-inline void mend_old_checksums(LevelBytes& level, std::size_t page, const store::Bytes& checksums) {
-  const std::size_t begin = level.page_parts[page].begin, count = level.clusters_of(page);
-  // Finds where the columns begin, and how many bits precede the checksums.
-  store::ByteReader in(level.bytes(level.page_parts[page]));
-  in.varint();
-  std::size_t bits = 0;
-  std::uint64_t base = 0;
-  std::uint16_t packed = 0;
-  for (unsigned column = 0; column < 12; ++column) {
-    bits += std::size_t{packed} % 256 * count;
-    base = in.varint();
-    packed = in.get<std::uint16_t>();
-  }
-  for (std::size_t end_of_range = 0; end_of_range < 2 * level.layout.ranges(); ++end_of_range) {
-    in.varint();
-    in.get<std::uint16_t>();
-  }
-  if (base != 0 || packed != 16) return;
-  for (std::size_t b = 0; b < 16 * count; ++b) {
-    const std::size_t at = 8 * (begin + in.offset()) + bits + b;
-    const int bit = checksums[b / 8] >> b % 8 & 1;
-    char& byte = level.index[at / 8];
-    byte = static_cast<char>((byte & ~(1 << at % 8)) | (bit != 0 ? 1 << at % 8 : 0));
-  }
-}
-
 inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
   const Part part = level.page_parts[page];
   try {
-    const store::Tables tables = level.old() ? store::Tables() : level.tables_of(page);
+    const store::Tables tables = level.tables_of(page);
     const store::DecodingTables decoding(tables);
     const std::uint32_t clusters = level.clusters_of(page);
-    store::CodedPage coded = store::read_page(level.bytes(part), clusters, level.layout, &decoding);
+    store::CodedPage coded = store::read_page(level.bytes(part), clusters, level.layout, decoding);
     std::uint64_t from = coded.offset;
-    store::Bytes checksums;
     for (std::uint32_t i = 0; i < clusters; ++i) {
       const std::uint64_t size = coded.entries.column(store::PageColumns::kBytes)[i];
       const bool there = from <= level.data.size() && size <= level.data.size() - from;
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
-      const auto checksum =
+      coded.entries.column(store::PageColumns::kChecksum)[i] =
           there ? level.layout.checksum({bytes + from, static_cast<std::size_t>(size)})
                 : std::uint16_t{0};
-      store::put(checksums, checksum);
-      coded.entries.column(store::PageColumns::kChecksum)[i] = checksum;
       from += size;
     }
-    if (level.old()) {
-      mend_old_checksums(level, page, checksums);
-    } else {
-      store::Bytes fresh;
-      store::PageContent{coded.offset, coded.entries,
-                         store::read_ranges(coded.ranges, clusters, level.layout, &decoding)}
-          .write(level.layout, store::EncodingTables(tables), fresh);
-      if (fresh.size() == part.end - part.begin) {
-        std::memcpy(&level.index[part.begin], fresh.data(), fresh.size());
-      }
+    store::Bytes fresh;
+    store::PageContent{coded.offset, coded.entries,
+                       store::read_ranges(coded.ranges, clusters, level.layout, decoding)}
+        .write(level.layout, store::EncodingTables(tables), fresh);
+    if (fresh.size() == part.end - part.begin) {
+      std::memcpy(&level.index[part.begin], fresh.data(), fresh.size());
     }
   } catch (const store::Damage&) {
     return;  // not a page
@@ -297,9 +245,7 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
                            const std::function<void(LevelBytes&, nlohmann::ordered_json&)>& use) {
   if (!manifest.contains("levels") || !manifest["levels"].is_array()) return;
   Schema schema;
-  int version = 0;
   try {
-    version = manifest.at("version").get<int>();
     schema.grid = manifest.at("kind") == "grid";
     for (const auto& channel : manifest.at("attributes")) {
       schema.attributes.emplace_back();
@@ -311,7 +257,7 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
   }
   unsigned number = 0;
   for (auto& level : manifest["levels"]) {
-    const store::Layout layout(schema, number++, version);
+    const store::Layout layout(schema, number++);
     try {
       auto& segment = level.at("segments").at(0);
       const auto data = files.find(segment.at("data").at("file").get<std::string>());
@@ -340,9 +286,7 @@ inline void mend(StoreFiles& files) {
       mend_cluster_checksums(level, page);
     }
     for (const Part& part : level.contents) sign(level.index, part.begin, part.end);
-    for (const Part& part : level.sets) {
-      if (!level.old()) sign(level.index, part.begin, part.end);
-    }
+    for (const Part& part : level.sets) sign(level.index, part.begin, part.end);
     sign(level.index, level.directory(), level.index.size());
     for (const auto& [name, bytes] :
          {std::pair<const char*, const std::string&>{"data", level.data}, {"index", level.index}}) {
@@ -378,13 +322,13 @@ inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
     const store::Tables tables = bytes.tables_of(page);
     const store::DecodingTables decoding(tables);
     const store::IndexPage old(bytes.bytes(bytes.page_parts[page]), bytes.clusters_of(page),
-                               bytes.layout, &decoding);
+                               bytes.layout, decoding);
     std::vector<store::Entry> entries;
     for (std::uint32_t i = 0; i < old.clusters(); ++i) entries.push_back(old.entry(i));
     std::uint64_t offset = old.offset(0);
     edit(entries, offset);
     store::Bytes fresh;
-    store::PageContent{offset, store::PageColumns(entries), old.ranges(bytes.layout, &decoding)}
+    store::PageContent{offset, store::PageColumns(entries), old.ranges(bytes.layout, decoding)}
         .write(bytes.layout, store::EncodingTables(tables), fresh);
     IndexParts parts(bytes);
     parts.pages[page].bytes.assign(fresh.begin(), fresh.end());

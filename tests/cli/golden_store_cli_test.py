@@ -73,7 +73,7 @@ class GoldenStoreTest(unittest.TestCase):
     def test_a_cloud_with_attributes_of_every_type(self):
         self.check('cloud', 3)
 
-    def test_version_2(self):
+    def test_columns_of_points(self):
         self.check('survey', 2)
 
     def test_a_store_without_points(self):

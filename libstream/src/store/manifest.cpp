@@ -258,19 +258,15 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     }
     // Checked before anything that may differ in a newer version.
     const auto version = json.at("version").count();
+    // Development versions before the first release also wrote higher numbers.
     if (version > kVersion) {
       throw Error({.file = file,
                    .where = {},
                    .cause = "store version " + std::to_string(version) +
-                            " was written by a newer terrace; this one reads up to version " +
+                            " was written by a newer terrace, or by a development version before "
+                            "the first release; this one reads version " +
                             std::to_string(kVersion),
-                   .remedy = "update"});
-    }
-    if (version == kDroppedVersion) {
-      throw Error({.file = file,
-                   .where = {},
-                   .cause = "store version " + std::to_string(version) + " was never released",
-                   .remedy = "rebuild the store"});
+                   .remedy = "update, or rebuild the store from its source"});
     }
     if (version < 1) damaged(file, "the version is impossible");
 

@@ -21,6 +21,8 @@ inline constexpr std::size_t kMostAttributes = 4096;
 inline constexpr std::uint64_t kMostStorePoints = std::uint64_t{1} << 48;
 inline constexpr std::uint64_t kMostColumns = std::uint64_t{1} << 31;
 
+/// The version of the format.
+inline constexpr int kVersion = 1;
 inline constexpr std::string_view kFormatName = "terrace-store";
 /// The text ends with this key, eight hexadecimal digits, and the closing below. The checksum is
 /// the CRC-32 of the whole text with zeros for its digits.
@@ -34,7 +36,7 @@ struct FileEntry {
   std::uint32_t checksum = 0;
 };
 
-/// A level as the manifest lists it. Version 1 has one segment per level.
+/// A level as the manifest lists it, with its one segment.
 struct LevelEntry {
   std::uint64_t points = 0, members = 0, clusters = 0;
   FileEntry data, index;
@@ -63,8 +65,8 @@ std::string to_text(const Manifest& manifest);
 /// Reads the text of a manifest. Throws: Error if it is too large or cannot be read.
 std::string read_manifest(const ByteSource& file);
 
-/// Parses a manifest. Throws: Error, naming `file`, if the text is not a manifest of this version
-/// or an earlier one, or was modified.
+/// Parses a manifest. Throws: Error, naming `file`, if the text is not a manifest of this
+/// version, or was modified.
 Manifest parse_manifest(const std::string& text, const std::string& file);
 
 /// Whether `text`, the source of `manifest`, has exactly the keys of the format, in the format's

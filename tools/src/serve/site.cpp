@@ -167,12 +167,10 @@ std::optional<std::vector<int>> classes_of(const stream::Store& store) {
   for (const stream::LevelInfo& level : store.levels()) {
     for (std::uint64_t i = 0; i < level.clusters; ++i) {
       const stream::ClusterId id = stream::cluster_id(level.level, i);
-      if (const auto ranges = store.attribute_ranges(id); !ranges.empty()) {
-        const auto first = seen.begin() + class_in(ranges[number].low);
-        const auto end = seen.begin() + class_in(ranges[number].high) + 1;
-        if (!ranges[number].nan && first < end && std::all_of(first, end, std::identity()))
-          continue;
-      }
+      const stream::ValueRange range = store.attribute_ranges(id)[number];
+      const auto first = seen.begin() + class_in(range.low);
+      const auto end = seen.begin() + class_in(range.high) + 1;
+      if (!range.nan && first < end && std::all_of(first, end, std::identity())) continue;
       store.read(id, points);
       for (std::size_t at = offset; at < points.payload.size(); at += bytes) {
         seen[class_in(stream::to_double(type, points.payload.data() + at))] = true;

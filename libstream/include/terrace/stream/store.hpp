@@ -217,6 +217,7 @@ class Store {
   [[nodiscard]] bool may_match(ClusterId id) const;
 
   [[nodiscard]] const StoreSchema& schema() const;
+  /// The version of the format.
   [[nodiscard]] int version() const;
   [[nodiscard]] const std::filesystem::path& path() const;
   [[nodiscard]] unsigned top() const;
@@ -239,15 +240,14 @@ class Store {
   [[nodiscard]] ClusterRecord record(ClusterId id) const;
   /// A box that contains all points of the cluster, those below it, and those of its neighbours in
   /// the index. A query that does not intersect it can skip the cluster without calling record().
-  /// Reads a few bytes per 8192 clusters, once. In stores before version 5 it is the store's
-  /// bounding box. Requires that the cluster exists. Throws: Error.
+  /// Reads a few bytes per 64 pages of the index, once. Requires that the cluster exists. Throws:
+  /// Error.
   [[nodiscard]] Box3 page_box(ClusterId id) const;
   /// Like page_box(), but does not read, so it may be larger. Requires that the cluster exists.
   [[nodiscard]] Box3 coarse_box(ClusterId id) const;
   /// The range of each attribute's values over the cluster's points, including the representative,
   /// from the index. It may be wider than that by a 32nd of the range over the neighbouring
-  /// clusters. Empty if the store has no ranges (version 1). Throws: Error for a damaged page or an
-  /// ordinal that does not exist.
+  /// clusters. Throws: Error for a damaged page or an ordinal that does not exist.
   [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
   /// Decodes a cluster. Throws: Error for damage (checksum, counts); never returns a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;

@@ -49,25 +49,6 @@ TERRACE_STORE_INLINE unsigned code_difference(Coder& coder, unsigned context, st
   return number_class;
 }
 
-/// Codes one attribute of a store of version 1. `form` is coded only for floating-point types.
-template <class Coder>
-void code_old_column(Coder& coder, unsigned attribute, bool floating, NumberForm& form,
-                     std::int64_t* values, std::uint32_t n) {
-  const unsigned first = context::kAttribute + context::kPerAttributeBefore3 * attribute;
-  if (floating) {
-    unsigned symbol = form;
-    code_symbol(coder, first, symbol);
-    if (symbol >= kNumberForms) throw Damage("an attribute has an unknown number form");
-    form = static_cast<NumberForm>(symbol);
-  }
-  std::int64_t previous = 0;
-  unsigned context = first + 1;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    context = first + 2 + difference_step(code_difference(coder, context, previous, values[i]));
-    previous = values[i];
-  }
-}
-
 /// The most recent differences, latest first. The intervals between a scanner's pulses have few
 /// different lengths.
 template <unsigned kSize>

@@ -46,7 +46,7 @@ class GridCodec {
   [[nodiscard]] std::uint32_t point(std::size_t i) const { return points_[cells_[i]]; }
 
   /// Codes the cells by rows and columns. Decoding fills x and y with n cells. borders: the first
-  /// context of borders from version 5 on; 0 before.
+  /// context of borders.
   template <class Coder>
   void positions(Coder& shared, unsigned borders, std::uint32_t width, std::uint32_t height,
                  std::uint32_t n, std::uint64_t* x, std::uint64_t* y) {
@@ -78,7 +78,7 @@ class GridCodec {
             right.begin(coder, begin + 1, end);
           } else {
             left.move(coder, lower_half, begin);
-            if (borders == 0 || row + 1 < height || runs > 1) {
+            if (row + 1 < height || runs > 1) {
               right.move(coder, lower_half, end);
             } else if constexpr (Coder::kDecoding) {
               end = begin + (n - found);  // all remaining cells
@@ -195,34 +195,28 @@ class GridCodec {
     template <class Coder>
     void begin(Coder& coder, std::uint64_t lowest, std::uint64_t& value) {
       std::uint64_t number = value - lowest;
-      code_number(coder, kFirstContext + 5, number);
+      code_number(coder, kRight ? context::kRunEnd : context::kRunStart, number);
       if (number > UINT32_MAX) throw Damage("a run is outside its cluster");
       value = lowest + number;
       at_ = static_cast<std::int64_t>(value);
     }
     template <class Coder>
     TERRACE_STORE_INLINE void move(Coder& coder, bool lower_half, std::uint64_t& value) {
-      unsigned place = kFirstContext + last_;
-      const bool outwards = kRight || borders_ == 0;  // before version 5 steps go to the right
-      if (borders_ > 0) {
-        const std::int64_t room = kRight ? width_ - at_ : at_;
-        place = borders_ + (lower_half ? context::kBorders / 2 : 0) +
-                last_ * context::kBorderRooms +
-                static_cast<unsigned>(std::min<std::int64_t>(room, context::kBorderRooms - 1));
-      }
+      const std::int64_t room = kRight ? width_ - at_ : at_;
+      const unsigned place =
+          borders_ + (lower_half ? context::kBorders / 2 : 0) + last_ * context::kBorderRooms +
+          static_cast<unsigned>(std::min<std::int64_t>(room, context::kBorderRooms - 1));
       const std::int64_t moved = static_cast<std::int64_t>(value) - at_;
-      std::uint64_t number = zigzag(outwards ? moved : -moved);
+      std::uint64_t number = zigzag(kRight ? moved : -moved);
       code_number(coder, place, number);
       if (number > 2ull * UINT32_MAX) throw Damage("a run is outside its cluster");
       const std::int64_t step = unzigzag(number);
-      at_ += outwards ? step : -step;
+      at_ += kRight ? step : -step;
       last_ = static_cast<unsigned>(std::clamp<std::int64_t>(step, -2, 2) + 2);
       value = static_cast<std::uint64_t>(at_);
     }
 
    private:
-    static constexpr unsigned kFirstContext = kRight ? context::kRunEnd : context::kRunStart;
-
     unsigned borders_, last_ = 2;  ///< last_: the previous step + 2, 0 to 4
     std::uint32_t width_;
     std::int64_t at_ = 0;

@@ -23,29 +23,21 @@ inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
 /// Limit of the coded bytes of a cluster; the limits above keep valid clusters far below it.
 inline constexpr std::uint32_t kMostBytes = 1u << 31;
 
-/// The version that is written. Stores of earlier versions can be read, except for one that was
-/// never released.
-inline constexpr int kVersion = 5, kDroppedVersion = 4;
-
 /// Maximum clusters per page of the index. Every page of a level but the last has the same number,
 /// so page numbers follow from ordinals.
-inline constexpr std::uint32_t kMostPageClusters = 128;
+inline constexpr std::uint32_t kMostPageClusters = 64;
 inline constexpr std::uint64_t kLeastPageBytes = 4;
 
 /// The common properties of the clusters of one level.
 struct Layout {
-  int version = kVersion;
   bool grid = false;
   unsigned level = 0;
   std::vector<ScalarType> attributes;
   std::vector<std::size_t> offsets;  ///< of the attributes in the payload of a point
   std::size_t payload_size = 0;
 
-  Layout(const Schema& schema, unsigned of_level, int of_version)
-      : version(of_version),
-        grid(schema.grid),
-        level(of_level),
-        payload_size(schema.payload_size()) {
+  Layout(const Schema& schema, unsigned of_level)
+      : grid(schema.grid), level(of_level), payload_size(schema.payload_size()) {
     std::size_t offset = 0;
     for (const Channel& channel : schema.attributes) {
       attributes.push_back(channel.type);
@@ -59,22 +51,17 @@ struct Layout {
     const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
     return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);
   }
-  /// Number of columns: the attributes and, from version 2 on, the three axes.
-  [[nodiscard]] unsigned columns() const {
-    return static_cast<unsigned>(attributes.size()) + (version > 1 ? 3 : 0);
-  }
-  /// Number of attributes whose ranges the index has.
-  [[nodiscard]] std::size_t ranges() const { return version > 1 ? attributes.size() : 0; }
+  /// Number of columns: the attributes and the three axes.
+  [[nodiscard]] unsigned columns() const { return static_cast<unsigned>(attributes.size()) + 3; }
   /// Clusters per page. Few enough that reading the unneeded entries of a page is cheap: entries
   /// above level 0 cover larger areas, and entries of rasters are large compared with their
   /// clusters.
   [[nodiscard]] std::uint64_t page_clusters() const {
-    if (version < 5) return kMostPageClusters;
-    return level > 0 ? 4 : grid ? 16 : 64;
+    return level > 0 ? 4 : grid ? 16 : kMostPageClusters;
   }
   /// Whether clusters are small and many, as on level 0 of rasters. They may then share bytes, and
   /// have short checksums.
-  [[nodiscard]] bool small() const { return version > 4 && grid && level == 0; }
+  [[nodiscard]] bool small() const { return grid && level == 0; }
   [[nodiscard]] unsigned checksum_bits() const { return small() ? 8 : 16; }
   /// Returns the checksum that the index has for the bytes of a cluster.
   [[nodiscard]] std::uint16_t checksum(ByteView bytes) const {
@@ -82,19 +69,16 @@ struct Layout {
   }
   [[nodiscard]] unsigned contexts() const {
     const auto ends = 2 * static_cast<unsigned>(attributes.size());
-    return version > 4 ? index_context() + context::kIndexRange + ends : border_context();
+    return index_context() + context::kIndexRange + ends;
   }
-  /// The first contexts of borders and of the index, both from version 5 on.
+  /// The first contexts of borders and of the index.
   [[nodiscard]] unsigned border_context() const { return first_context(columns()); }
   [[nodiscard]] unsigned index_context() const { return border_context() + context::kBorders; }
   /// Whether points that are not split are coded as columns instead of rows of a raster.
-  [[nodiscard]] bool has_point_columns() const {
-    return grid ? version > 4 && level > 0 : version > 1;
-  }
+  [[nodiscard]] bool has_point_columns() const { return !grid || level > 0; }
   /// The first context of a column.
   [[nodiscard]] unsigned first_context(unsigned column) const {
-    return context::kAttribute +
-           column * (version > 2 ? context::kPerAttribute : context::kPerAttributeBefore3);
+    return context::kAttribute + column * context::kPerAttribute;
   }
   /// Whether the column may be coded beside the preceding one, which requires that both are
   /// attributes of integers.

@@ -60,7 +60,7 @@ enum class ColumnKind : std::uint8_t {
   line_median
 };
 inline constexpr unsigned kColumnKinds = 10;
-/// Number of kinds before version 3.
+/// Number of kinds without a guide, the first ones.
 inline constexpr unsigned kUnguidedKinds = 3;
 /// Returns the kind with which differences along a line are coded.
 constexpr ColumnKind along_line(ColumnKind kind) {
@@ -70,11 +70,10 @@ constexpr bool from_line(ColumnKind kind) { return kind >= ColumnKind::line; }
 
 /// Contexts, each with its own table of frequencies. Attribute contexts follow the fixed ones.
 namespace context {
-inline constexpr unsigned kForm = 0;      ///< grid or k-d, own box or not
-inline constexpr unsigned kRunCount = 1;  ///< by the runs of the row above: 0, 1, more
-inline constexpr unsigned kRunStart = 4;  ///< by the last step, -2 to 2; then the first row
-/// Likewise; from version 5 on only the first row of both borders is used.
-inline constexpr unsigned kRunEnd = 10;
+inline constexpr unsigned kForm = 0;        ///< grid or k-d, own box or not
+inline constexpr unsigned kRunCount = 1;    ///< by the runs of the row above: 0, 1, more
+inline constexpr unsigned kRunStart = 9;    ///< in the first row that has cells; 4 to 8 are unused
+inline constexpr unsigned kRunEnd = 15;     ///< likewise; 10 to 14 are unused
 inline constexpr unsigned kRunGap = 16;     ///< of second and further runs
 inline constexpr unsigned kRunLength = 17;  ///< likewise
 inline constexpr unsigned kInset = 18;      ///< six: low and high side per axis
@@ -86,15 +85,14 @@ inline constexpr unsigned kHeight = kSplitWide + 24;
 inline constexpr unsigned kHeightSteps = 32;
 inline constexpr unsigned kAttribute = kHeight + 2 * kHeightSteps;
 /// Contexts of an attribute: its head (number form, several values or one), its first value, and
-/// eight by magnitude, or for ColumnKind::recent four by position and four by magnitude. From
-/// version 3 on, four more for differences between lines and four for points of one pulse, of which
-/// the guide uses three for its steps.
+/// eight by magnitude, or for ColumnKind::recent four by position and four by magnitude; then four
+/// for differences between lines and four for points of one pulse, of which the guide uses three
+/// for its steps.
 inline constexpr unsigned kPerAttribute = 18;
-inline constexpr unsigned kPerAttributeBefore3 = 10;
 inline constexpr unsigned kBetweenLines = 10;
 inline constexpr unsigned kWithinPulse = 14;
 
-// From version 5 on, after those of the attributes:
+// After those of the attributes:
 /// Steps of either border of a raster's cluster, by the half of its rows, the last step (-2 to 2)
 /// and the columns left to the side of the box (0 to 4).
 inline constexpr unsigned kBorderSteps = 5, kBorderRooms = 5;

@@ -83,9 +83,9 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::u
   return frequencies;
 }
 
-void Tables::write(Bytes& out, int version) const {
+void Tables::write(Bytes& out) const {
   predictor.write(out);
-  if (version > 2) put_varint(out, guide.exists() ? guide.attribute + std::uint64_t{1} : 0);
+  put_varint(out, guide.exists() ? guide.attribute + std::uint64_t{1} : 0);
   for (const ColumnKind kind : kinds) out.push_back(static_cast<std::uint8_t>(kind));
   std::uint64_t unused = 0;  // contexts without symbols, not yet written
   const auto put_unused = [&] {
@@ -97,7 +97,7 @@ void Tables::write(Bytes& out, int version) const {
   for (const Frequencies& context : frequencies) {
     const auto used = std::count_if(context.begin(), context.begin() + kClasses,
                                     [](std::uint16_t f) { return f != 0; });
-    if (version > 4 && used == 0) {
+    if (used == 0) {
       ++unused;
       continue;
     }
@@ -118,12 +118,10 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
   ByteReader in(bytes);
   Tables tables;
   tables.predictor = Predictor::read(in);
-  if (layout.version > 2) {
-    const std::uint64_t guide = in.varint();
-    if (guide > layout.attributes.size()) throw Damage("a table's guide does not exist");
-    if (guide > 0) tables.guide.attribute = static_cast<unsigned>(guide - 1);
-  }
-  for (unsigned c = 0; layout.version > 1 && c < layout.columns(); ++c) {
+  const std::uint64_t guide = in.varint();
+  if (guide > layout.attributes.size()) throw Damage("a table's guide does not exist");
+  if (guide > 0) tables.guide.attribute = static_cast<unsigned>(guide - 1);
+  for (unsigned c = 0; c < layout.columns(); ++c) {
     const unsigned kind = in.get<std::uint8_t>();
     const bool lines = tables.guide.exists() && c != tables.guide.attribute;
     if (kind >= (lines ? kColumnKinds : kUnguidedKinds)) {
@@ -141,7 +139,7 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
     Frequencies frequencies{};
     std::uint64_t symbol = 0, left = kScale;
     const std::uint64_t used = in.varint();
-    if (layout.version > 4 && used == 0) {
+    if (used == 0) {
       const std::uint64_t more = in.varint();
       if (more >= contexts - c) throw Damage("a table has too many contexts");
       tables.frequencies.resize(c + 1 + static_cast<std::size_t>(more), escape_only());

@@ -38,19 +38,13 @@ struct Guide {
 /// The tables of a range of a level's clusters: height predictor and symbol frequencies.
 struct Tables {
   Predictor predictor;
-  Guide guide;                           ///< from version 3 on
-  std::vector<ColumnKind> kinds;         ///< one per column; none in version 1
+  Guide guide;
+  std::vector<ColumnKind> kinds;         ///< one per column
   std::vector<Frequencies> frequencies;  ///< one per context
 
-  void write(Bytes& out, int version) const;
+  void write(Bytes& out) const;
   /// Parses tables. Throws: Damage.
   static Tables read(ByteView bytes, const Layout& layout);
-  /// Maximum bytes of tables.
-  static std::uint64_t most_bytes(const Layout& layout) {
-    constexpr std::uint64_t kVarint = 10;
-    return 8 + kVarint * kPatterns * kNeighbours + kVarint + layout.columns() +
-           std::uint64_t{layout.contexts()} * kVarint * (1 + 2 * kClasses);
-  }
 };
 
 /// Tables prepared for encoding.

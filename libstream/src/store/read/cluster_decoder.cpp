@@ -94,7 +94,7 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   const std::uint32_t coded = coder.finish() | static_cast<std::uint32_t>(upper) << 16;
   if (root ? coded != 0 : coded >= n)
     throw Damage("a cluster's representative is not one of its points");
-  const std::uint32_t last = layout.version > 4 && !root ? uncentred(coded, n) : coded;
+  const std::uint32_t last = root ? coded : uncentred(coded, n);
   out.before_representative = last;
   deliver(entry, root ? n : last, out);
 
@@ -132,9 +132,7 @@ void ClusterDecoder::attribute(SymbolDecoder& coder, const Layout& layout,
   NumberForm form = kIntegerForm;
   NumberForm* const coded_form = floating ? &form : nullptr;
   column_.resize(n);
-  if (layout.version == 1) {
-    code_old_column(coder, number, floating, form, column_.data(), n);
-  } else if (number == tables.guide.attribute) {
+  if (number == tables.guide.attribute) {
     code_guide(coder, layout.first_context(number), tables.kinds[number], coded_form, lines_, 0,
                column_.data(), nullptr, n);
     guide_ = column_;
@@ -163,11 +161,10 @@ bool ClusterDecoder::positions(SymbolDecoder& coder, const Layout& layout,
     return true;
   }
   if (layout.has_point_columns()) return false;
-  if (!layout.grid || !GridCodec::fits(box_.size[0], box_.size[1], n)) {
+  if (!GridCodec::fits(box_.size[0], box_.size[1], n)) {
     throw Damage("a cluster's box does not fit its form");
   }
-  grid_.positions(coder, layout.version > 4 ? layout.border_context() : 0,
-                  static_cast<std::uint32_t>(box_.size[0]),
+  grid_.positions(coder, layout.border_context(), static_cast<std::uint32_t>(box_.size[0]),
                   static_cast<std::uint32_t>(box_.size[1]), n, relative_[0].data(),
                   relative_[1].data());
   grid_.heights(coder, tables.predictor, box_.size[2], relative_[2].data());

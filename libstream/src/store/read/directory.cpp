@@ -3,7 +3,6 @@
 
 #include <utility>
 
-#include "store/codec/tables.hpp"
 #include "store/read/index_page.hpp"
 
 namespace terrace::stream::store {
@@ -32,23 +31,16 @@ Directory::Directory(const ByteSource& index, std::uint64_t bytes, std::uint64_t
     : index_(index),
       clusters_(clusters),
       pages_(clusters / layout.page_clusters() + (clusters % layout.page_clusters() != 0)),
-      ranges_(layout.ranges()),
+      attributes_(layout.attributes.size()),
       bounds_(bounds) {
-  const bool old = layout.version < 5;
   const std::uint64_t most_tables = 1 + clusters / kFewestClustersOfTables;
-  const std::uint64_t of_tables =
-      2 * kMostVarint + (old ? Tables::most_bytes(layout) : std::uint64_t{0});
-  if (bytes > 8 * pages_ + 64 * (1 + pages_ / kChapterPages) + most_tables * of_tables) {
+  if (bytes > 64 * (1 + pages_ / kChapterPages) + most_tables * 2 * kMostVarint) {
     throw Damage("the directory is too large for the level's clusters");
   }
   const std::uint64_t start = index_.size() - bytes;
   held_at_ = start;
   held_ = read(start, bytes);
   ByteReader in(checked(held_, "the checksum of the directory is wrong"));
-  if (old) {
-    read_old(in, start);
-    return;
-  }
   read_chapters(in, start);
   contents_ = std::vector<std::atomic<const Contents*>>(chapters_.size());
   const std::uint64_t tail = chapters_.front().contents_at;
@@ -60,25 +52,6 @@ Directory::~Directory() {
   for (const auto& contents : contents_) delete contents.load();
 }
 
-void Directory::read_old(ByteReader in, std::uint64_t start) {
-  if (in.left() < 8 || (in.left() - 8) / 8 < pages_) {
-    throw Damage("the directory has too few pages");
-  }
-  std::uint64_t previous = 0;
-  for (std::uint64_t p = 0; p <= pages_; ++p) {
-    old_offsets_.push_back(in.get<std::uint64_t>());
-    if (old_offsets_.back() < previous ||
-        old_offsets_.back() - previous > most_page_bytes(ranges_) ||
-        (p == 0 && old_offsets_[0] != 0)) {
-      throw Damage("the pages of the directory do not follow one another");
-    }
-    previous = old_offsets_.back();
-  }
-  if (previous != start) throw Damage("the pages do not end where the directory begins");
-  const auto sets = in.get<std::uint32_t>();
-  read_sets(in, sets, start, false);
-}
-
 void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
   const std::uint64_t chapters = (pages_ + kChapterPages - 1) / kChapterPages;
   std::uint64_t pages_end = 0, contents_bytes = 0;
@@ -86,7 +59,7 @@ void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
     const std::uint64_t pages = std::min(kChapterPages, pages_ - c * kChapterPages);
     Chapter chapter;
     const std::uint64_t of_pages = in.varint(), of_contents = in.varint();
-    if (of_pages > pages * most_page_bytes(ranges_) || of_pages > start - pages_end) {
+    if (of_pages > pages * most_page_bytes(attributes_) || of_pages > start - pages_end) {
       throw Damage("the chapters of the directory do not follow one another");
     }
     if (of_contents < 7 * pages + kChecksum || of_contents > 16 * pages + kChecksum) {
@@ -109,32 +82,25 @@ void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
     throw Damage("the chapters of the directory do not follow one another");
   }
   for (Chapter& chapter : chapters_) chapter.contents_at += pages_end;
-  const std::uint64_t sets = in.varint();
-  read_sets(in, sets, pages_end + contents_bytes, true);
+  read_sets(in, pages_end + contents_bytes);
   if (tables_.back().offset + tables_.back().size + kChecksum != start) {
     throw Damage("the tables do not end where the directory begins");
   }
 }
 
-/// Reads the positions of the sets. at: where the first begins if they are `apart` from the
-/// directory.
-void Directory::read_sets(ByteReader& in, std::uint64_t sets, std::uint64_t at, bool apart) {
+/// Reads the positions of the sets. at: where the first begins.
+void Directory::read_sets(ByteReader& in, std::uint64_t at) {
+  const std::uint64_t sets = in.varint();
   for (std::uint64_t t = 0; t < sets; ++t) {
     TablesAt set;
     set.first = in.varint();
     const std::uint64_t size = in.varint();
-    if (apart ? size > index_.size() - at || kChecksum > index_.size() - at - size
-              : size > in.left()) {
+    if (size > index_.size() - at || kChecksum > index_.size() - at - size) {
       throw Damage("the data end too early");
     }
     set.size = memory_size(size);
-    if (apart) {
-      set.offset = at;
-      at += size + kChecksum;
-    } else {
-      set.offset = held_at_ + in.offset();
-      in.take(set.size);
-    }
+    set.offset = at;
+    at += size + kChecksum;
     if (tables_.empty() ? set.first != 0 : set.first <= tables_.back().first) {
       throw Damage("the tables do not follow one another");
     }
@@ -169,7 +135,7 @@ const Directory::Contents& Directory::contents(std::uint64_t number) const {
   for (std::uint64_t p = 0; p < pages; ++p) {
     contents->offsets.push_back(offset);
     const std::uint64_t size = in.varint();
-    if (size > most_page_bytes(ranges_) || size > chapter.pages_end - offset) {
+    if (size > most_page_bytes(attributes_) || size > chapter.pages_end - offset) {
       throw Damage("the pages of a chapter do not follow one another");
     }
     offset += size;
@@ -190,22 +156,18 @@ const Directory::Contents& Directory::contents(std::uint64_t number) const {
 }
 
 Directory::Range Directory::page_range(std::uint64_t page) const {
-  const bool old = !old_offsets_.empty();
-  const std::vector<std::uint64_t>& offsets =
-      old ? old_offsets_ : contents(page / kChapterPages).offsets;
-  const auto place = static_cast<std::size_t>(old ? page : page % kChapterPages);
+  const std::vector<std::uint64_t>& offsets = contents(page / kChapterPages).offsets;
+  const auto place = static_cast<std::size_t>(page % kChapterPages);
   return {offsets[place], offsets[place + 1]};
 }
 
 Box3 Directory::page_box(std::uint64_t page) const {
-  if (chapters_.empty()) return bounds_;
   const Contents& of_pages = contents(page / kChapterPages);
   return of_pages.boxes[static_cast<std::size_t>(page % kChapterPages)].in(
       chapters_[static_cast<std::size_t>(page / kChapterPages)].box);
 }
 
 Box3 Directory::coarse_box(std::uint64_t page) const {
-  if (chapters_.empty()) return bounds_;
   const auto number = static_cast<std::size_t>(page / kChapterPages);
   const Contents* const known = contents_[number].load(std::memory_order_acquire);
   const Box3& chapter = chapters_[number].box;
@@ -215,7 +177,6 @@ Box3 Directory::coarse_box(std::uint64_t page) const {
 }
 
 Bytes Directory::read_tables(const TablesAt& at) const {
-  if (!old_offsets_.empty()) return read(at.offset, at.size);
   Bytes bytes = read(at.offset, at.size + kChecksum);
   bytes.resize(checked(bytes, "the checksum of tables is wrong").size());
   return bytes;

@@ -68,8 +68,8 @@ using ChapterBox = BoxWithin<std::uint16_t>;
 using PageBox = BoxWithin<std::uint8_t>;
 
 /// The positions of the parts of a level's index: pages, the contents of each chapter, sets of
-/// tables. From version 5 on, the contents of chapters are read when needed, unless all of them
-/// together are small. Thread-safe.
+/// tables. The contents of chapters are read when needed, unless all of them together are small.
+/// Thread-safe.
 class Directory {
  public:
   struct TablesAt {
@@ -114,19 +114,17 @@ class Directory {
     Box3 box;
   };
 
-  void read_old(ByteReader in, std::uint64_t start);
   void read_chapters(ByteReader& in, std::uint64_t start);
-  void read_sets(ByteReader& in, std::uint64_t sets, std::uint64_t at, bool apart);
+  void read_sets(ByteReader& in, std::uint64_t at);
   [[nodiscard]] Bytes read(std::uint64_t offset, std::uint64_t size) const;
   [[nodiscard]] const Contents& contents(std::uint64_t chapter) const;
 
   const ByteSource& index_;
   std::uint64_t clusters_, pages_;
-  std::size_t ranges_;
+  std::size_t attributes_;
   Box3 bounds_;
   Bytes held_;  ///< the part of the file from held_at_ on that was read with the directory
   std::uint64_t held_at_ = 0;
-  std::vector<std::uint64_t> old_offsets_;  ///< before version 5
   std::vector<Chapter> chapters_;
   std::vector<TablesAt> tables_;
   mutable std::vector<std::atomic<const Contents*>> contents_;

@@ -213,61 +213,6 @@ class PageCoder {
   Steps steps_{}, last_steps_{};  ///< last_steps_: those of the last differences
 };
 
-/// The columns of a page before version 5, in their order.
-constexpr std::array<PageColumns::Field, 12> kOldOrder{
-    PageColumns::kBytes, PageColumns::kPoints, PageColumns::kForms,       PageColumns::kLowX,
-    PageColumns::kLowY,  PageColumns::kLowZ,   PageColumns::kSizeX,       PageColumns::kSizeY,
-    PageColumns::kSizeZ, PageColumns::kError,  PageColumns::kDescendants, PageColumns::kChecksum};
-
-/// Reads a page before version 5, without its checksum: for each column a base, a shift and a
-/// width, then the columns with that many bits per cluster. Calls use(number of the column,
-/// cluster, value). Returns the offset of the first cluster.
-template <class Use>
-std::uint64_t read_old_page(ByteView bytes, std::uint32_t clusters, std::size_t ranges, Use&& use) {
-  struct Packed {
-    std::uint64_t base = 0;
-    unsigned shift = 0, width = 0;
-  };
-  ByteReader in(bytes);
-  const std::uint64_t offset = in.varint();
-  std::vector<Packed> packed(kOldOrder.size() + 2 * ranges);
-  std::uint64_t bits = 0;
-  for (std::size_t f = 0; f < packed.size(); ++f) {
-    const std::uint64_t base = in.varint();
-    const bool is_signed = f < kOldOrder.size() && kOldOrder[f] >= PageColumns::kLowX &&
-                           kOldOrder[f] <= PageColumns::kLowZ;
-    packed[f].base = is_signed ? static_cast<std::uint64_t>(unzigzag(base)) : base;
-    packed[f].width = in.get<std::uint8_t>();
-    packed[f].shift = in.get<std::uint8_t>();
-    if (packed[f].shift > 63 || packed[f].width > 64)
-      throw Damage("an index page has a bad column");
-    bits += std::uint64_t{packed[f].width} * clusters;
-  }
-  if (in.left() != (bits + 7) / 8) throw Damage("an index page has a wrong size");
-  if (bits % 8 != 0 && bytes.back() >> bits % 8 != 0) {
-    throw Damage("an index page ends with bits that are not zero");
-  }
-  // With readable bytes after the page, so that a value is one load.
-  Bytes room(bytes.begin() + static_cast<std::ptrdiff_t>(in.offset()), bytes.end());
-  room.resize(room.size() + 16);
-  std::size_t bit = 0;
-  for (std::size_t f = 0; f < packed.size(); ++f) {
-    const auto [base, shift, width] = packed[f];
-    const bool high = f >= kOldOrder.size() && (f - kOldOrder.size()) % 2 != 0;
-    for (std::uint32_t i = 0; i < clusters; ++i) {
-      const unsigned skip = bit & 7;
-      std::uint64_t steps = load<std::uint64_t>(room.data() + bit / 8) >> skip;
-      if (skip + width > 64) steps |= static_cast<std::uint64_t>(room[bit / 8 + 8]) << (64 - skip);
-      if (width < 64) steps &= (std::uint64_t{1} << width) - 1;
-      // The last step up may exceed the highest key.
-      const bool beyond = high && steps > (UINT64_MAX - base) >> shift;
-      use(f, i, beyond ? UINT64_MAX : base + (steps << shift));
-      bit += width;
-    }
-  }
-  return offset;
-}
-
 Bytes padded_copy(ByteView bytes) {
   Bytes room(bytes.size() + 2 * kPadding);
   std::copy(bytes.begin(), bytes.end(), room.begin() + kPadding);
@@ -354,60 +299,43 @@ void PageContent::write(const Layout& layout, const EncodingTables& tables, Byte
 }
 
 CodedPage read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
-                    const DecodingTables* tables) {
+                    const DecodingTables& tables) {
   assert(clusters >= 1 && clusters <= layout.page_clusters());
-  const std::size_t of_checksum = layout.version < 5 ? 4 : 2;
-  if (bytes.size() < of_checksum) throw Damage("an index page has a wrong size");
-  const ByteView checksum = bytes.last(of_checksum);
-  bytes = bytes.first(bytes.size() - of_checksum);
-  if (layout.version < 5 ? crc32(bytes) != load<std::uint32_t>(checksum.data())
-                         : crc16(bytes) != load<std::uint16_t>(checksum.data())) {
+  constexpr std::size_t kChecksum = sizeof(std::uint16_t);
+  if (bytes.size() < kChecksum) throw Damage("an index page has a wrong size");
+  const ByteView checksum = bytes.last(kChecksum);
+  bytes = bytes.first(bytes.size() - kChecksum);
+  if (crc16(bytes) != load<std::uint16_t>(checksum.data())) {
     throw Damage("the checksum of an index page is wrong");
   }
   CodedPage page{0, PageColumns(clusters), {}};
-  if (layout.version < 5) {
-    page.offset = read_old_page(bytes, clusters, layout.ranges(),
-                                [&](std::size_t f, std::uint32_t i, std::uint64_t value) {
-                                  if (f >= kOldOrder.size()) return;
-                                  page.entries.column(kOldOrder[f])[i] = value;
-                                });
-    page.ranges.assign(bytes.begin(), bytes.end());
-    return page;
-  }
   ByteReader in(bytes);
   const std::uint64_t upper = in.varint();
   if (upper >> 48 != 0) throw Damage("an index entry is out of range");
-  const std::uint64_t of_ranges = layout.ranges() > 0 ? in.varint() : 0;
+  const std::uint64_t of_ranges = layout.attributes.empty() ? 0 : in.varint();
   if (of_ranges > in.left()) throw Damage("the data end too early");
   const ByteView entries = in.take(in.left() - static_cast<std::size_t>(of_ranges));
   page.ranges = padded_copy(in.take(in.left()));
-  page.offset = upper << 16 | decode_symbols(padded_copy(entries), layout, *tables,
+  page.offset = upper << 16 | decode_symbols(padded_copy(entries), layout, tables,
                                              [&](auto coder) { coder.entries(page.entries); });
   return page;
 }
 
 RangeColumns read_ranges(const Bytes& coded, std::uint32_t clusters, const Layout& layout,
-                         const DecodingTables* tables) {
-  RangeColumns columns(clusters, layout.ranges());
-  if (layout.ranges() == 0) return columns;
-  if (layout.version < 5) {
-    read_old_page(coded, clusters, layout.ranges(),
-                  [&](std::size_t f, std::uint32_t i, std::uint64_t value) {
-                    if (f >= kOldOrder.size()) columns.column(f - kOldOrder.size())[i] = value;
-                  });
-  } else {
-    if (decode_symbols(coded, layout, *tables, [&](auto coder) { coder.ranges(columns); }) != 0) {
-      throw Damage("an index page does not end correctly");
-    }
+                         const DecodingTables& tables) {
+  RangeColumns columns(clusters, layout.attributes.size());
+  if (layout.attributes.empty()) return columns;
+  if (decode_symbols(coded, layout, tables, [&](auto coder) { coder.ranges(columns); }) != 0) {
+    throw Damage("an index page does not end correctly");
   }
   return columns;
 }
 
 IndexPage::IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layout,
-                     const DecodingTables* tables)
+                     const DecodingTables& tables)
     : clusters_(clusters) {
   CodedPage page = read_page(bytes, clusters, layout, tables);
-  if (layout.ranges() > 0) ranges_ = std::move(page.ranges);
+  if (!layout.attributes.empty()) ranges_ = std::move(page.ranges);
   std::uint64_t at = page.offset;
   for (std::uint32_t i = 0; i < clusters_; ++i) {
     const std::uint64_t size = page.entries.column(Field::kBytes)[i];

@@ -11,11 +11,11 @@
 
 namespace terrace::stream::store {
 
-/// Returns the maximum bytes of a page of thirteen columns and two for each attribute. Before
-/// version 5 a column has its base, shift and width, and at most 64 bits per cluster; from version
-/// 5 on it has its shift, and a number takes at most 81 bits.
+/// Returns the maximum bytes of a page of thirteen columns and two for each attribute. A column has
+/// a shift and a number per cluster, each of at most 81 bits; two varints, the states of two
+/// strings of symbols and a checksum take the rest.
 constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
-  return 28 + (13 + 2 * std::uint64_t{attributes}) * (10 + 2 + 11 * kMostPageClusters) + 4;
+  return 32 + (13 + 2 * std::uint64_t{attributes}) * 11 * (1 + kMostPageClusters);
 }
 
 /// Columns of unsigned integers, one number per cluster.
@@ -84,7 +84,7 @@ struct PageContent {
 
   /// Adds the symbols to `counts`, by context of `layout`.
   void count(const Layout& layout, std::span<std::array<std::uint32_t, kSymbols>> counts);
-  /// Appends a page of the version that is written.
+  /// Appends a page.
   void write(const Layout& layout, const EncodingTables& tables, Bytes& out);
 };
 
@@ -92,28 +92,28 @@ struct PageContent {
 struct CodedPage {
   std::uint64_t offset = 0;  ///< see PageContent
   PageColumns entries;
-  Bytes ranges;  ///< padded; before version 5 the whole page
+  Bytes ranges;  ///< padded
 };
 
-/// Decodes a page. bytes: as in the file, including the checksum. tables: the first cluster's, from
-/// version 5 on. Throws: Damage.
+/// Decodes a page. bytes: as in the file, including the checksum. tables: the first cluster's.
+/// Throws: Damage.
 CodedPage read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout,
-                    const DecodingTables* tables);
+                    const DecodingTables& tables);
 /// Throws: Damage.
 RangeColumns read_ranges(const Bytes& coded, std::uint32_t clusters, const Layout& layout,
-                         const DecodingTables* tables);
+                         const DecodingTables& tables);
 
 /// A page that has been checked, with random access to its entries.
 class IndexPage {
  public:
   /// See read_page(). Throws: Damage.
   IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layout,
-            const DecodingTables* tables);
+            const DecodingTables& tables);
 
   [[nodiscard]] std::uint32_t clusters() const { return clusters_; }
   [[nodiscard]] Entry entry(std::uint32_t i) const;
   /// Decodes the ranges, which may be widened. layout, tables: the page's. Throws: Damage.
-  [[nodiscard]] RangeColumns ranges(const Layout& layout, const DecodingTables* tables) const {
+  [[nodiscard]] RangeColumns ranges(const Layout& layout, const DecodingTables& tables) const {
     return read_ranges(ranges_, clusters_, layout, tables);
   }
   /// Where the bytes of cluster i begin in the data file; end() is where they end.

@@ -51,7 +51,7 @@ auto LevelReader::from_directory(Read&& read) const {
 }
 
 LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
-    : layout_(manifest.schema, level, manifest.version),
+    : layout_(manifest.schema, level),
       clusters_(manifest.levels[level].clusters),
       most_points_(std::min(layout_.most_points(), manifest.levels[level].points)),
       top_(level + 1 == manifest.levels.size()),
@@ -76,7 +76,9 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
         std::clamp<std::uint64_t>(wanted, 1, std::max<std::uint64_t>(1, most)));
   };
   page_cache_ = SlotCache<IndexPage>(slots(pages(), kCachedPages));
-  if (layout_.ranges() > 0) range_cache_ = SlotCache<RangeColumns>(slots(pages(), kCachedRanges));
+  if (!layout_.attributes.empty()) {
+    range_cache_ = SlotCache<RangeColumns>(slots(pages(), kCachedRanges));
+  }
   tables_cache_ = SlotCache<DecodingTables>(slots(
       directory_->tables().size(), std::min(kCachedTables, kCachedContexts / layout_.contexts())));
 }
@@ -107,7 +109,7 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
     const std::uint64_t most = layout_.page_clusters(), first = number * most;
     return std::make_shared<const IndexPage>(
         bytes, static_cast<std::uint32_t>(std::min(most, clusters_ - first)), layout_,
-        layout_.version > 4 ? tables(first).get() : nullptr);
+        *tables(first));
   } catch (const Damage& damage) {
     throw damaged_file(*index_, start, damage.what());
   }
@@ -142,18 +144,18 @@ Entry LevelReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
 
 void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
   out.clear();
-  if (layout_.ranges() == 0) return;
+  if (layout_.attributes.empty()) return;
   const std::uint64_t number = ordinal / layout_.page_clusters();
   const auto columns = range_cache_.get(number, [&] {
     const auto page = this->page(number);
     try {
-      return std::make_shared<const RangeColumns>(page->ranges(
-          layout_, layout_.version > 4 ? tables(number * layout_.page_clusters()).get() : nullptr));
+      return std::make_shared<const RangeColumns>(
+          page->ranges(layout_, *tables(number * layout_.page_clusters())));
     } catch (const Damage& damage) {
       throw damaged_file(*index_, page_offset(number), damage.what());
     }
   });
-  for (std::size_t a = 0; a < layout_.ranges(); ++a) {
+  for (std::size_t a = 0; a < layout_.attributes.size(); ++a) {
     out.push_back(columns->range(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()), a));
   }
 }

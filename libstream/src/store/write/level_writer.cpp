@@ -279,7 +279,7 @@ void LevelWriter::train() {
   }
 
   sets_.push_back({.first = segment_start_, .bytes = {}});
-  tables.write(sets_.back().bytes, layout_.version);
+  tables.write(sets_.back().bytes);
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
   for (const PreparedBlock& block : prepared) write(block);
   encoders_.resize(1);

@@ -90,7 +90,7 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
   encoded->points = block.positions.size();
   if (block.level == 0) encoded->sum_up(block.positions);
   if (const SharedTablesPtr shared = tables(block.level)) {
-    const Layout layout(schema, block.level, kVersion);
+    const Layout layout(schema, block.level);
     auto encoder = encoders.take();
     encoder->load(layout, block);
     encoder->encode(shared->encoding, shared->sequence, encoded->block.bytes,
@@ -115,9 +115,9 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   broken = true;  // until this call succeeds
   const unsigned level = encoded->level;
   while (levels.size() <= level) {
-    levels.push_back(std::make_unique<LevelWriter>(
-        staging.folder(), staging.target(),
-        Layout(schema, static_cast<unsigned>(levels.size()), kVersion), team));
+    levels.push_back(
+        std::make_unique<LevelWriter>(staging.folder(), staging.target(),
+                                      Layout(schema, static_cast<unsigned>(levels.size())), team));
   }
   if (level == 0) {
     points += encoded->points;
