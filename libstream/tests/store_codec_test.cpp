@@ -268,6 +268,13 @@ TEST(StoreCodec, FewSymbolsTakeFewBytes) {
   EXPECT_THROW(SymbolDecoder(tables.pointers, ByteView()), Damage);
 }
 
+TEST(StoreCodec, RefusesALastStateAbove65535WithoutRawBits) {
+  const BothTables tables({Frequencies{}});
+  const Bytes good = padded({5, 0, 0, 0}), bad = padded({5, 0, 1, 0});
+  EXPECT_EQ(SymbolDecoder(tables.pointers, inside(good)).finish(), 5u);
+  EXPECT_THROW(static_cast<void>(SymbolDecoder(tables.pointers, inside(bad)).finish()), Damage);
+}
+
 /// Entries of every kind are read back from a page, with ranges possibly widened. Truncated and
 /// trailing bytes are detected, unless an escape happens to select a class with that many more
 /// bits.
