@@ -16,6 +16,7 @@
 #include "inputs.hpp"
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/facility_location.hpp"
+#include "terrace/cluster/hierarchy.hpp"
 #include "terrace/cluster/k_means.hpp"
 #include "terrace/cluster/k_median.hpp"
 #include "terrace/cluster/linkage.hpp"
@@ -156,6 +157,33 @@ TEST(StopCheck, EndsFacilityLocation) {
                                 {.strategy = full_scan, .steps = 30, .check_stop = check}));
       },
       30);
+}
+
+TEST(StopCheck, EndsTheCheckOfAMatrix) {
+  constexpr std::size_t kSide = 1000;
+  const std::vector<double> opening(kSide, 1.0), connection(kSide * kSide, 1.0);
+  expect_stops(
+      [&](const base::StopCheck& stop) {
+        check(FacilityMatrix{kSide, kSide, opening, connection}, stop);
+      },
+      15);
+}
+
+TEST(StopCheck, EndsClustersOfASize) {
+  const std::vector<Point3> points = some(30000);
+  // The first calls are made while blocks are cut, before any is clustered.
+  std::size_t calls = 0;
+  const auto no_block = [](std::uint64_t) { FAIL() << "a block is done"; };
+  EXPECT_THROW(static_cast<void>(clusters_of_size(points, 1000, 1, 1, no_block,
+                                                  [&] {
+                                                    if (++calls == 5) throw Stop();
+                                                  })),
+               Stop);
+  expect_stops(
+      [&](const base::StopCheck& stop) {
+        static_cast<void>(clusters_of_size(points, 1000, 1, 1, {}, stop));
+      },
+      20);
 }
 
 TEST(StopCheck, LeavesABlockClustererUsable) {

@@ -35,7 +35,7 @@ void check_weights(std::span<const double> weights, std::size_t count, const std
 
 }  // namespace
 
-void check(const FacilityMatrix& problem) {
+void check(const FacilityMatrix& problem, const base::StopCheck& check_stop) {
   check_count(problem.facilities, "facilities");
   check_count(problem.clients, "clients");
   if (problem.opening.size() != problem.facilities) {
@@ -53,7 +53,9 @@ void check(const FacilityMatrix& problem) {
     fail("the opening cost of facility " + std::to_string(j) + " is " +
          std::to_string(problem.opening[j]) + ": costs must be finite and not negative");
   }
+  base::StopTicks ticks(check_stop);
   for (std::size_t j = 0; j < problem.facilities; ++j) {
+    ticks(problem.clients);
     for (std::size_t i = 0; i < problem.clients; ++i) {
       if (is_cost(problem.cost(j, i))) continue;
       fail("the cost of connecting client " + std::to_string(i) + " to facility " +

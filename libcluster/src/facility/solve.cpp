@@ -151,7 +151,7 @@ FacilitySolution solve(const FacilityEntities& problem, const FacilityOptions& o
 
 FacilitySolution solve(const FacilityMatrix& problem, const FacilityOptions& options,
                        FacilityReport* report) {
-  check(problem);
+  check(problem, options.check_stop);
   FacilityReport own;
   if (report) *report = {};
   return solve_matrix(problem, options, report ? *report : own);

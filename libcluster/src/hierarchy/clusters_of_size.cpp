@@ -73,7 +73,9 @@ class ParentSink final : public HierarchySink {
 /// Returns the ends of consecutive ranges of `order` that are compact sets of at most `most`
 /// points.
 std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::size_t most,
-                                        std::vector<std::uint32_t>& order) {
+                                        std::vector<std::uint32_t>& order,
+                                        const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   std::vector<std::size_t> ends;
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, order.size()}};
   while (!open.empty()) {
@@ -87,6 +89,7 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
     for (std::size_t d = 0; d < 3; ++d) {
       double low = points[order[begin]][d], high = low;
       for (std::size_t k = begin; k < end; ++k) {
+        ticks(4);
         low = std::min(low, points[order[k]][d]);
         high = std::max(high, points[order[k]][d]);
       }
@@ -99,6 +102,7 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
     const std::size_t middle = begin + blocks / 2 * most;
     const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
     std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
+      ticks(4);
       return std::tie(points[a][axis], a) < std::tie(points[b][axis], b);
     });
     open.emplace_back(middle, end);
@@ -111,7 +115,8 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
 
 std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, double size,
                                             std::uint64_t seed, unsigned threads,
-                                            const std::function<void(std::uint64_t)>& progress) {
+                                            const std::function<void(std::uint64_t)>& progress,
+                                            const base::StopCheck& check_stop) {
   if (!(size > 0)) throw std::invalid_argument("the cluster size must be positive");
   std::vector<std::uint32_t> order(points.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -119,7 +124,9 @@ std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, doub
   options.payload_size = sizeof(std::uint32_t);
   options.threads = threads;
   options.block.seed = seed;
-  const std::vector<std::size_t> ends = compact_ranges(points, options.block_size, order);
+  options.block.check_stop = check_stop;
+  const std::vector<std::size_t> ends =
+      compact_ranges(points, options.block_size, order, check_stop);
   ParentSink sink(points.size());
   {
     HierarchyBuilder builder(options, sink);
@@ -151,7 +158,9 @@ std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, doub
     levels = level + 1;
   }
   if (levels == 0) return labels;
+  base::StopTicks ticks(check_stop);
   for (std::size_t i = 0; i < labels.size(); ++i) {
+    ticks(8 * levels);
     std::uint32_t cluster = sink.parents(0)[i];
     for (std::size_t level = 1; level < levels; ++level) cluster = sink.parents(level)[cluster];
     labels[i] = cluster;

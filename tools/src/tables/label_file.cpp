@@ -70,6 +70,7 @@ void write_labels(const std::string& path, std::span<const std::uint32_t> labels
                   const stream::Naming& replace) {
   std::string text;
   for (const std::uint32_t label : labels) {
+    check_interrupt();
     text += label == kNoCluster ? "-1" : std::to_string(label);
     text += '\n';
   }

@@ -71,9 +71,10 @@ struct FacilityMatrix {
 /// Checks a problem. Throws: std::invalid_argument for sizes that do not match, no facilities or
 /// clients, more than 2^32 - 2 of either, coordinates, weights or channels that are not finite,
 /// weights or costs out of range, or a missing function. The message names the index.
+/// Also throws whatever check_stop throws.
 void check(const FacilityPoints& problem);
 void check(const FacilityEntities& problem);
-void check(const FacilityMatrix& problem);
+void check(const FacilityMatrix& problem, const base::StopCheck& check_stop = {});
 
 /// Assignment of a client that is connected to no facility, because leaving it out was cheaper.
 inline constexpr std::uint32_t kOutlier = 0xffffffff;

@@ -225,10 +225,12 @@ class HierarchyBuilder {
 /// `size` (as a ratio). Blocks are compact sets of points, whatever the order of the input. The
 /// facility cost gives clusters of about 100 points, so smaller sizes give these too, and up to
 /// 10,000 points form one cluster. Takes O(n log n). progress, if given, is called with the number
-/// of points done; an exception from it ends the work.
+/// of points done; an exception from it or from check_stop ends
+/// the work.
 /// Throws: std::invalid_argument unless size is positive; as HierarchyBuilder::push().
 [[nodiscard]] std::vector<std::uint32_t> clusters_of_size(
     std::span<const Point3> points, double size, std::uint64_t seed, unsigned threads = 1,
-    const std::function<void(std::uint64_t)>& progress = {});
+    const std::function<void(std::uint64_t)>& progress = {},
+    const base::StopCheck& check_stop = {});
 
 }  // namespace terrace::cluster

@@ -43,7 +43,7 @@ std::vector<double> ascended(const MatrixRows& costs) {
 
 double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
                   const base::StopCheck& check_stop) {
-  check(problem);
+  check(problem, check_stop);
   if (duals.size() != problem.clients) {
     throw std::invalid_argument(std::to_string(duals.size()) + " duals for " +
                                 std::to_string(problem.clients) + " clients");
@@ -60,7 +60,7 @@ double dual_value(const FacilityMatrix& problem, std::span<const double> duals,
 
 LowerBound lower_bound(const FacilityMatrix& problem, const FacilitySolution& start,
                        const LowerBoundOptions& options) {
-  check(problem);
+  check(problem, options.check_stop);
   const MatrixRows costs(problem, options.check_stop);
   LowerBound bound;
   bound.duals = ascended(costs);

@@ -28,14 +28,16 @@ CostMatrix fill(const Space& space, const SearchFrame& frame, const base::StopCh
   const std::size_t n = frame.weights.size();
   CostMatrix matrix;
   matrix.opening.assign(n, frame.true_facility_cost);
-  matrix.connection.resize(n * n);
+  // Memory is first touched row by row, as that takes seconds.
+  matrix.connection.reserve(n * n);
   std::vector<double> scratch;
   for (std::size_t j = 0; j < n; ++j) {
     const double* const row = rows.row(j, scratch);
-    double* const out = matrix.connection.data() + j * n;
-    for (std::size_t i = 0; i < n; ++i) out[i] = std::ldexp(row[i], frame.cost_exponent);
+    for (std::size_t i = 0; i < n; ++i) {
+      matrix.connection.push_back(std::ldexp(row[i], frame.cost_exponent));
+    }
   }
-  check(matrix.view());
+  check(matrix.view(), check_stop);
   return matrix;
 }
 

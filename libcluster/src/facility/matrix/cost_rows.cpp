@@ -16,7 +16,11 @@ MatrixRows::MatrixRows(const FacilityMatrix& matrix, const base::StopCheck& chec
       connection_(matrix.connection) {
   double largest = 0.0;
   for (const double c : opening_) largest = std::max(largest, c);
-  for (const double c : connection_) largest = std::max(largest, c);
+  base::StopTicks ticks(check_stop);
+  for (const double c : connection_) {
+    ticks();
+    largest = std::max(largest, c);
+  }
   if (largest == 0.0) return;
   const int top = std::ilogb(largest);
   if (top >= 900) exponent_ = top - 899;
@@ -24,7 +28,10 @@ MatrixRows::MatrixRows(const FacilityMatrix& matrix, const base::StopCheck& chec
   if (exponent_ == 0) return;
   owned_.reserve(opening_.size() + connection_.size());
   for (const double c : opening_) owned_.push_back(scaled(c));
-  for (const double c : connection_) owned_.push_back(scaled(c));
+  for (const double c : connection_) {
+    ticks(4);
+    owned_.push_back(scaled(c));
+  }
   opening_ = std::span(owned_).first(opening_.size());
   connection_ = std::span(owned_).subspan(opening_.size());
 }
@@ -49,12 +56,15 @@ double MatrixRows::scaled(double cost) const {
   return exponent_ == 0 ? cost : std::ldexp(cost, -exponent_);
 }
 
-FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open) {
+FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open,
+                             const base::StopCheck& check_stop) {
   assert(!open.empty());
   FacilitySolution solution;
   std::vector<double> least(matrix.clients, std::numeric_limits<double>::infinity());
   solution.assignment.assign(matrix.clients, 0);
+  base::StopTicks ticks(check_stop);
   for (std::size_t k = 0; k < open.size(); ++k) {
+    ticks(matrix.clients);
     const double* const costs = matrix.connection.data() + open[k] * matrix.clients;
     for (std::size_t i = 0; i < matrix.clients; ++i) {
       if (costs[i] < least[i]) {

@@ -46,6 +46,7 @@ class CostRows {
 /// or if they are all so small that they lack digits.
 class MatrixRows final : public CostRows {
  public:
+  /// Throws what the check throws.
   MatrixRows(const FacilityMatrix& matrix, const base::StopCheck& check_stop);
 
   const double* row(std::size_t facility, std::vector<double>& scratch) const override;
@@ -69,6 +70,7 @@ class MatrixRows final : public CostRows {
 /// Assigns each client to the cheapest of these facilities, on ties to the first, and closes
 /// facilities without clients. Costs are those of the matrix, infinite if they overflow a double.
 /// Requires: `open` is ascending and not empty.
-FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open);
+FacilitySolution solution_of(const FacilityMatrix& matrix, std::span<const std::uint32_t> open,
+                             const base::StopCheck& check_stop = {});
 
 }  // namespace terrace::cluster

@@ -32,7 +32,7 @@ class Stars {
         duals_(costs.clients(), 0.0) {
     const std::size_t m = costs.facilities(), n = costs.clients();
     try {
-      order_.resize(m * n);
+      order_.reserve(m * n);
     } catch (const std::bad_alloc&) {
       throw std::invalid_argument("clients sorted by facility would need " +
                                   std::to_string(4 * m * n) +
@@ -42,7 +42,8 @@ class Stars {
     std::vector<double> scratch;
     for (std::size_t j = 0; j < m; ++j) {
       const double* const row = costs.row(j, scratch);
-      std::uint32_t* const order = order_.data() + j * n;
+      order_.resize((j + 1) * n);
+      std::uint32_t* const order = row_order(static_cast<std::uint32_t>(j));
       std::iota(order, order + n, 0u);
       std::sort(order, order + n, [row](std::uint32_t a, std::uint32_t b) {
         return row[a] < row[b] || (row[a] == row[b] && a < b);
@@ -161,7 +162,7 @@ FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& rep
   const MatrixRows costs(problem, check_stop);
   Stars stars(costs);
   stars.run();
-  FacilitySolution solution = solution_of(problem, stars.open());
+  FacilitySolution solution = solution_of(problem, stars.open(), check_stop);
   report.divisor = least_divisor(costs, stars.duals());
   report.duals = std::move(stars.duals());
   std::vector<double> feasible = report.duals;

@@ -78,7 +78,7 @@ FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOption
   });
   const auto best = std::min_element(
       found.begin(), found.end(), [](const Found& a, const Found& b) { return a.cost < b.cost; });
-  return solution_of(problem, best->open);
+  return solution_of(problem, best->open, options.check_stop);
 }
 
 }  // namespace terrace::cluster

@@ -158,7 +158,7 @@ FacilitySolution jain_vazirani(const FacilityMatrix& problem, FacilityReport& re
   const ClientOrder order(costs);
   Growth growth(costs, order);
   growth.run();
-  FacilitySolution solution = solution_of(problem, growth.independent());
+  FacilitySolution solution = solution_of(problem, growth.independent(), check_stop);
   report.duals = growth.duals();
   for (double& v : report.duals) v = costs.unscaled(v);
   solution.lower_bound = dual_value(problem, report.duals, check_stop);

@@ -71,7 +71,7 @@ double bound(const CostRows& costs, const Connections& connections, std::size_t 
 
 FacilitySolution k_median(const FacilityMatrix& problem, std::size_t k,
                           const KMedianOptions& options) {
-  check(problem);
+  check(problem, options.check_stop);
   check_count(k, problem.facilities, options);
   const MatrixRows costs(problem, options.check_stop);
   FacilitySolution solution;
