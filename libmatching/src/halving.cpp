@@ -66,10 +66,12 @@ class Matcher {
   /// Returns the matching of least total distance between the halves.
   Trial match(const Halves& halves) {
     const std::size_t rows = halves.first.size(), columns = halves.second.size();
-    costs_.resize(rows * columns);
+    // Memory is first touched row by row, as that takes seconds.
+    costs_.reserve(rows * columns);
     base::StopTicks ticks(check_stop_);
     for (std::size_t r = 0; r < rows; ++r) {
       ticks(2 * columns);
+      costs_.resize(std::max(costs_.size(), (r + 1) * columns));
       row_(halves.first[r], halves.second, costs_.data() + r * columns);
     }
     const auto assignment = assign(std::span<const double>(costs_), rows, columns, check_stop_);
