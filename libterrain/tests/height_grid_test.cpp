@@ -28,6 +28,27 @@ TEST(HeightGrid, AveragesSquares) {
   EXPECT_EQ(mesh.positions[2][2], (4 + 9) / 2.0);  // the last column has no partner
 }
 
+TEST(HeightGrid, EndsAtAStop) {
+  struct Stop {};
+  constexpr std::uint64_t kSide = 1000;
+  std::size_t calls = 0, last = 0;
+  const auto check_stop = [&] {
+    if (++calls == last) throw Stop();
+  };
+  HeightGrid grid(kSide, kSide, kSide * kSide, check_stop);
+  EXPECT_GE(calls, 3U);
+  for (std::uint64_t i = 0; i < kSide * kSide; ++i) {
+    grid.add({static_cast<double>(i % kSide), static_cast<double>(i / kSide), 0.0});
+  }
+  calls = 0;
+  static_cast<void>(grid.mesh());
+  last = calls;
+  EXPECT_GE(last, 100U);
+  calls = 0;
+  EXPECT_THROW(static_cast<void>(grid.mesh()), Stop);
+  EXPECT_EQ(calls, last);
+}
+
 TEST(HeightGrid, LeavesHolesWithoutData) {
   HeightGrid grid(3, 3, 100);
   for (int i = 0; i < 9; ++i) {

@@ -2,8 +2,12 @@
 #include "mesh/scene.hpp"
 
 #include <cmath>
+#include <cstdint>
+#include <functional>
+#include <vector>
 
 #include <gtest/gtest.h>
+#include <terrace/base/stop_check.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -48,6 +52,39 @@ TEST(VertexNormals, PointUpOnTerrainInAnyOrientation) {
     mesh.triangles = {t};
     EXPECT_EQ(vertex_normals(mesh)[0][2], 1);
     EXPECT_EQ(vertex_normals(mesh)[3][2], 1);  // a vertex without triangles
+  }
+}
+
+TEST(Scene, HearsAStop) {
+  struct Stop {};
+  TriangleMesh mesh;
+  for (std::uint32_t i = 0; i < 100'000; ++i) {
+    mesh.positions.push_back({i % 2 + 0.0, i + 0.0, i % 3 + 0.0});
+    if (i >= 2) mesh.triangles.push_back({i - 2, i - 1, i});
+  }
+  TriangleMesh cloud;
+  cloud.positions = mesh.positions;
+  cloud.left_out.assign(cloud.positions.size(), 1);
+  const std::vector<double> heights(mesh.positions.size(), 1.0);
+  const std::vector<std::function<void(const base::StopCheck&)>> works{
+      [&](const base::StopCheck& check) { is_height_field(mesh, check); },
+      [&](const base::StopCheck& check) { mostly_steep(mesh, check); },
+      [&](const base::StopCheck& check) { rms_slope(mesh, check); },
+      [&](const base::StopCheck& check) { vertex_normals(mesh, check); },
+      [&](const base::StopCheck& check) { shown_heights(mesh, heights, true, check); },
+      [&](const base::StopCheck& check) { shown_heights(cloud, heights, true, check); }};
+  for (std::size_t k = 0; k < works.size(); ++k) {
+    SCOPED_TRACE(k);
+    std::size_t calls = 0;
+    works[k]([&] { ++calls; });
+    const std::size_t all = calls;
+    ASSERT_GE(all, 10U);
+    calls = 0;
+    EXPECT_THROW(works[k]([&] {
+                   if (++calls == all) throw Stop();
+                 }),
+                 Stop);
+    EXPECT_EQ(calls, all);
   }
 }
 

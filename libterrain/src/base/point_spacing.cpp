@@ -10,6 +10,8 @@
 #include <limits>
 #include <numeric>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "base/parallel.hpp"
 
 namespace terrace::terrain {
@@ -22,7 +24,8 @@ constexpr unsigned kMostRank = 32;
 /// last) meet at its middle.
 class Tree {
  public:
-  explicit Tree(std::span<const stream::Point3> points) : points_(points), order_(points.size()) {
+  Tree(std::span<const stream::Point3> points, const base::StopCheck& check_stop)
+      : points_(points), order_(points.size()), ticks_(check_stop) {
     std::iota(order_.begin(), order_.end(), 0U);
     splits_.resize(points.size());
     divide(0, order_.size());
@@ -63,7 +66,10 @@ class Tree {
   void divide(std::size_t first, std::size_t last) {
     if (last - first <= kLeaf) return;
     stream::Box3 box;
-    for (std::size_t i = first; i < last; ++i) box.include(points_[order_[i]]);
+    for (std::size_t i = first; i < last; ++i) {
+      ticks_(4);
+      box.include(points_[order_[i]]);
+    }
     std::size_t axis = 0;
     for (std::size_t k = 1; k < 3; ++k) {
       if (box.max[k] - box.min[k] > box.max[axis] - box.min[axis]) axis = k;
@@ -73,6 +79,7 @@ class Tree {
       return order_.begin() + static_cast<std::ptrdiff_t>(i);
     };
     std::nth_element(at(first), at(middle), at(last), [&](std::uint32_t a, std::uint32_t b) {
+      ticks_(4);
       return points_[a][axis] < points_[b][axis];
     });
     splits_[middle] = {points_[order_[middle]][axis], axis};
@@ -108,18 +115,24 @@ class Tree {
   std::span<const stream::Point3> points_;
   std::vector<std::uint32_t> order_;
   std::vector<Split> splits_;  // indexed by the middle of a part
+  base::StopTicks ticks_;
 };
 
 }  // namespace
 
 std::vector<float> neighbour_distances(std::span<const stream::Point3> points, unsigned rank,
-                                       unsigned threads) {
+                                       unsigned threads, const std::stop_token& stop) {
   assert(rank >= 1 && rank <= kMostRank);
-  const Tree tree(points);
+  const auto check_stop = [&stop] {
+    if (stop.stop_requested()) throw stream::Stopped();
+  };
+  const Tree tree(points, check_stop);
   std::vector<float> distances(points.size());
   for_bands(static_cast<std::uint32_t>(points.size()), threads,
             [&](std::uint32_t first, std::uint32_t last) {
+              base::StopTicks ticks(check_stop);
               for (std::uint32_t i = first; i < last; ++i) {
+                ticks(256);
                 distances[i] = static_cast<float>(std::sqrt(tree.square(i, rank)));
               }
             });

@@ -2,6 +2,10 @@
 #include "mesh/height_grid.hpp"
 
 #include <algorithm>
+#include <utility>
+
+#include <terrace/base/filled.hpp>
+#include <terrace/base/stop_check.hpp>
 
 #include "base/progress_report.hpp"
 
@@ -29,14 +33,16 @@ std::uint64_t HeightGrid::cells(std::uint64_t columns, std::uint64_t rows,
   return reduced(columns, by) * reduced(rows, by);
 }
 
-HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells)
-    : reduction_(reduction_for(columns, rows, most_cells)),
+HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells,
+                       base::StopCheck check_stop)
+    : check_stop_(std::move(check_stop)),
+      reduction_(reduction_for(columns, rows, most_cells)),
       columns_(reduced(columns, reduction_)),
       rows_(reduced(rows, reduction_)),
       full_columns_(columns),
       full_rows_(rows) {
-  sums_.assign(columns_ * rows_, 0.0);
-  counts_.assign(columns_ * rows_, 0);
+  sums_ = base::filled(columns_ * rows_, 0.0, check_stop_);
+  counts_ = base::filled(columns_ * rows_, std::uint32_t{0}, check_stop_);
 }
 
 void HeightGrid::add(const stream::Point3& cell) {
@@ -52,13 +58,15 @@ void HeightGrid::add(const stream::Point3& cell) {
 TriangleMesh HeightGrid::mesh() const {
   constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   TriangleMesh mesh;
-  std::vector<std::uint32_t> vertex(sums_.size(), kNone);
+  std::vector<std::uint32_t> vertex = base::filled(sums_.size(), kNone, check_stop_);
+  base::StopTicks ticks(check_stop_);
   const auto filled = sums_.size() - static_cast<std::size_t>(std::ranges::count(counts_, 0U));
   mesh.positions.reserve(filled);
   mesh.triangles.reserve(2 * filled);
   // An averaged square is placed at its centre.
   const double shift = 0.5 * static_cast<double>(reduction_ - 1);
   for (std::uint64_t row = 0; row < rows_; ++row) {
+    ticks(4 * columns_);
     for (std::uint64_t column = 0; column < columns_; ++column) {
       const std::size_t place = row * columns_ + column;
       if (counts_[place] == 0) continue;
@@ -69,6 +77,7 @@ TriangleMesh HeightGrid::mesh() const {
     }
   }
   for (std::uint64_t row = 0; row + 1 < rows_; ++row) {
+    ticks(16 * columns_);
     for (std::uint64_t column = 0; column + 1 < columns_; ++column) {
       const std::size_t place = row * columns_ + column;
       // Around the square; omitting any one corner leaves one triangle.
@@ -92,7 +101,8 @@ TriangleMesh HeightGrid::mesh() const {
 
 TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
                             const Context& context) {
-  HeightGrid grid(store.schema().columns, store.schema().rows, most_cells);
+  HeightGrid grid(store.schema().columns, store.schema().rows, most_cells,
+                  [&context] { context.check_stop(); });
   const ProgressReport progress(context, "points");
   std::uint64_t points = 0;
   for (const stream::LevelInfo& level : store.levels()) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
 #include <terrace/stream/point.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -17,7 +18,8 @@ namespace terrace::terrain {
 class HeightGrid {
  public:
   /// Uses the smallest reduction that leaves at most `most_cells` of columns x rows cells.
-  HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells);
+  HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells,
+             base::StopCheck check_stop = {});
 
   /// Adds a cell in stored coordinates (column, row, raw sample), in any order. Ignores cells
   /// outside.
@@ -33,6 +35,7 @@ class HeightGrid {
   [[nodiscard]] TriangleMesh mesh() const;
 
  private:
+  base::StopCheck check_stop_;
   std::uint64_t reduction_ = 1;
   std::uint64_t columns_ = 0, rows_ = 0;  ///< reduced
   std::uint64_t full_columns_ = 0, full_rows_ = 0;

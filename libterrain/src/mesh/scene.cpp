@@ -6,7 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include <terrace/base/filled.hpp>
 #include <terrace/base/portable_math.hpp>
+#include <terrace/base/stop_check.hpp>
 
 #include "base/steepness.hpp"
 #include "base/vector.hpp"
@@ -18,25 +20,33 @@ stream::Point3 area_vector(const TriangleMesh& mesh, const std::array<std::uint3
                difference(mesh.positions[t[2]], mesh.positions[t[0]]));
 }
 
-bool is_height_field(const TriangleMesh& mesh) {
+bool is_height_field(const TriangleMesh& mesh, const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   double up = 0, down = 0;
   for (const auto& t : mesh.triangles) {
+    ticks(8);
     const double z = area_vector(mesh, t)[2];
     (z > 0 ? up : down) += std::abs(z);
   }
   return std::max(up, down) > 0 && std::min(up, down) < 0.001 * std::max(up, down);
 }
 
-bool mostly_steep(const TriangleMesh& mesh) {
+bool mostly_steep(const TriangleMesh& mesh, const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   Steepness steepness;
-  for (const auto& t : mesh.triangles) steepness.add(area_vector(mesh, t));
+  for (const auto& t : mesh.triangles) {
+    ticks(8);
+    steepness.add(area_vector(mesh, t));
+  }
   return steepness.mostly();
 }
 
-double rms_slope(const TriangleMesh& mesh) {
+double rms_slope(const TriangleMesh& mesh, const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   double sum = 0, area = 0;
   for (const auto& t : mesh.triangles) {
     const stream::Point3 n = area_vector(mesh, t);
+    ticks(8);
     const double flat = std::abs(n[2]);
     if (flat <= 0) continue;
     sum += (n[0] * n[0] + n[1] * n[1]) / flat;
@@ -50,12 +60,14 @@ namespace {
 constexpr std::size_t kShownHeights = 100000;
 
 std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<double>& heights,
-                                    bool flat) {
+                                    bool flat, const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   std::vector<double> areas;
   areas.reserve(mesh.triangles.size());
   double whole = 0;
   for (const auto& t : mesh.triangles) {
     const stream::Point3 n = area_vector(mesh, t);
+    ticks(8);
     const double area = flat ? std::abs(n[2]) : base::hypot(base::hypot(n[0], n[1]), n[2]);
     areas.push_back(std::isfinite(area) ? area : 0.0);
     whole += areas.back();
@@ -66,6 +78,7 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   if (!(each >= std::numeric_limits<double>::min()) || !std::isfinite(whole)) return shown;
   double before = 0;
   for (std::size_t i = 0; i < areas.size(); ++i) {
+    ticks(4);
     const auto& t = mesh.triangles[i];
     const double after = before + areas[i];
     // Distributes places evenly in a triangle (M. Roberts's sequence in two dimensions).
@@ -84,8 +97,9 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
 }
 
 /// Samples by cells of space with points; where points are fewest, a cell has about four.
-std::vector<double> heights_by_cells(const TriangleMesh& cloud,
-                                     const std::vector<double>& heights) {
+std::vector<double> heights_by_cells(const TriangleMesh& cloud, const std::vector<double>& heights,
+                                     const base::StopCheck& check_stop) {
+  base::StopTicks ticks(check_stop);
   constexpr double kMostCells = 64;  // along a side
   std::array<std::size_t, 256> groups{};
   for (const std::uint8_t left_out : cloud.left_out) ++groups[left_out];
@@ -94,13 +108,17 @@ std::vector<double> heights_by_cells(const TriangleMesh& cloud,
   const double cells =
       std::clamp(std::floor(std::sqrt(static_cast<double>(coarsest) / 4)), 1.0, kMostCells);
   stream::Box3 box;
-  for (const stream::Point3& p : cloud.positions) box.include(p);
+  for (const stream::Point3& p : cloud.positions) {
+    ticks(4);
+    box.include(p);
+  }
   double width = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     width = std::max(width, box.max[axis] - box.min[axis]);
   }
   std::vector<std::vector<double>> members(static_cast<std::size_t>(cells * cells * cells));
   for (std::size_t i = 0; i < heights.size(); ++i) {
+    ticks(16);
     double cell = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double place = cloud.positions[i][axis] - box.min[axis];
@@ -121,12 +139,12 @@ std::vector<double> heights_by_cells(const TriangleMesh& cloud,
 }  // namespace
 
 std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<double>& heights,
-                                  bool flat) {
+                                  bool flat, const base::StopCheck& check_stop) {
   std::vector<double> shown;
   if (!mesh.triangles.empty()) {
-    shown = heights_by_area(mesh, heights, flat);
+    shown = heights_by_area(mesh, heights, flat, check_stop);
   } else if (!mesh.left_out.empty()) {
-    shown = heights_by_cells(mesh, heights);
+    shown = heights_by_cells(mesh, heights, check_stop);
   }
   if (!shown.empty()) return shown;
   const std::size_t stride = heights.size() / kShownHeights + 1;
@@ -134,19 +152,25 @@ std::vector<double> shown_heights(const TriangleMesh& mesh, const std::vector<do
   return shown;
 }
 
-std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
-  std::vector<stream::Point3> sums(mesh.positions.size(), stream::Point3{});
+std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh,
+                                                 const base::StopCheck& check_stop) {
+  std::vector<stream::Point3> sums =
+      base::filled(mesh.positions.size(), stream::Point3{}, check_stop);
+  base::StopTicks ticks(check_stop);
   double up = 0;
   for (const auto& t : mesh.triangles) {
     const stream::Point3 n = area_vector(mesh, t);
+    ticks(16);
     up += n[2];
     for (const std::uint32_t v : t) {
       for (std::size_t axis = 0; axis < 3; ++axis) sums[v][axis] += n[axis];
     }
   }
-  const double sign = up < 0 && is_height_field(mesh) ? -1 : 1;
-  std::vector<std::array<float, 3>> normals(sums.size());
+  const double sign = up < 0 && is_height_field(mesh, check_stop) ? -1 : 1;
+  std::vector<std::array<float, 3>> normals =
+      base::filled(sums.size(), std::array<float, 3>{}, check_stop);
   for (std::size_t v = 0; v < sums.size(); ++v) {
+    ticks(8);
     const double length =
         std::sqrt(sums[v][0] * sums[v][0] + sums[v][1] * sums[v][1] + sums[v][2] * sums[v][2]);
     if (length > 0) {

@@ -4,10 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include <terrace/base/filled.hpp>
 #include <terrace/base/portable_math.hpp>
 
-#include "base/parallel.hpp"
 #include "base/vector.hpp"
+#include "cli/interrupt.hpp"
 
 namespace terrace::tools {
 namespace {
@@ -20,14 +21,17 @@ constexpr std::array<float, 3> kBackground{0.90F, 0.92F, 0.94F};
 Canvas::Canvas(std::uint32_t width, std::uint32_t height)
     : width_(width * kOversampling),
       height_(height * kOversampling),
-      colours_(std::size_t{width_} * height_, kBackground),
-      depths_(std::size_t{width_} * height_, -std::numeric_limits<float>::infinity()) {}
+      colours_(base::filled(std::size_t{width_} * height_, kBackground, check_interrupt)),
+      depths_(base::filled(std::size_t{width_} * height_, -std::numeric_limits<float>::infinity(),
+                           check_interrupt)) {}
 
 std::vector<std::uint8_t> Canvas::resolve() const {
   const std::size_t width = width_ / kOversampling;
   const std::size_t height = height_ / kOversampling;
-  std::vector<std::uint8_t> pixels(width * height * 3);
+  std::vector<std::uint8_t> pixels;
+  pixels.reserve(width * height * 3);
   for (std::size_t y = 0; y < height; ++y) {
+    check_interrupt();
     for (std::size_t x = 0; x < width; ++x) {
       for (std::size_t c = 0; c < 3; ++c) {
         float sum = 0;
@@ -37,8 +41,8 @@ std::vector<std::uint8_t> Canvas::resolve() const {
           }
         }
         constexpr float kSamples = kOversampling * kOversampling;
-        pixels[(y * width + x) * 3 + c] =
-            static_cast<std::uint8_t>(std::lround(255.0F * std::clamp(sum / kSamples, 0.0F, 1.0F)));
+        pixels.push_back(static_cast<std::uint8_t>(
+            std::lround(255.0F * std::clamp(sum / kSamples, 0.0F, 1.0F))));
       }
     }
   }

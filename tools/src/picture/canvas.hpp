@@ -19,7 +19,7 @@ class Canvas {
  public:
   static constexpr std::uint32_t kOversampling = 2;
 
-  /// `width` and `height` are those of the final picture, in pixels.
+  /// `width` and `height` are those of the final picture, in pixels. Throws: stream::Stopped.
   Canvas(std::uint32_t width, std::uint32_t height);
 
   [[nodiscard]] std::uint32_t width() const { return width_; }    ///< in samples
@@ -34,7 +34,8 @@ class Canvas {
     return depths_[std::size_t{y} * width_ + x];
   }
 
-  /// Returns the picture: averaged samples as RGB bytes, rows from the top.
+  /// Returns the picture: averaged samples as RGB bytes, rows from the top. Throws:
+  /// stream::Stopped.
   [[nodiscard]] std::vector<std::uint8_t> resolve() const;
 
  private:

@@ -24,6 +24,7 @@ std::vector<double> leaf_places(const Dendrogram& tree) {
       static_cast<std::uint32_t>(tree.points + tree.merges.size() - 1)};
   double next = 0.5;
   while (!stack.empty()) {
+    check_interrupt();
     const std::uint32_t node = stack.back();
     stack.pop_back();
     if (node < points) {
@@ -44,6 +45,7 @@ std::vector<std::int64_t> groups_below(const Dendrogram& tree, double threshold)
   std::int64_t next = 0;
   const auto points = static_cast<std::uint32_t>(tree.points);
   for (std::size_t r = tree.merges.size(); r > 0; --r) {
+    check_interrupt();
     const Merge& merge = tree.merges[r - 1];
     if (merge.height < threshold && group[r - 1] < 0) group[r - 1] = next++;
     for (const std::uint32_t child : {merge.a, merge.b}) {

@@ -35,6 +35,7 @@ class Brush {
     const double top = std::max(std::floor(std::min(a[1], b[1]) - reach), double{0.0} + first_);
     const double bottom = std::min(std::ceil(std::max(a[1], b[1]) + reach), double{0.0} + last_);
     for (double y = top; y < bottom; ++y) {
+      check_interrupt();
       // The part of the line near this row.
       double from = 0, to = 1;
       if (dy != 0) {
@@ -72,6 +73,7 @@ class Brush {
 
 void fill_with_paper(Canvas& canvas, std::uint32_t first_row, std::uint32_t last_row) {
   for (std::uint32_t y = first_row; y < last_row; ++y) {
+    check_interrupt();
     for (std::uint32_t x = 0; x < canvas.width(); ++x) canvas.colour(x, y) = kPaper;
   }
 }
@@ -97,6 +99,7 @@ std::vector<std::uint32_t> by_level(const std::vector<MatchingLine>& lines, bool
   std::vector<std::uint32_t> order(lines.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
+    check_interrupt();
     return higher_first ? lines[i].level > lines[j].level : lines[i].level < lines[j].level;
   });
   return order;
@@ -109,6 +112,7 @@ double usual_distance(const std::vector<MatchingLine>& lines,
                       const Canvas& canvas) {
   std::vector<double> lengths;
   for (const MatchingLine& line : lines) {
+    check_interrupt();
     const auto &a = places[line.a], &b = places[line.b];
     const double length = base::hypot(a[0] - b[0], a[1] - b[1]);
     if (line.level == 1 && std::isfinite(length)) lengths.push_back(length);
@@ -131,13 +135,17 @@ void draw_lines(const std::vector<stream::Point3>& positions,
   constexpr double kRadius = 1.0;
   std::vector<std::array<double, 3>> places;
   places.reserve(positions.size());
-  for (const stream::Point3& p : positions) places.push_back(camera.project(p));
+  for (const stream::Point3& p : positions) {
+    check_interrupt();
+    places.push_back(camera.project(p));
+  }
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
     for (const LineSet::Line& line : lines) {
       check_interrupt();
       for (std::size_t i = line.begin; i + 1 < line.end; ++i) {
+        check_interrupt();
         Colour colour = kDot;
         for (std::size_t c = 0; c < 3 && !colours.empty(); ++c) {
           colour[c] = static_cast<float>(colours[i][c]) / 255.0F;
@@ -154,9 +162,13 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
   const std::size_t points = picture.result.points;
   std::vector<std::array<double, 3>> places;
   places.reserve(picture.positions.size());
-  for (const stream::Point3& p : picture.positions) places.push_back(camera.project(p));
+  for (const stream::Point3& p : picture.positions) {
+    check_interrupt();
+    places.push_back(camera.project(p));
+  }
   std::vector<bool> reached(points, false);
   for (const MatchingLine& line : lines) {
+    check_interrupt();
     if (line.a < points) reached[line.a] = true;
     if (line.b < points) reached[line.b] = true;
   }

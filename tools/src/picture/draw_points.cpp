@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include <terrace/base/filled.hpp>
 #include <terrace/base/portable_math.hpp>
 
 #include "base/parallel.hpp"
@@ -39,9 +40,11 @@ double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   for (std::uint32_t cell = 2; cell <= 256; cell *= 2) {
     check_interrupt();
     const std::size_t columns = canvas.width() / cell + 1;
-    std::vector<std::uint8_t> taken(columns * (canvas.height() / cell + 1), 0);
+    std::vector<std::uint8_t> taken =
+        base::filled(columns * (canvas.height() / cell + 1), std::uint8_t{0}, check_interrupt);
     std::size_t count = 0, points = 0;
     for (const Splat& s : splats) {
+      check_interrupt();
       if (!(s.x >= 0 && s.y >= 0 && s.x < static_cast<float>(canvas.width()) &&
             s.y < static_cast<float>(canvas.height()))) {
         continue;
@@ -59,11 +62,12 @@ double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
 }
 
 std::vector<Splat> projected(const std::vector<stream::Point3>& positions, const Camera& camera) {
-  std::vector<Splat> splats(positions.size());
-  for (std::size_t i = 0; i < splats.size(); ++i) {
+  std::vector<Splat> splats;
+  splats.reserve(positions.size());
+  for (const stream::Point3& position : positions) {
     check_interrupt();
-    const auto [x, y, depth] = camera.project(positions[i]);
-    splats[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0};
+    const auto [x, y, depth] = camera.project(position);
+    splats.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 0});
   }
   return splats;
 }
@@ -91,6 +95,7 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
   const double most = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
   std::array<std::vector<std::uint32_t>, 256> groups;
   for (std::size_t i = 0; i < splats.size(); ++i) {
+    check_interrupt();
     groups[cloud.left_out[i]].push_back(static_cast<std::uint32_t>(i));
   }
   std::vector<stream::Point3> positions;
@@ -99,13 +104,17 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
     if (group.size() < 2) continue;
     const double per_distance = coarse > 0 ? apart : scattered;
     positions.clear();
-    for (const std::uint32_t i : group) positions.push_back(cloud.positions[i]);
-    check_interrupt();
-    const std::vector<float> distances = neighbour_distances(positions, kRank, options.threads);
+    for (const std::uint32_t i : group) {
+      check_interrupt();
+      positions.push_back(cloud.positions[i]);
+    }
+    const std::vector<float> distances =
+        neighbour_distances(positions, kRank, options.threads, stop_token());
     std::vector<float> sorted = distances;
     const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::nth_element(sorted.begin(), middle, sorted.end());
     for (std::size_t k = 0; k < group.size(); ++k) {
+      check_interrupt();
       const double distance = std::min(distances[k], 1.5F * *middle);
       splats[group[k]].radius =
           static_cast<float>(std::clamp(per_distance * distance * camera.scale, 1.0, most));
@@ -123,7 +132,8 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
   // Rows and columns as lines, each followed by some samples without depth, so that all lanes can
   // be read.
   const std::size_t row_size = width + kLanes, column_size = height + kLanes;
-  std::vector<float> rows(row_size * height, -HUGE_VALF), columns(column_size * width, -HUGE_VALF);
+  std::vector<float> rows = base::filled(row_size * height, -HUGE_VALF, check_interrupt);
+  std::vector<float> columns = base::filled(column_size * width, -HUGE_VALF, check_interrupt);
   const auto smooth = [&](const float* line, std::uint32_t size, std::uint32_t index, float disc) {
     const float centre = line[index];
     if (!std::isfinite(centre)) return centre;
@@ -243,7 +253,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
   for (Splat& splat : splats) splat.radius = usual;
   if (cloud.left_out.size() == splats.size()) set_radii(cloud, camera, canvas, options, splats);
 
-  Radii radii(std::size_t{canvas.width()} * canvas.height(), 0.0F);
+  Radii radii = base::filled(std::size_t{canvas.width()} * canvas.height(), 0.0F, check_interrupt);
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::size_t i = 0; i < splats.size(); ++i) {
       check_interrupt();
@@ -263,6 +273,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
       std::array<float, 3> colour = as_floats(colours[i]);
       for (float& c : colour) c *= shade;
       for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
+        check_interrupt();
         for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
           const float dx = static_cast<float>(x) + 0.5F - s.x;
           const float dy = static_cast<float>(y) + 0.5F - s.y;
@@ -296,6 +307,7 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
   constexpr std::array<float, 3> kRim{1.0F, 1.0F, 1.0F}, kCore{0.1F, 0.1F, 0.12F};
   double nearest = -std::numeric_limits<double>::infinity(), farthest = -nearest;
   for (const stream::Point3& position : positions) {
+    check_interrupt();
     const double depth = camera.project(position)[2];
     nearest = std::max(nearest, depth);
     farthest = std::min(farthest, depth);
@@ -305,6 +317,7 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
   const double behind = std::max(12.0 / camera.scale, 0.02 * (nearest - farthest));
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (const stream::Point3& position : positions) {
+      check_interrupt();
       const auto [cx, cy, depth] = camera.project(position);
       const double y0 = std::max(std::floor(cy - radius), static_cast<double>(first));
       const double y1 = std::min(std::ceil(cy + radius), static_cast<double>(last));

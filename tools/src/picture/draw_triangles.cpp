@@ -59,6 +59,7 @@ void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_r
 
   const float scale = 1.0F / area;
   for (std::uint32_t y = y0; y < y1; ++y) {
+    check_interrupt();
     const float py = static_cast<float>(y) + 0.5F;
     for (std::uint32_t x = x0; x < x1; ++x) {
       const float px = static_cast<float>(x) + 0.5F;
@@ -91,15 +92,18 @@ void fill(const std::array<ScreenCorner, 3>& t, bool wire, std::uint32_t first_r
 
 void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, const Camera& camera,
                     const Light& light, const DrawOptions& options, Canvas& canvas) {
-  std::vector<Projected> vertices(mesh.positions.size());
+  std::vector<Projected> vertices;
+  vertices.reserve(mesh.positions.size());
   const std::vector<std::array<float, 3>> normals =
-      options.wire ? std::vector<std::array<float, 3>>() : vertex_normals(mesh);
-  for (std::size_t i = 0; i < vertices.size(); ++i) {
+      options.wire ? std::vector<std::array<float, 3>>() : vertex_normals(mesh, check_interrupt);
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
     check_interrupt();
     const auto [x, y, depth] = camera.project(mesh.positions[i]);
-    vertices[i] = {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 1.0F};
+    vertices.push_back(
+        {static_cast<float>(x), static_cast<float>(y), static_cast<float>(depth), 1.0F});
     if (!normals.empty()) {
-      vertices[i].shade = light.shade({normals[i][0], normals[i][1], normals[i][2]}, camera.toward);
+      vertices.back().shade =
+          light.shade({normals[i][0], normals[i][1], normals[i][2]}, camera.toward);
     }
   }
 
@@ -128,6 +132,7 @@ void fit(Camera& camera, const std::vector<stream::Point3>& positions, const Can
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   double left = kInfinity, right = -kInfinity, bottom = kInfinity, top = -kInfinity;
   for (const stream::Point3& p : positions) {
+    check_interrupt();
     const double x = dot(p, camera.right), y = dot(p, camera.up);
     left = std::min(left, x);
     right = std::max(right, x);

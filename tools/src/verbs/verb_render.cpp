@@ -70,7 +70,10 @@ struct PictureInput {
 /// keeps the heights in the source's unit.
 void put_on_ground(PictureInput& input, const stream::Placement& placement, const Ground& ground) {
   stream::Box3 box;
-  for (const stream::Point3& p : input.mesh.positions) box.include(p);
+  for (const stream::Point3& p : input.mesh.positions) {
+    check_interrupt();
+    box.include(p);
+  }
   const GroundMap map = ground.map(box);
   const stream::Point3 middle{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1]),
                               0.5 * (box.min[2] + box.max[2])};
@@ -90,7 +93,10 @@ bool looks_geographic(const stream::MeshFile& file) {
     if (comment.find("EPSG:4326") != std::string::npos) return true;
   }
   stream::Box3 box;
-  for (const stream::Point3& p : file.vertices.positions) box.include(p);
+  for (const stream::Point3& p : file.vertices.positions) {
+    check_interrupt();
+    box.include(p);
+  }
   if (box.empty()) return false;
   const double extent = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
   return box.min[0] >= -360 && box.max[0] <= 360 && box.min[1] >= -90 && box.max[1] <= 90 &&
@@ -156,7 +162,7 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
 
   PictureInput input;
   std::optional<HeightGrid> grid;
-  if (info.grid) grid.emplace(info.columns, info.rows, most_cells);
+  if (info.grid) grid.emplace(info.columns, info.rows, most_cells, check_interrupt);
   UndeclaredVoids voids(info);
   for_each_block(*source, common, [&](const stream::PointBlock& block) {
     voids.add(block);
@@ -246,7 +252,7 @@ PictureInput from_store(const std::string& path, const PictureSelection& selecti
   }
   input.mesh = detail_mesh(store, detail, {}, common.context());
   put_on_ground(input, world, ground);
-  if (input.terrain || stored_triangles || !mostly_steep(input.mesh)) return input;
+  if (input.terrain || stored_triangles || !mostly_steep(input.mesh, check_interrupt)) return input;
   input = {};
   input.mesh = scan_surface(store, detail, {}, common.context()).mesh;
   input.guess = "not a height field: drawn as by 'terrace surface'";
@@ -369,7 +375,7 @@ class RenderCommand : public Command {
            .cause = "there is nothing to draw: no point is selected",
            .remedy = selection_.where.empty() ? "check the file" : "give another --where"});
     }
-    const bool terrain = input.terrain || is_height_field(mesh);
+    const bool terrain = input.terrain || is_height_field(mesh, check_interrupt);
     std::vector<Rgb> colours;
     check_interrupt();
     if (input.lines.empty() || !color_.empty()) colours = colours_of(mesh, input.heights, terrain);
@@ -471,6 +477,7 @@ class RenderCommand : public Command {
   static std::vector<Rgb> rgb_of(const TriangleMesh& mesh) {
     std::uint16_t brightest = 0;
     for (const auto& colour : mesh.colours) {
+      check_interrupt();
       brightest = std::max({brightest, colour[0], colour[1], colour[2]});
     }
     // Otherwise everything would be black.
@@ -478,6 +485,7 @@ class RenderCommand : public Command {
     std::vector<Rgb> colours;
     colours.reserve(mesh.colours.size());
     for (const auto& colour : mesh.colours) {
+      check_interrupt();
       Rgb& rgb = colours.emplace_back();
       for (std::size_t k = 0; k < 3; ++k) rgb[k] = static_cast<std::uint8_t>(colour[k] / full);
     }
@@ -511,8 +519,10 @@ class RenderCommand : public Command {
     if ((by == "class" || by == "cluster") && mesh.classes.empty()) fail_without(by);
     if (by == "slope" && mesh.triangles.empty()) fail_without("triangles to have a slope");
     const HeightTint tint =
-        by == "height" ? HeightTint::of(shown_heights(mesh, heights, terrain)) : HeightTint{};
-    const auto normals = by == "slope" ? vertex_normals(mesh) : std::vector<std::array<float, 3>>();
+        by == "height" ? HeightTint::of(shown_heights(mesh, heights, terrain, check_interrupt))
+                       : HeightTint{};
+    const auto normals =
+        by == "slope" ? vertex_normals(mesh, check_interrupt) : std::vector<std::array<float, 3>>();
     const unsigned top =
         by == "level" ? *std::max_element(mesh.levels.begin(), mesh.levels.end()) : 0;
     for (std::size_t i = 0; i < colours.size(); ++i) {
@@ -530,7 +540,7 @@ class RenderCommand : public Command {
   double exaggerate(TriangleMesh& mesh, bool terrain, const ViewDirection& view) {
     // RMS slope that gives clear light and shadow.
     constexpr double kPleasant = 0.45;
-    const double slope = terrain ? rms_slope(mesh) : 0;
+    const double slope = terrain ? rms_slope(mesh, check_interrupt) : 0;
     const double wanted = slope > 0 ? std::clamp(kPleasant / slope, 1.0, 25.0) : 1.0;
     double factor = 1;
     if (exaggerate_) {
@@ -540,7 +550,10 @@ class RenderCommand : public Command {
       factor = std::round(10 * std::sqrt(wanted)) / 10;
     }
     relief_ = exaggerate_ ? 1.0 : std::max(1.0, wanted / factor);
-    for (stream::Point3& p : mesh.positions) p[2] *= factor;
+    for (stream::Point3& p : mesh.positions) {
+      check_interrupt();
+      p[2] *= factor;
+    }
     return factor;
   }
 
