@@ -893,5 +893,20 @@ TEST(DatumShift, NeedsThreeOrSevenNumbers) {
   }
 }
 
+TEST(PlaceConversion, HearsAStop) {
+  struct Stop {};
+  const PlaceConversion places(
+      Transformation(CoordinateSystem::parse("EPSG:32632"), CoordinateSystem::parse("EPSG:4326")));
+  std::vector<stream::Point3> points(20000, stream::Point3{500000, 5000000, 7});
+  std::size_t calls = 0;
+  EXPECT_THROW(places(points,
+                      [&] {
+                        if (++calls == 10) throw Stop();
+                      }),
+               Stop);
+  EXPECT_EQ(calls, 10U);
+  EXPECT_EQ(points.back(), (stream::Point3{500000, 5000000, 7}));
+}
+
 }  // namespace
 }  // namespace terrace::terrain

@@ -102,7 +102,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
     terrain::TriangleMesh mesh = detail_mesh(store, detail, options, context);
     if (writer) writer->finish();
     const terrain::PlaceConversion places = places_to(store, crs);
-    places(mesh.positions);
+    places(mesh.positions, [&] { context.check_stop(); });
     units = terrain::MeshUnits(store, places);
     return mesh;
   });

@@ -242,10 +242,12 @@ void PlaceConversion::operator()(std::span<Point2> places) const {
   for (Point2& place : places) place = turns(place);
 }
 
-void PlaceConversion::operator()(std::span<stream::Point3> points) const {
+void PlaceConversion::operator()(std::span<stream::Point3> points,
+                                 const base::StopCheck& check_stop) const {
   if (!change_) return;
   std::array<Point2, 1024> places{};
   for (std::size_t first = 0; first < points.size(); first += places.size()) {
+    if (check_stop) check_stop();
     const std::size_t count = std::min(places.size(), points.size() - first);
     for (std::size_t i = 0; i < count; ++i)
       places[i] = {points[first + i][0], points[first + i][1]};

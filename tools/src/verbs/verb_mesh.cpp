@@ -231,7 +231,7 @@ class MeshCommand final : public Command {
     TriangleMesh mesh = detail_mesh(store, detail, options, common.context());
     if (mesh.positions.empty()) throw_none_inside(store, "triangle");
     if (mesh.triangles.empty()) common.say(part_.path + ": " + why_flat(mesh.positions));
-    places(mesh.positions);
+    places(mesh.positions, check_interrupt);
     const MeshCoordinates coordinates =
         write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()},
                    MeshUnits(store, places));

@@ -149,7 +149,7 @@ class PointsCommand final : public Command {
     LineSet lines = detail_lines(store, detail, common.context());
     if (lines.lines.empty()) need_some(store, detail);
     const std::optional<Transformation> to = part_.crs.to(store, common);
-    places(to)(lines.vertices);
+    places(to)(lines.vertices, check_interrupt);
     stream::Sink file(output_, may_replace(output_, common.force), stop_token());
     write_geojson(lines, to ? to->to().crs() : store.schema().crs,
                   [&](std::string_view text) { file.write(text); });

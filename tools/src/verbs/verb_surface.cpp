@@ -74,7 +74,7 @@ class SurfaceCommand final : public Command {
                : "as if all were in one plane; 'terrace mesh' "
                  "triangulates heights over x and y"));
     }
-    places(surface.mesh.positions);
+    places(surface.mesh.positions, check_interrupt);
     const MeshUnits units(store, places);
     const stream::WriterOptions writer{.format = format_, .replace = replace, .stop = stop_token()};
     MeshCoordinates coordinates;

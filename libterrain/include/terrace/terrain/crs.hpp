@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/stop_check.hpp>
 #include <terrace/stream/point.hpp>
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
@@ -238,8 +239,8 @@ class PlaceConversion {
   /// neighbours stay together.
   PlaceConversion(Transformation change, const stream::Store& store);
   /// Converts x and y in place. Throws: stream::Error for a point without an image in the other
-  /// CRS.
-  void operator()(std::span<stream::Point3> points) const;
+  /// CRS; whatever check_stop throws.
+  void operator()(std::span<stream::Point3> points, const base::StopCheck& check_stop = {}) const;
   /// Converts in place; NaN where a place has no image.
   void operator()(std::span<Point2> places) const;
   /// Returns a box around the images of all places in `box`; empty if they have none.
