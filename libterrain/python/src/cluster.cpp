@@ -389,12 +389,12 @@ py::array clusters_of_size(const Array<double>& given, double size, std::uint64_
   const std::vector<cluster::Point3> points = points3_of(given);
   return to_array(Job(job).run([&](const terrain::Context& context) {
     const auto report = [&](std::uint64_t done) {
-      context.check_stop();
       if (!context.progress) return;
       const double share = static_cast<double>(done) / static_cast<double>(points.size());
       context.progress({.what = "points", .count = done, .fraction = share});
     };
-    auto labels = cluster::clusters_of_size(points, size, seed, context.threads, report);
+    auto labels = cluster::clusters_of_size(points, size, seed, context.threads, report,
+                                            [&] { context.check_stop(); });
     if (context.progress) {
       context.progress({.what = "points", .count = points.size(), .fraction = 1, .ended = true});
     }
