@@ -484,6 +484,20 @@ class MachineMemoryTest(MemoryCase):
             self.assertIn('takes about', err)
             self.assertIn('--memory is 200 MiB', err)
 
+    def test_matching_takes_no_more_than_it_says(self):
+        points, pairs = self.path('points.csv'), self.path('pairs.csv')
+        with open(points, 'w') as file:
+            file.write('x,y,z\n')
+            for i in range(20000):
+                file.write(f'{i % 150},{i // 150},{i % 7}\n')
+        args = ('match', points, '-o', pairs, '--threads', 1, '--memory')
+        code, _, err, _ = run(*args, '40M')
+        self.assertEqual(code, 1, err)
+        said = float(re.search(r'takes about ([\d.]+) MiB', err).group(1)) + 1  # it is rounded
+        code, _, err, peak = run(*args, int(said * MIB))
+        self.assertEqual(code, 0, err)
+        self.assertLessEqual(peak, said * MIB)
+
 
 if __name__ == '__main__':
     unittest.main()

@@ -54,7 +54,8 @@ struct MatchRequest {
   double seconds = 0.0;                     ///< for halving; 0: no limit
   std::uint64_t seed = 1;
   unsigned threads = 1;
-  std::uint64_t memory_bytes = 0;
+  std::uint64_t memory_bytes = 0;  ///< for all
+  std::uint64_t held_bytes = 0;    ///< of that, of the program and the points
 };
 
 struct MatchOutcome {
@@ -77,10 +78,12 @@ constexpr double kClusterSize = 10000;
 /// Measured memory of an exact matching, in bytes per point.
 constexpr std::uint64_t kExactBytes = 800;
 /// Memory of windows, in bytes per point, besides the windows being solved.
-constexpr std::uint64_t kWindowBytes = 150;
+constexpr std::uint64_t kWindowBytes = 110;
 
+/// needed: besides what is held already.
 void check_memory(std::uint64_t needed, const MatchRequest& request, std::size_t points,
                   const char* remedy) {
+  needed += request.held_bytes;
   if (request.memory_bytes == 0 || needed <= request.memory_bytes) return;
   throw std::runtime_error("matching " + counted(points, "point") + " takes about " +
                            readable_bytes(needed) + " and --memory is " +
@@ -93,6 +96,13 @@ std::size_t distinct(std::span<const std::uint32_t> labels) {
   return static_cast<std::size_t>(std::unique(sorted.begin(), sorted.end()) - sorted.begin());
 }
 
+/// Memory for a method: not 0, which would be no limit.
+std::uint64_t left_for(const MatchRequest& request) {
+  if (request.memory_bytes == 0) return 0;
+  return std::max<std::uint64_t>(
+      request.memory_bytes - std::min(request.memory_bytes, request.held_bytes), 1);
+}
+
 matching::HalvingOptions halving_options(const MatchRequest& request) {
   matching::HalvingOptions options;
   options.method = request.method == MatchMethod::monotone ? matching::Halving::monotone
@@ -101,7 +111,7 @@ matching::HalvingOptions halving_options(const MatchRequest& request) {
   if (request.seconds > 0) options.seconds = request.seconds;
   options.seed = request.seed;
   options.threads = request.threads;
-  options.memory_limit = request.memory_bytes;
+  options.memory_limit = left_for(request);
   options.check_stop = check_interrupt;
   return options;
 }
@@ -110,16 +120,22 @@ bool halves(MatchMethod method) {
   return method == MatchMethod::monotone || method == MatchMethod::monte_carlo;
 }
 
-/// Returns the clusters to match first: the caller's, or those of facility location if there are
-/// too many points to match at once.
+/// Returns whether clusters are matched first: the caller's, or those of facility location if there
+/// are too many points to match at once.
+bool has_clusters(const MatchRequest& request, std::size_t points) {
+  if (!request.labels.empty()) return true;
+  return request.method == MatchMethod::automatic &&
+         points > matching::LargeMatchingOptions{}.exact_limit;
+}
+
+/// Returns the clusters to match first; empty if there are none.
 std::vector<std::uint32_t> clusters_of(const MatchRequest& request, std::span<const Point3> points,
                                        const MatchProgress& progress) {
   if (!request.labels.empty()) return {request.labels.begin(), request.labels.end()};
-  if (request.method != MatchMethod::automatic ||
-      points.size() <= matching::LargeMatchingOptions{}.exact_limit)
-    return {};
-  return cluster::clusters_of_size(points, kClusterSize, request.seed, request.threads,
-                                   [&](std::uint64_t done) { progress(done, points.size(), 0); });
+  if (!has_clusters(request, points.size())) return {};
+  return cluster::clusters_of_size(
+      points, kClusterSize, request.seed, request.threads,
+      [&](std::uint64_t done) { progress(done, points.size(), 0); }, check_interrupt);
 }
 
 /// Pairs points. Sets too large for an exact matching are first clustered by facility location
@@ -137,10 +153,9 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
     outcome.iterations = matching.iterations;
     return outcome;
   }
-  const std::vector<std::uint32_t> labels = clusters_of(request, points, progress);
   matching::LargeMatchingOptions options;
   if (request.method == MatchMethod::exact) options.exact_limit = points.size();
-  const bool exact = labels.empty();
+  const bool exact = !has_clusters(request, points.size());
   if (exact) {
     check_memory(kExactBytes * points.size(), request, points.size(),
                  "raise it, or name clusters with --labels");
@@ -148,6 +163,7 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
     check_memory(kWindowBytes * points.size() + kExactBytes * options.window * request.threads,
                  request, points.size(), "raise it, or take fewer --threads");
   }
+  const std::vector<std::uint32_t> labels = clusters_of(request, points, progress);
   options.labels = labels;
   options.threads = request.threads;
   options.progress = progress;
@@ -166,11 +182,16 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
 /// as run_matching() does.
 TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point3> points,
                               const MatchProgress& progress) {
+  // The tree, and the level being matched.
+  const std::uint64_t tree_bytes = 120 * points.size();
+  check_memory(
+      has_clusters(request, points.size()) ? tree_bytes : tree_bytes + kExactBytes * points.size(),
+      request, points.size(), "raise it, or name clusters with --labels");
   const std::vector<std::uint32_t> labels = clusters_of(request, points, progress);
   matching::MatchingTreeOptions<Point3> options;
   options.labels = labels;
   options.threads = request.threads;
-  options.memory_limit = request.memory_bytes;
+  options.memory_limit = left_for(request);
   if (halves(request.method)) {
     options.matcher = [&](std::span<const Point3> nodes) {
       matching::HalvingOptions halving = halving_options(request);
@@ -185,10 +206,6 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
       return std::move(matching::match_points(nodes, matching).mate);
     };
   }
-  // Memory of the tree and of the level being matched.
-  const std::uint64_t tree_bytes = 120 * points.size();
-  check_memory(labels.empty() ? tree_bytes + kExactBytes * points.size() : tree_bytes, request,
-               points.size(), "raise it, or name clusters with --labels");
   options.progress = [&](std::size_t done, std::size_t total) { return progress(done, total, 0); };
   options.check_stop = check_interrupt;
   return {matching::make_matching_tree(points, options), labels.empty() ? 0 : distinct(labels)};
@@ -250,6 +267,9 @@ class MatchCommand final : public Command {
     std::vector<std::uint32_t> labels;
     if (!labels_.empty()) labels = read_labels(labels_, table.size());
     request.labels = labels;
+    request.held_bytes = kProgramMemory + table.payload.size() +
+                         table.size() * 2 * sizeof(stream::Point3) +
+                         boxes.size() * sizeof(matching::Box<3>);
     positions_.resize(table.size());
     std::transform(table.positions.begin(), table.positions.end(), positions_.begin(), ground);
 
@@ -332,6 +352,7 @@ class MatchCommand final : public Command {
     const std::size_t record = table.info.payload_size();
     std::vector<matching::Box<3>> boxes(table.size());
     for (std::size_t i = 0; i < boxes.size(); ++i) {
+      check_interrupt();
       std::array<stream::Point3, 3> corners{table.positions[i]};
       read(std::span(table.payload).subspan(i * record, record), corners);
       for (std::size_t axis = 0; axis < 3; ++axis) {
