@@ -497,6 +497,14 @@ class MachineMemoryTest(MemoryCase):
         code, _, err, peak = run(*args, int(said * MIB))
         self.assertEqual(code, 0, err)
         self.assertLessEqual(peak, said * MIB)
+        # Nor does a picture of it.
+        args = ('render', pairs, '--points', points, '-o', self.path('pairs.png'), '--size', '100x100', '--memory')
+        code, _, err, _ = run(*args, '34M')
+        self.assertEqual(code, 1, err)
+        said = int(re.search(r'needs (\d+) MiB', err).group(1))
+        code, _, err, peak = run(*args, f'{said}M')
+        self.assertEqual(code, 0, err)
+        self.assertLessEqual(peak, said * MIB)
 
 
 if __name__ == '__main__':

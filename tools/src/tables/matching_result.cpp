@@ -131,8 +131,12 @@ void MatchingPicture::keep_levels(const std::string& level) {
 }
 
 MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
-                                      const CommonOptions& common) {
+                                      const CommonOptions& common,
+                                      const std::function<void(std::uint64_t)>& need) {
   const PointTable table = read_point_table(points_file, "", common.memory_or(0), common);
+  // Per point until the picture is drawn, measured.
+  const std::uint64_t each = CsvRows::open(path, kTreeHead) ? 120 : 64;
+  if (need) need(table.payload.size() + table.size() * each);
   const GroundFrame ground = GroundFrame::of(table, 1.0);
   MatchingPicture picture{.result = read_matching_result(path, table.size()),
                           .positions = {},

@@ -451,7 +451,9 @@ class RenderCommand : public Command {
       throw UsageError(
           "--wire, --color, --region and --focus do not apply to results of 'terrace match'");
     }
-    MatchingPicture picture = read_matching_picture(input_, points_file_, common);
+    MatchingPicture picture = read_matching_picture(
+        input_, points_file_, common,
+        [&](std::uint64_t bytes) { memory_for_points(points_file_, size, bytes, common); });
     if (!picture.assumption.empty()) common.explain(points_file_ + ": " + picture.assumption);
     picture.keep_levels(selection_.level);
     if (exaggerate_) {
