@@ -48,9 +48,9 @@ struct MatchingPicture {
   void keep_levels(const std::string& level);
 };
 
-/// Reads the result and the file of its points. Calls need, if given, with the bytes that the points
-/// and the picture will take before it allocates them; need may throw. Throws: stream::Error,
-/// stream::Stopped.
+/// Reads the result and the file of its points. Calls need, if given, with the bytes that the
+/// points and the picture will take before it allocates them; need may throw. Throws:
+/// stream::Error, stream::Stopped.
 MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
                                       const CommonOptions& common,
                                       const std::function<void(std::uint64_t)>& need = {});

@@ -59,8 +59,9 @@ SurfaceMeasures measure(const Surface& surface);
 /// does.
 void turn_outward(Surface& surface);
 
-/// Decides which facets of a tetrahedron are likely to be on the surface ("boundary" facets) as seen
-/// from that tetrahedron: those that are small compared to it. Used by the two rules that peel.
+/// Decides which facets of a tetrahedron are likely to be on the surface ("boundary" facets) as
+/// seen from that tetrahedron: those that are small compared to it. Used by the two rules that
+/// peel.
 enum class ShapeCriterion : std::uint8_t {
   /// The interior of the smallest sphere that contains the facet does not contain the tetrahedron's
   /// fourth corner (K. Gabriel, R. Sokal, doi:10.2307/2412323). Two corners of the facet are on
