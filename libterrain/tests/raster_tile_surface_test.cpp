@@ -290,7 +290,7 @@ TEST_F(RasterOfDegrees, ConcurrentCacheReadsMatchStore) {
   for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{1} << 20}) {
     HeightCache cache(store, bytes);
     std::atomic<std::size_t> wrong = 0;
-    parallel_for(8, 8, [&](unsigned, std::size_t) {
+    parallel_for(8, 8, [&](std::size_t) {
       StoreWindow reader(store);
       std::vector<double> heights(100);
       for (std::int64_t i = 0; i < 200; ++i) {
