@@ -210,8 +210,9 @@ class MeshCommand final : public Command {
     if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
       throw UsageError("--quality, --duplicates and --fill need --max-error or --max-points");
     }
-    DetailMeshOptions options{{.smoothing = parse_smoothing(smooth_)},
-                              MetricChoice::parse(metric_)};
+    DetailMeshOptions options;
+    options.heights.smoothing = parse_smoothing(smooth_);
+    options.metric = MetricChoice::parse(metric_);
     const bool save = !save_overlay_.empty();
     if (save && smooth_.empty()) throw UsageError("--save-overlay needs --smooth");
     const stream::Store store = open_store(part_.path, part_.where);
