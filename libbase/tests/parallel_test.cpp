@@ -23,7 +23,7 @@ TEST(Parallel, UsesNoMoreThreadsThanParts) {
 
 TEST(Parallel, VisitsEveryNumberOnce) {
   for (const unsigned threads : {1u, 2u, 7u}) {
-    for (const std::size_t count : {0, 1, 2, 999}) {
+    for (const std::size_t count : {0u, 1u, 2u, 999u}) {
       std::vector<std::atomic<int>> done(count);
       parallel_for(count, threads, [&](std::size_t i) { ++done[i]; });
       for (const auto& times : done) ASSERT_EQ(times, 1);
