@@ -401,7 +401,7 @@ class BoundedMeshTest(unittest.TestCase):
         count = sum(1 for times in places.values() if times > 1)
         self.assertIn(f'{count} places have several samples', result.stderr)
         self.assertRegex(result.stderr, r'differ by up to 1[78]\.?\d* m \(at ')
-        self.assertIn('--duplicates min, max, mean or first', result.stderr)
+        self.assertIn('set --duplicates to min, max, mean or first', result.stderr)
         self.assertFalse(os.path.exists(self.path('tree.obj')))
 
         # The error is measured on the file as readers see it, at the samples that the rule selects.
@@ -533,7 +533,7 @@ class BoundedMeshTest(unittest.TestCase):
                                ('--level', '--max-error', 1, '--level', 1),
                                ('greedy', '--max-error', 1, '--quality', 'best'),
                                ('flat', '--max-error', 1, '--fill', 'water'),
-                               ('belong', '--quality', 'greedy')):
+                               ('need --max-error', '--quality', 'greedy')):
             with self.subTest(options):
                 self.refuse(2, text, *mesh, *options)
         self.refuse(1, '--memory', *mesh, '--max-error', 1, '--memory', '20M')
