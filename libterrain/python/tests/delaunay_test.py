@@ -118,7 +118,7 @@ class Triangulations(unittest.TestCase):
         self.assertEqual(made.vertices.tolist(), [0, 1, 3, 5])
         with self.assertRaisesRegex(ValueError, 'no vertex 4'):
             made.remove([4])
-        for wrong, text in (([9], 'no vertex 9'), ([-1], 'no such vertex'), ([3, 3], 'vertex 3 is named twice')):
+        for wrong, text in (([9], 'no vertex 9'), ([-1], 'negative or too large'), ([3, 3], 'vertex 3 is named twice')):
             with self.assertRaisesRegex(ValueError, text):
                 made.remove(wrong)
         made.remove([1])
