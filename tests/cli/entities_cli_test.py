@@ -176,7 +176,7 @@ class TrianglesTest(EntitiesCase):
                      ['tile', self.store, '--zoom', '5', '-o', self.path('tiles')]):
             with self.subTest(args[0]):
                 self.expect_error('holds triangles', *args)
-        self.expect_error('without --metric', 'mesh', self.store, '--smooth', 'taubin:2', '-o', self.path('x.ply'))
+        self.expect_error('leave out --metric', 'mesh', self.store, '--smooth', 'taubin:2', '-o', self.path('x.ply'))
 
     def test_pictures_show_the_triangles(self):
         store = self.path('unplaced.st')
@@ -196,7 +196,7 @@ class TrianglesTest(EntitiesCase):
         with open(table, 'w', encoding='ascii') as file:
             file.write('0 0 0\n1 1 1\n')
         self.expect_error('has no triangles', 'build', table, *triangles)
-        self.expect_error('no kd-tree search', 'build', self.file, *triangles, '--strategy', 'kd-tree')
+        self.expect_error('do not support the kd-tree search', 'build', self.file, *triangles, '--strategy', 'kd-tree')
         self.assertFalse(os.path.exists(out))
 
 

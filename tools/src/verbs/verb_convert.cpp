@@ -75,8 +75,6 @@ class ConvertCommand : public Command {
                                    .lattice = lattice_of(info)},
                                   writing);
     writing_within_memory(*writer, output_, memory, held);
-    const std::string lost = lost_height_unit(output_, *writer, located(info));
-    if (!lost.empty()) common.say(lost);
     UndeclaredVoids voids(info);
     ProgressMeter meter(common.progress, "points");
     // Each thread holds one block as read and one as encoded, both with some room to grow.
@@ -108,6 +106,8 @@ class ConvertCommand : public Command {
     }
     writer->finish();
     if (writer->points() == 0) common.say(inputs_.front() + ": contains no points");
+    const std::string lost = lost_height_unit(output_, *writer, located(info));
+    if (!lost.empty()) common.say(lost);
     tell_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
     if (const std::string note = voids.note(); !note.empty()) common.say(note);

@@ -170,13 +170,6 @@ class PointsCommand final : public Command {
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
     NearPlace place{.xy = WholeTurns(store.schema(), store.whole().bounds())({v[0], v[1]})};
     if (v.size() == 3) place.z = v[2];
-    const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
-    const auto& [x, y] = place.xy;
-    if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
-      common.say(near_ + " is outside the store: in its CRS X is from " + plain_number(box.min[0]) +
-                 " to " + plain_number(box.max[0]) + ", Y from " + plain_number(box.min[1]) +
-                 " to " + plain_number(box.max[1]));
-    }
     stream::StoreQuery query(store);
     const std::vector<stream::FoundPoint> found =
         count_ ? nearest_points(query, place, *count_, detail.level)
@@ -188,6 +181,13 @@ class PointsCommand final : public Command {
            .cause = "no point is selected " +
                     (radius_ ? "within " + plain_number(*radius_) + " m of " : "near ") + near_,
            .remedy = radius_ ? "raise --within" : "give another --where"});
+    }
+    const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
+    const auto& [x, y] = place.xy;
+    if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
+      common.say(near_ + " is outside the store: in its CRS X is from " + plain_number(box.min[0]) +
+                 " to " + plain_number(box.max[0]) + ", Y from " + plain_number(box.min[1]) +
+                 " to " + plain_number(box.max[1]));
     }
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
