@@ -491,7 +491,7 @@ class StrangerTest(CrashCase):
                             (lambda run: (run.returncode, run.stderr))(terrace(*command, '--force', cwd=self.folder))):
             self.assertEqual(code, 1, error)
             self.assertIn('contains letter.txt, which terrace did not write', error)
-            self.assertIn('move that file away', error)
+            self.assertIn('move it away', error)
             self.assertEqual(everything(self.folder), before)
         for name in ('s/notes.txt', 's/letter.txt'):
             os.remove(self.path(name))

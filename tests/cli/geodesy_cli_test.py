@@ -761,6 +761,13 @@ class GeodesyTest(unittest.TestCase):
                     data = file.read()
                 accessor = json.loads(data[20:20 + int.from_bytes(data[12:16], 'little')])['accessors'][0]
                 heights.append(accessor['max'][1] - accessor['min'][1])
+            # A raster in the other CRS names the unit that its own x and y no longer imply.
+            self.ok('raster', store, '--to-crs', f'EPSG:{other}', '-o', raster, '--force')
+            self.ok('mesh', self.build(raster), '-o', mesh, '--force')
+            with open(mesh, 'rb') as file:
+                data = file.read()
+            accessor = json.loads(data[20:20 + int.from_bytes(data[12:16], 'little')])['accessors'][0]
+            self.assertAlmostEqual(accessor['max'][1] - accessor['min'][1], heights[0], delta=0.03 * heights[0])
             self.assertAlmostEqual(slopes[0], slopes[1], delta=0.02 * slopes[0])
             self.assertAlmostEqual(heights[0], heights[1], delta=0.01 * heights[0])
             self.assertAlmostEqual(heights[0], 123 * (1 if own == 32611 else 1200 / 3937), delta=0.1)

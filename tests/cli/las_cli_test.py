@@ -213,9 +213,16 @@ class LasFormatTest(LasCase):
             copy = self.path('copy.laz')
             self.run_ok('convert', table, '-o', copy, '--force')
             self.assertEqual(metres(copy), expected)
+            # A horizontal CRS from the user says nothing of heights.
+            shutil.rmtree(store, ignore_errors=True)
+            self.run_ok('build', copy, '--crs', 'EPSG:32632', '-o', store)
+            self.run_ok('points', store, '-o', file, '--force')
+            self.assertEqual(metres(file), expected, unit)
             for ending in '.csv', '.xyz', '.ply':
                 result = terrace('convert', copy, '-o', self.path('lost' + ending), '--force')
                 self.assertEqual(b'no place for a unit' in result.stderr, unit != 'metre', result.stderr)
+        inches = self.put('inches.csv', b'x,y,z (in)\n1,2,3\n2,3,4\n')
+        self.assertIn(b'heights are in inches', terrace('convert', inches, '-o', self.path('inches.las')).stderr)
         strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')
         self.assertIn(b"'NAVD88' in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
 

@@ -408,7 +408,7 @@ class StopTest(ProcessTest):
         for args, what in ((['profile', self.dem(), *line, '--step', '1e-17'], '--step is too small'),
                            (['profile', self.dem(), *line, '--step', '1e-300'], '--step is too small'),
                            (['profile', self.dem(), '--line', '0,0,1e12,1e12'], 'the line is too long'),
-                           (['contour', self.dem(), '--interval', '1e-6'], 'levels of 1e-06'),
+                           (['contour', self.dem(), '--interval', '1e-6'], 'levels of 0.000001'),
                            (['raster', self.dem(), '--cell', '0.0003'], 'of memory')):
             with self.subTest(args=args):
                 result = terrace(*args, '-o', self.path('out'))

@@ -195,13 +195,11 @@ class StoreTest(unittest.TestCase):
         self.assertAlmostEqual(deep[0][3], min(
             math.hypot(scale * math.hypot(p[0] - x, p[1] - y), p[2] - z) for p in everything),
             delta=1e-6)
-        self.assertEqual(
-            numbers('points', self.store, '-o', '-', '--near', f'{x},{y}', '-k', 0), [])
         for place, said in ((f'{x},{y}', False), ('11,46.5', True)):
             result = terrace('points', self.store, '-o', '-', '--near', place, '-k', 1)
             self.assertEqual(result.returncode, 0)
             self.assertEqual('outside the store' in result.stderr, said, result.stderr)
-        for wrong in (['--near', f'{x},{y}'], ['--near', f'{x}', '-k', 2],
+        for wrong in (['--near', f'{x},{y}'], ['--near', f'{x}', '-k', 2], ['--near', f'{x},{y}', '-k', 0],
                       ['--near', f'{x},{y}', '-k', 2, '--within', 3],
                       ['--near', f'{x},{y}', '--within', -1], ['-k', 2], ['--within', 2],
                       ['--near', f'{x},{y}', '-k', 2, '--region', '0,0,1,1']):

@@ -65,7 +65,7 @@ Error not_replaced(std::string file, const Ownership& found) {
                 .where = {},
                 .cause = "contains " + found.stranger +
                          ", which terrace did not write, so it is not replaced",
-                .remedy = "move that file away or choose another name",
+                .remedy = "move it away or choose another name",
                 .error_number = EEXIST});
 }
 

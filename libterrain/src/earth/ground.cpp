@@ -82,6 +82,7 @@ std::string unit_name(double metres) {
 
 std::string plural_unit(const std::string& unit) {
   if (unit.ends_with("foot")) return unit.substr(0, unit.size() - 4) + "feet";
+  if (unit.ends_with("inch")) return unit + "es";
   return unit.ends_with('s') || unit.ends_with("feet") ? unit : unit + "s";
 }
 

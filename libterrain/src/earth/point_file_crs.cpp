@@ -72,13 +72,17 @@ stream::Crs crs_of_point_file(const stream::Placement& own,
 std::string lost_height_unit(const std::string& path, const stream::PointWriter& writer,
                              const stream::Placement& own,
                              const std::optional<stream::Crs>& other) {
-  if (writer.records_units() || is_geocentric(own.crs)) return {};
+  if (is_geocentric(own.crs)) return {};
   try {
     const std::string unit = unit_of_heights(own, other.has_value());
+    // Without a CRS the unit is a code of a GeoKey, which these two units do not have.
+    const bool codeless = unit == "inch" || unit == "decimetre";
+    if (writer.records_units() && !(codeless && !definition_in_file(own, other))) return {};
     if (unit.empty() || metres_in_unit(unit).value_or(0) == 1) return {};
-    return path + ": heights are in " + plural_unit(unit) +
-           ", and the format has no place for a unit, so programs read them as metres; write LAS "
-           "or LAZ to keep the unit";
+    return path + ": heights are in " + plural_unit(unit) + ", and the format has no place for " +
+           (writer.records_units() ? "that" : "a") + " unit, so programs read them as metres; " +
+           (writer.records_units() ? "name the CRS to keep it"
+                                   : "write LAS or LAZ to keep the unit");
   } catch (const CrsError&) {
     return {};
   }

@@ -154,8 +154,11 @@ std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
                                : "metres of a map that stretches lengths to " +
                                      readable_number(1 / here.metres[0]) + " times";
   return "x and y are " + what + " and heights " + plural_unit(heights) +
-         ", which most programs read as one unit; pass `to_crs`" + here.projection() +
-         " for metres, or write GLB, which is in metres";
+         ", which most programs read as one unit; " +
+         // A conversion leaves heights as they are.
+         (metres_in_unit(heights) == 1.0 ? "pass `to_crs`" + here.projection() + " for metres, or "
+                                         : std::string()) +
+         "write GLB, which is in metres";
 }
 
 }  // namespace

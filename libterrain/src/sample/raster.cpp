@@ -157,12 +157,12 @@ class RasterRun {
         shader_(grid_, store.schema(), crs_, request.value),
         nodata_(nodata(store, request.value)) {}
 
-  RasterOutcome run(const stream::Channel& heights, const ProgressReport& report) {
+  RasterOutcome run(const std::string& height_unit, const ProgressReport& report) {
     stream::GeoTiffOptions options;
     options.columns = grid_.columns;
     options.rows = grid_.rows;
     options.sample.type = shaded() ? stream::ScalarType::u8 : stream::ScalarType::f32;
-    if (request_.value == RasterValue::height) options.sample.unit = heights.unit;
+    if (request_.value == RasterValue::height) options.sample.unit = height_unit;
     options.world.xy = {grid_.step_x, 0, grid_.x, 0, grid_.step_y, grid_.y};
     options.crs = crs_;
     options.nodata = nodata_;
@@ -353,7 +353,16 @@ RasterOutcome write_raster(const stream::Store& store, const RasterRequest& requ
   RasterRequest wanted = request;
   const RasterGrid grid =
       request.align.empty() ? raster_grid(source, request) : aligned_grid(source, wanted, context);
-  return RasterRun(source, wanted, grid, context).run(store.schema().coordinates[2], report);
+  std::string height_unit = store.schema().coordinates[2].unit;
+  if (request.to && height_unit.empty()) {
+    // A unit that follows from the store's own x and y does not follow from those of the raster.
+    // Readers take metres for granted unless x and y are in another unit of length.
+    const std::string unit = Ground(store.schema()).height_unit();
+    const stream::Crs other = request.to->to().crs();
+    const bool assumed = other.geographic || metres_in_unit(other.horizontal_unit) == 1.0;
+    if (unit != "metre" || !assumed) height_unit = unit;
+  }
+  return RasterRun(source, wanted, grid, context).run(height_unit, report);
 }
 
 }  // namespace terrace::terrain

@@ -317,4 +317,9 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
   return names_something(by_keys) ? by_keys : by_wkt;
 }
 
+std::string las_height_unit(const LasHeader& header) {
+  std::vector<std::string> ignored;
+  return crs_of_key_records(header, ignored).vertical_unit;
+}
+
 }  // namespace terrace::stream

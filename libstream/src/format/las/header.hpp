@@ -67,4 +67,8 @@ std::optional<LasHeader> peek_las_header(std::string_view head);
 /// pipe.
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments);
 
+/// The unit of heights in the GeoKeys, for files whose CRS is named by the caller; empty if none is
+/// recorded.
+std::string las_height_unit(const LasHeader& header);
+
 }  // namespace terrace::stream

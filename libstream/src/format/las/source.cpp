@@ -44,8 +44,15 @@ class LasOpener {
     SourceInfo& info = stream_.info;
     info.format = header_.compressed ? "laz" : "las";
     info.files = {file_};
-    info.crs =
-        options_.crs ? *options_.crs : las_crs(header_, stream_.input->name(), info.comments);
+    if (options_.crs) {
+      info.crs = *options_.crs;
+      // A horizontal system says nothing of heights: their unit is that of the file.
+      if (info.crs.vertical_epsg == 0 && info.crs.vertical_unit.empty()) {
+        info.crs.vertical_unit = las_height_unit(header_);
+      }
+    } else {
+      info.crs = las_crs(header_, stream_.input->name(), info.comments);
+    }
     if (header_.uncounted > 0) {
       info.note = stream_.input->name() + ": the header counts " +
                   counted(header_.points, "point") + ", but the bytes of " +
