@@ -178,6 +178,8 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
     const bool fits =
         box.min[0] >= -360 && box.max[0] <= 540 && box.min[1] >= -90 && box.max[1] <= 90;
     if (!fits || !own->reaches_wgs84()) {
+      // In a system of longitudes and latitudes the note would contradict itself.
+      if (!fits && own->is_geographic()) return std::nullopt;
       say(given.file + ": has no crs, and its places are read in the CRS of the data, " +
           own->title() + (fits ? "" : ", because they are not longitudes and latitudes"));
       return std::nullopt;
