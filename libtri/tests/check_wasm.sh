@@ -9,5 +9,5 @@ shift 3
 mkdir -p "$folder"
 printf '#include "%s"\n' "$@" > "$folder/core.cpp"
 "$compiler" -std=c++20 -O1 -fexceptions -Wall -Wextra -Wshorten-64-to-32 -Werror -DTERRACE_TRI_CORE -DNDEBUG -ffp-contract=off \
-  -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -I "$root/include" -I "$root/src" "$folder/core.cpp" "$root/examples/flight.cpp" -o "$folder/flight.js"
+  -sALLOW_MEMORY_GROWTH=1 -sSINGLE_FILE=1 -I "$root/include" -I "$root/src" -I "$root/subprojects/terrace-base/include" "$folder/core.cpp" "$root/examples/flight.cpp" -o "$folder/flight.js"
 node "$folder/flight.js"
