@@ -51,7 +51,7 @@ Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exp
   if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
   Matching result = blossom::proof_of(solver);
   result.exponent = exponent;
-  // Of parallel edges, the cheapest is the matched one.
+  // The cheapest of several edges between the same vertices is the matched one.
   std::vector<std::size_t> chosen(vertex_count, edges.size());
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const AnyEdge& e = edges[k];

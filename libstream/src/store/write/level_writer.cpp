@@ -245,7 +245,7 @@ void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
 
 void LevelWriter::train() {
   encoders_.resize(team_.threads());
-  // Of many blocks only a part is counted, because other threads wait for this.
+  // If there are many blocks, counts only some of them, because other threads wait for this.
   const bool many = held_.size() == kTrainingBlocks;
   Tables tables;
   if (layout_.grid && layout_.level == 0) {
