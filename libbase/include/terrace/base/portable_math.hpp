@@ -95,7 +95,8 @@ inline double atan2_degrees(double y, double x) {
                                            36.86989764584402,
                                            41.18592516570965,
                                            45.0};
-  const int eighth = static_cast<int>(t * 8.0 + 0.5);
+  // Either eighth will do next to the middle between two.
+  const int eighth = static_cast<int>(t * 8.0 + 0.5);  // NOLINT(bugprone-incorrect-roundings)
   t = (t - eighth / 8.0) / (1.0 + t * (eighth / 8.0));
   const double q = t * t;  // at most 1 / 256
   double sum = 0.0;
