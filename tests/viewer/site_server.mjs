@@ -4,15 +4,15 @@ import {createServer} from 'node:http';
 import {createReadStream, existsSync, statSync} from 'node:fs';
 import {join, normalize} from 'node:path';
 
-/// Milliseconds before a slow server answers.
-const SLOW = 1500;
 const TYPES = {html: 'text/html', js: 'text/javascript', css: 'text/css', json: 'application/json', wasm: 'application/wasm'};
 
 /// Serves `folder` on a free port. `fault(request)` may return 'whole', 'short', 'packed', 'missing', 'error',
-/// 'replaced', 'damaged', 'slow' or 'dead' for a request {path, range, method}; log lists all requests.
+/// 'replaced', 'damaged' or 'dead' for a request {path, range, method}, or 'held': it is answered when the test calls release().
+/// log lists all requests.
 export async function serveSite(folder) {
   const log = [];
   const site = {log, fault: () => null};
+  const released = new Promise(resolve => site.release = resolve);
   const server = createServer((request, response) => {
     const path = normalize(decodeURIComponent(new URL(request.url, 'http://x').pathname));
     const entry = {path, range: request.headers.range ?? null, method: request.method, status: 0, bytes: 0};
@@ -37,7 +37,7 @@ export async function serveSite(folder) {
       }
       return undefined;
     };
-    if (fault === 'slow') return setTimeout(answer, SLOW);
+    if (fault === 'held') return released.then(answer);
     return answer();
 
     function answer() {
