@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The layout check finds every kind of breach, each in a small tree that is sound without it."""
 
+import json
 import os
 import tempfile
 import unittest
@@ -53,6 +54,14 @@ class CheckLayout(unittest.TestCase):
             change(root)
             with mock.patch.dict(check_layout.MAY_DIFFER, allowed, clear=True):
                 return list(check_layout.breaches(root))
+
+    def test_finds_the_numbers_of_sources_that_break_unity_builds(self):
+        with tempfile.TemporaryDirectory() as build:
+            targets = [{'name': f'library{count}', 'type': 'static library', 'defined_in': 'meson.build',
+                        'target_sources': [{'sources': ['a.cpp'] * count}, {'linker': ['ar']}]} for count in (0, 29, 30, 31, 60)]
+            write(build, 'meson-info/intro-targets.json', json.dumps(targets))
+            found = list(check_layout.check_unity(build))
+        self.assertEqual([breach.split()[1] for breach in found], ['library30', 'library60'])
 
     def test_sound_tree_has_none(self):
         self.assertEqual(self.breaches(lambda root: None), [])
