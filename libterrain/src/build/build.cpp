@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -11,6 +12,8 @@
 #include <stop_token>
 #include <string>
 #include <utility>
+#include <variant>
+#include <vector>
 
 #include <terrace/base/portable_math.hpp>
 #include <terrace/cluster/hierarchy.hpp>
@@ -124,32 +127,6 @@ std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payl
       (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
       64 * request.block_points * (point + 16);
   return (std::uint64_t{32} << 20) + blocks;
-}
-
-/// Returns the number of threads: as many as requested and as fit into --memory. Results do not
-/// depend on it. Throws: stream::Error if not even one thread fits.
-unsigned threads_within_memory(const BuildRequest& request, const Context& context,
-                               std::uint64_t memory_bytes, std::size_t payload_size,
-                               std::uint64_t source_bytes, const stream::SourceInfo& info) {
-  const auto needed = [&](unsigned threads) {
-    return source_bytes + memory_beside_source(request, payload_size, threads);
-  };
-  for (unsigned threads = std::max(1U, context.threads); threads > 0; --threads) {
-    if (needed(threads) <= memory_bytes) return threads;
-  }
-  const auto in_mebibytes = [](std::uint64_t bytes) {
-    return std::to_string((bytes >> 20) + 1) + "M";
-  };
-  throw stream::Error(
-      {.file = request.store.string(),
-       .where = {},
-       .cause = "`memory_bytes` " + std::to_string(memory_bytes >> 20) +
-                "M is not enough: the build needs " + in_mebibytes(needed(1)) + ", " +
-                in_mebibytes(source_bytes) + " of it to read the input",
-       .remedy = source_bytes > kSourceMemory && info.grid
-                     ? "raise `memory_bytes`, lower `block_points`, or rewrite large strips and "
-                       "tiles as small tiles: gdal_translate -co TILED=YES"
-                     : "raise `memory_bytes`, or lower `block_points`"});
 }
 
 /// Returns the ratio of a cell's height to its width on the ground, in the middle of the raster.
@@ -268,21 +245,18 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
                        .remedy = remedy});
 }
 
-/// Ends a build that must join points across the antimeridian.
-struct AcrossAntimeridian {
-  JoinedLongitudes::Joint joint;
-};
-
-/// Throws: AcrossAntimeridian if the input can be read again; otherwise stream::Error.
-void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longitudes,
-                     const Context& context) {
-  const std::optional<JoinedLongitudes::Joint> joint = longitudes.joint();
-  if (!joint || request.most_points > 0) return;
+/// Returns how to join the points across the antimeridian if they must be joined and the input can
+/// be read again; nullopt if they need not be. Throws: stream::Error if it cannot be read again.
+std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request,
+                                                     const JoinedLongitudes& longitudes,
+                                                     const Context& context) {
+  std::optional<JoinedLongitudes::Joint> joint = longitudes.joint();
+  if (!joint || request.most_points > 0) return std::nullopt;
   if (request.entities != stream::Entities::points) {
     // Their corners are attributes, which cannot be shifted.
     context.say("the points " + joint->what +
                 ", and what connects them goes around the earth: continue longitudes beyond 180");
-    return;
+    return std::nullopt;
   }
   if (!request.open &&
       std::any_of(request.inputs.begin(), request.inputs.end(),
@@ -294,10 +268,263 @@ void join_longitudes(const BuildRequest& request, const JoinedLongitudes& longit
                   ", which is known only at the end, and the input can be read only once",
          .remedy = "name a file, or count longitudes from 0 to 360 or continue them beyond 180"});
   }
-  throw AcrossAntimeridian{*joint};
+  return joint;
+}
+
+/// One reading of the input into a store. A thread of its own reads ahead; the context's threads
+/// cluster.
+class Build {
+ public:
+  /// middle: for joining points across the antimeridian; see JoinedLongitudes.
+  Build(const BuildRequest& request, const Context& context, std::optional<double> middle)
+      : request_(request), context_(context), middle_(middle) {}
+
+  /// Returns the outcome, or, if there is no middle but one is needed, the joint to build again
+  /// with. To be called once.
+  std::variant<BuildOutcome, JoinedLongitudes::Joint> run();
+
+ private:
+  [[nodiscard]] std::unique_ptr<stream::PointSource> open_input();
+  [[nodiscard]] std::unique_ptr<stream::PointSource> in_order(
+      std::unique_ptr<stream::PointSource> points);
+  /// Returns the number of threads: as many as requested and as fit into --memory. Results do not
+  /// depend on it. Throws: stream::Error if not even one thread fits.
+  [[nodiscard]] unsigned threads_for(std::size_t payload_bytes) const;
+  /// Pushes all points to the builder.
+  void read_all(cluster::HierarchyBuilder& builder, const stream::StoreSchema& schema,
+                UndeclaredVoids& voids, JoinedLongitudes& longitudes);
+  [[nodiscard]] bool next(cluster::HierarchyBuilder& builder, stream::PointBlock& block);
+  [[nodiscard]] BuildOutcome outcome_of(const stream::Progress& read,
+                                        const cluster::HierarchyResult& result,
+                                        std::uint64_t store_bytes) const;
+  /// Notes what a user should know of the input.
+  void tell(const BuildOutcome& outcome, const UndeclaredVoids& voids) const;
+
+  [[nodiscard]] std::filesystem::path folder() const {
+    return std::filesystem::absolute(request_.store).parent_path();
+  }
+
+  const BuildRequest& request_;
+  const Context& context_;
+  std::optional<double> middle_;
+  std::uint64_t memory_bytes_ = context_.memory_or(kMemory);
+
+  DamageReport damage_;
+  std::stop_source reading_;
+  std::function<void()> stop_reading_ = [this] { reading_.request_stop(); };
+  std::stop_callback<std::function<void()>> on_stop_{context_.stop, stop_reading_};
+  std::mutex reporting_;                          ///< guards both reports
+  std::optional<ProgressReport> records_report_;  ///< until the first points come out of the sort
+  std::optional<ProgressReport> points_report_;
+  stream::SourceInfo info_;
+  /// Computed on first use. PROJ takes tens of milliseconds to open its database; the first points
+  /// are read meanwhile.
+  std::shared_future<Located> located_;
+  stream::OrderedSource* ordered_ = nullptr;  ///< in points_, unless they are cells
+  /// Last, because its thread uses the members above.
+  std::unique_ptr<stream::PointSource> points_;
+};
+
+std::unique_ptr<stream::PointSource> Build::open_input() {
+  stream::SourceOptions options;
+  options.format = request_.input_format;
+  options.entities = request_.entities;
+  options.block_points = request_.block_points;
+  options.memory_bytes = std::max(kSourceMemory, memory_bytes_);
+  options.band = request_.band;
+  options.selection = request_.selection;
+  options.heights_of_colour = request_.heights_of_colour;
+  options.cell = request_.cell.value_or(0);
+  options.crs = request_.crs;
+  options.same_crs = &same_crs;
+  options.threads = std::max(1U, context_.threads);
+  if (request_.skip_damaged) options.on_damage = damage_.taker();
+  options.stop = reading_.get_token();
+  auto source =
+      request_.open ? request_.open(options) : stream::open_source(request_.inputs, options);
+  if (request_.most_points == 0) return source;
+  return std::make_unique<FirstPoints>(std::move(source), request_.most_points);
+}
+
+std::unique_ptr<stream::PointSource> Build::in_order(std::unique_ptr<stream::PointSource> points) {
+  const auto on_the_ground = [located = located_](const stream::Box3& box) {
+    return unit_lengths(located.get().ground.map(box));
+  };
+  const auto report = [this](const stream::Progress& progress) {
+    const std::lock_guard lock(reporting_);
+    if (!records_report_) records_report_.emplace(context_, "records");
+    records_report_->update(progress.points, progress.fraction);
+  };
+  auto ordered = stream::in_spatial_order(
+      std::move(points),
+      {.order = request_.order,
+       .block_points = request_.block_points,
+       .unit_lengths = on_the_ground,
+       .folder = folder(),
+       .threads = std::max(1U, context_.threads),
+       .parts_ahead = memory_bytes_ < kMemory ? 0 : std::min(context_.threads / 4, kMostPartsAhead),
+       .stop = reading_.get_token(),
+       .reading = report});
+  ordered_ = ordered.get();
+  return ordered;
+}
+
+unsigned Build::threads_for(std::size_t payload_bytes) const {
+  const std::uint64_t source_bytes = std::max(kSourceMemory, points_->reading_bytes());
+  const auto needed = [&](unsigned threads) {
+    return source_bytes + memory_beside_source(request_, payload_bytes, threads);
+  };
+  for (unsigned threads = std::max(1U, context_.threads); threads > 0; --threads) {
+    if (needed(threads) <= memory_bytes_) return threads;
+  }
+  const auto in_mebibytes = [](std::uint64_t bytes) {
+    return std::to_string((bytes >> 20) + 1) + "M";
+  };
+  throw stream::Error(
+      {.file = request_.store.string(),
+       .where = {},
+       .cause = "`memory_bytes` " + std::to_string(memory_bytes_ >> 20) +
+                "M is not enough: the build needs " + in_mebibytes(needed(1)) + ", " +
+                in_mebibytes(source_bytes) + " of it to read the input",
+       .remedy = source_bytes > kSourceMemory && info_.grid
+                     ? "raise `memory_bytes`, lower `block_points`, or rewrite large strips and "
+                       "tiles as small tiles: gdal_translate -co TILED=YES"
+                     : "raise `memory_bytes`, or lower `block_points`"});
+}
+
+bool Build::next(cluster::HierarchyBuilder& builder, stream::PointBlock& block) {
+  // Reading stops for two reasons: the context requested it, or a failure that push() rethrows.
+  try {
+    return points_->next(block);
+  } catch (const stream::Stopped&) {
+    if (!context_.stop.stop_requested()) builder.push({});
+    throw;
+  }
+}
+
+void Build::read_all(cluster::HierarchyBuilder& builder, const stream::StoreSchema& schema,
+                     UndeclaredVoids& voids, JoinedLongitudes& longitudes) {
+  const LatitudeCheck check_latitude(schema,
+                                     info_.files.empty() ? std::string() : info_.files.front());
+  stream::PointBlock block;
+  std::vector<std::byte> marked;
+  while (next(builder, block)) {
+    check_latitude(block.positions);
+    voids.add(block);
+    if (!info_.grid) longitudes(block.positions);
+    if (schema.payload_size() > info_.payload_size()) {  // room for the mark
+      append_zero_byte(block.payload, info_.payload_size(), block.positions.size(), marked);
+      builder.push(block.positions, marked);
+    } else {
+      builder.push(block.positions, block.payload);
+    }
+    const stream::Progress progress = points_->progress();
+    if (context_.stop.stop_requested()) throw stream::Stopped();
+    const std::lock_guard lock(reporting_);
+    records_report_.reset();
+    points_report_->update(progress.points, progress.fraction);
+  }
+}
+
+BuildOutcome Build::outcome_of(const stream::Progress& read, const cluster::HierarchyResult& result,
+                               std::uint64_t store_bytes) const {
+  BuildOutcome outcome;
+  outcome.points = result.points;
+  outcome.nodata = read.nodata;
+  outcome.raster = info_.grid;
+  outcome.excluded = read.excluded;
+  outcome.lost = read.lost;
+  outcome.outliers = result.outliers;
+  outcome.empty_values = read.empty_values;
+  outcome.withheld = read.withheld;
+  outcome.store_bytes = store_bytes;
+  if (ordered_ != nullptr) outcome.order = ordered_->report();
+  outcome.top = result.top;
+  outcome.level_points = result.level_points;
+  outcome.level_clusters = result.level_clusters;
+  return outcome;
+}
+
+void Build::tell(const BuildOutcome& outcome, const UndeclaredVoids& voids) const {
+  const auto say = [this](const std::string& note) {
+    if (!note.empty()) context_.say(note);
+  };
+  if (outcome.empty_values > 0) {
+    say(counted(outcome.empty_values, "attribute", "has no value in its file; it is NaN",
+                "have no value in their file; they are NaN"));
+  }
+  if (outcome.withheld > 0) {
+    say(counted(outcome.withheld, "point",
+                "is marked as withheld in its file; it is kept, with the mark",
+                "are marked as withheld in their file; they are kept, with the mark"));
+  }
+  tell_spooled(info_, context_);
+  say(info_.note);
+  say(voids.note());
+  damage_.tell(context_);
+  tell_order(outcome.order, folder(), context_);
+  const auto& [crs, ground] = located_.get();
+  say(crs.note);
+  say(ground.assumption());
+}
+
+std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
+  points_ = open_input();
+  info_ = points_->info();
+  check_cells(info_);
+  located_ = std::async(std::launch::deferred, [this] { return Located(info_, request_); });
+  points_report_.emplace(context_, "points");
+  if (!info_.grid) points_ = in_order(std::move(points_));
+  // Checks memory before reading begins, without the bytes that the store adds, which are known
+  // later.
+  static_cast<void>(threads_for(info_.payload_size()));
+  // Reads ahead from now on, except for rasters, which need their cell size first (see below).
+  points_ = stream::read_ahead(std::move(points_), kBlocksAhead, reading_, reading_.get_token());
+  const auto& [crs, ground] = located_.get();
+  const stream::StoreSchema schema = schema_of(info_, crs, request_);
+  const unsigned threads = threads_for(schema.payload_size());
+  if (info_.grid) {
+    // Tiles should be square on the ground, and the size of a cell there is known only now.
+    points_->refine(cell_aspect(ground, info_),
+                    memory_bytes_ - memory_beside_source(request_, schema.payload_size(), threads));
+  }
+
+  stream::StoreWriter writer(request_.store, schema, request_.replace, threads);
+  StoreSink sink(writer, request_.most_points == 0, context_.stop);
+  cluster::HierarchyOptions options = clustering_of(request_, schema, ground);
+  options.threads = threads;
+  options.stop = context_.stop;
+  // Reports a full disk at once, even if the producer of the input is idle.
+  options.on_failure = stop_reading_;
+  cluster::HierarchyBuilder builder(options, sink);
+  UndeclaredVoids voids(info_);
+  JoinedLongitudes longitudes(schema, middle_);
+  read_all(builder, schema, voids, longitudes);
+
+  const stream::Progress read = points_->progress();
+  if (read.points == 0) throw_no_points(request_, info_, read);
+  if (!middle_) {
+    if (auto joint = joint_to_make(request_, longitudes, context_)) return *std::move(joint);
+  }
+  writer.set_nodata(read.nodata);
+  const cluster::HierarchyResult result = builder.finish();
+  BuildOutcome outcome = outcome_of(read, result, sink.store_bytes());
+  tell(outcome, voids);
+  return outcome;
 }
 
 }  // namespace
+
+BuildOutcome build_store(const BuildRequest& request, const Context& context) {
+  auto built = Build(request, context, std::nullopt).run();
+  if (const auto* const joint = std::get_if<JoinedLongitudes::Joint>(&built)) {
+    const bool beyond = joint->what.ends_with("antimeridian");
+    context.say("the points " + joint->what + ": they are read again and joined" +
+                (beyond ? ", with longitudes that continue beyond 180 degrees" : ""));
+    built = Build(request, context, joint->middle).run();
+  }
+  return std::get<BuildOutcome>(std::move(built));
+}
 
 std::optional<cluster::Effort> effort_of(const std::string& name) {
   for (const auto& [text, effort] : kEfforts) {
@@ -308,184 +535,6 @@ std::optional<cluster::Effort> effort_of(const std::string& name) {
 
 std::string name_of(cluster::Effort effort) {
   return kEfforts[static_cast<std::size_t>(effort)].first;
-}
-
-namespace {
-
-/// middle: for joining points across the antimeridian; see JoinedLongitudes. Throws:
-/// AcrossAntimeridian if it is missing but needed.
-BuildOutcome build_once(const BuildRequest& request, const Context& context,
-                        std::optional<double> middle) {
-  const std::uint64_t memory_bytes = context.memory_or(kMemory);
-  stream::SourceOptions source_options;
-  source_options.format = request.input_format;
-  source_options.entities = request.entities;
-  source_options.block_points = request.block_points;
-  source_options.memory_bytes = std::max(kSourceMemory, memory_bytes);
-  source_options.band = request.band;
-  source_options.selection = request.selection;
-  source_options.heights_of_colour = request.heights_of_colour;
-  source_options.cell = request.cell.value_or(0);
-  source_options.crs = request.crs;
-  source_options.same_crs = &same_crs;
-  source_options.threads = std::max(1U, context.threads);
-  DamageReport damage;
-  if (request.skip_damaged) source_options.on_damage = damage.taker();
-  std::stop_source reading;
-  const auto stop_reading = [&reading] { reading.request_stop(); };
-  const std::stop_callback on_stop(context.stop, stop_reading);
-  source_options.stop = reading.get_token();
-  std::unique_ptr<stream::PointSource> source =
-      request.open ? request.open(source_options)
-                   : stream::open_source(request.inputs, source_options);
-  if (request.most_points > 0) {
-    source = std::make_unique<FirstPoints>(std::move(source), request.most_points);
-  }
-  const stream::SourceInfo info = source->info();
-  check_cells(info);
-  // Computed on first use. PROJ takes tens of milliseconds to open its database; the first points
-  // are read meanwhile.
-  const std::shared_future<Located> located =
-      std::async(std::launch::deferred, [&info, &request] { return Located(info, request); });
-  const ProgressReport report(context, "points");
-  std::optional<ProgressReport> reading_report;
-  std::mutex reporting;
-  const auto set_aside = [&](const stream::Progress& progress) {
-    const std::lock_guard lock(reporting);
-    if (!reading_report) reading_report.emplace(context, "records");
-    reading_report->update(progress.points, progress.fraction);
-  };
-  const std::filesystem::path folder = std::filesystem::absolute(request.store).parent_path();
-  // Must be destroyed before the objects that its thread calls.
-  std::unique_ptr<stream::PointSource> points = std::move(source);
-  stream::OrderedSource* in_order = nullptr;
-  if (!info.grid) {
-    auto ordered = stream::in_spatial_order(
-        std::move(points),
-        {.order = request.order,
-         .block_points = request.block_points,
-         .unit_lengths =
-             [located](const stream::Box3& box) {
-               return unit_lengths(located.get().ground.map(box));
-             },
-         .folder = folder,
-         .threads = std::max(1U, context.threads),
-         .parts_ahead = memory_bytes < kMemory ? 0 : std::min(context.threads / 4, kMostPartsAhead),
-         .stop = reading.get_token(),
-         .reading = set_aside});
-    in_order = ordered.get();
-    points = std::move(ordered);
-  }
-  const auto threads_for = [&](std::size_t payload_size) {
-    return threads_within_memory(request, context, memory_bytes, payload_size,
-                                 std::max(kSourceMemory, points->reading_bytes()), info);
-  };
-  // Checks memory before reading begins, without the bytes that the store adds, which are known
-  // later.
-  static_cast<void>(threads_for(info.payload_size()));
-  // Start now, except for rasters, which need their cell size first (see below).
-  points = stream::read_ahead(std::move(points), kBlocksAhead, reading, reading.get_token());
-  const auto& [crs, ground] = located.get();
-  BuildOutcome outcome;
-  const stream::StoreSchema schema = schema_of(info, crs, request);
-  const std::size_t payload_bytes = schema.payload_size();
-  const unsigned threads = threads_for(payload_bytes);
-  if (info.grid) {
-    // Tiles should be square on the ground, and the size of a cell there is known only now.
-    points->refine(cell_aspect(ground, info),
-                   memory_bytes - memory_beside_source(request, payload_bytes, threads));
-  }
-
-  stream::StoreWriter writer(request.store, schema, request.replace, threads);
-  StoreSink sink(writer, request.most_points == 0, context.stop);
-  cluster::HierarchyOptions options = clustering_of(request, schema, ground);
-  options.threads = threads;
-  options.stop = context.stop;
-  // Reports a full disk at once, even if the producer of the input is idle.
-  options.on_failure = stop_reading;
-  cluster::HierarchyBuilder builder(options, sink);
-
-  JoinedLongitudes longitudes(schema, middle);
-  const LatitudeCheck check_latitude(schema,
-                                     info.files.empty() ? std::string() : info.files.front());
-  stream::PointBlock block;
-  UndeclaredVoids voids(info);
-  std::vector<std::byte> marked;
-  stream::Progress so_far;
-  // Reading stops for two reasons: the context requested it, or a failure that push() rethrows.
-  const auto next = [&] {
-    try {
-      return points->next(block);
-    } catch (const stream::Stopped&) {
-      if (!context.stop.stop_requested()) builder.push({});
-      throw;
-    }
-  };
-  while (next()) {
-    check_latitude(block.positions);
-    voids.add(block);
-    if (!info.grid) longitudes(block.positions);
-    if (payload_bytes > info.payload_size()) {  // room for the mark
-      append_zero_byte(block.payload, info.payload_size(), block.positions.size(), marked);
-      builder.push(block.positions, marked);
-    } else {
-      builder.push(block.positions, block.payload);
-    }
-    so_far = points->progress();
-    if (context.stop.stop_requested()) throw stream::Stopped();
-    const std::lock_guard lock(reporting);
-    reading_report.reset();
-    report.update(so_far.points, so_far.fraction);
-  }
-  so_far = points->progress();
-  if (so_far.points == 0) throw_no_points(request, info, so_far);
-  if (!middle) join_longitudes(request, longitudes, context);
-  writer.set_nodata(so_far.nodata);
-  const cluster::HierarchyResult result = builder.finish();
-  outcome.points = result.points;
-  outcome.outliers = result.outliers;
-  outcome.nodata = so_far.nodata;
-  outcome.raster = info.grid;
-  outcome.excluded = so_far.excluded;
-  outcome.lost = so_far.lost;
-  outcome.empty_values = so_far.empty_values;
-  outcome.withheld = so_far.withheld;
-  outcome.store_bytes = sink.store_bytes();
-  if (in_order != nullptr) outcome.order = in_order->report();
-  outcome.top = result.top;
-  outcome.level_points = result.level_points;
-  outcome.level_clusters = result.level_clusters;
-  if (so_far.empty_values > 0) {
-    context.say(counted(so_far.empty_values, "attribute", "has no value in its file; it is NaN",
-                        "have no value in their file; they are NaN"));
-  }
-  if (so_far.withheld > 0) {
-    context.say(counted(so_far.withheld, "point",
-                        "is marked as withheld in its file; it is kept, with the mark",
-                        "are marked as withheld in their file; they are kept, with the mark"));
-  }
-  tell_spooled(info, context);
-  if (!info.note.empty()) context.say(info.note);
-  if (const std::string note = voids.note(); !note.empty()) context.say(note);
-  damage.tell(context);
-  tell_order(outcome.order, folder, context);
-  if (!crs.note.empty()) context.say(crs.note);
-  if (!ground.assumption().empty()) context.say(ground.assumption());
-  return outcome;
-}
-
-}  // namespace
-
-BuildOutcome build_store(const BuildRequest& request, const Context& context) {
-  try {
-    return build_once(request, context, std::nullopt);
-  } catch (const AcrossAntimeridian& across) {
-    const auto& [middle, what] = across.joint;
-    const bool beyond = what.ends_with("antimeridian");
-    context.say("the points " + what + ": they are read again and joined" +
-                (beyond ? ", with longitudes that continue beyond 180 degrees" : ""));
-    return build_once(request, context, middle);
-  }
 }
 
 }  // namespace terrace::terrain

@@ -52,7 +52,6 @@ void UndeclaredVoids::add(const stream::PointBlock& block) {
 std::string UndeclaredVoids::note_of(std::uint64_t count, double stored,
                                      const std::string& heights) const {
   const std::string value = number_text(stored);
-  const std::string file = info_.files.size() == 1 ? info_.files.front() : "FILE";
   std::string remedy;
   if (!info_.grid) {
     const std::string limit = std::abs(stored) > kMost ? (stored > 0 ? "1e30" : "-1e30") : value;
@@ -60,10 +59,10 @@ std::string UndeclaredVoids::note_of(std::uint64_t count, double stored,
   } else if (info_.format == "ascii-grid" || info_.format == "binary-grid") {
     remedy = "declare the value in the header: NODATA_value " + value;
   } else {
-    remedy = "declare the value: gdal_edit.py -a_nodata " + value + " " + file;
+    remedy = "declare the value: gdal_edit.py -a_nodata " + value + " FILE";
   }
   const bool one = count == 1;
-  return (info_.files.size() == 1 ? file + ": " : std::string()) +
+  return (info_.files.size() == 1 ? info_.files.front() + ": " : std::string()) +
          counted(count, info_.grid ? "cell" : "point") + (one ? " has " : " have ") + heights +
          ", and " + (one ? "is" : "are") + " kept; if " + (one ? "that means" : "these mean") +
          " no data, " + remedy;
