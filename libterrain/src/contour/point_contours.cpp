@@ -10,8 +10,9 @@
 #include <variant>
 #include <vector>
 
+#include <terrace/base/ordered_work.hpp>
+
 #include "base/available_memory.hpp"
-#include "base/ordered_work.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "contour/contour_parts.hpp"
@@ -116,7 +117,7 @@ class PointContours {
     const auto voids = std::make_shared<PointVoids>(parts_.store, request_.level);
     ContourTriangles lines(request_.interval, parts_.emit, parts_.limit);
     std::vector<Triangle> strange;
-    in_order(
+    base::in_order(
         loads.size(), threads,
         [&](unsigned thread, std::size_t i) {
           std::unique_ptr<PointWindow>& window = windows[thread];

@@ -11,7 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/ordered_work.hpp"
+#include <terrace/base/ordered_work.hpp>
+
 #include "base/store_checks.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -171,7 +172,7 @@ class Descent {
     const std::uint64_t members = store_.levels()[level].members;
     const std::uint64_t each = clusters_per_part(level);
     std::uint64_t read_so_far = 0;
-    in_order(
+    base::in_order(
         static_cast<std::size_t>((clusters + each - 1) / each), threads_,
         [&](unsigned worker, std::size_t i) {
           Read read = begin(worker);
@@ -195,7 +196,7 @@ class Descent {
   void run_heads(unsigned level) {
     const std::vector<std::uint64_t> ordinals = take_heads(level);
     const std::size_t each = static_cast<std::size_t>(clusters_per_part(level));
-    in_order((ordinals.size() + each - 1) / each, threads_,
+    base::in_order((ordinals.size() + each - 1) / each, threads_,
              [&](unsigned worker, std::size_t i) {
                Read read = begin(worker);
                stream::ClusterPoints points;

@@ -11,7 +11,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "base/ordered_work.hpp"
+#include <terrace/base/ordered_work.hpp>
+
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/geotiff_writer.hpp"
@@ -110,7 +111,7 @@ class Maker {
   Statistics run() {
     Statistics all;
     std::uint64_t cells = 0;
-    in_order(
+    base::in_order(
         pieces_, options_.threads, [this](unsigned, std::size_t i) { return make(piece(i)); },
         [&](std::size_t i, const Made& made) {
           check_interrupt();

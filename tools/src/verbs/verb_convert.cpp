@@ -8,9 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/ordered_work.hpp>
+
 #include <CLI/CLI.hpp>
 
-#include "base/ordered_work.hpp"
 #include "base/units.hpp"
 #include "build/damage_report.hpp"
 #include "cli/interrupt.hpp"
@@ -83,7 +84,7 @@ class ConvertCommand : public Command {
     const auto threads = static_cast<unsigned>(std::clamp<std::uint64_t>(
         (memory - std::min(memory, taken)) / of_thread, 1, common.threads));
     std::vector<stream::PointBlock> blocks(threads);
-    each_in_order(
+    base::each_in_order(
         threads,
         [&](unsigned worker) -> std::optional<stream::PointBlock*> {
           check_interrupt();

@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
+#include <terrace/base/ordered_work.hpp>
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "base/ordered_work.hpp"
 #include "base/progress_report.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
@@ -87,7 +87,7 @@ class BoundedMesher {
     std::uint64_t work = 0;
     struct Enough {};
     try {
-      in_order(
+      base::in_order(
           windows, threads,
           [&](unsigned worker, std::size_t i) {
             context_.check_stop();

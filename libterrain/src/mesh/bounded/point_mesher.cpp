@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/ordered_work.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "base/ordered_work.hpp"
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
@@ -217,7 +217,7 @@ PointMeshPlan PointMesher::plan_for(double max_error) const {
   const PointMeshEstimate estimate(cuts_, *samples_, options_.duplicates);
   std::vector<double> vertices(cuts_.cells.size(), kPointsPerMeshWindow);
   if (estimate.per_cell(max_error) < kPointsPerMeshWindow / 2.0) {
-    in_order(
+    base::in_order(
         cuts_.cells.size(), cell_threads_,
         [&](unsigned, std::size_t i) {
           context_.check_stop();

@@ -11,9 +11,9 @@
 #include <span>
 #include <utility>
 
+#include <terrace/base/ordered_work.hpp>
 #include <terrace/base/portable_math.hpp>
 
-#include "base/ordered_work.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
@@ -353,7 +353,7 @@ RasterMesher::Sample RasterMesher::sample(double max_error, tri::TinQuality qual
   const auto meshers = this->meshers(max_error);
   Sample sample;
   double vertices = 0.0, cells = 0.0;
-  in_order(
+  base::in_order(
       windows.size(), threads_,
       [&](unsigned worker, std::size_t i) {
         return meshers[worker]->count(plan.window(windows[i]), quality);

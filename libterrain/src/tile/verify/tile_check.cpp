@@ -11,10 +11,10 @@
 #include <string_view>
 #include <utility>
 
+#include <terrace/base/ordered_work.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/gzip.hpp>
 
-#include "base/ordered_work.hpp"
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
@@ -296,7 +296,7 @@ void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
   std::vector<TileHeights> heights(tiles.size());
   if (!surfaces_.empty()) heights = measure(tiles);
   ProgressReport report(context_, "tiles");
-  in_order(
+  base::in_order(
       tiles.size(), threads_, [&](unsigned, std::size_t i) { return check(tiles[i], heights[i]); },
       [&](std::size_t i, Checked&& checked) {
         const TileAddress& tile = tiles[i];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/ordered_work.hpp"
+#include "terrace/base/ordered_work.hpp"
 
 #include <atomic>
 #include <latch>
@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace terrace::terrain {
+namespace terrace::base {
 namespace {
 
 TEST(OrderedWork, CommitsEachResultOnceInOrder) {
@@ -148,4 +148,4 @@ TEST(OrderedWork, StopsAfterCommitError) {
 }
 
 }  // namespace
-}  // namespace terrace::terrain
+}  // namespace terrace::base

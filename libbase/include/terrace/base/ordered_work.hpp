@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace terrace::terrain {
+namespace terrace::base {
 
 /// Makes a result of each item of a sequence in several threads, including the calling one, and
 /// takes the results in order. next(worker) returns items as optionals, an empty one at the end.
@@ -128,4 +128,4 @@ void in_order(std::size_t count, unsigned threads, const Make& make, const Commi
       [&](auto&& result) { commit(committed++, std::forward<decltype(result)>(result)); });
 }
 
-}  // namespace terrace::terrain
+}  // namespace terrace::base
