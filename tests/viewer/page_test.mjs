@@ -34,7 +34,7 @@ after(async () => {
 async function newContext(t, options) {
   const context = await browser.newContext(options);
   t.after(() => context.close());
-  // Software rendering beside other tests is slow.
+  // Software rendering is slow, above all while other tests run.
   context.setDefaultTimeout(120_000);
   return context;
 }

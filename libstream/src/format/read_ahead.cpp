@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cassert>
-#include <condition_variable>
-#include <deque>
-#include <exception>
-#include <mutex>
-#include <system_error>
-#include <thread>
 #include <utility>
+
+#include <terrace/base/work_ahead.hpp>
 
 #include "terrace/stream/source.hpp"
 
@@ -22,55 +18,34 @@ class ReadAhead final : public PointSource {
         most_(std::max<std::size_t>(blocks, 1)),
         info_(source_->info()),
         reading_(reading),
-        on_stop_(stop, Forward{reading}) {
-    if (!info_.grid) start();
+        on_stop_(stop, Forward{reading}),
+        ahead_(1, [this] { return reader(); }) {
+    if (!info_.grid) give_blocks();
   }
-
-  ~ReadAhead() override {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = true;
-    }
-    room_.notify_one();
-    reading_.request_stop();
-    if (thread_.joinable()) thread_.join();
-  }
+  /// The source must not wait for a pipe when its thread is joined.
+  ~ReadAhead() override { reading_.request_stop(); }
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
   [[nodiscard]] std::uint64_t reading_bytes() const override { return source_->reading_bytes(); }
   void refine(double cell_aspect, std::uint64_t memory_bytes) override {
-    assert(!started_);
+    assert(ahead_.size() == 0);
     source_->refine(cell_aspect, memory_bytes);
   }
 
   bool next(PointBlock& block) override {
-    if (!started_) start();
-    if (!thread_.joinable()) {
-      const bool more = source_->next(block);
-      progress_ = source_->progress();
-      return more;
-    }
-    std::unique_lock lock(mutex_);
-    news_.wait(lock, [this] { return !ready_.empty() || ended_; });
-    if (ready_.empty()) {
+    give_blocks();
+    Ahead ahead = ahead_.take();
+    progress_ = ahead.progress;
+    // The caller's buffers are used for another block, so that in the long run nothing is allocated
+    // or set to zero.
+    std::swap(block, ahead.block);
+    if (!ahead.more) {
       block.clear();
-      if (error_) std::rethrow_exception(error_);
-      progress_ = last_progress_;
       return false;
     }
-    progress_ = ready_.front().progress;
-    // The reading thread reuses the caller's buffers, so that in the long run nothing is allocated
-    // or set to zero.
-    if (spare_.size() < most_) {
-      spare_.push_back(std::exchange(block, std::move(ready_.front().block)));
-    } else {
-      block = std::move(ready_.front().block);
-    }
-    ready_.pop_front();
-    lock.unlock();
-    room_.notify_one();
+    ahead_.give(std::move(ahead));
     return true;
   }
 
@@ -78,9 +53,10 @@ class ReadAhead final : public PointSource {
   [[nodiscard]] Progress progress() const override { return progress_; }
 
  private:
-  struct Ready {
-    PointBlock block;
-    Progress progress;
+  struct Ahead {
+    PointBlock block{};
+    Progress progress{};
+    bool more = false;  ///< the source has not ended before this block
   };
 
   /// Forwards a stop request.
@@ -89,50 +65,22 @@ class ReadAhead final : public PointSource {
     void operator()() { to.request_stop(); }
   };
 
-  void start() {
-    started_ = true;
-    try {
-      thread_ = std::thread([this] { run(); });
-    } catch (const std::system_error&) {
-      // The system has no more threads: next() reads.
-    }
+  void give_blocks() {
+    while (ahead_.size() < most_) ahead_.give({});
   }
 
-  void run() {
-    try {
-      while (step()) {
+  /// After the end or an error the source is not asked again.
+  base::WorkAhead<Ahead>::Work reader() {
+    return [this, ended = false](Ahead& ahead) mutable {
+      if (!ended) {
+        ended = true;
+        ahead.more = source_->next(ahead.block);
+        ended = !ahead.more;
+      } else {
+        ahead.more = false;
       }
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      error_ = std::current_exception();
-    }
-    {
-      const std::lock_guard lock(mutex_);
-      ended_ = true;
-      last_progress_ = source_->progress();
-    }
-    news_.notify_one();
-  }
-
-  bool step() {
-    Ready ready;
-    {
-      std::unique_lock lock(mutex_);
-      room_.wait(lock, [this] { return ready_.size() < most_ || stop_; });
-      if (stop_) return false;
-      if (!spare_.empty()) {
-        ready.block = std::move(spare_.back());
-        spare_.pop_back();
-      }
-    }
-    if (!source_->next(ready.block)) return false;
-    ready.progress = source_->progress();
-    {
-      const std::lock_guard lock(mutex_);
-      ready_.push_back(std::move(ready));
-    }
-    news_.notify_one();
-    return true;
+      ahead.progress = source_->progress();
+    };
   }
 
   const std::unique_ptr<PointSource> source_;  // used only by the thread once it runs
@@ -141,17 +89,7 @@ class ReadAhead final : public PointSource {
   std::stop_source reading_;
   std::stop_callback<Forward> on_stop_;
   Progress progress_;  // used only by the caller
-  bool started_ = false;
-
-  std::mutex mutex_;
-  std::condition_variable news_, room_;
-  std::deque<Ready> ready_;
-  std::vector<PointBlock> spare_;
-  Progress last_progress_;
-  std::exception_ptr error_;
-  bool ended_ = false, stop_ = false;
-
-  std::thread thread_;
+  base::WorkAhead<Ahead> ahead_;
 };
 
 }  // namespace

@@ -2,13 +2,10 @@
 #include "format/record_parts.hpp"
 
 #include <algorithm>
-#include <condition_variable>
-#include <exception>
-#include <mutex>
 #include <string_view>
-#include <system_error>
-#include <thread>
 #include <utility>
+
+#include <terrace/base/work_ahead.hpp>
 
 namespace terrace::stream {
 namespace {
@@ -57,38 +54,20 @@ class PartsAhead final : public RecordReader {
   /// the caller's.
   PartsAhead(RecordParts parts, unsigned threads, std::size_t slots, OnDamage on_damage)
       : parts_(std::move(parts)),
-        wanted_threads_(threads),
         on_damage_(std::move(on_damage)),
-        slots_(slots) {}
-  ~PartsAhead() override {
-    {
-      const std::lock_guard lock(mutex_);
-      stop_ = true;
-    }
-    room_.notify_all();
-    for (std::thread& thread : threads_) thread.join();
-  }
-  PartsAhead(const PartsAhead&) = delete;
-  PartsAhead& operator=(const PartsAhead&) = delete;
+        slots_(slots),
+        ahead_(threads, [this] { return work(); }) {}
 
   std::string_view read(std::uint64_t wanted) override {
-    if (!started_) start();
-    Slot* slot = &slots_[reading_ % slots_.size()];
-    if (at_ > 0 && at_ == slot->records.size()) {
-      release(*slot);
-      slot = &slots_[reading_ % slots_.size()];
-    }
-    while (at_ == 0) {
-      if (reading_ == parts_.parts.size()) return {};
-      wait_for(*slot);
-      if (!slot->error) break;
-      leave_out(*slot);
-      slot = &slots_[reading_ % slots_.size()];
+    while (at_ == current_.records.size()) {
+      if (number_ == parts_.parts.size()) return {};
+      take_next();
     }
     const std::size_t bytes = static_cast<std::size_t>(
-        std::min<std::uint64_t>(wanted, (slot->records.size() - at_) / parts_.record_bytes) *
+        std::min<std::uint64_t>(wanted, (current_.records.size() - at_) / parts_.record_bytes) *
         parts_.record_bytes);
-    const std::string_view found(reinterpret_cast<const char*>(slot->records.data()) + at_, bytes);
+    const std::string_view found(reinterpret_cast<const char*>(current_.records.data()) + at_,
+                                 bytes);
     at_ += bytes;
     return found;
   }
@@ -96,112 +75,51 @@ class PartsAhead final : public RecordReader {
   std::uint64_t lost() const override { return lost_; }
 
  private:
-  struct Slot {
-    std::vector<std::byte> records;
-    std::exception_ptr error;
-    bool ready = false;
+  struct Part {
+    std::size_t number = 0;
+    std::vector<std::byte> records{};
   };
 
-  /// Skips a part that failed to read. Rethrows unless it is damage and a handler is set.
-  void leave_out(Slot& slot) {
+  /// Takes the next part, unless it is damaged and may be left out, and gives another in its place.
+  void take_next() {
+    at_ = 0;
+    // The first parts are given here, not on construction, because files are also opened just for
+    // their header.
+    for (std::size_t free = slots_ - ahead_.size(); free > 0; --free) {
+      if (given_ < parts_.parts.size()) {
+        ahead_.give({.number = given_++, .records = std::exchange(current_.records, {})});
+      }
+    }
+    current_.records.clear();
+    const std::uint64_t points = parts_.parts[number_++].points;
     try {
-      std::rethrow_exception(std::exchange(slot.error, nullptr));
+      current_ = ahead_.take();
     } catch (const Error& damage) {
       if (!on_damage_) throw;
-      const std::uint64_t points = parts_.parts[reading_].points;
       lost_ += points;
       on_damage_(damage, points);
     }
-    release(slot);
   }
 
-  /// Called only when records are requested, because files are also opened just for their header.
-  void start() {
-    started_ = true;
-    try {
-      for (unsigned i = 0; i < wanted_threads_; ++i) threads_.emplace_back([this] { run(); });
-    } catch (const std::system_error&) {
-      // The system has no more threads.
-    }
-    if (threads_.empty()) own_ = parts_.make_reader();  // the caller reads
-  }
-
-  void release(Slot& slot) {
-    {
-      const std::lock_guard lock(mutex_);
-      slot.ready = false;
-      ++reading_;
-    }
-    at_ = 0;
-    room_.notify_all();
-  }
-
-  void wait_for(Slot& slot) {
-    if (own_) {
-      fill(reading_, slot, *own_);
-    } else {
-      std::unique_lock lock(mutex_);
-      news_.wait(lock, [&slot] { return slot.ready; });
-    }
-  }
-
-  void fill(std::size_t part, Slot& slot, PartReader& reader) const {
-    try {
-      read_part(part, slot, reader);
-    } catch (...) {
-      slot.error = std::current_exception();
-    }
-  }
-
-  void run() {
-    std::unique_ptr<PartReader> reader;
-    for (;;) {
-      std::size_t part = 0;
-      {
-        std::unique_lock lock(mutex_);
-        room_.wait(lock, [this] {
-          return stop_ || (next_ < parts_.parts.size() && next_ < reading_ + slots_.size());
-        });
-        if (stop_) return;
-        part = next_++;
+  base::WorkAhead<Part>::Work work() const {
+    return [this, reader = std::shared_ptr<PartReader>(parts_.make_reader())](Part& part) {
+      part.records.resize(parts_.parts[part.number].points * parts_.record_bytes);
+      reader->start(part.number);
+      for (std::size_t done = 0; done < part.records.size();) {
+        done += reader->read(std::span(part.records).subspan(done));
       }
-      Slot& slot = slots_[part % slots_.size()];
-      try {
-        if (!reader) reader = parts_.make_reader();
-        fill(part, slot, *reader);
-      } catch (...) {
-        slot.error = std::current_exception();
-      }
-      {
-        const std::lock_guard lock(mutex_);
-        slot.ready = true;
-      }
-      news_.notify_one();
-    }
+    };
   }
 
-  void read_part(std::size_t number, Slot& slot, PartReader& reader) const {
-    slot.records.resize(parts_.parts[number].points * parts_.record_bytes);
-    reader.start(number);
-    for (std::size_t done = 0; done < slot.records.size();) {
-      done += reader.read(std::span(slot.records).subspan(done));
-    }
-  }
-
-  RecordParts parts_;
-  unsigned wanted_threads_;
-  OnDamage on_damage_;
+  const RecordParts parts_;
+  const OnDamage on_damage_;
+  const std::size_t slots_;
   std::uint64_t lost_ = 0;
-  bool started_ = false;
-  std::vector<Slot> slots_;
-  std::unique_ptr<PartReader> own_;  ///< without threads
-  std::size_t at_ = 0;               ///< bytes of the part being read
-
-  std::mutex mutex_;
-  std::condition_variable news_, room_;
-  std::size_t reading_ = 0, next_ = 0;  ///< parts
-  bool stop_ = false;
-  std::vector<std::thread> threads_;
+  Part current_;            ///< the part being read
+  std::size_t at_ = 0;      ///< bytes of it that were read
+  std::size_t number_ = 0;  ///< of the part after it
+  std::size_t given_ = 0;   ///< of the next part to give
+  base::WorkAhead<Part> ahead_;
 };
 
 /// How many readers, and how many parts at once, fit into memory.

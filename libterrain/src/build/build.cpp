@@ -314,7 +314,7 @@ class Build {
   std::function<void()> stop_reading_ = [this] { reading_.request_stop(); };
   std::stop_callback<std::function<void()>> on_stop_{context_.stop, stop_reading_};
   std::mutex reporting_;                          ///< guards both reports
-  std::optional<ProgressReport> records_report_;  ///< until the first points come out of the sort
+  std::optional<ProgressReport> records_report_;  ///< until the first points are sorted
   std::optional<ProgressReport> points_report_;
   stream::SourceInfo info_;
   /// Computed on first use. PROJ takes tens of milliseconds to open its database; the first points
