@@ -15,8 +15,8 @@ import sys
 LIBRARIES = ['base', 'stream', 'cluster', 'matching', 'tri', 'terrain']
 # Whom each may use besides libbase, which all may use and which uses none.
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
-# What joins all of them for another language.
-BINDINGS = 'libterrain/python'
+# The rooms that use the libraries and that no library knows.
+PROGRAMS = ['python', 'tools']
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
@@ -33,6 +33,7 @@ LICENCES = {
     'libmatching': 'Apache-2.0',
     'libtri': 'Apache-2.0',
     'libterrain': 'Apache-2.0',
+    'python': 'Apache-2.0',
     'tools': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
@@ -57,7 +58,7 @@ RESTRICTED = [
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'CLI/', ['tools']),
-    (r'pybind11/|Python\.h', [BINDINGS]),
+    (r'pybind11/|Python\.h', ['python']),
     (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'libterrain/fuzz', 'tools', 'tests'] + IN_STREAM),
     (r'gtest/|gmock/', TESTS + ['tools']),
     (r'benchmark/', BENCHES),
@@ -129,7 +130,7 @@ def check_include(path, bracket, name):
     """The breaches of one #include line."""
     library = library_of(path)
     if library:
-        for other in LIBRARIES if not below(path, BINDINGS) else []:
+        for other in LIBRARIES:
             if other not in ['base', library] + SIBLINGS.get(library, []) and name.startswith(f'terrace/{other}/'):
                 yield f'includes its sibling\'s <{name}>'
         if bracket == '"':
@@ -225,7 +226,7 @@ def check_meson(root):
             if os.path.basename(path) != 'meson.build':
                 continue
             for name in re.findall(r"(?:dependency|subproject)\(\s*'([^']+)'", read(root, path)):
-                sibling = not below(path, BINDINGS) and name.startswith('terrace-') and name[8:] not in ['base', library] + SIBLINGS.get(library, [])
+                sibling = name.startswith('terrace-') and name[8:] not in ['base', library] + SIBLINGS.get(library, [])
                 if sibling or (name in ('geographiclib', 'proj', 'geos') and library != 'terrain') or (name in ('gmp', 'mpfr') and library != 'tri'):
                     yield f'{path}: depends on {name}'
         for folder, ending, list_path, cut in LISTED:
@@ -250,9 +251,10 @@ def check_rooms(root):
         for name in ('LICENSE', 'README.md', 'meson.build', 'meson_options.txt'):
             if not os.path.isfile(os.path.join(root, f'lib{library}', name)):
                 yield f'lib{library}/{name}: is missing'
-    for name in ('LICENSE', 'README.md'):
-        if not os.path.isfile(os.path.join(root, 'tools', name)):
-            yield f'tools/{name}: is missing'
+    for room in PROGRAMS:
+        for name in ('LICENSE', 'README.md'):
+            if not os.path.isfile(os.path.join(root, room, name)):
+                yield f'{room}/{name}: is missing'
 
 
 def check_versions(root):
@@ -265,7 +267,7 @@ def check_versions(root):
 
 
 def check_folders(root):
-    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['tools/src']:
+    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['python/src', 'tools/src']:
         sources = collections.Counter(os.path.dirname(path) for path in files_below(root, folder)
                                       if path.endswith(('.cpp', '.hpp', '.h', '.cu')))
         for place, count in sorted(sources.items()):

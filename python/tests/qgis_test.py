@@ -16,7 +16,7 @@ try:
 except ImportError:
     raise unittest.SkipTest('QGIS is missing (python3-qgis, qgis-providers)') from None
 
-sys.path.insert(0, os.path.join(ROOT, 'libterrain', 'python', 'qgis'))
+sys.path.insert(0, os.path.join(ROOT, 'python', 'qgis'))
 
 
 class Qgis(StoreCase):

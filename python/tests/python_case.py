@@ -12,7 +12,7 @@ import numpy as np
 
 import terrace
 
-ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..', '..'))
+ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), '..', '..'))
 ALPS = os.path.join(ROOT, 'libterrain', 'examples', 'alps.tif')
 COMMAND = os.environ.get('TERRACE_BIN')
 TRANSFORM = (10, 0, 500000, 0, -10, 5000000)  # corners of cells, UTM zone 32

@@ -17,7 +17,7 @@ import numpy as np
 import terrace
 from python_case import ALPS, COMMAND, ROOT, StoreCase
 
-FOLDER = os.path.join(ROOT, 'libterrain', 'python', 'tutorials')
+FOLDER = os.path.join(ROOT, 'python', 'tutorials')
 
 
 def run(name):
@@ -77,7 +77,7 @@ class Examples(StoreCase):
     """The examples are scripts of at most 15 lines."""
 
     def run_script(self, name, *arguments):
-        path = os.path.join(ROOT, 'libterrain', 'python', 'examples', name)
+        path = os.path.join(ROOT, 'python', 'examples', name)
         with open(path, encoding='utf-8') as file:
             self.assertLessEqual(len(file.readlines()), 15)
         return subprocess.run([sys.executable, path, *arguments], cwd=self.folder, check=True, text=True,

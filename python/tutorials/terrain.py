@@ -11,7 +11,7 @@ import numpy as np
 import terrace
 
 folder = Path(__file__).parent if '__file__' in globals() else Path.cwd()
-store = terrace.build(folder / '../../examples/alps.tif', 'alps.store', replace=True, progress=True)
+store = terrace.build(folder / '../../libterrain/examples/alps.tif', 'alps.store', replace=True, progress=True)
 print(store, store.info['crs']['name'], f'{store.info["bytes"] / len(store):.2f} bytes per sample')
 # Later, or elsewhere: terrace.open('alps.store')
 
