@@ -65,7 +65,7 @@ class ReadmeTest(unittest.TestCase):
 
     def test_links_in_the_readme_exist(self):
         links = re.findall(r'\]\(([^)#:]+)(?:#[^)]*)?\)', readme())
-        for wanted in ('tools/README.md', 'tools/viewer/README.md', 'python/README.md'):
+        for wanted in ('tools/README.md', 'viewer/README.md', 'python/README.md'):
             self.assertIn(wanted, links)
         for link in links:
             self.assertTrue(os.path.exists(os.path.join(ROOT, link)), link)

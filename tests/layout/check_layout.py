@@ -16,7 +16,7 @@ LIBRARIES = ['base', 'stream', 'cluster', 'matching', 'tri', 'terrain']
 # Whom each may use besides libbase, which all may use and which uses none.
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 # The rooms that use the libraries and that no library knows.
-PROGRAMS = ['python', 'tools']
+PROGRAMS = ['python', 'tools', 'viewer']
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
@@ -35,6 +35,7 @@ LICENCES = {
     'libterrain': 'Apache-2.0',
     'python': 'Apache-2.0',
     'tools': 'GPL-3.0-or-later',
+    'viewer': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
 
@@ -60,7 +61,7 @@ RESTRICTED = [
     (r'CLI/', ['tools']),
     (r'pybind11/|Python\.h', ['python']),
     (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'libterrain/fuzz', 'tools', 'tests'] + IN_STREAM),
-    (r'gtest/|gmock/', TESTS + ['tools']),
+    (r'gtest/|gmock/', TESTS + ['tools', 'viewer/tests']),
     (r'benchmark/', BENCHES),
 ]
 
@@ -267,7 +268,7 @@ def check_versions(root):
 
 
 def check_folders(root):
-    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['python/src', 'tools/src']:
+    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['python/src', 'tools/src', 'viewer/core']:
         sources = collections.Counter(os.path.dirname(path) for path in files_below(root, folder)
                                       if path.endswith(('.cpp', '.hpp', '.h', '.cu')))
         for place, count in sorted(sources.items()):

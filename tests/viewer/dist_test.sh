@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: GPL-3.0-or-later
 # dist_test.sh SOURCE BUILD: rebuilds the viewer below BUILD and compares it byte for byte with
-# tools/viewer/dist. Skipped (77) if Emscripten, npm or its packages are not available.
+# viewer/dist. Skipped (77) if Emscripten, npm or its packages are not available.
 set -eu
 source=$1 build=$2
 skip() {
@@ -13,9 +13,9 @@ for program in em++ make node npm; do
 done
 em++ --version | grep -q ' 3\.1\.6' || skip 'Emscripten is not 3.1.6, and other versions make different bytes'
 
-make -s -j"$(nproc)" -f "$source/tools/viewer/core/Makefile" ROOT="$source" OUT="$build/viewer-core" all
+make -s -j"$(nproc)" -f "$source/viewer/core/Makefile" ROOT="$source" OUT="$build/viewer-core" all
 mkdir -p "$build/viewer-sources"
-cp -R "$source/tools/viewer/src" "$source"/tools/viewer/*.json "$source/tools/viewer/build.mjs" "$build/viewer-sources"
+cp -R "$source/viewer/src" "$source"/viewer/*.json "$source/viewer/build.mjs" "$build/viewer-sources"
 cd "$build/viewer-sources"
 # This copy is made last, so it marks a complete installation.
 if ! cmp -s package-lock.json node_modules/.viewer; then
@@ -31,7 +31,7 @@ node build.mjs "$build/viewer-dist"
 cp "$build/viewer-core/core.wasm" "$build/viewer-core/body.wasm" "$build/viewer-dist"
 status=0
 for file in "$build"/viewer-dist/*; do
-  cmp "$file" "$source/tools/viewer/dist/${file##*/}" || status=1
+  cmp "$file" "$source/viewer/dist/${file##*/}" || status=1
 done
-[ $status = 0 ] || echo 'tools/viewer/dist does not match its sources; run ./dev viewer'
+[ $status = 0 ] || echo 'viewer/dist does not match its sources; run ./dev viewer'
 exit $status

@@ -60,7 +60,7 @@ std::string_view query_value(std::string_view target, std::string_view name);
 Answer answer_to(const Request& request, const Site& site, const Access& access);
 
 /// Content security policy of the viewer: it may load and run its own files, WebAssembly, and icons
-/// embedded in the page. The page repeats this for other servers (tools/viewer/src/index.html).
+/// embedded in the page. The page repeats this for other servers (viewer/src/index.html).
 inline constexpr const char* kContentPolicy =
     "default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; style-src "
     "'self'; "

@@ -6,7 +6,7 @@
 
 namespace terrace::tools {
 
-/// A file of the viewer (tools/viewer/dist), embedded in the command.
+/// A file of the viewer (viewer/dist), embedded in the command.
 struct ViewerFile {
   std::string_view name;
   std::string_view bytes;

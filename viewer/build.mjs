@@ -18,7 +18,7 @@ await build({
   format: 'iife',
   target: 'es2022',
   legalComments: 'none',
-  banner: {js: '// terrace viewer, GPL-3.0-or-later. Sources: tools/viewer of terrace.'},
+  banner: {js: '// terrace viewer, GPL-3.0-or-later. Sources: viewer/ of terrace.'},
   logLevel: 'warning'
 });
 for (const name of ['index.html', 'viewer.css']) copyFileSync(join(here, 'src', name), join(out, name));

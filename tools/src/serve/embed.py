@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""embed.py OUT.cpp FILES...: writes the files as strings to a C++ source, to embed them in the command."""
+"""embed.py OUT.cpp FILES...: writes the files of the viewer as strings to a C++ source."""
 
 import os
 import sys
