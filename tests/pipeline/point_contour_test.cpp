@@ -326,18 +326,15 @@ TEST(PointContours, RejectsMoreLevelsThanFitIntoMemory) {
   const stream::Store store =
       cloud(folder.path(), std::vector<stream::Point3>{{0, 0, 0}, {1, 0, 10}, {0, 1, 10}});
   terrain::ContourRequest request{.interval = 1e-9};
-  EXPECT_THROW(terrain::draw_point_contours(
-                   {.store = store,
-                    .request = request,
-                    .emit = [](const terrain::ContourLine&) {},
-                    .limit = {.points = 10000,
-                              .exceeded =
-                                  [] {
-                                    throw stream::Error(
-                                        {.file = "", .where = {}, .cause = "many", .remedy = ""});
-                                  }},
-                    .progress = [](double) {}}),
-               stream::Error);
+  EXPECT_THROW(
+      terrain::draw_point_contours(
+          {.store = store,
+           .request = request,
+           .emit = [](const terrain::ContourLine&) {},
+           .limit = {.points = 10000,
+                     .exceeded = [] { throw stream::Error({.file = "", .cause = "many"}); }},
+           .progress = [](double) {}}),
+      stream::Error);
 }
 
 }  // namespace

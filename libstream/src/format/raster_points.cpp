@@ -23,7 +23,6 @@ class WithCells final : public Raster {
     info_ = raster_->info();
     if (info_.world != kPlainWorld) {
       throw Error({.file = info_.files.front(),
-                   .where = {},
                    .cause = "is georeferenced, which sets its cell size",
                    .remedy = "leave `cell` out"});
     }

@@ -266,7 +266,6 @@ class RecordSource final : public PointSource {
       move_ = move_between(info, placement);
     } catch (const std::domain_error& axis) {
       throw Error({.file = file(),
-                   .where = {},
                    .cause = std::string(axis.what()) + " is not on the lattice of the other " +
                             "files: its scale or the fraction of its offset differs",
                    .remedy = "name files instead of pipes, or read it separately"});

@@ -64,7 +64,6 @@ bool is_ept_name(const std::string& file) {
 
 [[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
   throw Error({.file = shown_name(file),
-               .where = {},
                .cause = "is " + std::string(format.name) + ", which cannot be read",
                .remedy = std::string(format.remedy)});
 }
@@ -98,7 +97,6 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
   throw Error(
       {.file = shown_name(file),
-       .where = {},
        .cause = head.empty() ? "the file is empty" : "neither content nor name shows its format",
        .remedy = head.empty() ? "download or export the file again"
                               : "convert a raster (gdal_translate FILE out.tif), or name the "
@@ -124,7 +122,6 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
     const Format& other = format_of(file, options);
     if (&other != &format) {
       throw Error({.file = shown_name(file),
-                   .where = {},
                    .cause = "is " + other.name + ", but " + shown_name(files.front()) + " is " +
                             format.name,
                    .remedy = "name files of one format, or select files of a folder by `format`"});
@@ -132,7 +129,6 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
     if (is_seekable(file) || packed_format_of(file) == &format) continue;
     if (!format.streams && !format.self_contained) {
       throw Error({.file = shown_name(file),
-                   .where = {},
                    .cause = format.name + " cannot be read from a pipe or from gzip",
                    .remedy = "name an unpacked file"});
     }
@@ -140,27 +136,23 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   }
   if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
     throw Error({.file = "standard input",
-                 .where = {},
                  .cause = "is named twice",
                  .remedy = "name it once: it can be read only once"});
   }
   if (options.heights_of_colour != HeightsOfColour::none && format.name != png_format().name) {
     throw Error({.file = shown_name(files.front()),
-                 .where = {},
                  .cause = format.name + " does not encode heights as colours",
                  .remedy = "leave `heights_of_colour` out"});
   }
   if (options.selection.resolution > 0 && format.name != las_format().name &&
       format.name != ept_format().name) {
     throw Error({.file = shown_name(files.front()),
-                 .where = {},
                  .cause = format.name + " has no octree, so `resolution` does not apply",
                  .remedy = "name a COPC file or EPT, or leave `resolution` out"});
   }
   const bool triangles = options.entities == Entities::triangles;
   if (options.entities != Entities::points && !(triangles ? format.triangles : format.lines)) {
     throw Error({.file = shown_name(files.front()),
-                 .where = {},
                  .cause = format.name + " has no " + (triangles ? "triangles" : "lines"),
                  .remedy = std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)"
                                                  : "name GeoJSON") +
@@ -169,13 +161,11 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
     throw Error({.file = shown_name(files.front()),
-                 .where = {},
                  .cause = format.name + " is not a raster format",
                  .remedy = "leave `cell` out"});
   }
   if (options.band != 1 && !source->info().grid) {
     throw Error({.file = shown_name(files.front()),
-                 .where = {},
                  .cause = format.name + " has no bands",
                  .remedy = "leave `band` out"});
   }

@@ -196,7 +196,6 @@ void check_attributes(const std::vector<std::string>& names, const std::vector<C
       list += attribute.name;
     }
     throw Error({.file = file,
-                 .where = {},
                  .cause = "its points have no attribute " + in_quotes(name),
                  .remedy = list.empty() ? "they have no attributes" : "known are " + list});
   }

@@ -68,7 +68,6 @@ WorldTransform read_world_file(const std::string& file) {
   const double area = a * e - b * d;
   if (!std::isfinite(area) || area == 0) {
     throw Error({.file = file,
-                 .where = {},
                  .cause = "does not map cells to distinct places",
                  .remedy = "correct or remove it"});
   }

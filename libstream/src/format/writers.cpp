@@ -67,7 +67,6 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
     }
     if (to_stdout && !row.streams) {
       throw Error({.file = "standard output",
-                   .where = {},
                    .cause = std::string(row.name) + " cannot be written to a pipe",
                    .remedy = "name a file"});
     }
@@ -78,7 +77,6 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
                                 known(table));
   }
   throw Error({.file = path,
-               .where = {},
                .cause = "no output format has its ending",
                .remedy = "known are " + known(table)});
 }

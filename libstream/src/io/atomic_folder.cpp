@@ -62,7 +62,6 @@ AtomicFolder::AtomicFolder(fs::path target, std::string mark, Naming naming)
   if (!target.has_filename()) target = target.parent_path();
   if (!target.has_filename() || target.filename() == "." || target.filename() == "..") {
     throw Error({.file = target.string(),
-                 .where = {},
                  .cause = "this cannot be the name of a new folder",
                  .remedy = "give a name that does not exist yet"});
   }
@@ -74,7 +73,6 @@ AtomicFolder::AtomicFolder(fs::path target, std::string mark, Naming naming)
   std::error_code error;
   if (!fs::is_directory(parent, error)) {
     throw Error({.file = impl.target.string(),
-                 .where = {},
                  .cause = "the folder " + parent.string() + " does not exist",
                  .remedy = "create it first"});
   }

@@ -28,7 +28,7 @@ class FileSource final : public ByteSource {
     }
     if (!S_ISREG(status.st_mode)) {
       ::close(descriptor_);
-      throw Error({.file = name_, .where = {}, .cause = "is not a regular file", .remedy = {}});
+      throw Error({.file = name_, .cause = "is not a regular file"});
     }
     size_ = static_cast<std::uint64_t>(status.st_size);
   }

@@ -26,15 +26,11 @@ std::string one_line(const Error::Parts& parts) {
 Error::Error(Parts parts) : std::runtime_error(one_line(parts)), parts_(std::move(parts)) {}
 
 ClosedPipe::ClosedPipe()
-    : Error({.file = "standard output",
-             .where = {},
-             .cause = "the program that reads it has ended",
-             .remedy = {}}) {}
+    : Error({.file = "standard output", .cause = "the program that reads it has ended"}) {}
 
 Error system_error(std::string file, const std::string& action, int error_number,
                    std::string remedy) {
   return Error({.file = std::move(file),
-                .where = {},
                 .cause = action + ": " + std::generic_category().message(error_number),
                 .remedy = std::move(remedy),
                 .error_number = error_number});

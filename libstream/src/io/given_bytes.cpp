@@ -21,7 +21,7 @@ std::string text_of(const std::vector<ByteRange>& ranges) {
 }
 
 Error impossible(const std::string& file, const std::string& cause) {
-  return Error({.file = file, .where = {}, .cause = cause, .remedy = {}});
+  return Error({.file = file, .cause = cause});
 }
 
 }  // namespace

@@ -83,14 +83,11 @@ class Input::Descriptor {
       const ssize_t got = ::read(fd_, to, most);
       if (got >= 0) return static_cast<std::size_t>(got);
       if (errno == EISDIR) {
-        throw Error({.file = name,
-                     .where = {},
-                     .cause = "is a folder, not a file",
-                     .remedy = "name the files in it"});
+        throw Error(
+            {.file = name, .cause = "is a folder, not a file", .remedy = "name the files in it"});
       }
       if (errno == EBADF) {
         throw Error({.file = name,
-                     .where = {},
                      .cause = "is closed",
                      .remedy = "give the name of a file, or redirect one to it"});
       }

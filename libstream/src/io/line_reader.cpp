@@ -24,7 +24,6 @@ bool is_utf16(std::string_view head) {
 void refuse_utf16(Input& input) {
   if (!is_utf16(input.fill(4))) return;
   throw Error({.file = input.name(),
-               .where = {},
                .cause = "is text in UTF-16, which is not supported",
                .remedy = "save it as UTF-8, e.g. 'iconv -f UTF-16 -t UTF-8 FILE'"});
 }

@@ -56,13 +56,11 @@ Ownership ownership_of_entries(
 Error not_replaced(std::string file, const Ownership& found) {
   if (found.stranger.empty()) {
     return Error({.file = std::move(file),
-                  .where = {},
                   .cause = "exists and was not written by terrace, so it is not replaced",
                   .remedy = "move it away or choose another name",
                   .error_number = EEXIST});
   }
   return Error({.file = std::move(file),
-                .where = {},
                 .cause = "contains " + found.stranger +
                          ", which terrace did not write, so it is not replaced",
                 .remedy = "move it away or choose another name",
@@ -102,7 +100,6 @@ void OutputPlacement::fail(int error_number) const {
 
 void OutputPlacement::fail_because_it_exists() const {
   throw Error({.file = shown_.string(),
-               .where = {},
                .cause = "exists already",
                .remedy = "remove it, choose another name, or ask to replace it",
                .error_number = EEXIST});

@@ -70,7 +70,6 @@ void Sink::flush() {
     if (errno == EPIPE) throw ClosedPipe();
     if (errno == EBADF) {
       throw Error({.file = "standard output",
-                   .where = {},
                    .cause = "is closed",
                    .remedy = "connect it to a file or a pipe"});
     }

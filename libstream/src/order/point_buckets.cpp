@@ -245,7 +245,6 @@ Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
   if (place == free_.end()) {
     if (pages > UINT32_MAX - pages_) {
       throw Error({.file = file_.name(),
-                   .where = {},
                    .cause = "its points need more than 4 TiB of temporary disk space",
                    .remedy = "split the input"});
     }

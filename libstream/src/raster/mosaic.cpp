@@ -35,10 +35,7 @@ std::string all_digits(double value) {
 
 [[noreturn]] void differ(const std::string& first, const std::string& other,
                          const std::string& what, const std::string& remedy) {
-  throw Error({.file = other,
-               .where = {},
-               .cause = "does not match " + first + ": " + what,
-               .remedy = remedy});
+  throw Error({.file = other, .cause = "does not match " + first + ": " + what, .remedy = remedy});
 }
 
 /// Returns the column and row of `frame` at x, y.
@@ -332,7 +329,6 @@ class Mosaic final : public Raster {
     info_.rows = static_cast<std::uint64_t>(bottom - top);
     if (info_.columns >= kMostMosaicCells || info_.rows >= kMostMosaicCells) {
       throw Error({.file = members_.front().file,
-                   .where = {},
                    .cause = "the mosaic of the " + std::to_string(members_.size()) + " files has " +
                             std::to_string(info_.columns) + " x " + std::to_string(info_.rows) +
                             " cells: columns and rows must each be fewer than 2^30",
@@ -364,7 +360,6 @@ class Mosaic final : public Raster {
     if (info.columns != members_[member].columns || info.rows != members_[member].rows ||
         info.sample.type != info_.sample.type) {
       throw Error({.file = members_[member].file,
-                   .where = {},
                    .cause = "changed while it was read",
                    .remedy = "start again"});
     }

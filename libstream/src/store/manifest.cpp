@@ -220,7 +220,6 @@ void check_words(const Manifest& m) {
 
 [[noreturn]] void damaged(const std::string& file, const std::string& cause) {
   throw Error({.file = file,
-               .where = {},
                .cause = "damaged manifest: " + cause,
                .remedy = "restore the file or rebuild the store"});
 }
@@ -243,7 +242,7 @@ std::string hexadecimal(std::uint32_t value) {
 
 std::string read_manifest(const ByteSource& file) {
   if (file.size() > kMostManifestBytes) {
-    throw Error({.file = file.name(), .where = {}, .cause = "the file is too large", .remedy = {}});
+    throw Error({.file = file.name(), .cause = "the file is too large"});
   }
   std::string text(static_cast<std::size_t>(file.size()), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));
@@ -261,7 +260,6 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     // Development versions before the first release also wrote higher numbers.
     if (version > kVersion) {
       throw Error({.file = file,
-                   .where = {},
                    .cause = "store version " + std::to_string(version) +
                             " was written by a newer terrace, or by a development version before "
                             "the first release; this one reads version " +

@@ -23,7 +23,6 @@ std::unique_ptr<ByteSource> open_overlay(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
     throw Error({.file = path.string(),
-                 .where = {},
                  .cause = "there is no overlay here",
                  .remedy = "give an overlay written by terrace"});
   }
@@ -73,7 +72,6 @@ void Overlay::Impl::read_header(const Store& store) {
     const auto version = load<std::uint32_t>(bytes.data() + kOverlayMarkBytes);
     if (version > kOverlayVersion) {
       throw Error({.file = file->name(),
-                   .where = {},
                    .cause = "overlay version " + std::to_string(version) +
                             " was written by a newer terrace; this one reads up to version " +
                             std::to_string(kOverlayVersion),
@@ -97,7 +95,6 @@ void Overlay::Impl::read_header(const Store& store) {
     channel.assign(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(name));
     if (made_for != store.checksum()) {
       throw Error({.file = file->name(),
-                   .where = {},
                    .cause = "was made for the store with the checksum " + hexadecimal(made_for) +
                             ", " + store.path().string() + " has " + hexadecimal(store.checksum()),
                    .remedy = "give the store that it was made for, or write the overlay again"});

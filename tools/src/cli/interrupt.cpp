@@ -110,10 +110,9 @@ void call_library(const std::string& file, const std::string& method,
   try {
     work();
   } catch (const std::invalid_argument& error) {
-    throw stream::Error({.file = file, .where = {}, .cause = error.what(), .remedy = {}});
+    throw stream::Error({.file = file, .cause = error.what()});
   } catch (const std::bad_alloc&) {
     throw stream::Error({.file = file,
-                         .where = {},
                          .cause = "does not fit into memory with method " + method,
                          .remedy = "take fewer points, or another method"});
   }

@@ -263,7 +263,6 @@ Server::Server(std::function<const Site&()> site, std::uint16_t port, const Serv
     impl_->acceptor.listen();
   } catch (const boost::system::system_error& error) {
     throw stream::Error({.file = "127.0.0.1:" + std::to_string(port),
-                         .where = {},
                          .cause = "cannot be served: " + error.code().message(),
                          .remedy = "name another port"});
   }

@@ -251,7 +251,6 @@ Site make_site(std::span<const stream::Store> stores) {
       std::error_code error;
       if (!fs::is_regular_file(fs::symlink_status(path, error))) {
         throw stream::Error({.file = path.string(),
-                             .where = {},
                              .cause = "is not a regular file (links are not served)",
                              .remedy = "replace it with the file itself"});
       }
@@ -277,7 +276,6 @@ LiveSite::LiveSite(std::vector<std::string> paths,
   for (int attempts = 1; !make(); ++attempts) {
     if (attempts < kAttempts) continue;
     throw stream::Error({.file = paths_.front(),
-                         .where = {},
                          .cause = "the files of a store keep changing",
                          .remedy = "wait until they have been copied"});
   }

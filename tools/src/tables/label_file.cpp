@@ -22,7 +22,6 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
   std::ifstream file(path);
   if (!file) {
     throw stream::Error({.file = path,
-                         .where = {},
                          .cause = "cannot be opened",
                          .remedy = "name a file with one cluster number per line"});
   }
@@ -59,7 +58,6 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
   if (labels.size() < points) {
     throw stream::Error(
         {.file = path,
-         .where = {},
          .cause = "has " + counted(labels.size(), "label") + " for " + counted(points, "point"),
          .remedy = "give the labels of these points, in the order of the input"});
   }

@@ -39,7 +39,6 @@ void writing_within_memory(const stream::PointWriter& writer, const std::string&
   const std::uint64_t needed = kProgramMemory + reading + writing;
   if (writing == 0 || needed <= memory_bytes) return;
   throw stream::Error({.file = file,
-                       .where = {},
                        .cause = "writing it needs " + std::to_string((needed >> 20) + 1) +
                                 "M of memory, --memory allows " +
                                 std::to_string(memory_bytes >> 20) + "M",
@@ -51,7 +50,6 @@ std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint
   if (reading == 0 || kProgramMemory + reading <= memory_bytes) return reading;
   throw stream::Error(
       {.file = source.info().files.front(),
-       .where = {},
        .cause = "reading it needs " + std::to_string(((kProgramMemory + reading) >> 20) + 1) +
                 "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) + "M",
        .remedy = source.info().grid ? "raise --memory, or rewrite large strips and tiles as small "
@@ -100,7 +98,6 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     const bool grows = count > table.positions.capacity();
     if (count > (grows ? most / 2 : most)) {
       throw stream::Error({.file = file,
-                           .where = {},
                            .cause = "has more points than " + readable_bytes(memory_bytes) +
                                     " can hold (" + with_commas(table.size()) + " so far)",
                            .remedy = "raise --memory, or build a store, which takes points of any "
@@ -117,7 +114,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   }
   if (table.positions.empty()) {
     throw stream::Error(
-        {.file = file, .where = {}, .cause = "it contains no points", .remedy = "check the file"});
+        {.file = file, .cause = "it contains no points", .remedy = "check the file"});
   }
   return table;
 }

@@ -131,7 +131,6 @@ class BuildCommand final : public Command {
     std::error_code ignored;
     if (!common.force && std::filesystem::exists(request_.store, ignored)) {
       throw stream::Error({.file = output_,
-                           .where = {},
                            .cause = "exists already",
                            .remedy = "name another output, or give --force to replace it"});
     }

@@ -555,7 +555,6 @@ class ClusterCommand final : public Command {
     if (table.size() > std::numeric_limits<std::int32_t>::max()) {
       throw stream::Error(
           {.file = input_,
-           .where = {},
            .cause = "has " + counted(table.size(), "point"),
            .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
     }
@@ -617,7 +616,6 @@ class ClusterCommand final : public Command {
     const std::uint64_t memory = common.memory_or(0);
     if (needed > memory) {
       throw stream::Error({.file = input_,
-                           .where = {},
                            .cause = "clustering its " + counted(table.size(), "point") + " by " +
                                     method_ + " needs " + std::to_string((needed >> 20) + 1) +
                                     " MiB, --memory is " + readable_bytes(memory),

@@ -101,7 +101,6 @@ class ConvertCommand : public Command {
     if (writer->points() == 0 && selection_.selects()) {
       throw stream::Error(
           {.file = inputs_.front(),
-           .where = {},
            .cause = "none of its " + selected_of(source->progress()) + "points is selected",
            .remedy = "give another --where or --region"});
     }

@@ -108,7 +108,6 @@ class PointsCommand final : public Command {
     if (detail.region) throw_none_inside(store);
     throw stream::Error(
         {.file = part_.path,
-         .where = {},
          .cause = "no point is selected; all of the store's have " + extent_text(store.whole()),
          .remedy = "give another --where, --focus or --cluster"});
   }
@@ -177,7 +176,6 @@ class PointsCommand final : public Command {
     if (found.empty() && store.whole().points() > 0) {
       throw stream::Error(
           {.file = part_.path,
-           .where = {},
            .cause = "no point is selected " +
                     (radius_ ? "within " + plain_number(*radius_) + " m of " : "near ") + near_,
            .remedy = radius_ ? "raise --within" : "give another --where"});

@@ -131,7 +131,6 @@ std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, 
   const std::uint64_t memory = common.memory_or(0);
   if (fixed + bytes <= memory) return memory - fixed;
   throw stream::Error({.file = path,
-                       .where = {},
                        .cause = "drawing it with " + std::to_string(size.width) + " x " +
                                 std::to_string(size.height) + " pixels needs " +
                                 std::to_string(((fixed + bytes) >> 20) + 1) + " MiB, --memory is " +
@@ -173,7 +172,6 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
       if (input.mesh.positions.size() > memory / kDrawnBytesPerPoint) {
         throw stream::Error(
             {.file = path,
-             .where = {},
              .cause = "has more points than " + readable_bytes(memory) + " can hold",
              .remedy = "build a store and render that, or raise --memory"});
       }
@@ -371,7 +369,6 @@ class RenderCommand : public Command {
     if (mesh.positions.empty()) {
       throw stream::Error(
           {.file = input_,
-           .where = {},
            .cause = "there is nothing to draw: no point is selected",
            .remedy = selection_.where.empty() ? "check the file" : "give another --where"});
     }

@@ -11,11 +11,11 @@ namespace terrace::stream {
 class Error : public std::runtime_error {
  public:
   struct Parts {
-    std::string file;      ///< the file as the caller named it
-    std::string where;     ///< "line 12", "byte 4096", "tile 3,4", "cluster 0/17"
-    std::string cause;     ///< what is wrong
-    std::string remedy;    ///< what the user can do
-    int error_number = 0;  ///< errno of the failed system call, if any; otherwise 0
+    std::string file = {};    ///< the file as the caller named it
+    std::string where = {};   ///< "line 12", "byte 4096", "tile 3,4", "cluster 0/17"
+    std::string cause = {};   ///< what is wrong
+    std::string remedy = {};  ///< what the user can do
+    int error_number = 0;     ///< errno of the failed system call, if any; otherwise 0
   };
 
   explicit Error(Parts parts);

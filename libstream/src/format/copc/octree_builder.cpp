@@ -218,7 +218,6 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
   const std::uint64_t count = file_.records(bucket);
   if (count > most_together_) {
     throw Error({.file = name_,
-                 .where = {},
                  .cause = counted(count, "point") +
                           " are in one place, more than a node of "
                           "COPC can have in this memory: " +

@@ -180,7 +180,6 @@ class CopcWriter final : public PointWriter {
     OctreeNode& node = octree_.nodes[written_++];
     if (coded.size() > std::numeric_limits<std::int32_t>::max()) {
       throw Error({.file = path_,
-                   .where = {},
                    .cause = counted(node.points, "point") +
                             " in one place take more bytes than a node of COPC can have",
                    .remedy = "leave them out, or write LAZ"});

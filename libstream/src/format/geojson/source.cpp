@@ -32,7 +32,6 @@ constexpr std::array kAxes{"x", "y", "z"};
 
 [[noreturn]] void refuse_lines(const std::string& file) {
   throw Error({.file = file,
-               .where = {},
                .cause = "has more than 4,294,967,295 lines",
                .remedy = "build several stores"});
 }

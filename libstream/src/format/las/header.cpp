@@ -307,7 +307,6 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
   by_wkt.wkt = wkt_of_records(header, comments);
   if (header.wkt && by_wkt.wkt.empty() && header.unread_evlrs) {
     throw Error({.file = name,
-                 .where = {},
                  .cause = "the record of its coordinate reference system (an EVLR) follows the "
                           "points, so it cannot be read from a pipe",
                  .remedy = "name the file, or the system: `crs` EPSG:n"});

@@ -92,7 +92,6 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
   if (layout.record_bytes > kMostRecordBytes || layout.extra_bytes.size() > kMostVlrBytes) {
     throw Error(
         {.file = file,
-         .where = {},
          .cause = counted(attributes.size(), "attribute") + " are more than LAS has room for",
          .remedy = "write PLY"});
   }

@@ -225,7 +225,6 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
                              layout.vlr.compressor != laz::Compressor::layered;
     if (layout.chunks.empty() && needs_table) {
       throw Error({.file = input.name(),
-                   .where = {},
                    .cause = "its chunk table follows the points, so it cannot be read from a pipe",
                    .remedy = "name the file"});
     }

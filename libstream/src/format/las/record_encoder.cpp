@@ -333,7 +333,6 @@ void append_vlrs(std::string& out, const Crs& crs, const LasLayout& layout, cons
     const std::string wkt = crs.wkt + '\0';
     if (wkt.size() > std::numeric_limits<std::uint16_t>::max()) {
       throw Error({.file = path,
-                   .where = {},
                    .cause = "the WKT of its coordinate reference system is too long for LAS",
                    .remedy = "write PLY"});
     }

@@ -86,7 +86,6 @@ class LasOpener {
     if (stream_.info.octree) return;
     if (wanted.resolution > 0) {
       throw Error({.file = stream_.input->name(),
-                   .where = {},
                    .cause = "it has no octree, so `resolution` does not apply",
                    .remedy = "name a COPC file, not piped, or EPT, or leave `resolution` out"});
     }

@@ -83,7 +83,6 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
   const std::uint64_t chunks = options.memory_bytes / chunk;
   if (chunks < 2) {
     throw Error({.file = path,
-                 .where = {},
                  .cause = "writing LAZ with " + counted(vlr.record_length(), "byte") +
                           " per point needs " + std::to_string((2 * chunk >> 20) + 1) +
                           "M of memory, more than it may use",

@@ -119,7 +119,6 @@ class TriangleSource final : public PointSource {
     delivered_ += block.size();
     if (delivered_ + nodata_ == 0) {
       throw Error({.file = info_.files.front(),
-                   .where = {},
                    .cause = "has no faces, so it has no triangles",
                    .remedy = "read it as points: leave `entities` out"});
     }

@@ -31,8 +31,7 @@ class HeaderReader {
     }
     if (!lines_.next(line)) {
       if (lines_.number() == 0) {
-        throw Error(
-            {.file = input_->name(), .where = {}, .cause = "the file is empty", .remedy = {}});
+        throw Error({.file = input_->name(), .cause = "the file is empty"});
       }
       fail("the file ends before end_header", "the file is truncated: download it again");
     }

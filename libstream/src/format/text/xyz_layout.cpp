@@ -207,7 +207,6 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   for (;;) {
     if (!lines.next(line)) {
       throw Error({.file = file,
-                   .where = {},
                    .cause = lines.number() == 0 ? "the file is empty" : "it has no points",
                    .remedy = "each line needs three numbers: x, y and z"});
     }

@@ -62,7 +62,6 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
   const std::vector<char> head = peek_head(file, kRecognisedBytes, {});
   if (recognise_vrt(std::as_bytes(std::span(head)))) {
     throw Error({.file = file,
-                 .where = {},
                  .cause = "is a virtual raster inside another, which is not supported",
                  .remedy = "name the rasters of both: gdalbuildvrt, or convert it to GeoTIFF: "
                            "gdal_translate FILE out.tif"});
@@ -117,7 +116,6 @@ class WholeNumbers final : public Raster {
       if (!(real >= static_cast<double>(std::numeric_limits<T>::min()) && real < end) ||
           real != std::trunc(real)) {
         throw Error({.file = info_.files.front(),
-                     .where = {},
                      .cause = "has samples that are not " +
                               std::string(name_of(info_.sample.type)) +
                               ", the sample type of the virtual raster",

@@ -110,7 +110,6 @@ StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
 void StoreQuery::check_looked(std::uint64_t clusters) const {
   if (clusters <= clusters_) return;
   throw Error({.file = store_.path().string(),
-               .where = {},
                .cause = "the hierarchy is damaged: clusters are headed by several points",
                .remedy = "restore the files or rebuild the store"});
 }
@@ -335,7 +334,6 @@ class Store::ConditionView final : public Store::View {
     std::call_once(once_, [&] { find_bounds(view); });
     if (bounds_.empty()) {
       throw Error({.file = view.path().string(),
-                   .where = {},
                    .cause = "no point meets the condition " + in_quotes(condition_.text()),
                    .remedy = "give another `where`"});
     }

@@ -31,7 +31,6 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
   auto file = files(entry.name);
   if (file->size() != entry.bytes) {
     throw Error({.file = file->name(),
-                 .where = {},
                  .cause = "the manifest says " + counted(entry.bytes, "byte") + ", the file has " +
                           std::to_string(file->size()),
                  .remedy = kRestoreStore});
@@ -122,10 +121,9 @@ std::shared_ptr<const IndexPage> LevelReader::page(std::uint64_t number) const {
 Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
   if (ordinal >= clusters_) {
     throw Error({.file = index_->name(),
-                 .where = {},
                  .cause = "there is no cluster " + std::to_string(layout_.level) + "/" +
-                          std::to_string(ordinal) + ", the level has " + std::to_string(clusters_),
-                 .remedy = {}});
+                          std::to_string(ordinal) + ", the level has " +
+                          std::to_string(clusters_)});
   }
   const auto page = this->page(ordinal / layout_.page_clusters());
   offset = page->offset(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));

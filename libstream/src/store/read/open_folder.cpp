@@ -71,7 +71,6 @@ Ownership Store::ownership_of(const fs::path& folder) {
 Store Store::open(const std::filesystem::path& path) {
   if (!exists(path)) {
     throw Error({.file = path.string(),
-                 .where = {},
                  .cause = "there is no store here",
                  .remedy = "give a folder written by terrace build"});
   }

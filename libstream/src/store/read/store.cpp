@@ -153,7 +153,6 @@ std::uint64_t Store::for_each(unsigned number, std::uint64_t first, std::uint64_
 
 Error Store::miscounted(unsigned level) const {
   return Error({.file = impl_->level(level).data().name(),
-                .where = {},
                 .cause = "the clusters do not have the " +
                          std::to_string(impl_->infos[level].members) +
                          " members that the manifest lists",

@@ -171,7 +171,6 @@ void BlockEncoder::load_decimals(std::size_t axis) {
     doubles_[i] = block_->positions[block_->order[i]][axis];
     if (!std::isfinite(doubles_[i])) {
       throw Error({.file = {},
-                   .where = {},
                    .cause = "a point has a coordinate that is not finite",
                    .remedy = "remove such points"});
     }
@@ -271,7 +270,6 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   const auto n = static_cast<std::uint32_t>(members_.size());
   if (n > layout_->most_points()) {
     throw Error({.file = {},
-                 .where = {},
                  .cause = "a cluster has " + counted(n, "point") +
                           " of this size, more than the limit of " +
                           std::to_string(layout_->most_points()),
@@ -311,8 +309,7 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   }
   if (summary != nullptr) {
     if (!(summary->error >= 0)) {
-      throw Error(
-          {.file = {}, .where = {}, .cause = "a cluster's error is negative or NaN", .remedy = {}});
+      throw Error({.file = {}, .cause = "a cluster's error is negative or NaN"});
     }
     entry.error = error_code(std::abs(summary->error));
     entry.descendants = layout_->level == 0 ? 0 : summary->descendants;

@@ -107,10 +107,7 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
 std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   assert(encoded != nullptr);
   if (broken) {
-    throw Error({.file = staging.target().string(),
-                 .where = {},
-                 .cause = "an earlier write failed",
-                 .remedy = {}});
+    throw Error({.file = staging.target().string(), .cause = "an earlier write failed"});
   }
   broken = true;  // until this call succeeds
   const unsigned level = encoded->level;
@@ -144,7 +141,6 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
   if (std::filesystem::exists(status)) {
     if (!replace) {
       throw Error({.file = path.string(),
-                   .where = {},
                    .cause = "exists already",
                    .remedy = "choose another name or remove it"});
     }
@@ -153,10 +149,7 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
     }
   }
   if (schema.attributes.size() > kMostAttributes) {
-    throw Error({.file = path.string(),
-                 .where = {},
-                 .cause = "there are too many attributes",
-                 .remedy = {}});
+    throw Error({.file = path.string(), .cause = "there are too many attributes"});
   }
   impl_ = std::make_unique<Impl>(path, std::move(schema), replace, threads);
 }
@@ -185,7 +178,6 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
   if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
     throw Error({.file = w.staging.target().string(),
-                 .where = {},
                  .cause = "its coordinates are not finite in the CRS: scale or offset of the input "
                           "are too large",
                  .remedy = "correct the scale and the offset of the input"});
