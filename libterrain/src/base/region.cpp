@@ -21,7 +21,6 @@ namespace {
 
 [[noreturn]] void fail(const std::string& file, const std::string& cause) {
   throw stream::Error({.file = file,
-                       .where = {},
                        .cause = cause,
                        .remedy = "give a GeoJSON file with polygons, or minx,miny,maxx,maxy"});
 }
@@ -60,7 +59,6 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
   }
   if (depth > 0 && json.contains("crs") && !json["crs"].is_null()) {
     throw stream::Error({.file = file,
-                         .where = {},
                          .cause = "an object within it has its own crs",
                          .remedy = "write one crs for all, as the first member of the file, or "
                                    "give `region_crs`"});
@@ -120,7 +118,6 @@ std::optional<PlacesCrs> crs_of_geojson(const nlohmann::json& object, const std:
   if (!crs.is_object() || !crs.contains(name) || !crs.at(name).is_string() ||
       crs.at(name).get_ref<const std::string&>().empty()) {
     throw stream::Error({.file = file,
-                         .where = {},
                          .cause = "its crs does not name a CRS",
                          .remedy = "write {\"type\": \"name\", \"properties\": {\"name\": "
                                    "\"EPSG:n\"}}, or give `region_crs`"});

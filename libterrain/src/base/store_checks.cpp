@@ -13,7 +13,6 @@ void need_points(const stream::Store& store, const std::string& what) {
   const stream::Entities entities = entities_of(store.schema());
   if (entities == stream::Entities::points) return;
   throw stream::Error({.file = store.path().string(),
-                       .where = {},
                        .cause = "holds " + std::string(stream::name_of(entities)) + ", and " +
                                 what + " needs points",
                        .remedy = "build a store of the vertices: leave `entities` out"});
@@ -29,7 +28,6 @@ void need_terrain(const stream::Store& store, const std::string& what) {
   const stream::Crs& crs = store.schema().crs;
   if (!is_geocentric(crs)) return;
   throw stream::Error({.file = store.path().string(),
-                       .where = {},
                        .cause = "has the geocentric CRS \"" + crs.name +
                                 "\", in which z is not a height, and " + what + " needs heights",
                        .remedy = "convert the points to a projected CRS and build a store of "
@@ -65,7 +63,6 @@ std::string extent_text(const stream::Store& store) {
 void throw_none_inside(const stream::Store& store, const std::string& what) {
   throw stream::Error(
       {.file = store.path().string(),
-       .where = {},
        .cause = "no " + what + " is in the region; the points have " + extent_text(store),
        .remedy =
            "give a `region` that contains some of them: boxes are in their CRS or in `region_crs`, "

@@ -49,7 +49,6 @@ CornerReader::Column CornerReader::column(const stream::Schema& schema,
                    [&](const stream::Channel& channel) { return channel.name == name; });
   if (found == schema.attributes.end()) {
     throw stream::Error({.file = file_,
-                         .where = {},
                          .cause = "the column \"" + name + "\" of the corners is missing",
                          .remedy = "keep all columns: leave `keep` and `drop` out"});
   }
@@ -68,7 +67,6 @@ std::size_t CornerReader::operator()(std::span<const std::byte> record,
     const double vertices = value(*vertices_);
     if (!(vertices >= 2 && vertices <= static_cast<double>(count))) {
       throw stream::Error({.file = file_,
-                           .where = {},
                            .cause = "an entity of " + plain_number(vertices) + ' ' +
                                     stream::noun_for(vertices == 1, "vertex"),
                            .remedy = "the store is damaged; build it again"});

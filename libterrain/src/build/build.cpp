@@ -165,7 +165,6 @@ void check_cells(const stream::SourceInfo& info) {
   if (apart) return;
   throw stream::Error(
       {.file = info.files.empty() ? std::string() : info.files.front(),
-       .where = {},
        .cause = std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
                 " cannot be distinguished: steps of " + plain_number(base::hypot(m[0], m[3])) +
                 " x " + plain_number(base::hypot(m[1], m[4])) + " from " + plain_number(m[2]) +
@@ -240,7 +239,6 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
     remedy = info.grid ? "check the file and its nodata value" : "check the file";
   }
   throw stream::Error({.file = info.files.empty() ? std::string() : info.files.front(),
-                       .where = {},
                        .cause = cause,
                        .remedy = remedy});
 }
@@ -263,7 +261,6 @@ std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request
                   [](const std::string& name) { return stream::reads_once(name); })) {
     throw stream::Error(
         {.file = request.inputs.front(),
-         .where = {},
          .cause = "its points " + joint->what +
                   ", which is known only at the end, and the input can be read only once",
          .remedy = "name a file, or count longitudes from 0 to 360 or continue them beyond 180"});
@@ -382,7 +379,6 @@ unsigned Build::threads_for(std::size_t payload_bytes) const {
   };
   throw stream::Error(
       {.file = request_.store.string(),
-       .where = {},
        .cause = "`memory_bytes` " + std::to_string(memory_bytes_ >> 20) +
                 "M is not enough: the build needs " + in_mebibytes(needed(1)) + ", " +
                 in_mebibytes(source_bytes) + " of it to read the input",

@@ -56,7 +56,6 @@ AttributeAxis axis_of(const std::string& name, const BuildRequest& request,
     known += (known.empty() ? "" : ", ") + attribute.name;
   }
   throw stream::Error({.file = input_name(request),
-                       .where = {},
                        .cause = "its points have no attribute \"" + name + "\"",
                        .remedy = known.empty() ? "they have no attributes: leave out `channel`"
                                                : "`channel` takes one of these: " + known});
@@ -78,7 +77,6 @@ void set_channels(const BuildRequest& request, const stream::Schema& schema,
                   channel.offset;
       if (std::isfinite(values[i])) continue;
       throw stream::Error({.file = file,
-                           .where = {},
                            .cause = "\"" + channel.name + "\" of a point is not finite",
                            .remedy = "leave such points out with `where`, or the "
                                      "attribute out of `channel`"});
@@ -150,7 +148,6 @@ void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>&
   const auto same = [](const stream::Channel& channel) { return channel.name == kOutlierName; };
   if (std::any_of(attributes.begin(), attributes.end(), same)) {
     throw stream::Error({.file = input_name(request),
-                         .where = {},
                          .cause = std::string("its points already have an attribute \"") +
                                   kOutlierName +
                                   "\", the name that `outlier_price` marks outliers with",

@@ -118,17 +118,14 @@ std::vector<MetricChoice::Region> read_regions(const std::string& file) {
   const std::optional<nlohmann::json> found = json_of_file(file, kMostBytes, shape);
   if (!found) {
     throw stream::Error({.file = file,
-                         .where = {},
                          .cause = "cannot be read",
                          .remedy = "`metric` elliptical:FILE names a JSON file of regions"});
   }
   const nlohmann::json& json = *found;
   if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
       json["regions"].empty()) {
-    throw stream::Error({.file = file,
-                         .where = {},
-                         .cause = "is not a JSON object with a list \"regions\"",
-                         .remedy = shape});
+    throw stream::Error(
+        {.file = file, .cause = "is not a JSON object with a list \"regions\"", .remedy = shape});
   }
   std::vector<MetricChoice::Region> regions;
   for (const nlohmann::json& region : json["regions"]) {

@@ -116,7 +116,6 @@ void ContourText::append(std::string& text, const ContourLine& line,
     if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
     throw stream::Error({.file = file_,
-                         .where = {},
                          .cause = plain_number(at[0]) + ',' + plain_number(at[1]) +
                                   " has no longitude and latitude in " +
                                   geography_->system().title(),

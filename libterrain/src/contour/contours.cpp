@@ -28,8 +28,7 @@ constexpr double kMostLevelsDrawn = 1e7;
 
 stream::Error failure(const stream::Store& store, const std::string& cause,
                       const std::string& remedy) {
-  return stream::Error(
-      {.file = store.path().string(), .where = {}, .cause = cause, .remedy = remedy});
+  return stream::Error({.file = store.path().string(), .cause = cause, .remedy = remedy});
 }
 
 /// Throws: stream::Error if the interval is too small for the heights.

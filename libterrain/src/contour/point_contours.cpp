@@ -95,7 +95,6 @@ class PointContours {
         kBytesPerWindow, parts_.store.levels()[request_.level].points * kBytesPerPointAlone);
     if (memory < least) {
       throw stream::Error({.file = parts_.store.path().string(),
-                           .where = {},
                            .cause = "contours of its points need " +
                                     readable_bytes(kProcessBytes + 2 * least) +
                                     " of memory, `memory_bytes` allows " +

@@ -20,7 +20,7 @@ namespace terrace::terrain {
 
 GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
   const auto fail = [&file](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
+    throw stream::Error({.file = file, .cause = cause, .remedy = remedy});
   };
   const std::filesystem::path path(file);
   const char* const fetch = "give a grid of GeographicLib's, like egm2008-5.pgm";

@@ -12,7 +12,7 @@ namespace {
 
 [[noreturn]] void fail(const std::string& file, const std::string& cause,
                        const std::string& remedy) {
-  throw stream::Error({.file = file, .where = {}, .cause = cause, .remedy = remedy});
+  throw stream::Error({.file = file, .cause = cause, .remedy = remedy});
 }
 
 /// Returns nullopt for a local system, which it stores in `local`.

@@ -31,7 +31,6 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
     const std::string& name = store.schema().crs.name;
     throw stream::Error(
         {.file = file,
-         .where = {},
          .cause = name.empty() ? "has no CRS"
                   : is_geocentric(store.schema().crs)
                       ? "has the geocentric CRS \"" + name + "\", which is not converted"
@@ -82,7 +81,6 @@ CoordinateSystem system_named_in(const PlacesCrs& given) {
     // Reported below, with the file.
   }
   throw stream::Error({.file = given.file,
-                       .where = {},
                        .cause = "its crs \"" + given.name.substr(0, 80) + "\" is not known",
                        .remedy = "write a known one, like EPSG:n, or give `region_crs`"});
 }
@@ -122,7 +120,6 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   if (!system && !named.empty()) {
     throw stream::Error(
         {.file = source.files.empty() ? std::string() : source.files.front(),
-         .where = {},
          .cause = "has no known CRS, so the region cannot be converted to it",
          .remedy = "leave `region_crs` out and give the region in its coordinates"});
   }
@@ -166,7 +163,6 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
   if (!own && given.name.empty()) return std::nullopt;
   if (!own) {
     throw stream::Error({.file = given.file,
-                         .where = {},
                          .cause = "its crs is " + system_named_in(given).title() +
                                   ", and the CRS of the data is not known",
                          .remedy =

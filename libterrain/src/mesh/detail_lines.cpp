@@ -48,7 +48,6 @@ struct LineColumns {
       }
     }
     throw stream::Error({.file = store.path().string(),
-                         .where = {},
                          .cause = "its lines have no column \"" + std::string(name) + "\"",
                          .remedy = "keep all columns: leave `keep` and `drop` out"});
   }

@@ -131,7 +131,6 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
       points * (kBytesPerVertex + more_per_vertex) + (std::uint64_t{32} << 20);
   if (needed <= memory_bytes && points <= kMostVertices) return;
   throw stream::Error({.file = store.path().string(),
-                       .where = {},
                        .cause = "a mesh of " + counted(points, "point") + " needs " +
                                 std::to_string((needed >> 20) + 1) +
                                 "M of memory, `memory_bytes` allows " +
@@ -464,7 +463,6 @@ stream::Overlay open_height_overlay(const std::string& path, const stream::Store
   if (overlay.channel() != heights) {
     throw stream::Error(
         {.file = path,
-         .where = {},
          .cause = "has values of '" + overlay.channel() + "', not of the heights '" + heights + "'",
          .remedy = "name an overlay written by terrace mesh"});
   }

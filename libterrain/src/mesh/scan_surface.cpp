@@ -32,7 +32,6 @@ void check_surface_memory(const stream::Store& store, const Detail& detail,
   const std::uint64_t needed = kSurfaceBytesBeside + points * bytes_per_point;
   if (needed <= memory_bytes) return;
   throw stream::Error({.file = store.path().string(),
-                       .where = {},
                        .cause = "a surface of " + counted(points, "point") + " needs " +
                                 readable_bytes(needed) + ", `memory_bytes` allows " +
                                 readable_bytes(memory_bytes),

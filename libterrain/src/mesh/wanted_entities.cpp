@@ -32,7 +32,6 @@ void for_each_wanted_entity(
           const stream::Point3&) {
         if (visited++ >= most) {
           throw stream::Error({.file = store.path().string(),
-                               .where = {},
                                .cause = "the detail wants more than the " + std::to_string(most) +
                                         " " + std::string(stream::name_of(entities)) +
                                         " that fit into `memory_bytes` " +

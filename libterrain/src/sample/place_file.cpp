@@ -97,7 +97,6 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
   });
   if (json || binary || text.starts_with('<')) {
     throw stream::Error({.file = file,
-                         .where = {},
                          .cause = std::string("is ") +
                                   (json     ? "JSON"
                                    : binary ? "not text"
@@ -116,7 +115,6 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
     layout.separator = first_line[at];
   } else {
     throw stream::Error({.file = file,
-                         .where = {},
                          .cause = "the first line has only one column",
                          .remedy = "give x and y with a comma, a semicolon or a tab between them"});
   }

@@ -281,7 +281,6 @@ class PointSampler final : public HeightSampler {
     const std::uint64_t needed =
         2 * std::max(memory_ + (std::uint64_t{1} << 20), static_cast<std::uint64_t>(bytes));
     throw stream::Error({.file = store_.path().string(),
-                         .where = {},
                          .cause = "more than " + counted(room_, "point") +
                                   " are close together, too many for `memory_bytes`",
                          .remedy = "give " + std::to_string((needed >> 20) + 1) +

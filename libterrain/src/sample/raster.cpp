@@ -211,7 +211,6 @@ class RasterRun {
     if (table <= memory / 2) return memory - table;
     throw stream::Error(
         {.file = request_.output,
-         .where = {},
          .cause = "a raster of " + with_commas(grid_.columns) + " x " + with_commas(grid_.rows) +
                   " cells needs " + readable_bytes(kProcessBytes + 2 * table) +
                   " of memory, `memory_bytes` allows " + readable_bytes(context_.memory_or(0)),

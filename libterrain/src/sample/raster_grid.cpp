@@ -65,7 +65,6 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
   }
   if (result.empty()) {
     throw stream::Error({.file = store.path().string(),
-                         .where = {},
                          .cause = "the region has no image in " + change.to().title(),
                          .remedy = "choose another `to_crs` or a smaller `region`"});
   }
@@ -127,7 +126,7 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
   const stream::SourceInfo info =
       stream::open_source(std::span(&request.align, 1), options)->info();
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = request.align, .where = {}, .cause = cause, .remedy = remedy});
+    throw stream::Error({.file = request.align, .cause = cause, .remedy = remedy});
   };
   const std::array<double, 6>& m = info.world.xy;
   if (!info.grid) refuse("is not a raster, and has no grid to align with", "name a raster");
@@ -229,7 +228,6 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   if (!(cell > 0) || !std::isfinite(cell)) {
     throw stream::Error(
         {.file = store.path().string(),
-         .where = {},
          .cause = "all points are at one place or on one line, so no cell size follows",
          .remedy = "give `cell`"});
   }

@@ -64,7 +64,6 @@ void PointWindow::check_memory(std::size_t more) const {
                                open_tree_.memory_bytes();
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
   throw NoRoom({.file = store_.path().string(),
-                .where = {},
                 .cause = "a window of at least " + counted(around + inserted, "point") + " needs " +
                          std::to_string((needed >> 20) + 1) + "M of memory, " +
                          std::to_string(memory_bytes_ >> 20) + "M are allowed for it",

@@ -52,7 +52,6 @@ DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
                                    const DatumChange& change) {
   throw stream::Error(
       {.file = {},
-       .where = {},
        .cause = "the CRS " + from.title() + " has the datum " + from.definition().datum +
                 ", and no operation leads from it to " + to +
                 (change.better().empty() ? "" : ": " + change.better()),
@@ -114,8 +113,7 @@ std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,
     if (!definition) return std::nullopt;
     return CoordinateSystem(*definition);
   } catch (const CrsError& error) {
-    throw stream::Error(
-        {.file = file, .where = {}, .cause = error.what(), .remedy = error.remedy()});
+    throw stream::Error({.file = file, .cause = error.what(), .remedy = error.remedy()});
   }
 }
 

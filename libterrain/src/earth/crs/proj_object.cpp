@@ -61,13 +61,11 @@ void check_proj_database() {
   if (why.find("Cannot find") != why.npos) {
     throw CrsDatabaseError(
         {.file = "proj.db",
-         .where = {},
          .cause = "PROJ's database of reference systems is not found",
          .remedy = "install it (Debian's package proj-data), or name its folder in PROJ_DATA"});
   }
   throw CrsDatabaseError(
       {.file = "proj.db",
-       .where = {},
        .cause = "PROJ's database of reference systems cannot be read (" + why + ")",
        .remedy = "check the disk it is on, and how many files a process may open"});
 }

@@ -45,7 +45,6 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
       run(search.range, ~std::uint64_t{0});
       throw stream::Error(
           {.file = options.path,
-           .where = {},
            .cause = "`max_points` " + std::to_string(options.max_points) +
                     " is too few: even a flat mesh of this region, with its border, takes " +
                     std::to_string(result.vertices),

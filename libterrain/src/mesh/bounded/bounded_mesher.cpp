@@ -72,7 +72,6 @@ Aim BoundedMesher::aim_within(double bound) const {
   if (options_.max_points > 0) return {std::max(first, 0.0), std::max(sure, 0.0), HUGE_VAL};
   if (!(sure >= 0.0)) {
     throw stream::Error({.file = options_.path,
-                         .where = {},
                          .cause = "its format rounds heights by up to " +
                                   readable_number(moved[2]) + ", too much for this `max_error`",
                          .remedy = "write PLY, which is exact"});
@@ -85,7 +84,6 @@ unsigned BoundedMesher::threads_within_memory(std::uint64_t each, std::uint64_t 
   const std::uint64_t memory = context_.memory_or(0);
   if (memory < shared + each) {
     throw stream::Error({.file = store_.path().string(),
-                         .where = {},
                          .cause = "a mesh with a bound needs " +
                                   std::to_string(((shared + each) >> 20) + 1) + "M of memory" +
                                   purpose + ", `memory_bytes` allows " +

@@ -59,7 +59,6 @@ void MeshSpool::add_vertex(const stream::Point3& position) {
 void MeshSpool::add_vertices(std::span<const stream::Point3> positions) {
   if (positions.size() > std::numeric_limits<std::uint32_t>::max() - vertices_) {
     throw stream::Error({.file = vertex_file_.target().string(),
-                         .where = {},
                          .cause = "the mesh has more than 4,294,967,295 vertices",
                          .remedy = "mesh smaller regions, or allow a larger error"});
   }

@@ -332,7 +332,6 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
   const auto add = [&](const stream::Point3& p) {
     if (!(std::abs(p[0]) < kLargest && std::abs(p[1]) < kLargest && std::abs(p[2]) < kLargest)) {
       throw stream::Error({.file = store.path().string(),
-                           .where = {},
                            .cause = "a point has a coordinate that is not finite or exceeds 1e100",
                            .remedy = "leave it out of the store, or of the `region`"});
     }

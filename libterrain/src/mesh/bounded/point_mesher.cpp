@@ -278,7 +278,6 @@ stream::Error PointMesher::shared_places_error() const {
   }
   return stream::Error(
       {.file = store_.path().string(),
-       .where = {},
        .cause = counted(shared.places, "place", "has", "have") +
                 " several samples with heights that differ by up to " +
                 readable_number(shared.range * metres_vertical()) + " m (at " +

@@ -207,7 +207,7 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
                            const stream::MeshRounding& rounding, const std::string& source,
                            bool may_miss) {
   const auto fail = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = source, .where = {}, .cause = cause, .remedy = remedy});
+    throw stream::Error({.file = source, .cause = cause, .remedy = remedy});
   };
   const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
   MeshSamples left;

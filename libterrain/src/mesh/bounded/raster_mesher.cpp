@@ -245,7 +245,6 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
       throw UsageError("`region`: it does not meet the raster of the store");
     }
     throw stream::Error({.file = store.path().string(),
-                         .where = {},
                          .cause = "the raster is one line of samples, so it has no triangles",
                          .remedy = "use a profile or its points instead of a mesh"});
   }

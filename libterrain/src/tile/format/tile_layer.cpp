@@ -146,7 +146,6 @@ TileLayer read_layer(const std::string& path) {
   const auto json = json_of_file(path, kMostBytes, "make the tiles again");
   if (!json) {
     throw stream::Error({.file = path,
-                         .where = {},
                          .cause = "cannot be read",
                          .remedy = "name the folder of a finished tile set"});
   }
@@ -155,7 +154,6 @@ TileLayer read_layer(const std::string& path) {
   } catch (const std::exception& error) {
     throw stream::Error(
         {.file = path,
-         .where = {},
          .cause = std::string("does not describe a supported tile set: ") + error.what(),
          .remedy = "make the tiles again"});
   }

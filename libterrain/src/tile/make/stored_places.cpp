@@ -203,7 +203,6 @@ void StoredPlaces::find_bounds(const std::string& file, bool is_lattice) {
   if (!(all.min[0] <= all.max[0]) || (is_lattice && !std::isfinite(lattice_spacing()))) {
     throw stream::Error(
         {.file = file,
-         .where = {},
          .cause = "cannot be converted to longitude and latitude with " + crs_.title(),
          .remedy = "rebuild the store with the right `crs`"});
   }

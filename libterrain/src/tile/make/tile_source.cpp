@@ -66,7 +66,6 @@ void check_heights(const stream::Store& store, double metres) {
     const double height = (end[2] * z.scale + z.offset) * metres;
     if (std::abs(height) <= kFarthest) continue;
     throw stream::Error({.file = store.path().string(),
-                         .where = {},
                          .cause = "has heights of " + plain_number(height) +
                                   " m: heights beyond 10,000 km are not on a globe",
                          .remedy = "check the unit and the nodata value of the source, or leave "
@@ -81,7 +80,6 @@ TileResources tile_resources(const Context& context, const std::string& path) {
   if (memory < kBytesBeside + kBytesPerThread) {
     throw stream::Error(
         {.file = path,
-         .where = {},
          .cause = "tiles need " + std::to_string((kBytesBeside + kBytesPerThread) >> 20) +
                   "M of memory, `memory_bytes` allows " + std::to_string(memory >> 20) + "M",
          .remedy = "allow more"});

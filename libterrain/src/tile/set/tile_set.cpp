@@ -70,7 +70,6 @@ void refuse_another(const std::string& layer_path, const std::string& fingerprin
   if (!fs::exists(layer_path) || read_layer(layer_path).fingerprint == fingerprint) return;
   throw stream::Error(
       {.file = layer_path,
-       .where = {},
        .cause = "is finished, and made from another store or with other options",
        .remedy = "give `replace` to replace it: tiles that stay the same are kept"});
 }
@@ -138,7 +137,7 @@ class TileFolder {
 TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
     : path_(stream::follow_links(folder).string()) {
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = folder, .where = {}, .cause = cause, .remedy = remedy});
+    throw stream::Error({.file = folder, .cause = cause, .remedy = remedy});
   };
   if (fs::exists(path_) && !fs::is_directory(path_)) refuse("is not a folder", "name another one");
   // Nothing is created in a foreign folder, not even the lock.
@@ -173,7 +172,6 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
 void TileFolder::check_same() const {
   if (lock_.has_name()) return;
   throw stream::Error({.file = path_,
-                       .where = {},
                        .cause = "has been moved or replaced by another program in the meantime",
                        .remedy = "run again, and do not move the folder"});
 }

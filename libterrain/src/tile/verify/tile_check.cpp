@@ -365,7 +365,6 @@ bool is_tile_folder(const std::string& folder) {
 TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context) {
   if (!is_tile_folder(request.folder)) {
     throw stream::Error({.file = request.folder,
-                         .where = {},
                          .cause = "contains no tile set",
                          .remedy = "name the folder that it was written to"});
   }
@@ -379,7 +378,6 @@ TileCheckResult check_tiles(const TileCheckRequest& request, const Context& cont
   const std::string layer_path = request.folder + "/layer.json";
   if (!std::filesystem::exists(layer_path)) {
     throw stream::Error({.file = request.folder,
-                         .where = {},
                          .cause = "contains an unfinished tile set",
                          .remedy = "finish it first: make the set again with `resume`"});
   }
