@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 
 namespace terrace::stream {
 
 /// Thrown for bad data and failed input or output, never for misuse (which asserts). `what()` is
-/// one line: "FILE: WHERE: cause; remedy". Every part except file and cause may be empty.
+/// one line: "FILE: WHERE: cause; remedy". An error begins with file and cause; what else is known
+/// is added in the same expression:
+///
+///     throw Error(input.name(), "the file ends too early")
+///         .at_byte(input.offset())
+///         .remedy("download it again");
 class Error : public std::runtime_error {
  public:
   struct Parts {
@@ -18,7 +24,15 @@ class Error : public std::runtime_error {
     int error_number = 0;     ///< errno of the failed system call, if any; otherwise 0
   };
 
+  Error(std::string file, std::string cause);
   explicit Error(Parts parts);
+
+  /// Each returns the error with one more part, which replaces that of an earlier call.
+  [[nodiscard]] Error at(std::string where) &&;
+  [[nodiscard]] Error at_byte(std::uint64_t offset) &&;
+  [[nodiscard]] Error at_line(std::uint64_t number) &&;
+  [[nodiscard]] Error remedy(std::string remedy) &&;
+  [[nodiscard]] Error error_number(int number) &&;
 
   [[nodiscard]] const Parts& parts() const noexcept { return parts_; }
 
