@@ -84,10 +84,9 @@ class Where::Parser {
   static constexpr unsigned kMostNested = 64;
 
   [[noreturn]] void fail(std::string cause, std::string remedy = {}) const {
-    throw Error({.file = "the condition " + in_quotes(text_),
-                 .where = "character " + std::to_string(at_ + 1),
-                 .cause = std::move(cause),
-                 .remedy = std::move(remedy)});
+    throw Error("the condition " + in_quotes(text_), std::move(cause))
+        .at("character " + std::to_string(at_ + 1))
+        .remedy(std::move(remedy));
   }
 
   static bool is_letter(char c) {

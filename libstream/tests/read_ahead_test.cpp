@@ -32,7 +32,7 @@ class Counting final : public PointSource {
   bool next(PointBlock& block) override {
     block.clear();
     if (next_ == blocks_) {
-      if (fails_) throw Error({.file = "x", .cause = "broken"});
+      if (fails_) throw Error("x", "broken");
       return false;
     }
     block.positions.push_back({static_cast<double>(next_++), 0, 0});

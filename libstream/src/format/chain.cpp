@@ -43,8 +43,7 @@ std::string difference(const SourceInfo& first, const SourceInfo& other) {
 void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreement& crs) {
   const auto refuse = [&](std::string cause,
                           std::string remedy = "convert one of them, or read them separately") {
-    throw Error(
-        {.file = other.files.front(), .cause = std::move(cause), .remedy = std::move(remedy)});
+    throw Error(other.files.front(), std::move(cause)).remedy(std::move(remedy));
   };
   if (first.coordinates != other.coordinates) {
     refuse("its coordinates are " + std::string(name_of(other.coordinates[0].type)) +

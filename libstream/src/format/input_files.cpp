@@ -25,10 +25,7 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const std::string& name, std::string where, std::string cause,
                        std::string remedy) {
-  throw Error({.file = name,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = std::move(remedy)});
+  throw Error(name, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
 }
 
 bool exists(const std::string& name) {

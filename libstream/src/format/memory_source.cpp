@@ -79,10 +79,10 @@ class ColumnSource final : public PointSource {
         const auto value = static_cast<double>(number);
         missing = missing || std::isnan(value);
         if (std::isinf(value)) {
-          throw Error({.file = points_.info.files.empty() ? "" : points_.info.files.front(),
-                       .where = "point " + std::to_string(read_ + i),
-                       .cause = "its " + points_.info.coordinates[axis].name + " is infinite",
-                       .remedy = "leave such points out"});
+          throw Error(points_.info.files.empty() ? "" : points_.info.files.front(),
+                      "its " + points_.info.coordinates[axis].name + " is infinite")
+              .at("point " + std::to_string(read_ + i))
+              .remedy("leave such points out");
         }
         block.positions[i][axis] = value;
       }

@@ -58,11 +58,11 @@ class CubeCheckingReader final : public PartReader {
 
  private:
   [[noreturn]] void refuse() const {
-    throw Error({.file = check_->file,
-                 .where = "node " + name_of(check_->nodes[part_]),
-                 .cause = "has a point outside its cube: the header or the hierarchy is wrong, "
-                          "and a region would miss points",
-                 .remedy = "convert the whole file to LAS or LAZ and select the region from that"});
+    throw Error(check_->file,
+                "has a point outside its cube: the header or the hierarchy is wrong, "
+                "and a region would miss points")
+        .at("node " + name_of(check_->nodes[part_]))
+        .remedy("convert the whole file to LAS or LAZ and select the region from that");
   }
 
   std::shared_ptr<const CubeCheck> check_;

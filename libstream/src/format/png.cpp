@@ -87,9 +87,7 @@ bool write_image(const Image& image, Output& output) {
 
 void write_file(const std::filesystem::path& path, const Image& image, const Naming& replace,
                 const std::stop_token& stop) {
-  const auto refuse = [&](std::string cause) {
-    throw Error({.file = path.string(), .cause = std::move(cause)});
-  };
+  const auto refuse = [&](std::string cause) { throw Error(path.string(), std::move(cause)); };
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
   if (image.width == 0 || image.height == 0) refuse("a PNG image cannot be empty");
   if (image.width > kMost || image.height > kMost)

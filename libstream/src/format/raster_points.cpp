@@ -22,9 +22,8 @@ class WithCells final : public Raster {
   WithCells(std::unique_ptr<Raster> raster, double cell) : raster_(std::move(raster)) {
     info_ = raster_->info();
     if (info_.world != kPlainWorld) {
-      throw Error({.file = info_.files.front(),
-                   .cause = "is georeferenced, which sets its cell size",
-                   .remedy = "leave `cell` out"});
+      throw Error(info_.files.front(), "is georeferenced, which sets its cell size")
+          .remedy("leave `cell` out");
     }
     std::erase(info_.comments, kNoGeoreferencing);
     for (double& number : info_.world.xy) number *= cell;

@@ -189,10 +189,9 @@ class RecordSource final : public PointSource {
     return stream_.input ? stream_.input->name() : stream_.info.files.front();
   }
   [[noreturn]] void fail(std::size_t point, std::string cause, std::string remedy) const {
-    throw Error({.file = file(),
-                 .where = "point " + std::to_string(delivered_ + point),
-                 .cause = std::move(cause),
-                 .remedy = std::move(remedy)});
+    throw Error(file(), std::move(cause))
+        .at("point " + std::to_string(delivered_ + point))
+        .remedy(std::move(remedy));
   }
 
   /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
@@ -237,11 +236,10 @@ class RecordSource final : public PointSource {
                       std::abs(offset))) {
       return;
     }
-    throw Error({.file = file(),
-                 .where = "header",
-                 .cause = std::string("the scale and the offset of ") + "xyz"[axis] +
-                          " give coordinates that are not finite",
-                 .remedy = "the header is wrong: export the file again"});
+    throw Error(file(), std::string("the scale and the offset of ") + "xyz"[axis] +
+                            " give coordinates that are not finite")
+        .at("header")
+        .remedy("the header is wrong: export the file again");
   }
 
   void check(const PointBlock& block) const {
@@ -265,10 +263,9 @@ class RecordSource final : public PointSource {
     try {
       move_ = move_between(info, placement);
     } catch (const std::domain_error& axis) {
-      throw Error({.file = file(),
-                   .cause = std::string(axis.what()) + " is not on the lattice of the other " +
-                            "files: its scale or the fraction of its offset differs",
-                   .remedy = "name files instead of pipes, or read it separately"});
+      throw Error(file(), std::string(axis.what()) + " is not on the lattice of the other " +
+                              "files: its scale or the fraction of its offset differs")
+          .remedy("name files instead of pipes, or read it separately");
     }
     info.world = placement.world;
     info.coordinates = placement.coordinates;

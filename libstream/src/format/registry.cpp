@@ -63,9 +63,8 @@ bool is_ept_name(const std::string& file) {
 }
 
 [[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
-  throw Error({.file = shown_name(file),
-               .cause = "is " + std::string(format.name) + ", which cannot be read",
-               .remedy = std::string(format.remedy)});
+  throw Error(shown_name(file), "is " + std::string(format.name) + ", which cannot be read")
+      .remedy(std::string(format.remedy));
 }
 
 /// Determines the format by options.format, else by content, else by ending. A file with a known
@@ -95,13 +94,12 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   if (const Format* const format = format_of_name(file)) return *format;
   const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
   if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
-  throw Error(
-      {.file = shown_name(file),
-       .cause = head.empty() ? "the file is empty" : "neither content nor name shows its format",
-       .remedy = head.empty() ? "download or export the file again"
-                              : "convert a raster (gdal_translate FILE out.tif), or name the "
-                                "format: " +
-                                    known_formats()});
+  throw Error(shown_name(file),
+              head.empty() ? "the file is empty" : "neither content nor name shows its format")
+      .remedy(head.empty() ? "download or export the file again"
+                           : "convert a raster (gdal_translate FILE out.tif), or name the "
+                             "format: " +
+                                 known_formats());
 }
 
 /// Releases pipes that were peeked at but not opened.
@@ -121,53 +119,46 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   for (const std::string& file : files) {
     const Format& other = format_of(file, options);
     if (&other != &format) {
-      throw Error({.file = shown_name(file),
-                   .cause = "is " + other.name + ", but " + shown_name(files.front()) + " is " +
-                            format.name,
-                   .remedy = "name files of one format, or select files of a folder by `format`"});
+      throw Error(shown_name(file),
+                  "is " + other.name + ", but " + shown_name(files.front()) + " is " + format.name)
+          .remedy("name files of one format, or select files of a folder by `format`");
     }
     if (is_seekable(file) || packed_format_of(file) == &format) continue;
     if (!format.streams && !format.self_contained) {
-      throw Error({.file = shown_name(file),
-                   .cause = format.name + " cannot be read from a pipe or from gzip",
-                   .remedy = "name an unpacked file"});
+      throw Error(shown_name(file), format.name + " cannot be read from a pipe or from gzip")
+          .remedy("name an unpacked file");
     }
     spooled = spooled || !format.streams;
   }
   if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
-    throw Error({.file = "standard input",
-                 .cause = "is named twice",
-                 .remedy = "name it once: it can be read only once"});
+    throw Error("standard input", "is named twice")
+        .remedy("name it once: it can be read only once");
   }
   if (options.heights_of_colour != HeightsOfColour::none && format.name != png_format().name) {
-    throw Error({.file = shown_name(files.front()),
-                 .cause = format.name + " does not encode heights as colours",
-                 .remedy = "leave `heights_of_colour` out"});
+    throw Error(shown_name(files.front()), format.name + " does not encode heights as colours")
+        .remedy("leave `heights_of_colour` out");
   }
   if (options.selection.resolution > 0 && format.name != las_format().name &&
       format.name != ept_format().name) {
-    throw Error({.file = shown_name(files.front()),
-                 .cause = format.name + " has no octree, so `resolution` does not apply",
-                 .remedy = "name a COPC file or EPT, or leave `resolution` out"});
+    throw Error(shown_name(files.front()),
+                format.name + " has no octree, so `resolution` does not apply")
+        .remedy("name a COPC file or EPT, or leave `resolution` out");
   }
   const bool triangles = options.entities == Entities::triangles;
   if (options.entities != Entities::points && !(triangles ? format.triangles : format.lines)) {
-    throw Error({.file = shown_name(files.front()),
-                 .cause = format.name + " has no " + (triangles ? "triangles" : "lines"),
-                 .remedy = std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)"
-                                                 : "name GeoJSON") +
-                           ", or leave `entities` out"});
+    throw Error(shown_name(files.front()),
+                format.name + " has no " + (triangles ? "triangles" : "lines"))
+        .remedy(std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)" : "name GeoJSON") +
+                ", or leave `entities` out");
   }
   auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
   if (options.cell > 0 && !source->info().grid) {
-    throw Error({.file = shown_name(files.front()),
-                 .cause = format.name + " is not a raster format",
-                 .remedy = "leave `cell` out"});
+    throw Error(shown_name(files.front()), format.name + " is not a raster format")
+        .remedy("leave `cell` out");
   }
   if (options.band != 1 && !source->info().grid) {
-    throw Error({.file = shown_name(files.front()),
-                 .cause = format.name + " has no bands",
-                 .remedy = "leave `band` out"});
+    throw Error(shown_name(files.front()), format.name + " has no bands")
+        .remedy("leave `band` out");
   }
   return selection_of(std::move(source), options);
 }

@@ -195,9 +195,8 @@ void check_attributes(const std::vector<std::string>& names, const std::vector<C
       if (!list.empty()) list += ", ";
       list += attribute.name;
     }
-    throw Error({.file = file,
-                 .cause = "its points have no attribute " + in_quotes(name),
-                 .remedy = list.empty() ? "they have no attributes" : "known are " + list});
+    throw Error(file, "its points have no attribute " + in_quotes(name))
+        .remedy(list.empty() ? "they have no attributes" : "known are " + list);
   }
 }
 

@@ -58,18 +58,15 @@ WorldTransform read_world_file(const std::string& file) {
   for (double& number : numbers) {
     const bool more = lines.next(line);
     if (!more || !read_number(trim(line), number)) {
-      throw Error({.file = file,
-                   .where = "line " + std::to_string(lines.number()),
-                   .cause = "a world file has six numbers, one on each line",
-                   .remedy = "correct or remove it"});
+      throw Error(file, "a world file has six numbers, one on each line")
+          .at_line(lines.number())
+          .remedy("correct or remove it");
     }
   }
   const auto [a, d, b, e, c, f] = numbers;
   const double area = a * e - b * d;
   if (!std::isfinite(area) || area == 0) {
-    throw Error({.file = file,
-                 .cause = "does not map cells to distinct places",
-                 .remedy = "correct or remove it"});
+    throw Error(file, "does not map cells to distinct places").remedy("correct or remove it");
   }
   return {{a, b, c, d, e, f}};
 }

@@ -66,9 +66,8 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
       continue;
     }
     if (to_stdout && !row.streams) {
-      throw Error({.file = "standard output",
-                   .cause = std::string(row.name) + " cannot be written to a pipe",
-                   .remedy = "name a file"});
+      throw Error("standard output", std::string(row.name) + " cannot be written to a pipe")
+          .remedy("name a file");
     }
     return i;
   }
@@ -76,9 +75,7 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
     throw std::invalid_argument("unknown output format '" + options.format + "'; known are " +
                                 known(table));
   }
-  throw Error({.file = path,
-               .cause = "no output format has its ending",
-               .remedy = "known are " + known(table)});
+  throw Error(path, "no output format has its ending").remedy("known are " + known(table));
 }
 
 std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,

@@ -65,15 +65,13 @@ struct AtomicFile::Impl {
     if (status.type() == fs::file_type::not_found) return;
     if (error) fail("cannot be inspected", error.value());
     if (status.type() != fs::file_type::regular) {
-      throw Error({.file = target.string(),
-                   .cause = "exists and is not a regular file",
-                   .remedy = "choose another name"});
+      throw Error(target.string(), "exists and is not a regular file")
+          .remedy("choose another name");
     }
     if (naming.replace) return;
-    throw Error({.file = target.string(),
-                 .cause = "exists already",
-                 .remedy = "remove it, choose another name, or ask to replace it",
-                 .error_number = EEXIST});
+    throw Error(target.string(), "exists already")
+        .remedy("remove it, choose another name, or ask to replace it")
+        .error_number(EEXIST);
   }
 
   /// Creates and locks the temporary file. Between the two steps another writer may take it for
@@ -141,8 +139,7 @@ AtomicFile::AtomicFile(const fs::path& target, Naming naming) : impl_(std::make_
   impl_->shown = naming.shown.empty() ? target : naming.shown;
   impl_->naming = std::move(naming);
   if (!target.has_filename()) {
-    throw Error(
-        {.file = target.string(), .cause = "is not a file name", .remedy = "add a file name"});
+    throw Error(target.string(), "is not a file name").remedy("add a file name");
   }
   impl_->check_target();
   impl_->place = follow_links(target);

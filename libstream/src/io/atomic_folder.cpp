@@ -61,9 +61,8 @@ AtomicFolder::AtomicFolder(fs::path target, std::string mark, Naming naming)
   // "store/" names the same folder as "store".
   if (!target.has_filename()) target = target.parent_path();
   if (!target.has_filename() || target.filename() == "." || target.filename() == "..") {
-    throw Error({.file = target.string(),
-                 .cause = "this cannot be the name of a new folder",
-                 .remedy = "give a name that does not exist yet"});
+    throw Error(target.string(), "this cannot be the name of a new folder")
+        .remedy("give a name that does not exist yet");
   }
   Impl& impl = *impl_;
   impl.target = follow_links(std::move(target));
@@ -72,9 +71,8 @@ AtomicFolder::AtomicFolder(fs::path target, std::string mark, Naming naming)
   const fs::path parent = folder_of(impl.target);
   std::error_code error;
   if (!fs::is_directory(parent, error)) {
-    throw Error({.file = impl.target.string(),
-                 .cause = "the folder " + parent.string() + " does not exist",
-                 .remedy = "create it first"});
+    throw Error(impl.target.string(), "the folder " + parent.string() + " does not exist")
+        .remedy("create it first");
   }
   sweep_temporaries(impl.target, impl.mark);
   impl.create();

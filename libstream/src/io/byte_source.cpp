@@ -28,7 +28,7 @@ class FileSource final : public ByteSource {
     }
     if (!S_ISREG(status.st_mode)) {
       ::close(descriptor_);
-      throw Error({.file = name_, .cause = "is not a regular file"});
+      throw Error(name_, "is not a regular file");
     }
     size_ = static_cast<std::uint64_t>(status.st_size);
   }
@@ -47,10 +47,9 @@ class FileSource final : public ByteSource {
       if (got < 0 && errno == EINTR) continue;
       if (got < 0) throw system_error(name_, "cannot read", errno, {});
       if (got == 0) {
-        throw Error({.file = name_,
-                     .where = "byte " + std::to_string(offset + done),
-                     .cause = "the file ends too early",
-                     .remedy = "it was truncated while being read: restore it"});
+        throw Error(name_, "the file ends too early")
+            .at_byte(offset + done)
+            .remedy("it was truncated while being read: restore it");
       }
       done += static_cast<std::size_t>(got);
     }

@@ -20,9 +20,7 @@ std::string text_of(const std::vector<ByteRange>& ranges) {
          " on have not been given";
 }
 
-Error impossible(const std::string& file, const std::string& cause) {
-  return Error({.file = file, .cause = cause});
-}
+Error impossible(const std::string& file, const std::string& cause) { return Error(file, cause); }
 
 }  // namespace
 

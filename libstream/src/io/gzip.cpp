@@ -19,7 +19,7 @@ struct Free {
 };
 
 [[noreturn]] void refuse(const std::string& name, const std::string& cause) {
-  throw Error({.file = name, .where = "gzip", .cause = cause, .remedy = "recreate the file"});
+  throw Error(name, cause).at("gzip").remedy("recreate the file");
 }
 
 // Returns the size of the decompressed bytes modulo 2^32, which the last four bytes state.

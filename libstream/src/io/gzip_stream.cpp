@@ -42,10 +42,9 @@ GzipStream::GzipStream(std::string name, std::string_view first)
 GzipStream::~GzipStream() = default;
 
 void GzipStream::fail(const std::string& cause) const {
-  throw Error({.file = name_,
-               .where = "byte " + std::to_string(used_) + " of the gzip data",
-               .cause = cause,
-               .remedy = "the file is damaged or truncated: download it again"});
+  throw Error(name_, cause)
+      .at("byte " + std::to_string(used_) + " of the gzip data")
+      .remedy("the file is damaged or truncated: download it again");
 }
 
 bool GzipStream::refill(const Read& read) {

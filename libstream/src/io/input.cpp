@@ -83,13 +83,10 @@ class Input::Descriptor {
       const ssize_t got = ::read(fd_, to, most);
       if (got >= 0) return static_cast<std::size_t>(got);
       if (errno == EISDIR) {
-        throw Error(
-            {.file = name, .cause = "is a folder, not a file", .remedy = "name the files in it"});
+        throw Error(name, "is a folder, not a file").remedy("name the files in it");
       }
       if (errno == EBADF) {
-        throw Error({.file = name,
-                     .cause = "is closed",
-                     .remedy = "give the name of a file, or redirect one to it"});
+        throw Error(name, "is closed").remedy("give the name of a file, or redirect one to it");
       }
       // EAGAIN means that another reader of the same pipe was faster.
       if (errno != EINTR && errno != EAGAIN) throw system_error(name, "cannot read", errno);

@@ -23,9 +23,8 @@ bool is_utf16(std::string_view head) {
 
 void refuse_utf16(Input& input) {
   if (!is_utf16(input.fill(4))) return;
-  throw Error({.file = input.name(),
-               .cause = "is text in UTF-16, which is not supported",
-               .remedy = "save it as UTF-8, e.g. 'iconv -f UTF-16 -t UTF-8 FILE'"});
+  throw Error(input.name(), "is text in UTF-16, which is not supported")
+      .remedy("save it as UTF-8, e.g. 'iconv -f UTF-16 -t UTF-8 FILE'");
 }
 
 bool LineReader::next(std::string_view& line) {
@@ -50,10 +49,9 @@ bool LineReader::next(std::string_view& line) {
     }
   }
   if (length > kMaxLine) {
-    throw Error({.file = input_->name(),
-                 .where = "line " + std::to_string(number_ + 1),
-                 .cause = "longer than " + counted(kMaxLine, "byte"),
-                 .remedy = "the file is not text, or its line ends are missing"});
+    throw Error(input_->name(), "longer than " + counted(kMaxLine, "byte"))
+        .at_line(number_ + 1)
+        .remedy("the file is not text, or its line ends are missing");
   }
   pending_ = length + line_end;
   ++number_;

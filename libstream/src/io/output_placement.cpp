@@ -55,16 +55,14 @@ Ownership ownership_of_entries(
 
 Error not_replaced(std::string file, const Ownership& found) {
   if (found.stranger.empty()) {
-    return Error({.file = std::move(file),
-                  .cause = "exists and was not written by terrace, so it is not replaced",
-                  .remedy = "move it away or choose another name",
-                  .error_number = EEXIST});
+    return Error(std::move(file), "exists and was not written by terrace, so it is not replaced")
+        .remedy("move it away or choose another name")
+        .error_number(EEXIST);
   }
-  return Error({.file = std::move(file),
-                .cause = "contains " + found.stranger +
-                         ", which terrace did not write, so it is not replaced",
-                .remedy = "move it away or choose another name",
-                .error_number = EEXIST});
+  return Error(std::move(file), "contains " + found.stranger +
+                                    ", which terrace did not write, so it is not replaced")
+      .remedy("move it away or choose another name")
+      .error_number(EEXIST);
 }
 
 OutputPlacement::OutputPlacement(fs::path shown, fs::path place, fs::path temporary, Naming naming)
@@ -99,10 +97,9 @@ void OutputPlacement::fail(int error_number) const {
 }
 
 void OutputPlacement::fail_because_it_exists() const {
-  throw Error({.file = shown_.string(),
-               .cause = "exists already",
-               .remedy = "remove it, choose another name, or ask to replace it",
-               .error_number = EEXIST});
+  throw Error(shown_.string(), "exists already")
+      .remedy("remove it, choose another name, or ask to replace it")
+      .error_number(EEXIST);
 }
 
 /// False if the name is free by now. Throws: Error.

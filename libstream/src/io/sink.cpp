@@ -69,9 +69,7 @@ void Sink::flush() {
     if (written >= 0 || errno == EINTR || errno == EAGAIN) continue;
     if (errno == EPIPE) throw ClosedPipe();
     if (errno == EBADF) {
-      throw Error({.file = "standard output",
-                   .cause = "is closed",
-                   .remedy = "connect it to a file or a pipe"});
+      throw Error("standard output", "is closed").remedy("connect it to a file or a pipe");
     }
     throw system_error("standard output", "cannot write", errno);
   }

@@ -244,9 +244,8 @@ Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
   const auto place = free_.lower_bound(pages);
   if (place == free_.end()) {
     if (pages > UINT32_MAX - pages_) {
-      throw Error({.file = file_.name(),
-                   .cause = "its points need more than 4 TiB of temporary disk space",
-                   .remedy = "split the input"});
+      throw Error(file_.name(), "its points need more than 4 TiB of temporary disk space")
+          .remedy("split the input");
     }
     pages_ += pages;
     return chunk;

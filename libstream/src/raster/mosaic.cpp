@@ -35,7 +35,7 @@ std::string all_digits(double value) {
 
 [[noreturn]] void differ(const std::string& first, const std::string& other,
                          const std::string& what, const std::string& remedy) {
-  throw Error({.file = other, .cause = "does not match " + first + ": " + what, .remedy = remedy});
+  throw Error(other, "does not match " + first + ": " + what).remedy(remedy);
 }
 
 /// Returns the column and row of `frame` at x, y.
@@ -328,11 +328,11 @@ class Mosaic final : public Raster {
     info_.columns = static_cast<std::uint64_t>(right - left);
     info_.rows = static_cast<std::uint64_t>(bottom - top);
     if (info_.columns >= kMostMosaicCells || info_.rows >= kMostMosaicCells) {
-      throw Error({.file = members_.front().file,
-                   .cause = "the mosaic of the " + std::to_string(members_.size()) + " files has " +
-                            std::to_string(info_.columns) + " x " + std::to_string(info_.rows) +
-                            " cells: columns and rows must each be fewer than 2^30",
-                   .remedy = "read the files separately"});
+      throw Error(members_.front().file,
+                  "the mosaic of the " + std::to_string(members_.size()) + " files has " +
+                      std::to_string(info_.columns) + " x " + std::to_string(info_.rows) +
+                      " cells: columns and rows must each be fewer than 2^30")
+          .remedy("read the files separately");
     }
     auto& m = info_.world.xy;
     const auto c = static_cast<double>(left), r = static_cast<double>(top);
@@ -359,9 +359,7 @@ class Mosaic final : public Raster {
     const RasterInfo& info = open_.front().raster->info();
     if (info.columns != members_[member].columns || info.rows != members_[member].rows ||
         info.sample.type != info_.sample.type) {
-      throw Error({.file = members_[member].file,
-                   .cause = "changed while it was read",
-                   .remedy = "start again"});
+      throw Error(members_[member].file, "changed while it was read").remedy("start again");
     }
     return *open_.front().raster;
   }

@@ -104,10 +104,10 @@ std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t 
 void check_count(const SourceInfo& info, const CellWindow& crop) {
   constexpr std::uint64_t kMostReadableCells = std::uint64_t{1} << 48;
   if (cells_of(crop) <= kMostReadableCells) return;
-  throw Error({.file = info.files.front(),
-               .cause = "has " + std::to_string(crop.columns) + " x " + std::to_string(crop.rows) +
-                        " cells, more than the limit of 2^48",
-               .remedy = "select a part (`region`, gdal_translate -srcwin), or correct its size"});
+  throw Error(info.files.front(), "has " + std::to_string(crop.columns) + " x " +
+                                      std::to_string(crop.rows) +
+                                      " cells, more than the limit of 2^48")
+      .remedy("select a part (`region`, gdal_translate -srcwin), or correct its size");
 }
 
 class RasterSource final : public PointSource {

@@ -219,9 +219,7 @@ void check_words(const Manifest& m) {
 }
 
 [[noreturn]] void damaged(const std::string& file, const std::string& cause) {
-  throw Error({.file = file,
-               .cause = "damaged manifest: " + cause,
-               .remedy = "restore the file or rebuild the store"});
+  throw Error(file, "damaged manifest: " + cause).remedy("restore the file or rebuild the store");
 }
 
 }  // namespace
@@ -242,7 +240,7 @@ std::string hexadecimal(std::uint32_t value) {
 
 std::string read_manifest(const ByteSource& file) {
   if (file.size() > kMostManifestBytes) {
-    throw Error({.file = file.name(), .cause = "the file is too large"});
+    throw Error(file.name(), "the file is too large");
   }
   std::string text(static_cast<std::size_t>(file.size()), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));
@@ -259,12 +257,11 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     const auto version = json.at("version").count();
     // Development versions before the first release also wrote higher numbers.
     if (version > kVersion) {
-      throw Error({.file = file,
-                   .cause = "store version " + std::to_string(version) +
+      throw Error(file, "store version " + std::to_string(version) +
                             " was written by a newer terrace, or by a development version before "
                             "the first release; this one reads version " +
-                            std::to_string(kVersion),
-                   .remedy = "update, or rebuild the store from its source"});
+                            std::to_string(kVersion))
+          .remedy("update, or rebuild the store from its source");
     }
     if (version < 1) damaged(file, "the version is impossible");
 

@@ -22,9 +22,8 @@ constexpr const char* kRestoreOverlay = "restore the file or write the overlay a
 std::unique_ptr<ByteSource> open_overlay(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
-    throw Error({.file = path.string(),
-                 .cause = "there is no overlay here",
-                 .remedy = "give an overlay written by terrace"});
+    throw Error(path.string(), "there is no overlay here")
+        .remedy("give an overlay written by terrace");
   }
   return open_file(path);
 }
@@ -49,10 +48,7 @@ struct Overlay::Impl {
   OverlayPage page{};
 
   [[nodiscard]] Error damaged(std::uint64_t offset, const std::string& cause) const {
-    return Error({.file = file->name(),
-                  .where = "byte " + std::to_string(offset),
-                  .cause = cause,
-                  .remedy = kRestoreOverlay});
+    return Error(file->name(), cause).at_byte(offset).remedy(kRestoreOverlay);
   }
 
   void read_header(const Store& store);
@@ -71,11 +67,11 @@ void Overlay::Impl::read_header(const Store& store) {
     // Checked before anything that may differ in a newer version.
     const auto version = load<std::uint32_t>(bytes.data() + kOverlayMarkBytes);
     if (version > kOverlayVersion) {
-      throw Error({.file = file->name(),
-                   .cause = "overlay version " + std::to_string(version) +
-                            " was written by a newer terrace; this one reads up to version " +
-                            std::to_string(kOverlayVersion),
-                   .remedy = "update"});
+      throw Error(file->name(),
+                  "overlay version " + std::to_string(version) +
+                      " was written by a newer terrace; this one reads up to version " +
+                      std::to_string(kOverlayVersion))
+          .remedy("update");
     }
     ByteReader in(ByteView(bytes).subspan(kOverlayMarkBytes + 4));
     const auto made_for = in.get<std::uint32_t>();
@@ -94,10 +90,10 @@ void Overlay::Impl::read_header(const Store& store) {
     }
     channel.assign(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(name));
     if (made_for != store.checksum()) {
-      throw Error({.file = file->name(),
-                   .cause = "was made for the store with the checksum " + hexadecimal(made_for) +
-                            ", " + store.path().string() + " has " + hexadecimal(store.checksum()),
-                   .remedy = "give the store that it was made for, or write the overlay again"});
+      throw Error(file->name(), "was made for the store with the checksum " +
+                                    hexadecimal(made_for) + ", " + store.path().string() + " has " +
+                                    hexadecimal(store.checksum()))
+          .remedy("give the store that it was made for, or write the overlay again");
     }
     read_directory(count, end, store.points());
   } catch (const Damage& damage) {

@@ -110,11 +110,10 @@ void call_library(const std::string& file, const std::string& method,
   try {
     work();
   } catch (const std::invalid_argument& error) {
-    throw stream::Error({.file = file, .cause = error.what()});
+    throw stream::Error(file, error.what());
   } catch (const std::bad_alloc&) {
-    throw stream::Error({.file = file,
-                         .cause = "does not fit into memory with method " + method,
-                         .remedy = "take fewer points, or another method"});
+    throw stream::Error(file, "does not fit into memory with method " + method)
+        .remedy("take fewer points, or another method");
   }
 }
 

@@ -167,9 +167,8 @@ Focus parse_focus(const std::string& text) {
 
 Line parse_line(const std::string& text) {
   const auto bad = [&](const std::string& cause) {
-    return stream::Error({.file = text,
-                          .cause = cause,
-                          .remedy = "give x1,y1,x2,y2,... or a GeoJSON file with one LineString"});
+    return stream::Error(text, cause)
+        .remedy("give x1,y1,x2,y2,... or a GeoJSON file with one LineString");
   };
   Line line;
   if (text.find(',') != std::string::npos &&

@@ -44,7 +44,7 @@ stream::Naming may_replace(const std::string& path, bool force) {
   const fs::file_status status = fs::status(path, error);  // follows links
   if (status.type() == fs::file_type::not_found) return naming;
   const auto refuse = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = path, .cause = cause, .remedy = remedy});
+    throw stream::Error(path, cause).remedy(remedy);
   };
   if (error) throw stream::system_error(path, "cannot be examined", error.value());
   if (!fs::is_regular_file(status)) {

@@ -23,7 +23,7 @@ constexpr const char* kMark = "stores.json";
 constexpr std::size_t kCopied = std::size_t{1} << 20;
 
 stream::Error refused(const fs::path& path, const std::string& cause, const std::string& remedy) {
-  return stream::Error({.file = path.string(), .cause = cause, .remedy = remedy});
+  return stream::Error(path.string(), cause).remedy(remedy);
 }
 
 /// Returns the contents of stores.json; null unless terrace published the folder.

@@ -262,9 +262,9 @@ Server::Server(std::function<const Site&()> site, std::uint16_t port, const Serv
     impl_->acceptor.bind(here);
     impl_->acceptor.listen();
   } catch (const boost::system::system_error& error) {
-    throw stream::Error({.file = "127.0.0.1:" + std::to_string(port),
-                         .cause = "cannot be served: " + error.code().message(),
-                         .remedy = "name another port"});
+    throw stream::Error("127.0.0.1:" + std::to_string(port),
+                        "cannot be served: " + error.code().message())
+        .remedy("name another port");
   }
   impl_->access = {impl_->acceptor.local_endpoint().port(), random_token()};
 }

@@ -250,9 +250,8 @@ Site make_site(std::span<const stream::Store> stores) {
       const fs::path path = store.path() / file;
       std::error_code error;
       if (!fs::is_regular_file(fs::symlink_status(path, error))) {
-        throw stream::Error({.file = path.string(),
-                             .cause = "is not a regular file (links are not served)",
-                             .remedy = "replace it with the file itself"});
+        throw stream::Error(path.string(), "is not a regular file (links are not served)")
+            .remedy("replace it with the file itself");
       }
       std::shared_ptr<const stream::ByteSource> bytes = stream::open_file(path);
       const std::string tag = '"' + checksum + "-" + hexadecimal(bytes->size()) + '"';
@@ -275,9 +274,8 @@ LiveSite::LiveSite(std::vector<std::string> paths,
   for (const std::string& path : paths_) manifests_.push_back(fs::path(path) / kManifest);
   for (int attempts = 1; !make(); ++attempts) {
     if (attempts < kAttempts) continue;
-    throw stream::Error({.file = paths_.front(),
-                         .cause = "the files of a store keep changing",
-                         .remedy = "wait until they have been copied"});
+    throw stream::Error(paths_.front(), "the files of a store keep changing")
+        .remedy("wait until they have been copied");
   }
 }
 

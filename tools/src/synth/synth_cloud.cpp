@@ -201,9 +201,8 @@ DeliveryOrder::DeliveryOrder(const std::string& shuffle, std::uint64_t points, s
   }
   if (points / ((least + most) / 2) > memory_bytes / 32) {
     throw stream::Error(
-        {.file = {},
-         .cause = "the table of that many pieces does not fit into " + readable_bytes(memory_bytes),
-         .remedy = "make the pieces longer or raise --memory"});
+        {}, "the table of that many pieces does not fit into " + readable_bytes(memory_bytes))
+        .remedy("make the pieces longer or raise --memory");
   }
   std::vector<std::uint64_t> starts;
   for (std::uint64_t start = 0; start < points;) {

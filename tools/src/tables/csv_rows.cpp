@@ -37,10 +37,9 @@ bool CsvRows::next(std::string_view& line) {
     if (stream_.fail() && (stream_.eof() || stream_.bad())) return false;
     ++number_;
     if (stream_.fail()) {
-      throw stream::Error({.file = path_,
-                           .where = where(),
-                           .cause = "is longer than any row",
-                           .remedy = "rows are a few numbers with commas"});
+      throw stream::Error(path_, "is longer than any row")
+          .at(where())
+          .remedy("rows are a few numbers with commas");
     }
     // The count includes the line end, if there is one.
     line_.resize(stream_.eof() ? taken : taken - 1);

@@ -40,11 +40,11 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
   if (!rows) return std::nullopt;
   cluster::Dendrogram dendrogram;
   const auto fail = [&](const std::string& where, const std::string& cause) {
-    throw stream::Error({.file = path,
-                         .where = where,
-                         .cause = cause,
-                         .remedy = "rows must be a,b,height,size as written by 'terrace cluster "
-                                   "--dendrogram' and SciPy's linkage()"});
+    throw stream::Error(path, cause)
+        .at(where)
+        .remedy(
+            "rows must be a,b,height,size as written by 'terrace cluster "
+            "--dendrogram' and SciPy's linkage()");
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};

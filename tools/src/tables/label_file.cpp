@@ -21,9 +21,8 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
   constexpr std::streamsize kLongestLine = 4096;  // bounds non-text files too
   std::ifstream file(path);
   if (!file) {
-    throw stream::Error({.file = path,
-                         .cause = "cannot be opened",
-                         .remedy = "name a file with one cluster number per line"});
+    throw stream::Error(path, "cannot be opened")
+        .remedy("name a file with one cluster number per line");
   }
   std::vector<std::uint32_t> labels;
   std::vector<char> buffer(kLongestLine);
@@ -35,31 +34,26 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     const std::string where = "line " + std::to_string(labels.size() + 1);
     const std::uint32_t label = number_from<std::uint32_t>(line).value_or(kNoCluster);
     if (label == kNoCluster && line != "-1") {
-      throw stream::Error({.file = path,
-                           .where = where,
-                           .cause = "'" + line.substr(0, 40) + "' is not a cluster number",
-                           .remedy = "write one whole number from 0 to 4294967294 per line, or -1 "
-                                     "for a point without a cluster"});
+      throw stream::Error(path, "'" + line.substr(0, 40) + "' is not a cluster number")
+          .at(where)
+          .remedy(
+              "write one whole number from 0 to 4294967294 per line, or -1 "
+              "for a point without a cluster");
     }
     labels.push_back(label);
     if (labels.size() > points) {
-      throw stream::Error({.file = path,
-                           .where = where,
-                           .cause = "has more lines than the " + counted(points, "point"),
-                           .remedy = "give the labels of these points, in the order of the input"});
+      throw stream::Error(path, "has more lines than the " + counted(points, "point"))
+          .at(where)
+          .remedy("give the labels of these points, in the order of the input");
     }
   }
   if (file.bad()) {
-    throw stream::Error({.file = path,
-                         .where = "line " + std::to_string(labels.size() + 1),
-                         .cause = "cannot be read",
-                         .remedy = "check the disk"});
+    throw stream::Error(path, "cannot be read").at_line(labels.size() + 1).remedy("check the disk");
   }
   if (labels.size() < points) {
     throw stream::Error(
-        {.file = path,
-         .cause = "has " + counted(labels.size(), "label") + " for " + counted(points, "point"),
-         .remedy = "give the labels of these points, in the order of the input"});
+        path, "has " + counted(labels.size(), "label") + " for " + counted(points, "point"))
+        .remedy("give the labels of these points, in the order of the input");
   }
   return labels;
 }

@@ -85,11 +85,11 @@ bool is_matching_result(const std::string& path) {
 
 MatchingResult read_matching_result(const std::string& path, std::size_t points) {
   const auto fail = [&](const std::string& where, const std::string& cause) {
-    throw stream::Error({.file = path,
-                         .where = where,
-                         .cause = cause,
-                         .remedy = "pass the unchanged result of 'terrace match', and with "
-                                   "--points the file that it was made from"});
+    throw stream::Error(path, cause)
+        .at(where)
+        .remedy(
+            "pass the unchanged result of 'terrace match', and with "
+            "--points the file that it was made from");
   };
   std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
@@ -147,10 +147,9 @@ MatchingPicture read_matching_picture(const std::string& path, const std::string
     positions.push_back(ground(p));
     for (const double x : positions.back()) {
       if (std::isfinite(x)) continue;
-      throw stream::Error({.file = points_file,
-                           .where = "point " + std::to_string(positions.size() - 1),
-                           .cause = "has a coordinate that is not finite",
-                           .remedy = "match and draw the points without it"});
+      throw stream::Error(points_file, "has a coordinate that is not finite")
+          .at("point " + std::to_string(positions.size() - 1))
+          .remedy("match and draw the points without it");
     }
   }
   if (!picture.result.tree) return picture;

@@ -38,23 +38,22 @@ void writing_within_memory(const stream::PointWriter& writer, const std::string&
   const std::uint64_t writing = writer.writing_bytes();
   const std::uint64_t needed = kProgramMemory + reading + writing;
   if (writing == 0 || needed <= memory_bytes) return;
-  throw stream::Error({.file = file,
-                       .cause = "writing it needs " + std::to_string((needed >> 20) + 1) +
+  throw stream::Error(file, "writing it needs " + std::to_string((needed >> 20) + 1) +
                                 "M of memory, --memory allows " +
-                                std::to_string(memory_bytes >> 20) + "M",
-                       .remedy = "raise --memory, or write another format"});
+                                std::to_string(memory_bytes >> 20) + "M")
+      .remedy("raise --memory, or write another format");
 }
 
 std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint64_t memory_bytes) {
   const std::uint64_t reading = source.reading_bytes();
   if (reading == 0 || kProgramMemory + reading <= memory_bytes) return reading;
-  throw stream::Error(
-      {.file = source.info().files.front(),
-       .cause = "reading it needs " + std::to_string(((kProgramMemory + reading) >> 20) + 1) +
-                "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) + "M",
-       .remedy = source.info().grid ? "raise --memory, or rewrite large strips and tiles as small "
-                                      "tiles: gdal_translate -co TILED=YES"
-                                    : "raise --memory"});
+  throw stream::Error(source.info().files.front(),
+                      "reading it needs " + std::to_string(((kProgramMemory + reading) >> 20) + 1) +
+                          "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) +
+                          "M")
+      .remedy(source.info().grid ? "raise --memory, or rewrite large strips and tiles as small "
+                                   "tiles: gdal_translate -co TILED=YES"
+                                 : "raise --memory");
 }
 
 void for_each_block(stream::PointSource& source, const CommonOptions& common,
@@ -97,11 +96,11 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     const std::size_t count = table.size() + block.size();
     const bool grows = count > table.positions.capacity();
     if (count > (grows ? most / 2 : most)) {
-      throw stream::Error({.file = file,
-                           .cause = "has more points than " + readable_bytes(memory_bytes) +
-                                    " can hold (" + with_commas(table.size()) + " so far)",
-                           .remedy = "raise --memory, or build a store, which takes points of any "
-                                     "number"});
+      throw stream::Error(file, "has more points than " + readable_bytes(memory_bytes) +
+                                    " can hold (" + with_commas(table.size()) + " so far)")
+          .remedy(
+              "raise --memory, or build a store, which takes points of any "
+              "number");
     }
     table.positions.insert(table.positions.end(), block.positions.begin(), block.positions.end());
     table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());
@@ -113,8 +112,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
                          " without a coordinate are left out: point numbers do not count them");
   }
   if (table.positions.empty()) {
-    throw stream::Error(
-        {.file = file, .cause = "it contains no points", .remedy = "check the file"});
+    throw stream::Error(file, "it contains no points").remedy("check the file");
   }
   return table;
 }

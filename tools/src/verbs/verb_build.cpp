@@ -130,9 +130,8 @@ class BuildCommand final : public Command {
                                            : stream::Order::automatic;
     std::error_code ignored;
     if (!common.force && std::filesystem::exists(request_.store, ignored)) {
-      throw stream::Error({.file = output_,
-                           .cause = "exists already",
-                           .remedy = "name another output, or give --force to replace it"});
+      throw stream::Error(output_, "exists already")
+          .remedy("name another output, or give --force to replace it");
     }
     return dry_run_ ? estimate(common) : build(common);
   }

@@ -553,10 +553,8 @@ class ClusterCommand final : public Command {
     request_.memory_bytes = common.memory_or(0);
     PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
     if (table.size() > std::numeric_limits<std::int32_t>::max()) {
-      throw stream::Error(
-          {.file = input_,
-           .cause = "has " + counted(table.size(), "point"),
-           .remedy = "at most 2,147,483,647 are clustered in memory; build a store"});
+      throw stream::Error(input_, "has " + counted(table.size(), "point"))
+          .remedy("at most 2,147,483,647 are clustered in memory; build a store");
     }
     need_memory(table, common);
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
@@ -615,12 +613,12 @@ class ClusterCommand final : public Command {
     const std::uint64_t needed = held + table.size() * each;
     const std::uint64_t memory = common.memory_or(0);
     if (needed > memory) {
-      throw stream::Error({.file = input_,
-                           .cause = "clustering its " + counted(table.size(), "point") + " by " +
-                                    method_ + " needs " + std::to_string((needed >> 20) + 1) +
-                                    " MiB, --memory is " + readable_bytes(memory),
-                           .remedy = "raise --memory, or build a store, which takes points of any "
-                                     "number"});
+      throw stream::Error(input_, "clustering its " + counted(table.size(), "point") + " by " +
+                                      method_ + " needs " + std::to_string((needed >> 20) + 1) +
+                                      " MiB, --memory is " + readable_bytes(memory))
+          .remedy(
+              "raise --memory, or build a store, which takes points of any "
+              "number");
     }
     request_.memory_bytes = memory - held;
   }

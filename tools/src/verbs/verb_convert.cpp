@@ -99,10 +99,9 @@ class ConvertCommand : public Command {
         },
         [&](stream::PointWriter::EncodedPtr points) { writer->append(std::move(points)); });
     if (writer->points() == 0 && selection_.selects()) {
-      throw stream::Error(
-          {.file = inputs_.front(),
-           .cause = "none of its " + selected_of(source->progress()) + "points is selected",
-           .remedy = "give another --where or --region"});
+      throw stream::Error(inputs_.front(),
+                          "none of its " + selected_of(source->progress()) + "points is selected")
+          .remedy("give another --where or --region");
     }
     writer->finish();
     if (writer->points() == 0) common.say(inputs_.front() + ": contains no points");

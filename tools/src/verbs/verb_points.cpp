@@ -107,9 +107,8 @@ class PointsCommand final : public Command {
     if (store.whole().points() == 0) return;
     if (detail.region) throw_none_inside(store);
     throw stream::Error(
-        {.file = part_.path,
-         .cause = "no point is selected; all of the store's have " + extent_text(store.whole()),
-         .remedy = "give another --where, --focus or --cluster"});
+        part_.path, "no point is selected; all of the store's have " + extent_text(store.whole()))
+        .remedy("give another --where, --focus or --cluster");
   }
   static PlaceConversion places(const std::optional<Transformation>& to) {
     return to ? PlaceConversion(*to) : PlaceConversion();
@@ -174,11 +173,11 @@ class PointsCommand final : public Command {
         count_ ? nearest_points(query, place, *count_, detail.level)
                : points_within(query, place, *radius_, detail.level);
     if (found.empty() && store.whole().points() > 0) {
-      throw stream::Error(
-          {.file = part_.path,
-           .cause = "no point is selected " +
-                    (radius_ ? "within " + plain_number(*radius_) + " m of " : "near ") + near_,
-           .remedy = radius_ ? "raise --within" : "give another --where"});
+      throw stream::Error(part_.path,
+                          "no point is selected " +
+                              (radius_ ? "within " + plain_number(*radius_) + " m of " : "near ") +
+                              near_)
+          .remedy(radius_ ? "raise --within" : "give another --where");
     }
     const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
     const auto& [x, y] = place.xy;

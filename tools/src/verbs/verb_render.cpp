@@ -130,12 +130,11 @@ std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, 
   const std::uint64_t fixed = kProgramMemory + size.width * size.height * kBytesPerPixel;
   const std::uint64_t memory = common.memory_or(0);
   if (fixed + bytes <= memory) return memory - fixed;
-  throw stream::Error({.file = path,
-                       .cause = "drawing it with " + std::to_string(size.width) + " x " +
+  throw stream::Error(path, "drawing it with " + std::to_string(size.width) + " x " +
                                 std::to_string(size.height) + " pixels needs " +
                                 std::to_string(((fixed + bytes) >> 20) + 1) + " MiB, --memory is " +
-                                readable_bytes(memory),
-                       .remedy = "give a smaller --size, a coarser --level, or more --memory"});
+                                readable_bytes(memory))
+      .remedy("give a smaller --size, a coarser --level, or more --memory");
 }
 
 /// Returns the maximum number of raster cells in a picture.
@@ -170,10 +169,8 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
     } else {
       append_points(input.mesh, info, block);
       if (input.mesh.positions.size() > memory / kDrawnBytesPerPoint) {
-        throw stream::Error(
-            {.file = path,
-             .cause = "has more points than " + readable_bytes(memory) + " can hold",
-             .remedy = "build a store and render that, or raise --memory"});
+        throw stream::Error(path, "has more points than " + readable_bytes(memory) + " can hold")
+            .remedy("build a store and render that, or raise --memory");
       }
     }
   });
@@ -367,10 +364,8 @@ class RenderCommand : public Command {
     check_interrupt();
     TriangleMesh& mesh = input.mesh;
     if (mesh.positions.empty()) {
-      throw stream::Error(
-          {.file = input_,
-           .cause = "there is nothing to draw: no point is selected",
-           .remedy = selection_.where.empty() ? "check the file" : "give another --where"});
+      throw stream::Error(input_, "there is nothing to draw: no point is selected")
+          .remedy(selection_.where.empty() ? "check the file" : "give another --where");
     }
     const bool terrain = input.terrain || is_height_field(mesh, check_interrupt);
     std::vector<Rgb> colours;

@@ -17,10 +17,9 @@ namespace terrace::stream {
 namespace {
 
 [[noreturn]] void fail(const ByteSource& file, std::uint64_t byte, std::string cause) {
-  throw Error({.file = file.name(),
-               .where = "byte " + std::to_string(byte),
-               .cause = std::move(cause),
-               .remedy = "the file is damaged: download it again"});
+  throw Error(file.name(), std::move(cause))
+      .at_byte(byte)
+      .remedy("the file is damaged: download it again");
 }
 
 /// A part of the hierarchy that is read in one piece.

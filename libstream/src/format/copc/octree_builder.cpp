@@ -217,12 +217,11 @@ OctreeBuilder::NodePoints OctreeBuilder::load(const OctreeNode& node, Bucket buc
 OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node, Bucket bucket) {
   const std::uint64_t count = file_.records(bucket);
   if (count > most_together_) {
-    throw Error({.file = name_,
-                 .cause = counted(count, "point") +
-                          " are in one place, more than a node of "
-                          "COPC can have in this memory: " +
-                          std::to_string(most_together_),
-                 .remedy = "raise `memory_bytes`, leave them out, or write LAZ"});
+    throw Error(name_, counted(count, "point") +
+                           " are in one place, more than a node of "
+                           "COPC can have in this memory: " +
+                           std::to_string(most_together_))
+        .remedy("raise `memory_bytes`, leave them out, or write LAZ");
   }
   NodePoints points = load(node, std::move(bucket));
   sort(points.items, node.depth);

@@ -179,10 +179,9 @@ class CopcWriter final : public PointWriter {
     while (octree_.nodes[written_].points == 0) ++written_;
     OctreeNode& node = octree_.nodes[written_++];
     if (coded.size() > std::numeric_limits<std::int32_t>::max()) {
-      throw Error({.file = path_,
-                   .cause = counted(node.points, "point") +
-                            " in one place take more bytes than a node of COPC can have",
-                   .remedy = "leave them out, or write LAZ"});
+      throw Error(path_, counted(node.points, "point") +
+                             " in one place take more bytes than a node of COPC can have")
+          .remedy("leave them out, or write LAZ");
     }
     node.offset = sink_.size();
     node.bytes = coded.size();

@@ -269,10 +269,9 @@ class EptMetadataReader {
 }  // namespace
 
 void fail_ept(const std::string& file, std::string where, std::string cause) {
-  throw Error({.file = file,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = "the data set is damaged or not EPT 1.0: download it again"});
+  throw Error(file, std::move(cause))
+      .at(std::move(where))
+      .remedy("the data set is damaged or not EPT 1.0: download it again");
 }
 
 EptMetadata read_ept_metadata(const std::string& file) { return EptMetadataReader(file).read(); }

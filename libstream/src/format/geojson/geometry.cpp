@@ -220,10 +220,9 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
 
   [[noreturn]] void refuse(const std::string& what) const { fail(what + " is not allowed here"); }
   [[noreturn]] void fail(const std::string& cause) const {
-    throw Error({.file = file_,
-                 .where = "the feature at byte " + std::to_string(offset_),
-                 .cause = cause,
-                 .remedy = "the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr"});
+    throw Error(file_, cause)
+        .at("the feature at byte " + std::to_string(offset_))
+        .remedy("the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr");
   }
 
   const std::string& file_;

@@ -53,10 +53,9 @@ GeoJsonItems::GeoJsonItems(Input& input, std::size_t most_bytes, bool wants_crs)
 }
 
 void GeoJsonItems::fail(const std::string& cause, std::size_t ahead) const {
-  throw Error({.file = input_->name(),
-               .where = "byte " + std::to_string(input_->offset() + ahead),
-               .cause = cause,
-               .remedy = "the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr"});
+  throw Error(input_->name(), cause)
+      .at_byte(input_->offset() + ahead)
+      .remedy("the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr");
 }
 
 /// The byte at a position of the window, which grows as needed; 0 at the end of the input.
@@ -64,10 +63,10 @@ char GeoJsonItems::at(std::size_t place) {
   window_ = input_->window();
   if (place < window_.size()) return window_[place];
   if (place >= most_bytes_) {
-    throw Error({.file = input_->name(),
-                 .where = "byte " + std::to_string(input_->offset()),
-                 .cause = "a feature has more than " + std::to_string(most_bytes_ >> 20) + " MiB",
-                 .remedy = "raise `memory_bytes`, or split the feature's lines"});
+    throw Error(input_->name(),
+                "a feature has more than " + std::to_string(most_bytes_ >> 20) + " MiB")
+        .at_byte(input_->offset())
+        .remedy("raise `memory_bytes`, or split the feature's lines");
   }
   window_ = input_->fill(std::min(most_bytes_, std::max(place + 1, 2 * window_.size())));
   return place < window_.size() ? window_[place] : '\0';

@@ -31,9 +31,7 @@ namespace {
 constexpr std::array kAxes{"x", "y", "z"};
 
 [[noreturn]] void refuse_lines(const std::string& file) {
-  throw Error({.file = file,
-               .cause = "has more than 4,294,967,295 lines",
-               .remedy = "build several stores"});
+  throw Error(file, "has more than 4,294,967,295 lines").remedy("build several stores");
 }
 
 class GeoJsonSource final : public PointSource {

@@ -235,10 +235,7 @@ std::string GeoTiffHandle::text(std::uint32_t tag) const {
 }
 
 void GeoTiffHandle::fail(std::string where, std::string cause, std::string remedy) const {
-  throw Error({.file = file_,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = std::move(remedy)});
+  throw Error(file_, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
 }
 
 }  // namespace terrace::stream

@@ -86,10 +86,9 @@ class Words {
   void more() {
     const auto left = static_cast<std::size_t>(end_ - at_);
     if (left > kLongest) {
-      throw Error({.file = input_.name(),
-                   .where = "byte " + std::to_string(input_.offset()),
-                   .cause = "a word of more than 1,024 characters is not a number",
-                   .remedy = "the file is damaged or not an ASCII grid: download it again"});
+      throw Error(input_.name(), "a word of more than 1,024 characters is not a number")
+          .at_byte(input_.offset())
+          .remedy("the file is damaged or not an ASCII grid: download it again");
     }
     input_.consume(static_cast<std::size_t>(at_ - begin_));
     const std::string_view window = input_.fill(left + 1);

@@ -72,7 +72,7 @@ WorldTransform GridHeader::world(std::uint64_t rows, std::vector<std::string>& c
 
 void GridHeader::fail(const std::string& key, const std::string& cause,
                       const std::string& remedy) const {
-  throw Error({.file = file_, .where = key, .cause = cause, .remedy = remedy});
+  throw Error(file_, cause).at(key).remedy(remedy);
 }
 
 }  // namespace terrace::stream

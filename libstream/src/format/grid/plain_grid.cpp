@@ -88,10 +88,7 @@ class PlainRaster final : public Raster {
 
 void refuse_grid(const std::string& file, std::string where, std::string cause,
                  std::string remedy) {
-  throw Error({.file = file,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = std::move(remedy)});
+  throw Error(file, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
 }
 
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,

@@ -30,10 +30,7 @@ constexpr std::uint64_t kMostEvlrs = 1u << 16;
 
 [[noreturn]] void fail(const Input& input, std::string where, std::string cause,
                        std::string remedy = kBadHeader) {
-  throw Error({.file = input.name(),
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = std::move(remedy)});
+  throw Error(input.name(), std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
 }
 
 std::string text_of_field(const char* at, std::size_t bytes) {
@@ -306,10 +303,10 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
   Crs by_wkt;
   by_wkt.wkt = wkt_of_records(header, comments);
   if (header.wkt && by_wkt.wkt.empty() && header.unread_evlrs) {
-    throw Error({.file = name,
-                 .cause = "the record of its coordinate reference system (an EVLR) follows the "
-                          "points, so it cannot be read from a pipe",
-                 .remedy = "name the file, or the system: `crs` EPSG:n"});
+    throw Error(name,
+                "the record of its coordinate reference system (an EVLR) follows the "
+                "points, so it cannot be read from a pipe")
+        .remedy("name the file, or the system: `crs` EPSG:n");
   }
   if (header.wkt && !by_wkt.wkt.empty()) return by_wkt;
   Crs by_keys = crs_of_key_records(header, comments);

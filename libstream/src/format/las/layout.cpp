@@ -90,10 +90,8 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     layout.fields.push_back(std::move(extra));
   }
   if (layout.record_bytes > kMostRecordBytes || layout.extra_bytes.size() > kMostVlrBytes) {
-    throw Error(
-        {.file = file,
-         .cause = counted(attributes.size(), "attribute") + " are more than LAS has room for",
-         .remedy = "write PLY"});
+    throw Error(file, counted(attributes.size(), "attribute") + " are more than LAS has room for")
+        .remedy("write PLY");
   }
   return layout;
 }

@@ -60,10 +60,9 @@ class LazChunkReader final : public PartReader {
 }  // namespace
 
 void fail_laz(const std::string& file, std::string where, std::string cause) {
-  throw Error({.file = file,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = "the file is damaged: download it again"});
+  throw Error(file, std::move(cause))
+      .at(std::move(where))
+      .remedy("the file is damaged: download it again");
 }
 void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
                 const std::string& cause) {

@@ -224,9 +224,9 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
     const bool needs_table = layout.vlr.chunk_size == laz::Vlr::kVariable &&
                              layout.vlr.compressor != laz::Compressor::layered;
     if (layout.chunks.empty() && needs_table) {
-      throw Error({.file = input.name(),
-                   .cause = "its chunk table follows the points, so it cannot be read from a pipe",
-                   .remedy = "name the file"});
+      throw Error(input.name(),
+                  "its chunk table follows the points, so it cannot be read from a pipe")
+          .remedy("name the file");
     }
     if (!input.skip(kPositionBytes)) {
       fail_chunk(input.name(), 0, input.offset(), "the file ends before its points");

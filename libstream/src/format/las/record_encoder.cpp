@@ -130,10 +130,7 @@ void LasRecords::pack(const PointBlock& block, Records& out) const {
 }
 
 void LasRecords::fail(std::string where, std::string cause, std::string remedy) const {
-  throw Error({.file = path_,
-               .where = std::move(where),
-               .cause = std::move(cause),
-               .remedy = std::move(remedy)});
+  throw Error(path_, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
 }
 
 void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const {
@@ -332,9 +329,8 @@ void append_vlrs(std::string& out, const Crs& crs, const LasLayout& layout, cons
   if (!crs.wkt.empty()) {
     const std::string wkt = crs.wkt + '\0';
     if (wkt.size() > std::numeric_limits<std::uint16_t>::max()) {
-      throw Error({.file = path,
-                   .cause = "the WKT of its coordinate reference system is too long for LAS",
-                   .remedy = "write PLY"});
+      throw Error(path, "the WKT of its coordinate reference system is too long for LAS")
+          .remedy("write PLY");
     }
     append_vlr(out, kLasProjection, kLasWkt, wkt);
     ++file.vlrs;

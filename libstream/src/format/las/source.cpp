@@ -85,9 +85,8 @@ class LasOpener {
     open_nodes();
     if (stream_.info.octree) return;
     if (wanted.resolution > 0) {
-      throw Error({.file = stream_.input->name(),
-                   .cause = "it has no octree, so `resolution` does not apply",
-                   .remedy = "name a COPC file, not piped, or EPT, or leave `resolution` out"});
+      throw Error(stream_.input->name(), "it has no octree, so `resolution` does not apply")
+          .remedy("name a COPC file, not piped, or EPT, or leave `resolution` out");
     }
     if (header_.compressed) {
       stream_.records = open_laz_records(*stream_.input, file_, header_, options_);

@@ -30,11 +30,10 @@ RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments) {
   const std::size_t standard = las_record_bytes(header.point_format);
   if (header.record_bytes - standard > kMostExtraBytes) {
-    throw Error({.file = name,
-                 .where = "header",
-                 .cause = "its records have " + std::to_string(header.record_bytes - standard) +
-                          " extra bytes; up to " + std::to_string(kMostExtraBytes) + " are read",
-                 .remedy = "the file is damaged or its header is wrong: export it again"});
+    throw Error(name, "its records have " + std::to_string(header.record_bytes - standard) +
+                          " extra bytes; up to " + std::to_string(kMostExtraBytes) + " are read")
+        .at("header")
+        .remedy("the file is damaged or its header is wrong: export it again");
   }
   RecordStream stream{.record_bytes = header.record_bytes, .points = header.points};
   SourceInfo& info = stream.info;

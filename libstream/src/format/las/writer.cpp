@@ -82,11 +82,10 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
   const std::uint64_t chunk = vlr.chunk_size * vlr.record_length();
   const std::uint64_t chunks = options.memory_bytes / chunk;
   if (chunks < 2) {
-    throw Error({.file = path,
-                 .cause = "writing LAZ with " + counted(vlr.record_length(), "byte") +
+    throw Error(path, "writing LAZ with " + counted(vlr.record_length(), "byte") +
                           " per point needs " + std::to_string((2 * chunk >> 20) + 1) +
-                          "M of memory, more than it may use",
-                 .remedy = "raise `memory_bytes`"});
+                          "M of memory, more than it may use")
+        .remedy("raise `memory_bytes`");
   }
   const std::uint64_t most = chunks < 5 ? 1 : (chunks - 3) / 2;
   return static_cast<unsigned>(std::min<std::uint64_t>(options.threads, most));

@@ -136,10 +136,7 @@ class GlbParser final : public MeshParser {
 
   [[noreturn]] void fail(std::string where, std::string cause,
                          std::string_view remedy = kGlbRemedy) const {
-    throw Error({.file = input_->name(),
-                 .where = std::move(where),
-                 .cause = std::move(cause),
-                 .remedy = std::string(remedy)});
+    throw Error(input_->name(), std::move(cause)).at(std::move(where)).remedy(std::string(remedy));
   }
   [[noreturn]] void fail_here(std::string cause, std::string_view remedy = kGlbRemedy) const {
     fail("byte " + std::to_string(input_->offset()), std::move(cause), remedy);

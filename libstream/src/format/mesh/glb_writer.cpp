@@ -49,8 +49,7 @@ class GlbWriter final : public MeshWriter {
         counts_(header),
         stride_(4 * (3 + header.attributes.size())) {
     const auto refuse = [&](std::string cause) {
-      throw Error(
-          {.file = path, .cause = std::move(cause), .remedy = "write PLY, or a smaller part"});
+      throw Error(path, std::move(cause)).remedy("write PLY, or a smaller part");
     };
     if (stride_ > kMaxStride) refuse("GLB holds at most 60 attributes");
     // Check two sizes that cannot overflow first, then the sum.

@@ -65,10 +65,9 @@ class ObjParser final : public MeshParser {
   static constexpr std::size_t kMostComments = 64;
 
   [[noreturn]] void fail(std::string cause) const {
-    throw Error({.file = input_->name(),
-                 .where = "line " + std::to_string(lines_.number()),
-                 .cause = std::move(cause),
-                 .remedy = "the file is damaged: export it again"});
+    throw Error(input_->name(), std::move(cause))
+        .at_line(lines_.number())
+        .remedy("the file is damaged: export it again");
   }
 
   /// Reads the next line, with its continuation lines and without surrounding blanks. Comments are

@@ -70,10 +70,9 @@ class OffParser final : public MeshParser {
 
  private:
   [[noreturn]] void fail(std::string cause, std::string_view remedy = kOffRemedy) const {
-    throw Error({.file = input_->name(),
-                 .where = "line " + std::to_string(lines_.number()),
-                 .cause = std::move(cause),
-                 .remedy = std::string(remedy)});
+    throw Error(input_->name(), std::move(cause))
+        .at_line(lines_.number())
+        .remedy(std::string(remedy));
   }
 
   /// The next line that is neither blank nor a comment.

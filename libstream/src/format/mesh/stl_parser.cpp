@@ -97,10 +97,9 @@ class StlText final : public StlParser {
   }
 
   [[noreturn]] void fail(std::string cause, std::string_view remedy = kStlRemedy) const override {
-    throw Error({.file = input_->name(),
-                 .where = "line " + std::to_string(lines_.number()),
-                 .cause = std::move(cause),
-                 .remedy = std::string(remedy)});
+    throw Error(input_->name(), std::move(cause))
+        .at_line(lines_.number())
+        .remedy(std::string(remedy));
   }
 
  private:
@@ -149,10 +148,9 @@ class StlBinary final : public StlParser {
   }
 
   [[noreturn]] void fail(std::string cause, std::string_view remedy = kStlRemedy) const override {
-    throw Error({.file = input_->name(),
-                 .where = "byte " + std::to_string(input_->offset()),
-                 .cause = std::move(cause),
-                 .remedy = std::string(remedy)});
+    throw Error(input_->name(), std::move(cause))
+        .at_byte(input_->offset())
+        .remedy(std::string(remedy));
   }
 
  private:

@@ -118,9 +118,8 @@ class TriangleSource final : public PointSource {
     }
     delivered_ += block.size();
     if (delivered_ + nodata_ == 0) {
-      throw Error({.file = info_.files.front(),
-                   .cause = "has no faces, so it has no triangles",
-                   .remedy = "read it as points: leave `entities` out"});
+      throw Error(info_.files.front(), "has no faces, so it has no triangles")
+          .remedy("read it as points: leave `entities` out");
     }
     return !block.empty();
   }

@@ -31,17 +31,16 @@ class HeaderReader {
     }
     if (!lines_.next(line)) {
       if (lines_.number() == 0) {
-        throw Error({.file = input_->name(), .cause = "the file is empty"});
+        throw Error(input_->name(), "the file is empty");
       }
       fail("the file ends before end_header", "the file is truncated: download it again");
     }
     return line;
   }
   [[noreturn]] void fail(std::string cause, std::string remedy) const {
-    throw Error({.file = input_->name(),
-                 .where = "line " + std::to_string(lines_.number()),
-                 .cause = std::move(cause),
-                 .remedy = std::move(remedy)});
+    throw Error(input_->name(), std::move(cause))
+        .at_line(lines_.number())
+        .remedy(std::move(remedy));
   }
   std::uint64_t finish() {
     lines_.release();
@@ -111,13 +110,12 @@ void check_counts(const PlyHeader& header, const Input& input) {
                                     : element.binary_bytes();
     if (least == 0) continue;
     if (element.count > left / least) {
-      throw Error({.file = input.name(),
-                   .where = "byte " + std::to_string(input.offset()),
-                   .cause = "the header promises " + counted(element.count, "item") + " of " +
-                            in_quotes(element.name) + " of at least " + counted(least, "byte") +
-                            ", but only " + counted(left, "byte") + (left == 1 ? " is" : " are") +
-                            " left",
-                   .remedy = "the file is truncated or its header is wrong: download it again"});
+      throw Error(input.name(), "the header promises " + counted(element.count, "item") + " of " +
+                                    in_quotes(element.name) + " of at least " +
+                                    counted(least, "byte") + ", but only " + counted(left, "byte") +
+                                    (left == 1 ? " is" : " are") + " left")
+          .at_byte(input.offset())
+          .remedy("the file is truncated or its header is wrong: download it again");
     }
     left -= element.count * least;
   }

@@ -54,10 +54,9 @@ class PlySource final : public PointSource {
     const auto vertex = std::find_if(header_.elements.begin(), header_.elements.end(),
                                      [](const PlyElement& e) { return e.name == "vertex"; });
     if (vertex == header_.elements.end()) {
-      throw Error({.file = input_.name(),
-                   .where = "header",
-                   .cause = "there is no element 'vertex'",
-                   .remedy = "name a PLY file of points or of a mesh"});
+      throw Error(input_.name(), "there is no element 'vertex'")
+          .at("header")
+          .remedy("name a PLY file of points or of a mesh");
     }
     count_ = vertex->count;
     stride_ = vertex->binary_bytes();
@@ -126,10 +125,7 @@ class PlySource final : public PointSource {
 
  private:
   [[noreturn]] void fail(std::string where, std::string cause, std::string remedy) const {
-    throw Error({.file = input_.name(),
-                 .where = std::move(where),
-                 .cause = std::move(cause),
-                 .remedy = std::move(remedy)});
+    throw Error(input_.name(), std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
   }
   [[noreturn]] void fail_end(const std::string& element, std::uint64_t item) const {
     fail("byte " + std::to_string(input_.offset()),

@@ -67,20 +67,18 @@ void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
   const NamedAxes found = named_axes(names);
   if (found.twice) {
     const std::size_t axis = axis_named(names[*found.twice])->axis;
-    throw Error({.file = file,
-                 .where = where,
-                 .cause = "columns " + in_quotes(names[*found.columns[axis]]) + " and " +
-                          in_quotes(names[*found.twice]) + " name the same coordinate",
-                 .remedy = "rename one of them"});
+    throw Error(file, "columns " + in_quotes(names[*found.columns[axis]]) + " and " +
+                          in_quotes(names[*found.twice]) + " name the same coordinate")
+        .at(where)
+        .remedy("rename one of them");
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!found.columns[axis]) {
-      throw Error({.file = file,
-                   .where = where,
-                   .cause = std::string("the header names no ") + "xyz"[axis] + " column",
-                   .remedy = found.none() ? "name the columns x, y and z, or lon, lat and height; "
-                                            "without the header, the first three are x, y and z"
-                                          : "name the columns x, y and z, or lon, lat and height"});
+      throw Error(file, std::string("the header names no ") + "xyz"[axis] + " column")
+          .at(where)
+          .remedy(found.none() ? "name the columns x, y and z, or lon, lat and height; "
+                                 "without the header, the first three are x, y and z"
+                               : "name the columns x, y and z, or lon, lat and height");
     }
     layout.xyz[axis] = *found.columns[axis];
   }
@@ -206,9 +204,8 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   std::string_view line;
   for (;;) {
     if (!lines.next(line)) {
-      throw Error({.file = file,
-                   .cause = lines.number() == 0 ? "the file is empty" : "it has no points",
-                   .remedy = "each line needs three numbers: x, y and z"});
+      throw Error(file, lines.number() == 0 ? "the file is empty" : "it has no points")
+          .remedy("each line needs three numbers: x, y and z");
     }
     const std::string_view text = trim(line);
     if (text.empty()) continue;
@@ -226,10 +223,9 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   }
   layout.separator = separator_of(line);
   if (layout.separator == ',' && has_decimal_commas(line)) {
-    throw Error({.file = file,
-                 .where = "line " + std::to_string(lines.number()),
-                 .cause = "has numbers with a decimal comma",
-                 .remedy = "write numbers with a decimal point"});
+    throw Error(file, "has numbers with a decimal comma")
+        .at_line(lines.number())
+        .remedy("write numbers with a decimal point");
   }
   const std::string& title = header_line != 0 ? header : last_comment;
   if (layout.separator == ' ' && separator_of(title) == ' ' &&
@@ -240,17 +236,14 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   layout.columns = split_fields(line, layout.separator).size();
   const std::string where = "line " + std::to_string(lines.number());
   if (layout.columns < 3) {
-    throw Error(
-        {.file = file,
-         .where = where,
-         .cause = "has " + counted(layout.columns, "column") + ", but a point needs x, y and z",
-         .remedy = "add the missing column (0 as z for points in the plane)"});
+    throw Error(file, "has " + counted(layout.columns, "column") + ", but a point needs x, y and z")
+        .at(where)
+        .remedy("add the missing column (0 as z for points in the plane)");
   }
   if (layout.columns > TextLayout::kMaxColumns) {
-    throw Error({.file = file,
-                 .where = where,
-                 .cause = "has " + counted(layout.columns, "column"),
-                 .remedy = "at most " + std::to_string(TextLayout::kMaxColumns) + " are read"});
+    throw Error(file, "has " + counted(layout.columns, "column"))
+        .at(where)
+        .remedy("at most " + std::to_string(TextLayout::kMaxColumns) + " are read");
   }
   if (header_line == 0 &&
       is_header_comment(header_names(last_comment, between_names), layout.columns)) {
@@ -259,12 +252,11 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   }
   const std::vector<std::string_view> names = header_names(header, between_names);
   if (header_line != 0 && names.size() != layout.columns) {
-    throw Error({.file = file,
-                 .where = where,
-                 .cause = "has " + counted(layout.columns, "column") + ", but the header in " +
+    throw Error(file, "has " + counted(layout.columns, "column") + ", but the header in " +
                           "line " + std::to_string(header_line) + " names " +
-                          std::to_string(names.size()),
-                 .remedy = "one of them is wrong"});
+                          std::to_string(names.size()))
+        .at(where)
+        .remedy("one of them is wrong");
   }
   if (!header.empty()) find_axes(names, layout, file, "line " + std::to_string(header_line));
   name_attributes(names, layout);

@@ -293,13 +293,13 @@ class XyzSource final : public PointSource {
   void check_exact(std::string_view line, std::size_t column) const {
     const std::string_view field = unquoted(split_row(line, layout_)[column]);
     if (!is_integer(field) || is_exact(field, row_[column])) return;
-    throw Error({.file = input_.name(),
-                 .where = "line " + std::to_string(lines_.number()),
-                 .cause = "column " + std::to_string(column + 1) + ", " + in_quotes(field) +
-                          ", is an integer that a double cannot hold",
-                 .remedy = "move this line to the top of the first file, which makes the column "
-                           "64-bit integers if all its values are integers and none is missing, or "
-                           "leave the column out (`drop` of build and convert)"});
+    throw Error(input_.name(), "column " + std::to_string(column + 1) + ", " + in_quotes(field) +
+                                   ", is an integer that a double cannot hold")
+        .at_line(lines_.number())
+        .remedy(
+            "move this line to the top of the first file, which makes the column "
+            "64-bit integers if all its values are integers and none is missing, or "
+            "leave the column out (`drop` of build and convert)");
   }
 
   /// Reads a line with fields that are empty, in quotes, or text that is not needed.
@@ -328,10 +328,9 @@ class XyzSource final : public PointSource {
   /// Throws: Error that says what is wrong with a line that is not a point.
   [[noreturn]] void refuse(std::string_view line) const {
     const auto fail = [&](std::string cause, std::string remedy) {
-      throw Error({.file = input_.name(),
-                   .where = "line " + std::to_string(lines_.number()),
-                   .cause = std::move(cause),
-                   .remedy = std::move(remedy)});
+      throw Error(input_.name(), std::move(cause))
+          .at_line(lines_.number())
+          .remedy(std::move(remedy));
     };
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {

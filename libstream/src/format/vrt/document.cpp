@@ -55,10 +55,7 @@ class VrtReader {
 
   [[noreturn]] void fail(std::string where, std::string cause,
                          std::string_view remedy = "make it again: gdalbuildvrt") const {
-    throw Error({.file = file_,
-                 .where = std::move(where),
-                 .cause = std::move(cause),
-                 .remedy = std::string(remedy)});
+    throw Error(file_, std::move(cause)).at(std::move(where)).remedy(std::string(remedy));
   }
 
   [[nodiscard]] double number(const std::string& text, const std::string& where) const {

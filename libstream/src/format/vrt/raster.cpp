@@ -61,10 +61,10 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
   constexpr std::size_t kRecognisedBytes = 4096;
   const std::vector<char> head = peek_head(file, kRecognisedBytes, {});
   if (recognise_vrt(std::as_bytes(std::span(head)))) {
-    throw Error({.file = file,
-                 .cause = "is a virtual raster inside another, which is not supported",
-                 .remedy = "name the rasters of both: gdalbuildvrt, or convert it to GeoTIFF: "
-                           "gdal_translate FILE out.tif"});
+    throw Error(file, "is a virtual raster inside another, which is not supported")
+        .remedy(
+            "name the rasters of both: gdalbuildvrt, or convert it to GeoTIFF: "
+            "gdal_translate FILE out.tif");
   }
   for (const Kind& kind : kKinds) {
     if (kind.format().recognise(std::as_bytes(std::span(head)))) return kind.open(file, options);
@@ -115,11 +115,10 @@ class WholeNumbers final : public Raster {
       const double end = std::ldexp(1.0, std::numeric_limits<T>::digits);
       if (!(real >= static_cast<double>(std::numeric_limits<T>::min()) && real < end) ||
           real != std::trunc(real)) {
-        throw Error({.file = info_.files.front(),
-                     .cause = "has samples that are not " +
-                              std::string(name_of(info_.sample.type)) +
-                              ", the sample type of the virtual raster",
-                     .remedy = "make the virtual raster again: gdalbuildvrt"});
+        throw Error(info_.files.front(), "has samples that are not " +
+                                             std::string(name_of(info_.sample.type)) +
+                                             ", the sample type of the virtual raster")
+            .remedy("make the virtual raster again: gdalbuildvrt");
       }
       const T number = static_cast<T>(real);
       std::memcpy(samples + to * sizeof number, &number, sizeof number);
@@ -251,10 +250,9 @@ class VrtRaster final : public Raster {
     }
     const RasterInfo& found = raster->info();
     const auto refuse = [&](const std::string& cause) {
-      throw Error({.file = info_.files.front(),
-                   .where = source.file,
-                   .cause = cause,
-                   .remedy = "convert it to GeoTIFF: gdal_translate FILE out.tif"});
+      throw Error(info_.files.front(), cause)
+          .at(source.file)
+          .remedy("convert it to GeoTIFF: gdal_translate FILE out.tif");
     };
     if (found.sample.type != info_.sample.type) {
       refuse("its samples are " + std::string(name_of(found.sample.type)) +

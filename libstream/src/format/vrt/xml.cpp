@@ -142,10 +142,9 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
   if (!parser) throw std::bad_alloc();
   XmlReading reading{.parser = parser.get(), .take = &take};
   const auto fail = [&](const std::string& cause) {
-    throw Error({.file = file,
-                 .where = "line " + std::to_string(XML_GetCurrentLineNumber(parser.get())),
-                 .cause = cause,
-                 .remedy = "the file is damaged: export it again"});
+    throw Error(file, cause)
+        .at_line(XML_GetCurrentLineNumber(parser.get()))
+        .remedy("the file is damaged: export it again");
   };
   if (bytes->size() > kMostBytes) fail("is too large for a description");
   XML_SetUserData(parser.get(), &reading);

@@ -109,9 +109,9 @@ StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
 
 void StoreQuery::check_looked(std::uint64_t clusters) const {
   if (clusters <= clusters_) return;
-  throw Error({.file = store_.path().string(),
-               .cause = "the hierarchy is damaged: clusters are headed by several points",
-               .remedy = "restore the files or rebuild the store"});
+  throw Error(store_.path().string(),
+              "the hierarchy is damaged: clusters are headed by several points")
+      .remedy("restore the files or rebuild the store");
 }
 
 void StoreQuery::fill(Node& node, ClusterId id) {
@@ -333,9 +333,9 @@ class Store::ConditionView final : public Store::View {
   const Box3& bounds(const Store& view) const override {
     std::call_once(once_, [&] { find_bounds(view); });
     if (bounds_.empty()) {
-      throw Error({.file = view.path().string(),
-                   .cause = "no point meets the condition " + in_quotes(condition_.text()),
-                   .remedy = "give another `where`"});
+      throw Error(view.path().string(),
+                  "no point meets the condition " + in_quotes(condition_.text()))
+          .remedy("give another `where`");
     }
     return bounds_;
   }

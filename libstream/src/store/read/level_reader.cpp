@@ -21,19 +21,15 @@ constexpr std::uint64_t kCachedTables = 32;
 constexpr std::uint64_t kCachedContexts = 512 * kCachedTables;
 
 Error damaged_file(const ByteSource& file, std::uint64_t offset, const std::string& cause) {
-  return Error({.file = file.name(),
-                .where = "byte " + std::to_string(offset),
-                .cause = cause,
-                .remedy = kRestoreStore});
+  return Error(file.name(), cause).at_byte(offset).remedy(kRestoreStore);
 }
 
 std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry& entry) {
   auto file = files(entry.name);
   if (file->size() != entry.bytes) {
-    throw Error({.file = file->name(),
-                 .cause = "the manifest says " + counted(entry.bytes, "byte") + ", the file has " +
-                          std::to_string(file->size()),
-                 .remedy = kRestoreStore});
+    throw Error(file->name(), "the manifest says " + counted(entry.bytes, "byte") +
+                                  ", the file has " + std::to_string(file->size()))
+        .remedy(kRestoreStore);
   }
   return file;
 }
@@ -120,10 +116,9 @@ std::shared_ptr<const IndexPage> LevelReader::page(std::uint64_t number) const {
 
 Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
   if (ordinal >= clusters_) {
-    throw Error({.file = index_->name(),
-                 .cause = "there is no cluster " + std::to_string(layout_.level) + "/" +
-                          std::to_string(ordinal) + ", the level has " +
-                          std::to_string(clusters_)});
+    throw Error(index_->name(), "there is no cluster " + std::to_string(layout_.level) + "/" +
+                                    std::to_string(ordinal) + ", the level has " +
+                                    std::to_string(clusters_));
   }
   const auto page = this->page(ordinal / layout_.page_clusters());
   offset = page->offset(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
@@ -209,10 +204,9 @@ void LevelReader::check_range(std::uint64_t ordinal, std::uint64_t offset,
 }
 
 Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) const {
-  return Error({.file = data_->name(),
-                .where = "cluster " + std::to_string(layout_.level) + "/" + std::to_string(ordinal),
-                .cause = cause,
-                .remedy = kRestoreStore});
+  return Error(data_->name(), cause)
+      .at("cluster " + std::to_string(layout_.level) + "/" + std::to_string(ordinal))
+      .remedy(kRestoreStore);
 }
 
 void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,

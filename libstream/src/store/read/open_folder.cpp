@@ -70,9 +70,8 @@ Ownership Store::ownership_of(const fs::path& folder) {
 
 Store Store::open(const std::filesystem::path& path) {
   if (!exists(path)) {
-    throw Error({.file = path.string(),
-                 .cause = "there is no store here",
-                 .remedy = "give a folder written by terrace build"});
+    throw Error(path.string(), "there is no store here")
+        .remedy("give a folder written by terrace build");
   }
   return open(path.string(), [path](const std::string& name) { return open_file(path / name); });
 }

@@ -152,11 +152,10 @@ std::uint64_t Store::for_each(unsigned number, std::uint64_t first, std::uint64_
 }
 
 Error Store::miscounted(unsigned level) const {
-  return Error({.file = impl_->level(level).data().name(),
-                .cause = "the clusters do not have the " +
-                         std::to_string(impl_->infos[level].members) +
-                         " members that the manifest lists",
-                .remedy = "restore the file or rebuild the store"});
+  return Error(impl_->level(level).data().name(), "the clusters do not have the " +
+                                                      std::to_string(impl_->infos[level].members) +
+                                                      " members that the manifest lists")
+      .remedy("restore the file or rebuild the store");
 }
 
 }  // namespace terrace::stream

@@ -30,9 +30,8 @@ struct Store::Impl {
 
   const store::LevelReader& level(unsigned number) const {
     if (number >= levels.size()) {
-      throw Error({.file = path.string(),
-                   .cause = "there is no level " + std::to_string(number) + ", the top is " +
-                            std::to_string(levels.size() - 1)});
+      throw Error(path.string(), "there is no level " + std::to_string(number) + ", the top is " +
+                                     std::to_string(levels.size() - 1));
     }
     return *levels[number];
   }

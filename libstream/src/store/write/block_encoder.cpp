@@ -170,9 +170,7 @@ void BlockEncoder::load_decimals(std::size_t axis) {
   for (std::size_t i = 0; i < n; ++i) {
     doubles_[i] = block_->positions[block_->order[i]][axis];
     if (!std::isfinite(doubles_[i])) {
-      throw Error({.file = {},
-                   .cause = "a point has a coordinate that is not finite",
-                   .remedy = "remove such points"});
+      throw Error({}, "a point has a coordinate that is not finite").remedy("remove such points");
     }
   }
   for (const ClusterSummary& summary : block_->summaries) {
@@ -269,11 +267,10 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   members_ = block_->order.subspan(first_, block_->first[cluster + 1] - first_);
   const auto n = static_cast<std::uint32_t>(members_.size());
   if (n > layout_->most_points()) {
-    throw Error({.file = {},
-                 .cause = "a cluster has " + counted(n, "point") +
-                          " of this size, more than the limit of " +
-                          std::to_string(layout_->most_points()),
-                 .remedy = "make the blocks smaller"});
+    throw Error({}, "a cluster has " + counted(n, "point") +
+                        " of this size, more than the limit of " +
+                        std::to_string(layout_->most_points()))
+        .remedy("make the blocks smaller");
   }
   Entry entry;
   entry.points = n;
@@ -309,7 +306,7 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   }
   if (summary != nullptr) {
     if (!(summary->error >= 0)) {
-      throw Error({.file = {}, .cause = "a cluster's error is negative or NaN"});
+      throw Error({}, "a cluster's error is negative or NaN");
     }
     entry.error = error_code(std::abs(summary->error));
     entry.descendants = layout_->level == 0 ? 0 : summary->descendants;

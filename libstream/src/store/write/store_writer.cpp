@@ -107,7 +107,7 @@ StoreWriter::EncodedPtr StoreWriter::Impl::encode(const ClusteredBlock& block) {
 std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   assert(encoded != nullptr);
   if (broken) {
-    throw Error({.file = staging.target().string(), .cause = "an earlier write failed"});
+    throw Error(staging.target().string(), "an earlier write failed");
   }
   broken = true;  // until this call succeeds
   const unsigned level = encoded->level;
@@ -140,16 +140,14 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
   const auto status = std::filesystem::status(path, error);
   if (std::filesystem::exists(status)) {
     if (!replace) {
-      throw Error({.file = path.string(),
-                   .cause = "exists already",
-                   .remedy = "choose another name or remove it"});
+      throw Error(path.string(), "exists already").remedy("choose another name or remove it");
     }
     if (const Ownership found = Store::ownership_of(path); !found.ours) {
       throw not_replaced(path.string(), found);
     }
   }
   if (schema.attributes.size() > kMostAttributes) {
-    throw Error({.file = path.string(), .cause = "there are too many attributes"});
+    throw Error(path.string(), "there are too many attributes");
   }
   impl_ = std::make_unique<Impl>(path, std::move(schema), replace, threads);
 }
@@ -177,10 +175,10 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
   if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
-    throw Error({.file = w.staging.target().string(),
-                 .cause = "its coordinates are not finite in the CRS: scale or offset of the input "
-                          "are too large",
-                 .remedy = "correct the scale and the offset of the input"});
+    throw Error(w.staging.target().string(),
+                "its coordinates are not finite in the CRS: scale or offset of the input "
+                "are too large")
+        .remedy("correct the scale and the offset of the input");
   }
 
   const std::uint64_t top_points = root.positions.size();
