@@ -51,12 +51,12 @@ class Where::Parser {
   void parse() {
     constexpr std::size_t kMostCharacters = 4096;
     if (text_.size() > kMostCharacters) {
-      fail("is longer than " + counted(kMostCharacters, "character"));
+      throw fault("is longer than " + counted(kMostCharacters, "character"));
     }
     expression(0);
     if (at_ < text_.size()) {
-      fail("an operator is expected, not " + in_quotes(text_.substr(at_)),
-           text_[at_] == '=' ? "for equality write ==" : "");
+      throw fault("an operator is expected, not " + in_quotes(text_.substr(at_)))
+          .remedy(text_[at_] == '=' ? "for equality write ==" : "");
     }
   }
 
@@ -83,10 +83,9 @@ class Where::Parser {
                                                    {"/", Operation::divide, 6}}};
   static constexpr unsigned kMostNested = 64;
 
-  [[noreturn]] void fail(std::string cause, std::string remedy = {}) const {
-    throw Error("the condition " + in_quotes(text_), std::move(cause))
-        .at("character " + std::to_string(at_ + 1))
-        .remedy(std::move(remedy));
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error("the condition " + in_quotes(text_), std::move(cause))
+        .at("character " + std::to_string(at_ + 1));
   }
 
   static bool is_letter(char c) {
@@ -128,7 +127,7 @@ class Where::Parser {
         return;
       }
       if (found->precedence == compared) {
-        fail("comparisons cannot be chained", "join two with &&: a < b && b < c");
+        throw fault("comparisons cannot be chained").remedy("join two with &&: a < b && b < c");
       }
       if (found->precedence == 3 || found->precedence == 4) compared = found->precedence;
       expression(found->precedence + 1);
@@ -137,9 +136,10 @@ class Where::Parser {
   }
 
   void operand() {
-    if (++nested_ > kMostNested) fail("is nested too deeply", "write it with fewer parentheses");
+    if (++nested_ > kMostNested)
+      throw fault("is nested too deeply").remedy("write it with fewer parentheses");
     skip_blanks();
-    if (at_ == text_.size()) fail("ends where a number or a name is expected");
+    if (at_ == text_.size()) throw fault("ends where a number or a name is expected");
     if (take("-")) {
       operand();
       emit({.operation = Operation::negate}, 1);
@@ -148,7 +148,7 @@ class Where::Parser {
       emit({.operation = Operation::invert}, 1);
     } else if (take("(")) {
       expression(0);
-      if (!take(")")) fail("a ')' is missing");
+      if (!take(")")) throw fault("a ')' is missing");
     } else if (text_[at_] == '"' || is_letter(text_[at_])) {
       name();
     } else {
@@ -162,8 +162,8 @@ class Where::Parser {
     double value = 0.0;
     const char* const rest = parse_real(begin, text_.data() + text_.size(), value);
     if (rest == nullptr || *begin == '+') {
-      fail("a number or a name is expected, not " + in_quotes(text_.substr(at_)),
-           text_[at_] == '=' ? "for equality write ==" : "");
+      throw fault("a number or a name is expected, not " + in_quotes(text_.substr(at_)))
+          .remedy(text_[at_] == '=' ? "for equality write ==" : "");
     }
     at_ += static_cast<std::size_t>(rest - begin);
     std::uint64_t whole = 0;
@@ -179,7 +179,7 @@ class Where::Parser {
     std::string_view word;
     if (text_[at_] == '"') {
       const std::size_t end = text_.find('"', at_ + 1);
-      if (end == text_.npos) fail("the name has no closing quote");
+      if (end == text_.npos) throw fault("the name has no closing quote");
       word = text_.substr(at_ + 1, end - at_ - 1);
       at_ = end + 1;
     } else {
@@ -202,7 +202,7 @@ class Where::Parser {
     at_ = begin;
     std::string known = "x, y, z";
     for (const Channel& attribute : schema_->attributes) known += ", " + attribute.name;
-    fail("the points have no " + in_quotes(word), "known are " + known);
+    throw fault("the points have no " + in_quotes(word)).remedy("known are " + known);
   }
 
   [[nodiscard]] std::optional<std::size_t> attribute_named(std::string_view word) const {

@@ -41,23 +41,24 @@ std::string difference(const SourceInfo& first, const SourceInfo& other) {
 }
 
 void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreement& crs) {
-  const auto refuse = [&](std::string cause,
-                          std::string remedy = "convert one of them, or read them separately") {
-    throw Error(other.files.front(), std::move(cause)).remedy(std::move(remedy));
+  const auto refused = [&](std::string cause) {
+    return Error(other.files.front(), std::move(cause))
+        .remedy("convert one of them, or read them separately");
   };
   if (first.coordinates != other.coordinates) {
-    refuse("its coordinates are " + std::string(name_of(other.coordinates[0].type)) +
-           ", but those of " + first.files.front() + " are " +
-           std::string(name_of(first.coordinates[0].type)) + ", or their units differ");
+    throw refused("its coordinates are " + std::string(name_of(other.coordinates[0].type)) +
+                  ", but those of " + first.files.front() + " are " +
+                  std::string(name_of(first.coordinates[0].type)) + ", or their units differ");
   }
   if (first.attributes != other.attributes) {
-    refuse(difference(first, other),
-           "`keep` only what all files have, or read the files separately");
+    throw refused(difference(first, other))
+        .remedy("`keep` only what all files have, or read the files separately");
   }
   if (!crs.agrees(other.crs)) {
-    refuse("its coordinate reference system differs from that of " + first.files.front(),
-           "if both mean the same system, name it (`crs` of build); otherwise convert one of the "
-           "files, or read them separately");
+    throw refused("its coordinate reference system differs from that of " + first.files.front())
+        .remedy(
+            "if both mean the same system, name it (`crs` of build); otherwise convert one of the "
+            "files, or read them separately");
   }
 }
 

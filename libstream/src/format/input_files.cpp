@@ -23,11 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail(const std::string& name, std::string where, std::string cause,
-                       std::string remedy) {
-  throw Error(name, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
-}
-
 bool exists(const std::string& name) {
   std::error_code ignored;
   return fs::exists(fs::symlink_status(name, ignored));
@@ -55,20 +50,20 @@ void add_folder(const std::string& folder, const std::string& format,
     }
     files.push_back(at->path().string());
   }
-  if (error) fail(folder, {}, "cannot be listed: " + error.message(), {});
+  if (error) throw Error(folder, "cannot be listed: " + error.message());
   if (files.size() == before) {
     if (exists((fs::path(folder) / kManifestName).string())) {
-      fail(folder, {}, "is a store, not a file of points",
-           "write its points to a file first, with 'terrace points'");
+      throw Error(folder, "is a store, not a file of points")
+          .remedy("write its points to a file first, with 'terrace points'");
     }
-    fail(folder, {}, "is a folder without a file that can be read",
-         "name a folder with files that end in .las, .tif or similar");
+    throw Error(folder, "is a folder without a file that can be read")
+        .remedy("name a folder with files that end in .las, .tif or similar");
   }
   std::sort(files.begin() + static_cast<std::ptrdiff_t>(before), files.end());
 }
 
-[[noreturn]] void fail_to_list(const std::string& pattern) {
-  fail(pattern, {}, "the folders of the pattern cannot be listed", {});
+Error unlisted(const std::string& pattern) {
+  return {pattern, "the folders of the pattern cannot be listed"};
 }
 
 /// The paths that match a pattern without "**".
@@ -78,7 +73,7 @@ std::vector<std::string> matches_of(const std::string& pattern) {
   const int result = ::glob(pattern.c_str(), GLOB_ERR, nullptr, &found);
   for (std::size_t i = 0; i < found.gl_pathc; ++i) names.emplace_back(found.gl_pathv[i]);
   ::globfree(&found);
-  if (result != 0 && result != GLOB_NOMATCH) fail_to_list(pattern);
+  if (result != 0 && result != GLOB_NOMATCH) throw unlisted(pattern);
   return names;
 }
 
@@ -120,7 +115,7 @@ std::vector<std::string> matches_below(const std::string& folder, const std::str
     const std::vector<std::string> more = matches_of(literal(below) + '/' + pattern);
     names.insert(names.end(), more.begin(), more.end());
   }
-  if (error) fail_to_list(folder + pattern);
+  if (error) throw unlisted(folder + pattern);
   return names;
 }
 
@@ -134,7 +129,7 @@ void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
   } else {
     const std::string rest = pattern.substr(std::min(stars + 3, pattern.size()));
     if (find_stars(rest) != rest.npos) {
-      fail(pattern, {}, "has ** twice", "use it once: it reaches all folders below");
+      throw Error(pattern, "has ** twice").remedy("use it once: it reaches all folders below");
     }
     std::vector<std::string> folders{""};
     if (stars > 0) folders = matches_of(pattern.substr(0, stars));
@@ -148,7 +143,7 @@ void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
     });
     std::sort(names.begin(), names.end());
   }
-  if (names.empty()) fail(pattern, {}, "no file matches", "check the pattern");
+  if (names.empty()) throw Error(pattern, "no file matches").remedy("check the pattern");
   files.insert(files.end(), names.begin(), names.end());
 }
 
@@ -189,16 +184,19 @@ class Names {
       if (name.empty() || name.front() == '#') continue;
       const std::string file = (fs::path(list).parent_path() / name).string();
       if (name.front() == '@') {
-        fail(list, "line " + std::to_string(lines.number()), "a list cannot contain lists",
-             "name them on the command line");
+        throw Error(list, "a list cannot contain lists")
+            .at_line(lines.number())
+            .remedy("name them on the command line");
       }
       if (file.find_first_of("*?[") == file.npos && !exists(file)) {
-        fail(list, "line " + std::to_string(lines.number()), "there is no file " + in_quotes(file),
-             "correct the list");
+        throw Error(list, "there is no file " + in_quotes(file))
+            .at_line(lines.number())
+            .remedy("correct the list");
       }
       add(file);
     }
-    if (files_.size() == before) fail(list, {}, "names no file", "write one name on each line");
+    if (files_.size() == before)
+      throw Error(list, "names no file").remedy("write one name on each line");
   }
 
   const std::string& format_;

@@ -51,16 +51,16 @@ class CubeCheckingReader final : public PartReader {
     }
     const Box3& box = check_->boxes[part_];
     for (const Point3& point : points_) {
-      if (!box.contains(world_point(check_->placement, point))) refuse();
+      if (!box.contains(world_point(check_->placement, point))) throw outside_cube();
     }
     return bytes;
   }
 
  private:
-  [[noreturn]] void refuse() const {
-    throw Error(check_->file,
-                "has a point outside its cube: the header or the hierarchy is wrong, "
-                "and a region would miss points")
+  [[nodiscard]] Error outside_cube() const {
+    return Error(check_->file,
+                 "has a point outside its cube: the header or the hierarchy is wrong, and a region "
+                 "would miss points")
         .at("node " + name_of(check_->nodes[part_]))
         .remedy("convert the whole file to LAS or LAZ and select the region from that");
   }

@@ -87,17 +87,17 @@ bool write_image(const Image& image, Output& output) {
 
 void write_file(const std::filesystem::path& path, const Image& image, const Naming& replace,
                 const std::stop_token& stop) {
-  const auto refuse = [&](std::string cause) { throw Error(path.string(), std::move(cause)); };
   constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
-  if (image.width == 0 || image.height == 0) refuse("a PNG image cannot be empty");
+  if (image.width == 0 || image.height == 0)
+    throw Error(path.string(), "a PNG image cannot be empty");
   if (image.width > kMost || image.height > kMost)
-    refuse("a PNG side has at most 2147483647 pixels");
+    throw Error(path.string(), "a PNG side has at most 2147483647 pixels");
   Sink file(path.string(), replace, stop);
   Output output{.file = &file, .error = nullptr, .message = ""};
   if (!write_image(image, output)) {
     if (output.error) std::rethrow_exception(output.error);
-    refuse(std::string("cannot write PNG: ") +
-           (output.message[0] == '\0' ? "out of memory" : output.message));
+    throw Error(path.string(), std::string("cannot write PNG: ") +
+                                   (output.message[0] == '\0' ? "out of memory" : output.message));
   }
   file.commit();
 }

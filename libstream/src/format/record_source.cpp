@@ -188,10 +188,8 @@ class RecordSource final : public PointSource {
   [[nodiscard]] std::string file() const {
     return stream_.input ? stream_.input->name() : stream_.info.files.front();
   }
-  [[noreturn]] void fail(std::size_t point, std::string cause, std::string remedy) const {
-    throw Error(file(), std::move(cause))
-        .at("point " + std::to_string(delivered_ + point))
-        .remedy(std::move(remedy));
+  [[nodiscard]] Error fault(std::size_t point, std::string cause) const {
+    return Error(file(), std::move(cause)).at("point " + std::to_string(delivered_ + point));
   }
 
   /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
@@ -250,8 +248,9 @@ class RecordSource final : public PointSource {
             is_wide_integer(types_[axis]) ? 0x1p53 : std::numeric_limits<double>::max();
         const auto [scale, offset] = scale_and_offset(axis);
         if (!(std::abs(value) <= most) || !std::isfinite(value * scale + offset)) {
-          fail(i, std::string("its ") + "xyz"[axis] + " is not a number that can be kept exactly",
-               "the file is damaged: download it again");
+          throw fault(
+              i, std::string("its ") + "xyz"[axis] + " is not a number that can be kept exactly")
+              .remedy("the file is damaged: download it again");
         }
       }
     }
@@ -297,8 +296,9 @@ class RecordSource final : public PointSource {
       point = moved(point);
       for (const double value : point) {
         if (value < -most - 1 || value > most) {
-          fail(i, "is out of range of the lattice chosen from the headers of all files",
-               "its header states wrong bounds: export the file again, or read it separately");
+          throw fault(i, "is out of range of the lattice chosen from the headers of all files")
+              .remedy(
+                  "its header states wrong bounds: export the file again, or read it separately");
         }
       }
     }

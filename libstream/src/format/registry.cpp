@@ -62,8 +62,8 @@ bool is_ept_name(const std::string& file) {
   return std::filesystem::path(file).filename() == kEptName;
 }
 
-[[noreturn]] void refuse(const std::string& file, const ForeignFormat& format) {
-  throw Error(shown_name(file), "is " + std::string(format.name) + ", which cannot be read")
+Error unsupported(const std::string& file, const ForeignFormat& format) {
+  return Error(shown_name(file), "is " + std::string(format.name) + ", which cannot be read")
       .remedy(std::string(format.remedy));
 }
 
@@ -88,12 +88,12 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
   if (is_ept_name(file)) return ept_format();
   if (const Format* const packed = packed_format_of(file)) return *packed;
   if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
-    refuse(file, *foreign);
+    throw unsupported(file, *foreign);
   }
   if (formats().back().recognise(bytes)) return formats().back();
   if (const Format* const format = format_of_name(file)) return *format;
   const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
-  if (foreign != nullptr && !head.empty()) refuse(file, *foreign);
+  if (foreign != nullptr && !head.empty()) throw unsupported(file, *foreign);
   throw Error(shown_name(file),
               head.empty() ? "the file is empty" : "neither content nor name shows its format")
       .remedy(head.empty() ? "download or export the file again"

@@ -55,23 +55,21 @@ struct AtomicFile::Impl {
     ::close(descriptor);
   }
 
-  [[noreturn]] void fail(const std::string& action, int error_number) const {
-    throw system_error(shown.string(), action, error_number, remedy_for(error_number));
+  [[nodiscard]] Error failed(const std::string& action, int error_number) const {
+    return system_error(shown.string(), action, error_number, remedy_for(error_number));
   }
 
   void check_target() const {
     std::error_code error;
     const fs::file_status status = fs::status(target, error);
     if (status.type() == fs::file_type::not_found) return;
-    if (error) fail("cannot be inspected", error.value());
+    if (error) throw failed("cannot be inspected", error.value());
     if (status.type() != fs::file_type::regular) {
       throw Error(target.string(), "exists and is not a regular file")
           .remedy("choose another name");
     }
     if (naming.replace) return;
-    throw Error(target.string(), "exists already")
-        .remedy("remove it, choose another name, or ask to replace it")
-        .error_number(EEXIST);
+    throw already_exists(target.string());
   }
 
   /// Creates and locks the temporary file. Between the two steps another writer may take it for
@@ -83,7 +81,7 @@ struct AtomicFile::Impl {
       descriptor = ::open(temporary.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
       if (descriptor < 0) {
         if (errno == EEXIST && attempt < 1000) continue;
-        fail("cannot be created", errno);
+        throw failed("cannot be created", errno);
       }
       // Work continues on file systems without locks (some network disks).
       const bool taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
@@ -100,7 +98,7 @@ struct AtomicFile::Impl {
           ::pwrite(descriptor, bytes.data(), bytes.size(), static_cast<off_t>(offset));
       if (n < 0) {
         if (errno == EINTR) continue;
-        fail("cannot be written", errno);
+        throw failed("cannot be written", errno);
       }
       bytes = bytes.subspan(static_cast<std::size_t>(n));
       offset += static_cast<std::uint64_t>(n);
@@ -115,7 +113,7 @@ struct AtomicFile::Impl {
 
   void complete() {
     flush();
-    if (::fsync(descriptor) != 0) fail("cannot be synced", errno);
+    if (::fsync(descriptor) != 0) throw failed("cannot be synced", errno);
     // After the sync, the file's time is final. Without the attribute the file is still complete.
     struct stat status {};
     if (::fstat(descriptor, &status) == 0) {
@@ -181,7 +179,7 @@ std::size_t AtomicFile::read_at(std::uint64_t offset, std::span<std::byte> bytes
     const ssize_t n = ::pread(impl_->descriptor, bytes.data() + done, bytes.size() - done,
                               static_cast<off_t>(offset + done));
     if (n < 0 && errno == EINTR) continue;
-    if (n < 0) impl_->fail("cannot be read back", errno);
+    if (n < 0) throw impl_->failed("cannot be read back", errno);
     if (n == 0) break;
     done += static_cast<std::size_t>(n);
   }

@@ -18,8 +18,8 @@ struct Free {
   void operator()(libdeflate_decompressor* d) const { libdeflate_free_decompressor(d); }
 };
 
-[[noreturn]] void refuse(const std::string& name, const std::string& cause) {
-  throw Error(name, cause).at("gzip").remedy("recreate the file");
+Error fault(const std::string& name, std::string cause) {
+  return Error(name, std::move(cause)).at("gzip").remedy("recreate the file");
 }
 
 // Returns the size of the decompressed bytes modulo 2^32, which the last four bytes state.
@@ -54,11 +54,11 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
 
 std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t most,
                               const std::string& name) {
-  if (!is_gzip(bytes) || bytes.size() < kLeast) refuse(name, "not gzip, or truncated");
+  if (!is_gzip(bytes) || bytes.size() < kLeast) throw fault(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
   if (size > most) {
-    refuse(name,
-           "states " + counted(size, "byte") + ", more than the limit of " + std::to_string(most));
+    throw fault(name, "states " + counted(size, "byte") + ", more than the limit of " +
+                          std::to_string(most));
   }
   const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
       libdeflate_alloc_decompressor());
@@ -68,7 +68,7 @@ std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t mo
   const libdeflate_result result = libdeflate_gzip_decompress_ex(
       decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &used, &made);
   if (result != LIBDEFLATE_SUCCESS || made != size || used != bytes.size()) {
-    refuse(name, "damaged: the contents do not match their checksum and size");
+    throw fault(name, "damaged: the contents do not match their checksum and size");
   }
   return out;
 }

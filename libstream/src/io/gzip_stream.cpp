@@ -41,8 +41,8 @@ GzipStream::GzipStream(std::string name, std::string_view first)
 
 GzipStream::~GzipStream() = default;
 
-void GzipStream::fail(const std::string& cause) const {
-  throw Error(name_, cause)
+Error GzipStream::fault(std::string cause) const {
+  return Error(name_, std::move(cause))
       .at("byte " + std::to_string(used_) + " of the gzip data")
       .remedy("the file is damaged or truncated: download it again");
 }
@@ -65,7 +65,7 @@ std::size_t GzipStream::read(char* to, std::size_t most, const Read& read) {
       inflateReset(&stream);
       in_member_ = true;
     }
-    if (begin_ == end_ && !refill(read)) fail("the data ends within a gzip member");
+    if (begin_ == end_ && !refill(read)) throw fault("the data ends within a gzip member");
     stream.next_in = reinterpret_cast<Bytef*>(packed_.data() + begin_);
     stream.avail_in = static_cast<uInt>(end_ - begin_);
     stream.next_out = reinterpret_cast<Bytef*>(to);
@@ -80,7 +80,8 @@ std::size_t GzipStream::read(char* to, std::size_t most, const Read& read) {
     if (result == Z_STREAM_END) {
       in_member_ = false;
     } else if (result != Z_OK && result != Z_BUF_ERROR) {
-      fail(stream.msg != nullptr ? std::string("damaged gzip: ") + stream.msg : "damaged gzip");
+      throw fault(stream.msg != nullptr ? std::string("damaged gzip: ") + stream.msg
+                                        : "damaged gzip");
     }
     if (stream.avail_out < room) return room - stream.avail_out;
   }

@@ -9,6 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "terrace/stream/error.hpp"
+
 namespace terrace::stream {
 
 /// Decompresses gzip (RFC 1952) as its bytes arrive, one member after another (as written by bgzip
@@ -32,7 +34,7 @@ class GzipStream {
  private:
   struct Inflater;
 
-  [[noreturn]] void fail(const std::string& cause) const;
+  [[nodiscard]] Error fault(std::string cause) const;
   /// Reads more compressed bytes and appends them to those not yet used; false at their end.
   bool refill(const Read& read);
 

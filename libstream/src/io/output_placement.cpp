@@ -53,6 +53,12 @@ Ownership ownership_of_entries(
   return error ? Ownership(false) : result;
 }
 
+Error already_exists(std::string file) {
+  return Error(std::move(file), "exists already")
+      .remedy("remove it, choose another name, or ask to replace it")
+      .error_number(EEXIST);
+}
+
 Error not_replaced(std::string file, const Ownership& found) {
   if (found.stranger.empty()) {
     return Error(std::move(file), "exists and was not written by terrace, so it is not replaced")
@@ -92,14 +98,8 @@ Ownership OutputPlacement::ownership_of(const fs::path& old) const noexcept {
   }
 }
 
-void OutputPlacement::fail(int error_number) const {
-  throw system_error(shown_.string(), "cannot be renamed into place", error_number);
-}
-
-void OutputPlacement::fail_because_it_exists() const {
-  throw Error(shown_.string(), "exists already")
-      .remedy("remove it, choose another name, or ask to replace it")
-      .error_number(EEXIST);
+Error OutputPlacement::failed(int error_number) const {
+  return system_error(shown_.string(), "cannot be renamed into place", error_number);
 }
 
 /// False if the name is free by now. Throws: Error.
@@ -107,7 +107,7 @@ bool OutputPlacement::put_by_exchange() {
   const int number = exchange(temporary_, place_);
   if (number == ENOENT) return false;
   if (number == EINVAL || number == ENOSYS) return put_by_steps();
-  if (number != 0) fail(number);
+  if (number != 0) throw failed(number);
   state_ = State::exchanged;
   // Something else may have taken the name since it was looked at.
   const Ownership found = ownership_of(temporary_);
@@ -127,21 +127,21 @@ bool OutputPlacement::put_by_steps() {
       const int why = errno;
       if (kept) ::unlink(old.c_str());
       if (!found.ours) throw not_replaced(shown_.string(), found);
-      fail(why);
+      throw failed(why);
     }
     state_ = kept ? State::aside : State::gone;
     return true;
   }
   if (::rename(place_.c_str(), old.c_str()) != 0) {
     if (errno == ENOENT) return false;
-    fail(errno);
+    throw failed(errno);
   }
   const Ownership found = ownership_of(old);
   const int number = found.ours ? rename_exclusively(temporary_, place_) : 0;
   if (!found.ours || number != 0) {
     rename_exclusively(old, place_);
     if (!found.ours) throw not_replaced(shown_.string(), found);
-    fail(number);
+    throw failed(number);
   }
   state_ = State::aside;
   return true;
@@ -156,9 +156,9 @@ void OutputPlacement::put() {
       return;
     }
     if (number != EEXIST && number != ENOTEMPTY && number != ENOTDIR && number != EISDIR) {
-      fail(number);
+      throw failed(number);
     }
-    if (!naming_.replace) fail_because_it_exists();
+    if (!naming_.replace) throw already_exists(shown_.string());
     const Ownership found = ownership_of(place_);
     if (!found.ours) {
       std::error_code ignored;
@@ -167,7 +167,7 @@ void OutputPlacement::put() {
     }
     if (put_by_exchange()) return;
   }
-  fail(EBUSY);
+  throw failed(EBUSY);
 }
 
 void OutputPlacement::undo() noexcept {

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "terrace/stream/atomic_file.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
 
@@ -45,9 +46,7 @@ class OutputPlacement {
   [[nodiscard]] Ownership ownership_of(const std::filesystem::path& old) const noexcept;
   bool put_by_exchange();
   bool put_by_steps();
-  [[noreturn]] void fail(int error_number) const;
-  [[noreturn]] void fail_because_it_exists() const;
-
+  [[nodiscard]] Error failed(int error_number) const;
   std::filesystem::path shown_, place_, temporary_;
   Naming naming_;
   State state_ = State::waiting;
@@ -56,6 +55,9 @@ class OutputPlacement {
 /// Gives all of them their names and syncs their folders. Throws: Error; then all names have what
 /// they had before.
 void put_together(std::span<OutputPlacement* const> outputs);
+
+/// Returns the Error for an output that may not replace what has its name.
+Error already_exists(std::string file);
 
 /// The remedy for an error of a system call that creates or writes a file; empty if none is known.
 std::string remedy_for(int error_number);

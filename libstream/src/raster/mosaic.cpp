@@ -33,9 +33,8 @@ std::string all_digits(double value) {
   return out.str();
 }
 
-[[noreturn]] void differ(const std::string& first, const std::string& other,
-                         const std::string& what, const std::string& remedy) {
-  throw Error(other, "does not match " + first + ": " + what).remedy(remedy);
+Error differs(const std::string& first, const std::string& other, const std::string& what) {
+  return {other, "does not match " + first + ": " + what};
 }
 
 /// Returns the column and row of `frame` at x, y.
@@ -73,22 +72,22 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
         std::max(std::abs(at[0] - origin[0] - c), std::abs(at[1] - origin[1] - r));
     off = std::max({off, std::abs(at[0] - column - c), std::abs(at[1] - row - r)});
     if (!(stretch <= kNearestCell)) {
-      differ(a, b,
-             "its cells are " + all_digits(m[0]) + " x " + all_digits(m[4]) + ", not " +
-                 all_digits(first.world.xy[0]) + " x " + all_digits(first.world.xy[4]),
-             align);
+      throw differs(a, b,
+                    "its cells are " + all_digits(m[0]) + " x " + all_digits(m[4]) + ", not " +
+                        all_digits(first.world.xy[0]) + " x " + all_digits(first.world.xy[4]))
+          .remedy(align);
     }
   }
   const double shift = std::max(std::abs(origin[0] - column), std::abs(origin[1] - row));
   off = std::max(off, shift);
   if (!(shift <= kNearestCell)) {
-    differ(a, b,
-           "its cells are shifted by " + shown(origin[0] - column) + ", " + shown(origin[1] - row) +
-               " of a cell",
-           align);
+    throw differs(a, b,
+                  "its cells are shifted by " + shown(origin[0] - column) + ", " +
+                      shown(origin[1] - row) + " of a cell")
+        .remedy(align);
   }
   if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
-    differ(a, b, "it is 2^31 or more cells away", "read them separately");
+    throw differs(a, b, "it is 2^31 or more cells away").remedy("read them separately");
   }
   return {.file = b,
           .column = static_cast<std::int64_t>(column),
@@ -105,22 +104,23 @@ std::string named(const std::string& unit) {
 void check_samples(const RasterInfo& first, const RasterInfo& other) {
   const std::string &a = first.files.front(), &b = other.files.front();
   if (first.sample.type != other.sample.type) {
-    differ(a, b,
-           "its samples are " + std::string(name_of(other.sample.type)) + ", not " +
-               std::string(name_of(first.sample.type)),
-           "convert one: gdal_translate -ot");
+    throw differs(a, b,
+                  "its samples are " + std::string(name_of(other.sample.type)) + ", not " +
+                      std::string(name_of(first.sample.type)))
+        .remedy("convert one: gdal_translate -ot");
   }
   if (first.sample.scale != other.sample.scale || first.sample.offset != other.sample.offset) {
-    differ(a, b,
-           "its scale and offset are " + all_digits(other.sample.scale) + ", " +
-               all_digits(other.sample.offset) + ", not " + all_digits(first.sample.scale) + ", " +
-               all_digits(first.sample.offset),
-           "make them agree: gdal_translate -unscale");
+    throw differs(a, b,
+                  "its scale and offset are " + all_digits(other.sample.scale) + ", " +
+                      all_digits(other.sample.offset) + ", not " + all_digits(first.sample.scale) +
+                      ", " + all_digits(first.sample.offset))
+        .remedy("make them agree: gdal_translate -unscale");
   }
   if (first.sample.unit != other.sample.unit) {
-    differ(a, b,
-           "its heights are in " + named(other.sample.unit) + ", not " + named(first.sample.unit),
-           "give both the same unit (gdal_edit.py -units), or convert one (gdal_calc.py)");
+    throw differs(
+        a, b,
+        "its heights are in " + named(other.sample.unit) + ", not " + named(first.sample.unit))
+        .remedy("give both the same unit (gdal_edit.py -units), or convert one (gdal_calc.py)");
   }
 }
 
@@ -148,9 +148,9 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
       (a.epsg != 0 || a.geo_keys == b.geo_keys)) {
     return;
   }
-  differ(first.files.front(), other.files.front(),
-         "its CRS is " + described(b) + ", not " + described(a),
-         "reproject one (gdalwarp -t_srs), or give the CRS of all");
+  throw differs(first.files.front(), other.files.front(),
+                "its CRS is " + described(b) + ", not " + described(a))
+      .remedy("reproject one (gdalwarp -t_srs), or give the CRS of all");
 }
 
 /// Returns the number of columns around the Earth; 0 if it is not an integer or is unknown.

@@ -218,8 +218,8 @@ void check_words(const Manifest& m) {
   }
 }
 
-[[noreturn]] void damaged(const std::string& file, const std::string& cause) {
-  throw Error(file, "damaged manifest: " + cause).remedy("restore the file or rebuild the store");
+Error damaged(const std::string& file, const std::string& cause) {
+  return Error(file, "damaged manifest: " + cause).remedy("restore the file or rebuild the store");
 }
 
 }  // namespace
@@ -251,7 +251,7 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
   try {
     const JsonValue json = JsonValue::parse(text);
     if (json.at("format").string() != kFormatName) {
-      damaged(file, "its format is not terrace-store");
+      throw damaged(file, "its format is not terrace-store");
     }
     // Checked before anything that may differ in a newer version.
     const auto version = json.at("version").count();
@@ -263,17 +263,17 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
                             std::to_string(kVersion))
           .remedy("update, or rebuild the store from its source");
     }
-    if (version < 1) damaged(file, "the version is impossible");
+    if (version < 1) throw damaged(file, "the version is impossible");
 
     const std::size_t tail = kChecksumKey.size() + kZeros.size() + kClosing.size();
-    if (text.size() < tail) damaged(file, "it is too short");
+    if (text.size() < tail) throw damaged(file, "it is too short");
     const std::size_t at = text.size() - kClosing.size() - kZeros.size();
     std::string zeroed = text;
     zeroed.replace(at, kZeros.size(), kZeros);
     const std::uint32_t checksum = crc32(0, zeroed.data(), zeroed.size());
     if (text.compare(text.size() - tail, kChecksumKey.size(), kChecksumKey) != 0 ||
         text.substr(at, kZeros.size()) != hexadecimal(checksum)) {
-      damaged(file, "its checksum is wrong");
+      throw damaged(file, "its checksum is wrong");
     }
     Manifest manifest = from_json(json);
     check_counts(manifest);
@@ -282,7 +282,7 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     manifest.checksum = checksum;
     return manifest;
   } catch (const Damage& error) {
-    damaged(file, error.what());
+    throw damaged(file, error.what());
   }
 }
 

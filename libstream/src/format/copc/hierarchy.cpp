@@ -16,8 +16,8 @@
 namespace terrace::stream {
 namespace {
 
-[[noreturn]] void fail(const ByteSource& file, std::uint64_t byte, std::string cause) {
-  throw Error(file.name(), std::move(cause))
+Error damaged(const ByteSource& file, std::uint64_t byte, std::string cause) {
+  return Error(file.name(), std::move(cause))
       .at_byte(byte)
       .remedy("the file is damaged: download it again");
 }
@@ -51,12 +51,12 @@ class HierarchyReader {
   void add_page(const Page& page, std::uint64_t from) {
     if (page.bytes % kCopcEntryBytes != 0 || page.bytes == 0 || page.offset > file_.size() ||
         page.bytes > file_.size() - page.offset) {
-      fail(file_, from, "a page of the COPC hierarchy is outside the file");
+      throw damaged(file_, from, "a page of the COPC hierarchy is outside the file");
     }
     // Pages that overlap could be many more bytes than the file has.
     page_bytes_ += page.bytes;
     if (!seen_.insert(page.offset).second || page_bytes_ > file_.size()) {
-      fail(file_, from, "a page of the COPC hierarchy is referred to twice");
+      throw damaged(file_, from, "a page of the COPC hierarchy is referred to twice");
     }
     pages_.push_back(page);
   }
@@ -67,18 +67,18 @@ class HierarchyReader {
     const auto bytes = load_little_endian<std::int32_t>(at + 24);
     const auto points = load_little_endian<std::int32_t>(at + 28);
     if (depth < 0 || depth > static_cast<std::int32_t>(kDeepestNode)) {
-      fail(file_, byte, "a node of the COPC hierarchy has depth " + std::to_string(depth));
+      throw damaged(file_, byte, "a node of the COPC hierarchy has depth " + std::to_string(depth));
     }
     node.depth = static_cast<unsigned>(depth);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto place = load_little_endian<std::int32_t>(at + 4 + 4 * axis);
       if (place < 0 || (place >> depth) != 0) {
-        fail(file_, byte, "a node of the COPC hierarchy is outside its root");
+        throw damaged(file_, byte, "a node of the COPC hierarchy is outside its root");
       }
       node.place[axis] = static_cast<std::uint32_t>(place);
     }
     if (points < -1 || bytes < 0) {
-      fail(file_, byte, "a node of the COPC hierarchy has a negative size");
+      throw damaged(file_, byte, "a node of the COPC hierarchy has a negative size");
     }
     node.bytes = static_cast<std::uint64_t>(bytes);
     if (points == -1) {
@@ -89,7 +89,7 @@ class HierarchyReader {
     node.points = static_cast<std::uint64_t>(points);
     if (node.offset < first_chunk_ || node.offset > file_.size() ||
         node.bytes > file_.size() - node.offset || node.bytes == 0) {
-      fail(file_, byte, "the points of a node of the COPC hierarchy are outside the file");
+      throw damaged(file_, byte, "the points of a node of the COPC hierarchy are outside the file");
     }
     nodes_.push_back(node);
   }
@@ -109,11 +109,11 @@ void check_disjoint(const ByteSource& file, Octree& octree) {
             [](const OctreeNode& a, const OctreeNode& b) { return a.offset < b.offset; });
   for (std::size_t i = 1; i < nodes.size(); ++i) {
     if (nodes[i].offset - nodes[i - 1].offset < nodes[i - 1].bytes) {
-      fail(file, nodes[i].offset, "two nodes of the COPC hierarchy share points");
+      throw damaged(file, nodes[i].offset, "two nodes of the COPC hierarchy share points");
     }
   }
   if (const OctreeNode* const twice = octree.arrange()) {
-    fail(file, twice->offset, "a node of the COPC hierarchy is listed twice");
+    throw damaged(file, twice->offset, "a node of the COPC hierarchy is listed twice");
   }
 }
 
@@ -179,7 +179,7 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
                            std::uint64_t points) {
   // The info follows the LAS 1.4 header and its own VLR header.
   constexpr std::uint64_t kInfoAt = 375 + 54;
-  if (info.size() < kCopcInfoBytes) fail(file, kInfoAt, "the COPC info is cut off");
+  if (info.size() < kCopcInfoBytes) throw damaged(file, kInfoAt, "the COPC info is cut off");
   Octree octree;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     octree.centre[axis] = load_little_endian<double>(info.data() + 8 * axis);
@@ -190,7 +190,8 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
                                   [](double value) { return std::isfinite(value); });
   if (!finite || !(octree.half_size > 0) || !std::isfinite(2 * octree.half_size) ||
       !(octree.spacing > 0) || !std::isfinite(octree.spacing)) {
-    fail(file, kInfoAt, "the cube or the spacing of the COPC info is not a positive number");
+    throw damaged(file, kInfoAt,
+                  "the cube or the spacing of the COPC info is not a positive number");
   }
   const Page root{.offset = load_little_endian<std::uint64_t>(info.data() + 40),
                   .bytes = load_little_endian<std::uint64_t>(info.data() + 48)};
@@ -198,9 +199,9 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
   if (points > 0 || root.bytes > 0) octree.nodes = HierarchyReader(file, first_chunk).read(root);
   check_disjoint(file, octree);
   if (const std::uint64_t found = octree.points(); found != points) {
-    fail(file, root.offset,
-         "the nodes of the COPC hierarchy have " + counted(found, "point") +
-             ", but the header promises " + std::to_string(points));
+    throw damaged(file, root.offset,
+                  "the nodes of the COPC hierarchy have " + counted(found, "point") +
+                      ", but the header promises " + std::to_string(points));
   }
   return octree;
 }

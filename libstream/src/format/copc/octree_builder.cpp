@@ -218,8 +218,7 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
   const std::uint64_t count = file_.records(bucket);
   if (count > most_together_) {
     throw Error(name_, counted(count, "point") +
-                           " are in one place, more than a node of "
-                           "COPC can have in this memory: " +
+                           " are in one place, more than a node of COPC can have in this memory: " +
                            std::to_string(most_together_))
         .remedy("raise `memory_bytes`, leave them out, or write LAZ");
   }

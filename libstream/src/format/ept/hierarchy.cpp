@@ -72,9 +72,9 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
     if (value == 0) return true;
     // Compared before adding, because the sum could overflow.
     if (value > reading_.points - reading_.found) {
-      fail_ept(
-          file_, "node " + name_,
-          "the nodes have more points than ept.json promises: " + std::to_string(reading_.points));
+      throw ept_fault(file_, "the nodes have more points than ept.json promises: " +
+                                 std::to_string(reading_.points))
+          .at("node " + name_);
     }
     node.points = value;
     reading_.found += value;
@@ -83,9 +83,10 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
   bool number_integer(number_integer_t value) override {
     const NodeKey key = key_of(place());
-    if (value != -1) fail_ept(file_, "node " + name_, "has " + std::to_string(value) + " points");
+    if (value != -1)
+      throw ept_fault(file_, "has " + std::to_string(value) + " points").at("node " + name_);
     if (!reading_.seen.insert(key).second) {
-      fail_ept(file_, "node " + name_, "its part of the hierarchy is referred to twice");
+      throw ept_fault(file_, "its part of the hierarchy is referred to twice").at("node " + name_);
     }
     reading_.pending.push_back(key);
     return true;
@@ -101,18 +102,18 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
   bool end_array() override { return refuse(); }
   bool parse_error(std::size_t byte, const std::string&,
                    const nlohmann::detail::exception&) override {
-    fail_ept(file_, "byte " + std::to_string(byte), "it is not JSON");
+    throw ept_fault(file_, "it is not JSON").at_byte(byte);
   }
 
  private:
   [[noreturn]] bool refuse() const {
-    fail_ept(file_, name_.empty() ? std::string() : "node " + in_quotes(name_),
-             "it does not hold the point counts of nodes");
+    throw ept_fault(file_, "it does not hold the point counts of nodes")
+        .at(name_.empty() ? std::string() : "node " + in_quotes(name_));
   }
   [[nodiscard]] OctreeNode place() const {
     if (depth_ == 0) refuse();
     const std::optional<OctreeNode> node = node_of(name_);
-    if (!node) fail_ept(file_, {}, in_quotes(name_) + " is not a node of an octree");
+    if (!node) throw ept_fault(file_, in_quotes(name_) + " is not a node of an octree");
     return *node;
   }
 
@@ -137,15 +138,15 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
     reading.pending.pop_back();
     const std::string name = name_of({.depth = depth, .place = {x, y, z}});
     const std::string file = (folder / "ept-hierarchy" / (name + ".json")).string();
-    if (open_file(file)->size() > kMostBytes) fail_ept(file, {}, "is too large for a hierarchy");
+    if (open_file(file)->size() > kMostBytes) throw ept_fault(file, "is too large for a hierarchy");
     std::ifstream bytes(file, std::ios::binary);
     EntryTaker taker(file, reading);
     nlohmann::json::sax_parse(bytes, &taker);
   }
   if (reading.found != points) {
-    fail_ept((folder / "ept-hierarchy").string(), {},
-             "its nodes have " + counted(reading.found, "point") + ", but ept.json promises " +
-                 std::to_string(points));
+    throw ept_fault((folder / "ept-hierarchy").string(),
+                    "its nodes have " + counted(reading.found, "point") +
+                        ", but ept.json promises " + std::to_string(points));
   }
   return std::move(reading.nodes);
 }

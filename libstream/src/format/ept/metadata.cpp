@@ -61,11 +61,13 @@ class EptMetadataReader {
 
   EptMetadata read() {
     const nlohmann::json json = parse();
-    if (!json.is_object()) fail({}, "it does not hold an object");
+    if (!json.is_object()) throw fault("it does not hold an object");
     const std::string version = text(json, "version", "1.0.0");
-    if (!version.starts_with("1.")) fail("version", "is " + in_quotes(version) + ", not 1");
+    if (!version.starts_with("1."))
+      throw fault("is " + in_quotes(version) + ", not 1").at("version");
     const std::string hierarchy = text(json, "hierarchyType", "json");
-    if (hierarchy != "json") fail("hierarchyType", in_quotes(hierarchy) + " is not known");
+    if (hierarchy != "json")
+      throw fault(in_quotes(hierarchy) + " is not known").at("hierarchyType");
     EptMetadata metadata;
     const std::string data = text(json, "dataType", {});
     if (data == "laszip") {
@@ -75,10 +77,11 @@ class EptMetadataReader {
     } else if (data == "zstandard") {
       metadata.data = EptData::zstandard;
     } else {
-      fail("dataType", in_quotes(data) + " is not known; laszip, binary and zstandard are");
+      throw fault(in_quotes(data) + " is not known; laszip, binary and zstandard are")
+          .at("dataType");
     }
     const nlohmann::json& points = member(json, "points");
-    if (!points.is_number_unsigned()) fail("points", "is not a number of points");
+    if (!points.is_number_unsigned()) throw fault("is not a number of points").at("points");
     metadata.points = metadata.stream.points = points.get<std::uint64_t>();
     read_cube(json, metadata.octree);
     read_schema(member(json, "schema"), metadata.stream);
@@ -94,27 +97,25 @@ class EptMetadataReader {
   static constexpr std::size_t kMostRecordBytes = 65535;
   static constexpr std::size_t kMostDimensions = 4096;
 
-  [[noreturn]] void fail(std::string where, std::string cause) const {
-    fail_ept(file_, std::move(where), std::move(cause));
-  }
+  [[nodiscard]] Error fault(std::string cause) const { return ept_fault(file_, std::move(cause)); }
 
   [[nodiscard]] Json parse() const {
     const std::unique_ptr<ByteSource> bytes = open_file(file_);
-    if (bytes->size() > kMostBytes) fail({}, "is too large for the description of a data set");
+    if (bytes->size() > kMostBytes) throw fault("is too large for the description of a data set");
     std::string all(bytes->size(), '\0');
     bytes->read(0, std::as_writable_bytes(std::span(all)));
     try {
-      return parse_bounded_json(all, {}, [this](const char* cause) { fail({}, cause); });
+      return parse_bounded_json(all, {}, [this](const char* cause) { throw fault(cause); });
     } catch (const Json::parse_error& error) {
-      fail("byte " + std::to_string(error.byte), "it is not JSON");
+      throw fault("it is not JSON").at_byte(error.byte);
     } catch (const Json::out_of_range&) {
-      fail({}, "its JSON has a number too large for a double");
+      throw fault("its JSON has a number too large for a double");
     }
   }
 
   [[nodiscard]] const Json& member(const Json& json, const char* name) const {
     const auto found = json.find(name);
-    if (found == json.end()) fail(name, "is missing");
+    if (found == json.end()) throw fault("is missing").at(name);
     return *found;
   }
 
@@ -122,42 +123,44 @@ class EptMetadataReader {
                                  const std::optional<std::string>& without) const {
     if (without && !json.contains(name)) return *without;
     const Json& value = member(json, name);
-    if (!value.is_string()) fail(name, "is not text");
+    if (!value.is_string()) throw fault("is not text").at(name);
     return value.get<std::string>();
   }
 
   [[nodiscard]] double number(const Json& json, const char* name, double without) const {
     const auto found = json.find(name);
     if (found == json.end()) return without;
-    if (!found->is_number() || !std::isfinite(found->get<double>())) fail(name, "is not a number");
+    if (!found->is_number() || !std::isfinite(found->get<double>()))
+      throw fault("is not a number").at(name);
     return found->get<double>();
   }
 
   void read_cube(const Json& json, Octree& octree) const {
     const Json& bounds = member(json, "bounds");
-    if (!bounds.is_array() || bounds.size() != 6) fail("bounds", "are not six numbers");
+    if (!bounds.is_array() || bounds.size() != 6) throw fault("are not six numbers").at("bounds");
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!bounds[axis].is_number() || !bounds[axis + 3].is_number()) {
-        fail("bounds", "are not six numbers");
+        throw fault("are not six numbers").at("bounds");
       }
       const double low = bounds[axis].get<double>(), high = bounds[axis + 3].get<double>();
       const double half = 0.5 * high - 0.5 * low;
       octree.centre[axis] = 0.5 * high + 0.5 * low;
       if (!std::isfinite(octree.centre[axis]) || !(half > 0) || !std::isfinite(2 * half)) {
-        fail("bounds", "do not enclose a cube");
+        throw fault("do not enclose a cube").at("bounds");
       }
       // Sides of a cube far from zero may differ by rounding.
       const double rounding = 0x1p-40 * (std::abs(low) + std::abs(high));
       if (axis == 0) octree.half_size = half;
-      if (std::abs(half - octree.half_size) > rounding) fail("bounds", "do not enclose a cube");
+      if (std::abs(half - octree.half_size) > rounding)
+        throw fault("do not enclose a cube").at("bounds");
     }
     const Json& span = member(json, "span");
     if (!span.is_number_unsigned() || span.get<std::uint64_t>() == 0 ||
         span.get<std::uint64_t>() > (1u << kDeepestNode)) {
-      fail("span", "is not a number of cells");
+      throw fault("is not a number of cells").at("span");
     }
     octree.spacing = 2 * octree.half_size / static_cast<double>(span.get<std::uint64_t>());
-    if (!(octree.spacing > 0)) fail("span", "is not a number of cells");
+    if (!(octree.spacing > 0)) throw fault("is not a number of cells").at("span");
   }
 
   [[nodiscard]] ScalarType type_of(const Json& json, const std::string& where) const {
@@ -174,11 +177,11 @@ class EptMetadataReader {
       if (type == "unsigned") return kUnsigned[i];
       if (is_float && bytes >= 4) return bytes == 4 ? ScalarType::f32 : ScalarType::f64;
     }
-    fail(where, in_quotes(type) + " of " + size.dump() + " bytes is not a type");
+    throw fault(in_quotes(type) + " of " + size.dump() + " bytes is not a type").at(where);
   }
 
   [[nodiscard]] Dimension dimension(const Json& json, const std::string& where) const {
-    if (!json.is_object()) fail(where, "is not an object");
+    if (!json.is_object()) throw fault("is not an object").at(where);
     Dimension dimension{.name = text(json, "name", {}), .channel = {}};
     Channel& channel = dimension.channel;
     channel.name = dimension.name;
@@ -188,7 +191,7 @@ class EptMetadataReader {
     channel.type = type_of(json, where);
     channel.scale = number(json, "scale", 1.0);
     channel.offset = number(json, "offset", 0.0);
-    if (channel.scale == 0) fail(where, "has the scale 0");
+    if (channel.scale == 0) throw fault("has the scale 0").at(where);
     for (const KnownDimension& known : kKnown) {
       if (dimension.name == known.ept) channel.name = known.name;
     }
@@ -201,34 +204,35 @@ class EptMetadataReader {
   }
 
   void read_schema(const Json& schema, RecordStream& stream) const {
-    if (!schema.is_array()) fail("schema", "is not a list of dimensions");
+    if (!schema.is_array()) throw fault("is not a list of dimensions").at("schema");
     SourceInfo& info = stream.info;
     std::array<bool, 3> found{};
     std::set<std::string> names;
-    if (schema.size() > kMostDimensions) fail("schema", "has too many dimensions");
+    if (schema.size() > kMostDimensions) throw fault("has too many dimensions").at("schema");
     for (std::size_t i = 0; i < schema.size(); ++i) {
       const std::string where = "dimension " + std::to_string(i) + " of the schema";
       const auto [name, channel] = dimension(schema[i], where);
       const std::size_t offset = stream.record_bytes;
       stream.record_bytes += size_of(channel.type);
-      if (stream.record_bytes > kMostRecordBytes) fail("schema", "has too many dimensions");
+      if (stream.record_bytes > kMostRecordBytes)
+        throw fault("has too many dimensions").at("schema");
       if (name.size() == 1 && name[0] >= 'X' && name[0] <= 'Z') {
         const auto axis = static_cast<std::size_t>(name[0] - 'X');
-        if (found[axis]) fail(where, "repeats " + name);
+        if (found[axis]) throw fault("repeats " + name).at(where);
         found[axis] = true;
         stream.coordinate_offsets[axis] = offset;
         place(channel, axis, info);
         continue;
       }
-      if (!names.insert(channel.name).second) fail(where, "repeats " + name);
-      if (channel.name.empty()) fail(where, "has no name");
+      if (!names.insert(channel.name).second) throw fault("repeats " + name).at(where);
+      if (channel.name.empty()) throw fault("has no name").at(where);
       stream.fields.push_back({.channel = channel, .offset = offset});
       info.attributes.push_back(channel);
     }
-    if (!found[0] || !found[1] || !found[2]) fail("schema", "lacks X, Y or Z");
+    if (!found[0] || !found[1] || !found[2]) throw fault("lacks X, Y or Z").at("schema");
     if (info.world.xy[0] * info.world.xy[4] == 0 ||
         !std::isfinite(info.world.xy[0] * info.world.xy[4])) {
-      fail("schema", "the scales of X and Y are too small or too large");
+      throw fault("the scales of X and Y are too small or too large").at("schema");
     }
   }
 
@@ -245,7 +249,7 @@ class EptMetadataReader {
   }
 
   void read_srs(const Json& srs, Crs& crs) const {
-    if (!srs.is_object()) fail("srs", "is not an object");
+    if (!srs.is_object()) throw fault("is not an object").at("srs");
     crs.wkt = text(srs, "wkt", "");
     const auto code = [&](const char* name) {
       const std::string digits = text(srs, name, "");
@@ -254,7 +258,7 @@ class EptMetadataReader {
           std::from_chars(digits.data(), digits.data() + digits.size(), value);
       if (!digits.empty() &&
           (error != std::errc() || end != digits.data() + digits.size() || value <= 0)) {
-        fail("srs", in_quotes(digits) + " is not the code of a reference system");
+        throw fault(in_quotes(digits) + " is not the code of a reference system").at("srs");
       }
       return value;
     };
@@ -268,9 +272,8 @@ class EptMetadataReader {
 
 }  // namespace
 
-void fail_ept(const std::string& file, std::string where, std::string cause) {
-  throw Error(file, std::move(cause))
-      .at(std::move(where))
+Error ept_fault(std::string file, std::string cause) {
+  return Error(std::move(file), std::move(cause))
       .remedy("the data set is damaged or not EPT 1.0: download it again");
 }
 

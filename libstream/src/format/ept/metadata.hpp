@@ -6,6 +6,7 @@
 
 #include "format/octree.hpp"
 #include "format/record_source.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/schema.hpp"
 
 /// EPT (Entwine Point Tile 1.0, entwine.io): a folder with ept.json, the nodes of an octree as
@@ -31,8 +32,8 @@ struct EptMetadata {
   Crs crs;
 };
 
-/// Throws: Error with the remedy for a damaged data set.
-[[noreturn]] void fail_ept(const std::string& file, std::string where, std::string cause);
+/// Returns an Error with the remedy for a damaged data set.
+Error ept_fault(std::string file, std::string cause);
 
 /// Reads ept.json. Attributes that LAS also has get the names that we use for LAS. Throws: Error
 /// unless the file has version 1 and X, Y and Z of known types.

@@ -22,10 +22,9 @@
 namespace terrace::stream {
 namespace {
 
-[[noreturn]] void fail_count(const std::string& file, std::uint64_t points,
-                             const std::string& found) {
-  fail_ept(file, {},
-           "the hierarchy counts " + counted(points, "point") + ", but the file " + found);
+Error miscounted(std::string file, std::uint64_t points, const std::string& found) {
+  return ept_fault(std::move(file),
+                   "the hierarchy counts " + counted(points, "point") + ", but the file " + found);
 }
 
 /// Records compressed with Zstandard, in one frame or several.
@@ -45,11 +44,11 @@ class ZstdRecords final : public RecordReader {
         {wanted, left_, std::max<std::size_t>(1, kPieceBytes / record_bytes_)});
     records_.resize(static_cast<std::size_t>(records) * record_bytes_);
     if (decode(records_) < records_.size()) {
-      fail_count(input_->name(), points_, "ends earlier");
+      throw miscounted(input_->name(), points_, "ends earlier");
     }
     left_ -= records;
     std::byte more{};
-    if (left_ == 0 && decode({&more, 1}) > 0) fail_count(input_->name(), points_, "has more");
+    if (left_ == 0 && decode({&more, 1}) > 0) throw miscounted(input_->name(), points_, "has more");
     return {reinterpret_cast<const char*>(records_.data()), records_.size()};
   }
 
@@ -68,12 +67,12 @@ class ZstdRecords final : public RecordReader {
       const std::size_t before = out.pos;
       const std::size_t result = ZSTD_decompressStream(stream_.get(), &out, &in);
       if (ZSTD_isError(result) != 0) {
-        fail_ept(input_->name(), "byte " + std::to_string(input_->offset()),
-                 std::string("zstandard: ") + ZSTD_getErrorName(result));
+        throw ept_fault(input_->name(), std::string("zstandard: ") + ZSTD_getErrorName(result))
+            .at_byte(input_->offset());
       }
       input_->consume(in.pos);
       if (in.pos == 0 && out.pos == before) {
-        if (result > 0 && !ended_) fail_ept(input_->name(), {}, "is cut off");
+        if (result > 0 && !ended_) throw ept_fault(input_->name(), "is cut off");
         break;
       }
       ended_ = result == 0;
@@ -133,8 +132,9 @@ class NodeReader final : public PartReader {
   void check_size(const OctreeNode& node) const {
     const std::uint64_t bytes = input_->size().value_or(0), record = nodes_->record_bytes;
     if (bytes % record != 0 || bytes / record != node.points) {
-      fail_count(input_->name(), node.points,
-                 "has " + counted(bytes, "byte") + " in records of " + std::to_string(record));
+      throw miscounted(
+          input_->name(), node.points,
+          "has " + counted(bytes, "byte") + " in records of " + std::to_string(record));
     }
   }
 
@@ -142,12 +142,13 @@ class NodeReader final : public PartReader {
     std::vector<std::string> comments;
     const LasHeader header = read_las_header(*input_, file, comments);
     if (header.points != node.points) {
-      fail_count(file, node.points, "has " + std::to_string(header.points));
+      throw miscounted(file, node.points, "has " + std::to_string(header.points));
     }
     const LasHeader& first = nodes_->first;
     if (header.point_format != first.point_format || header.record_bytes != first.record_bytes ||
         header.scale != first.scale || header.offset != first.offset) {
-      fail_ept(file, "header", "its point format, scale or offset differs from the other nodes");
+      throw ept_fault(file, "its point format, scale or offset differs from the other nodes")
+          .at("header");
     }
     if (header.compressed) {
       records_ = open_laz_records(*input_, file, header, SourceOptions{});

@@ -50,7 +50,8 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   Octree& octree = metadata.octree;
   octree.nodes = read_ept_hierarchy(folder, metadata.points);
   if (const OctreeNode* const twice = octree.arrange()) {
-    fail_ept((folder / "ept-hierarchy").string(), "node " + name_of(*twice), "is listed twice");
+    throw ept_fault((folder / "ept-hierarchy").string(), "is listed twice")
+        .at("node " + name_of(*twice));
   }
   LasHeader header;
   if (metadata.data == EptData::laszip && !octree.nodes.empty()) {

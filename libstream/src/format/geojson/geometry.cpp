@@ -40,7 +40,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
                : name == "geometries" || name == "features" ? Awaited::list
                                                             : Awaited::other;
     if (awaited_ == Awaited::coordinates && std::exchange(objects_.back().has_coordinates, true)) {
-      fail("a geometry has its coordinates twice");
+      throw fault("a geometry has its coordinates twice");
     }
     return true;
   }
@@ -50,8 +50,9 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
       ++left_out_;
       return true;
     }
-    if (depth_ > 0 || !(awaits(Awaited::object) || awaits(Awaited::item))) refuse("an object");
-    if (objects_.size() == kMostObjects) fail("its collections are nested too deeply");
+    if (depth_ > 0 || !(awaits(Awaited::object) || awaits(Awaited::item)))
+      throw misplaced("an object");
+    if (objects_.size() == kMostObjects) throw fault("its collections are nested too deeply");
     objects_.emplace_back();
     objects_.back().first_run = runs_.size();
     return true;
@@ -76,7 +77,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     } else if (awaits(Awaited::list)) {
       objects_.back().in_list = true;
     } else {
-      refuse("a list");
+      throw misplaced("a list");
     }
     return true;
   }
@@ -102,23 +103,23 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
 
   bool string(string_t& value) override {
     if (left_out()) return true;
-    if (depth_ > 0 || !awaits(Awaited::type)) refuse("a string");
+    if (depth_ > 0 || !awaits(Awaited::type)) throw misplaced("a string");
     objects_.back().type = value;
     return true;
   }
   bool null() override {
-    if (!left_out() && (depth_ > 0 || !awaits(Awaited::object))) refuse("null");
+    if (!left_out() && (depth_ > 0 || !awaits(Awaited::object))) throw misplaced("null");
     return true;
   }
   bool boolean(bool) override {
-    if (!left_out()) refuse("a truth value");
+    if (!left_out()) throw misplaced("a truth value");
     return true;
   }
   bool binary(binary_t&) override { return true; }  // text has no binary values
   bool parse_error(std::size_t byte, const std::string&,
                    const nlohmann::detail::exception& error) override {
     offset_ += byte > 0 ? byte - 1 : 0;
-    fail(std::string("is not JSON (") + error.what() + ')');
+    throw fault(std::string("is not JSON (") + error.what() + ')');
   }
 
  private:
@@ -152,18 +153,18 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
 
   bool number(double value) {
     if (left_out()) return true;
-    if (depth_ == 0) refuse("a number");
+    if (depth_ == 0) throw misplaced("a number");
     Bracket& bracket = brackets_[depth_ - 1];
-    if (bracket.brackets) fail("a position has a list among its numbers");
+    if (bracket.brackets) throw fault("a position has a list among its numbers");
     if (bracket.numbers < 3) position_[bracket.numbers] = value;
     ++bracket.numbers;
     return true;
   }
 
   void open_bracket() {
-    if (depth_ == kMostBrackets) fail("its coordinates are nested too deeply");
+    if (depth_ == kMostBrackets) throw fault("its coordinates are nested too deeply");
     if (depth_ > 0) {
-      if (brackets_[depth_ - 1].numbers > 0) fail("a position has a list among its numbers");
+      if (brackets_[depth_ - 1].numbers > 0) throw fault("a position has a list among its numbers");
       brackets_[depth_ - 1].brackets = true;
     }
     brackets_[depth_++] = {.first_position = geometry_.positions.size()};
@@ -173,9 +174,9 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     const Bracket& bracket = brackets_[depth_ - 1];
     Object& object = objects_.back();
     if (bracket.numbers > 0) {
-      if (bracket.numbers == 1) fail("a position has one number");
+      if (bracket.numbers == 1) throw fault("a position has one number");
       if (object.position_depth != 0 && object.position_depth != depth_) {
-        fail("its positions are nested unevenly");
+        throw fault("its positions are nested unevenly");
       }
       object.position_depth = depth_;
       if (bracket.numbers == 2) position_[2] = 0;
@@ -198,29 +199,31 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     if (type == kGeometryTypes.end()) {
       if (object.type != "Feature" && object.type != "FeatureCollection" &&
           object.type != "GeometryCollection") {
-        fail(object.type.empty() ? "an object has no type"
-                                 : "has an object of the type " + in_quotes(object.type));
+        throw fault(object.type.empty() ? "an object has no type"
+                                        : "has an object of the type " + in_quotes(object.type));
       }
-      if (object.has_coordinates) fail("a " + object.type + " has coordinates");
+      if (object.has_coordinates) throw fault("a " + object.type + " has coordinates");
       return;
     }
-    if (!object.has_coordinates) fail("a " + object.type + " has no coordinates");
+    if (!object.has_coordinates) throw fault("a " + object.type + " has no coordinates");
     const bool has_empty_position = type->depth > 1 && object.empty_depth >= type->depth;
     if ((object.position_depth != 0 && object.position_depth != type->depth) ||
         has_empty_position) {
-      fail("the coordinates are not those of a " + object.type);
+      throw fault("the coordinates are not those of a " + object.type);
     }
     if (!type->lines) return;
     for (std::size_t i = object.first_run; i < runs_.size(); ++i) {
       if (runs_[i].end - runs_[i].begin < 2)
-        fail("a line of a " + object.type + " has one position");
+        throw fault("a line of a " + object.type + " has one position");
       geometry_.lines.push_back(runs_[i]);
     }
   }
 
-  [[noreturn]] void refuse(const std::string& what) const { fail(what + " is not allowed here"); }
-  [[noreturn]] void fail(const std::string& cause) const {
-    throw Error(file_, cause)
+  [[nodiscard]] Error misplaced(const std::string& what) const {
+    return fault(what + " is not allowed here");
+  }
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error(file_, std::move(cause))
         .at("the feature at byte " + std::to_string(offset_))
         .remedy("the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr");
   }

@@ -52,8 +52,8 @@ GeoJsonItems::GeoJsonItems(Input& input, std::size_t most_bytes, bool wants_crs)
   advance();
 }
 
-void GeoJsonItems::fail(const std::string& cause, std::size_t ahead) const {
-  throw Error(input_->name(), cause)
+Error GeoJsonItems::fault(std::string cause, std::size_t ahead) const {
+  return Error(input_->name(), std::move(cause))
       .at_byte(input_->offset() + ahead)
       .remedy("the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr");
 }
@@ -87,7 +87,7 @@ GeoJsonItems::Stop GeoJsonItems::scan_object(std::size_t depth, bool stop_at_lis
       case '"': {
         std::size_t end = i + 1;
         for (char c = at(end); c != '"'; c = at(++end)) {
-          if (c == '\0') fail("the file ends within a string", i);
+          if (c == '\0') throw fault("the file ends within a string", i);
           if (c == '\\') ++end;
         }
         if (depth == 1) {
@@ -100,7 +100,7 @@ GeoJsonItems::Stop GeoJsonItems::scan_object(std::size_t depth, bool stop_at_lis
       case '[': {
         const std::string_view name = window_.substr(name_begin, name_end - name_begin);
         if (stop_at_list && depth == 1 && (name == "features" || name == "geometries")) {
-          if (after_list) fail("has a second list of features", i);
+          if (after_list) throw fault("has a second list of features", i);
           return {.at = i + 1, .in_list = true};
         }
         ++depth;
@@ -114,7 +114,7 @@ GeoJsonItems::Stop GeoJsonItems::scan_object(std::size_t depth, bool stop_at_lis
         if (--depth == 0) return {.at = i + 1, .in_list = false};
         break;
       case '\0':
-        fail("the file ends within an object", i);
+        throw fault("the file ends within an object", i);
       default:
         break;
     }
@@ -125,14 +125,15 @@ void GeoJsonItems::take_members(std::string_view text, bool before) {
   using nlohmann::json;
   json members;
   try {
-    members = parse_bounded_json(text, {.depth = 64}, [this](const char* cause) { fail(cause); });
+    members =
+        parse_bounded_json(text, {.depth = 64}, [this](const char* cause) { throw fault(cause); });
   } catch (const json::exception&) {
-    fail("is not JSON");
+    throw fault("is not JSON");
   }
   const auto type = members.find("type");
   if (before && type != members.end() && *type != "FeatureCollection" &&
       *type != "GeometryCollection") {
-    fail("has features but is not a FeatureCollection");
+    throw fault("has features but is not a FeatureCollection");
   }
   const auto crs = members.find("crs");
   if (!wants_crs_ || crs == members.end()) return;
@@ -148,7 +149,7 @@ void GeoJsonItems::take_members(std::string_view text, bool before) {
     crs_ = named ? *named : Crs{};
     if (!named) crs_.name = in_quotes(crs->dump());
   } else if (!named || *named != crs_) {
-    fail("its crs follows its features, which is too late: move it before \"features\"");
+    throw fault("its crs follows its features, which is too late: move it before \"features\"");
   }
 }
 
@@ -173,12 +174,12 @@ void GeoJsonItems::advance() {
         continue;
       }
       if (!first_of_list_) {
-        if (at(0) != ',') fail("a comma is missing between features");
+        if (at(0) != ',') throw fault("a comma is missing between features");
         input_->consume(1);
         skip_white_space();
       }
       first_of_list_ = false;
-      if (at(0) != '{') fail("a feature is expected here");
+      if (at(0) != '{') throw fault("a feature is expected here");
       found_ = scan_object(0, false).at;
       return;
     }
@@ -187,7 +188,7 @@ void GeoJsonItems::advance() {
       continue;
     }
     if (window_.empty()) return;
-    if (at(0) != '{') fail("is not GeoJSON: an object is expected here");
+    if (at(0) != '{') throw fault("is not GeoJSON: an object is expected here");
     const Stop stop = scan_object(0, true);
     if (!stop.in_list) {
       found_ = stop.at;

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/schema.hpp"
 
@@ -45,7 +46,7 @@ class GeoJsonItems {
   /// depth: 0 if the object's opening brace is next, 1 if it has been read.
   Stop scan_object(std::size_t depth, bool stop_at_list);
   void take_members(std::string_view text, bool before);
-  [[noreturn]] void fail(const std::string& cause, std::size_t ahead = 0) const;
+  [[nodiscard]] Error fault(std::string cause, std::size_t ahead = 0) const;
 
   Input* input_;
   std::size_t most_bytes_;

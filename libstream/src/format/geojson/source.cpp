@@ -30,8 +30,8 @@ namespace {
 
 constexpr std::array kAxes{"x", "y", "z"};
 
-[[noreturn]] void refuse_lines(const std::string& file) {
-  throw Error(file, "has more than 4,294,967,295 lines").remedy("build several stores");
+Error too_many_lines(const std::string& file) {
+  return Error(file, "has more than 4,294,967,295 lines").remedy("build several stores");
 }
 
 class GeoJsonSource final : public PointSource {
@@ -147,7 +147,7 @@ class GeoJsonSource final : public PointSource {
     ++part_;
     if (vertex_ + 1 < line.end) return;
     ++line_;
-    if (lines_++ == std::numeric_limits<std::uint32_t>::max()) refuse_lines(input_.name());
+    if (lines_++ == std::numeric_limits<std::uint32_t>::max()) throw too_many_lines(input_.name());
     begin_line();
   }
 
@@ -181,7 +181,8 @@ class NumberedLines final : public PointSource {
       std::memcpy(line_and_part.data(), number, sizeof line_and_part);
       if (line_and_part == std::array<std::uint32_t, 2>{}) first_ = next_;
       const std::uint64_t line = first_ + line_and_part[0];
-      if (line > std::numeric_limits<std::uint32_t>::max()) refuse_lines(info().files.front());
+      if (line > std::numeric_limits<std::uint32_t>::max())
+        throw too_many_lines(info().files.front());
       next_ = line + 1;
       line_and_part[0] = static_cast<std::uint32_t>(line);
       std::memcpy(number, line_and_part.data(), sizeof line_and_part[0]);

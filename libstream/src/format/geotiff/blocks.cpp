@@ -95,21 +95,20 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
              (!fits || decodes_by_rows(layout_.compression));
   if (fits || by_rows_) return;
   const bool countable = row <= UINT64_MAX / layout_.block_rows;
-  handle_.fail(
-      {},
-      std::string(layout_.tiled ? "tiles" : "strips") + " of " +
-          std::to_string(layout_.block_columns) + " x " +
-          std::to_string(layout_.tiled ? layout_.block_rows : 1) + " cells need " +
-          (countable ? std::to_string((row * (layout_.tiled ? layout_.block_rows : 1) >> 20) + 1)
-                     : "beyond 2^44") +
-          " MiB each, the limit is " + std::to_string(memory_bytes_ >> 20) + " MiB",
-      "allow more memory, or convert it to small tiles: gdal_translate -co TILED=YES");
+  throw handle_
+      .fault(std::string(layout_.tiled ? "tiles" : "strips") + " of " +
+             std::to_string(layout_.block_columns) + " x " +
+             std::to_string(layout_.tiled ? layout_.block_rows : 1) + " cells need " +
+             (countable ? std::to_string((row * (layout_.tiled ? layout_.block_rows : 1) >> 20) + 1)
+                        : "beyond 2^44") +
+             " MiB each, the limit is " + std::to_string(memory_bytes_ >> 20) + " MiB")
+      .remedy("allow more memory, or convert it to small tiles: gdal_translate -co TILED=YES");
 }
 
-void GeoTiffBlocks::fail(const Part& part, std::uint64_t offset, std::string cause,
-                         std::string remedy) const {
-  handle_.fail(layout_.place(part.across, part.down) + " (byte " + std::to_string(offset) + ")",
-               std::move(cause), remedy.empty() ? kDamaged : std::move(remedy));
+Error GeoTiffBlocks::fault(const Part& part, std::uint64_t offset, std::string cause) const {
+  return handle_.fault(std::move(cause))
+      .at(layout_.place(part.across, part.down) + " (byte " + std::to_string(offset) + ")")
+      .remedy(kDamaged);
 }
 
 /// Bytes of the largest block of the band, at most those of the file: larger claims are refused
@@ -181,20 +180,20 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
   int failed = 0;
   const std::uint64_t offset = TIFFGetStrileOffsetWithErr(handle_.tiff(), number, &failed);
   const std::uint64_t bytes = TIFFGetStrileByteCountWithErr(handle_.tiff(), number, &failed);
-  if (failed != 0) fail(part, 0, "has no place in the file: " + handle_.take_complaint());
+  if (failed != 0) throw fault(part, 0, "has no place in the file: " + handle_.take_complaint());
   if (bytes == 0) return fill_sparse(part, out);
   if (offset > handle_.file_bytes() || bytes > handle_.file_bytes() - offset) {
-    fail(part, offset,
-         "claims " + counted(bytes, "byte") + ", beyond the end of the file at byte " +
-             std::to_string(handle_.file_bytes()));
+    throw fault(part, offset,
+                "claims " + counted(bytes, "byte") + ", beyond the end of the file at byte " +
+                    std::to_string(handle_.file_bytes()));
   }
   if (layout_.plain) return read_plain(part, offset, bytes, out);
   if (by_rows_) {
     if (bytes > memory_bytes_) {
-      fail(part, offset,
-           "needs " + std::to_string((bytes >> 20) + 1) + " MiB, the limit is " +
-               std::to_string(memory_bytes_ >> 20) + " MiB",
-           "allow more memory, or convert it to tiles: gdal_translate -co TILED=YES");
+      throw fault(part, offset,
+                  "needs " + std::to_string((bytes >> 20) + 1) + " MiB, the limit is " +
+                      std::to_string(memory_bytes_ >> 20) + " MiB")
+          .remedy("allow more memory, or convert it to tiles: gdal_translate -co TILED=YES");
     }
     return read_by_rows(part, out);
   }
@@ -213,9 +212,9 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   const std::uint64_t row_bytes = layout_.row_bytes();
   const std::uint32_t rows = layout_.rows_in_image(part.down);
   if (bytes / row_bytes < rows) {
-    fail(part, offset,
-         "has " + counted(bytes, "byte") + " where " + counted(rows, "row") + " of " +
-             counted(row_bytes, "byte") + " are expected");
+    throw fault(part, offset,
+                "has " + counted(bytes, "byte") + " where " + counted(rows, "row") + " of " +
+                    counted(row_bytes, "byte") + " are expected");
   }
   const std::uint64_t pixel_bytes = layout_.samples_per_pixel() * size_of(layout_.type);
   // Read whole rows, unless the part is so narrow that most bytes would be read in vain.
@@ -230,7 +229,7 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
     if (raw_.size() < n * piece_bytes) raw_.resize(n * piece_bytes);
     const std::span<std::byte> piece(raw_.data(), n * piece_bytes);
     const std::uint64_t place = offset + (std::uint64_t{part.row} + row) * row_bytes + skip;
-    if (!handle_.read(place, piece)) fail(part, place, "cannot be read to its end");
+    if (!handle_.read(place, piece)) throw fault(part, place, "cannot be read to its end");
     if (layout_.swapped) {
       swap_bytes(raw_.data(), size_of(layout_.type), piece.size() / size_of(layout_.type));
     }
@@ -253,8 +252,8 @@ bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
   for (; next_row_ < first + part.rows; ++next_row_) {
     const auto row = static_cast<std::uint32_t>(next_row_);
     if (TIFFReadScanline(handle_.tiff(), block_.data(), row, sample) != 1) {
-      fail(part, TIFFGetStrileOffset(handle_.tiff(), layout_.block(part.across, part.down)),
-           "row " + std::to_string(row) + " cannot be decoded: " + handle_.take_complaint());
+      throw fault(part, TIFFGetStrileOffset(handle_.tiff(), layout_.block(part.across, part.down)),
+                  "row " + std::to_string(row) + " cannot be decoded: " + handle_.take_complaint());
     }
     if (next_row_ < first) continue;
     any |= overlay_part_row(part, block_.data(), part.column,
@@ -357,19 +356,20 @@ void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t
   // Some writers omit a tile's rows beyond the lower edge of the image.
   const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
   if (bytes > kMostGrowth * due + kMostOverhead) {
-    fail(part, offset,
-         "claims " + counted(bytes, "byte") + " for " + counted(due, "byte") + " of samples");
+    throw fault(
+        part, offset,
+        "claims " + counted(bytes, "byte") + " for " + counted(due, "byte") + " of samples");
   }
   if (raw_.size() < bytes) raw_.resize(bytes);
   if (!handle_.read(offset, std::span(raw_.data(), bytes))) {
-    fail(part, offset, "cannot be read to its end");
+    throw fault(part, offset, "cannot be read to its end");
   }
   const std::uint64_t whole = layout_.row_bytes() * layout_.block_rows;
   if (block_.size() != whole) block_.assign(whole, std::byte{0});
   const std::uint32_t number = layout_.block(part.across, part.down);
   if (TIFFReadFromUserBuffer(handle_.tiff(), number, raw_.data(), static_cast<tmsize_t>(bytes),
                              block_.data(), static_cast<tmsize_t>(due)) != 1) {
-    fail(part, offset, "cannot be decoded: " + handle_.take_complaint());
+    throw fault(part, offset, "cannot be decoded: " + handle_.take_complaint());
   }
   handle_.take_complaint();
 }

@@ -13,6 +13,7 @@
 #include "format/geotiff/layout.hpp"
 #include "raster/nodata.hpp"
 #include "raster/overlay.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
@@ -60,8 +61,7 @@ class GeoTiffBlocks {
   const std::vector<std::byte>& decoded(const Part& part, std::uint64_t offset,
                                         std::uint64_t bytes);
   void decode(const Part& part, std::uint64_t offset, std::uint64_t bytes);
-  [[noreturn]] void fail(const Part& part, std::uint64_t offset, std::string cause,
-                         std::string remedy = {}) const;
+  [[nodiscard]] Error fault(const Part& part, std::uint64_t offset, std::string cause) const;
 
   GeoTiffHandle& handle_;
   GeoTiffLayout layout_;

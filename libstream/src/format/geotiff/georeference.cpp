@@ -64,9 +64,10 @@ std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const G
   // As in GDAL, scale and tie point override the matrix if a file has both, which is not allowed.
   if (scale.size() >= 2 && tie.size() >= 6) {
     if (!all_finite(scale) || !all_finite(tie)) {
-      handle.fail("ModelPixelScale", "is not finite", kSetAgain);
+      throw handle.fault("is not finite").at("ModelPixelScale").remedy(kSetAgain);
     }
-    if (scale[0] == 0 || scale[1] == 0) handle.fail("ModelPixelScale", "is zero", kSetAgain);
+    if (scale[0] == 0 || scale[1] == 0)
+      throw handle.fault("is zero").at("ModelPixelScale").remedy(kSetAgain);
     if (scale[1] < 0) {
       comments.emplace_back("the pixel scale's negative y is read as positive, as in GDAL");
     }
@@ -77,7 +78,9 @@ std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const G
     const WorldTransform world{{matrix[0], matrix[1], matrix[3], matrix[4], matrix[5], matrix[7]}};
     const double determinant = world.xy[0] * world.xy[4] - world.xy[1] * world.xy[3];
     if (!all_finite(matrix) || !std::isfinite(determinant) || determinant == 0) {
-      handle.fail("ModelTransformation", "does not map cells to distinct places", kSetAgain);
+      throw handle.fault("does not map cells to distinct places")
+          .at("ModelTransformation")
+          .remedy(kSetAgain);
     }
     return shifted(world, to_sample);
   }
@@ -122,10 +125,11 @@ void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo&
   place_by_world_file(handle.file(), info);
   const std::size_t points = handle.doubles(kModelTiepoint).size() / 6;
   if (points > 1 && info.world == kPlainWorld) {
-    handle.fail(
-        "ModelTiepoint",
-        "has " + std::to_string(points) + " ground control points instead of a transformation",
-        "rectify it first: gdalwarp");
+    throw handle
+        .fault("has " + std::to_string(points) +
+               " ground control points instead of a transformation")
+        .at("ModelTiepoint")
+        .remedy("rectify it first: gdalwarp");
   }
 }
 

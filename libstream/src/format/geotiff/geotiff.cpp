@@ -48,8 +48,9 @@ class GeoTiffMask {
     if (handle == nullptr) return nullptr;
     std::unique_ptr<GeoTiffMask> mask(new GeoTiffMask(std::move(handle), band, options));
     if (mask->layout_.columns != layout.columns || mask->layout_.rows != layout.rows) {
-      mask->handle_->fail("mask", "is not as large as its raster",
-                          "export both again: gdal_translate");
+      throw mask->handle_->fault("is not as large as its raster")
+          .at("mask")
+          .remedy("export both again: gdal_translate");
     }
     return mask;
   }
@@ -129,8 +130,9 @@ class GeoTiffRaster final : public Raster {
     if (info_.crs.vertical_unit.empty()) info_.crs.vertical_unit = info_.sample.unit;
     if (info_.sample.scale == 0 || !std::isfinite(info_.sample.scale) ||
         !std::isfinite(info_.sample.offset)) {
-      handle_.fail("GDAL_METADATA", "scale or offset of the band is zero or not finite",
-                   "set them again (gdal_edit.py -scale -offset)");
+      throw handle_.fault("scale or offset of the band is zero or not finite")
+          .at("GDAL_METADATA")
+          .remedy("set them again (gdal_edit.py -scale -offset)");
     }
   }
 

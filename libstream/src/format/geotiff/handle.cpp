@@ -118,9 +118,10 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
   struct stat status {};
   if (::fstat(io_->descriptor, &status) != 0) throw system_error(file, "cannot be examined", errno);
   if (!S_ISREG(status.st_mode)) {
-    fail({}, "is not a regular file", "a TIFF is read out of order: save it to a file first");
+    throw fault("is not a regular file")
+        .remedy("a TIFF is read out of order: save it to a file first");
   }
-  if (status.st_size == 0) fail({}, "is empty", "download or export the file again");
+  if (status.st_size == 0) throw fault("is empty").remedy("download or export the file again");
   io_->size = file_bytes_ = static_cast<std::uint64_t>(status.st_size);
 
   // The longest arrays of a directory are the offsets and sizes of blocks: 8 bytes in memory for at
@@ -129,7 +130,7 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
       std::max({memory_bytes, std::min(4 * file_bytes_ + kMiB, 1024 * kMiB), 4 * kMiB});
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(),
                                                                              TIFFOpenOptionsFree);
-  if (options == nullptr) fail({}, "there is no memory to open it");
+  if (options == nullptr) throw fault("there is no memory to open it");
   TIFFOpenOptionsSetMaxSingleMemAlloc(
       options.get(), static_cast<tmsize_t>(std::min<std::uint64_t>(most, INT64_MAX)));
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), on_error, this);
@@ -139,15 +140,17 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
   tiff_ = TIFFClientOpenExt(file.c_str(), "rmhc", io_.get(), Io::read, Io::write, Io::seek,
                             Io::close, Io::size_of_file, nullptr, nullptr, options.get());
   const std::string remedy = "check that it is a complete TIFF file (gdalinfo, tiffinfo)";
-  if (tiff_ == nullptr) fail({}, "is not a TIFF file: " + take_complaint(), remedy);
+  if (tiff_ == nullptr) throw fault("is not a TIFF file: " + take_complaint()).remedy(remedy);
   try {
     for (int directory = 0;; ++directory) {
       warnings_.clear();
       const bool read = TIFFReadDirectory(tiff_) == 1;
       const std::string complaint = take_complaint();
       const std::string where = "directory " + std::to_string(directory);
-      if (!read && complaint.empty()) fail(where, "has no image that is not an overview", remedy);
-      if (!read || is_fatal(complaint)) fail(where, "cannot be read: " + complaint, remedy);
+      if (!read && complaint.empty())
+        throw fault("has no image that is not an overview").at(where).remedy(remedy);
+      if (!read || is_fatal(complaint))
+        throw fault("cannot be read: " + complaint).at(where).remedy(remedy);
       if (!complaint.empty()) warnings_.push_back(complaint);
       const auto kind = value_or<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
       if ((kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == 0) break;
@@ -204,10 +207,10 @@ std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) con
   }
   if (found != 1 || data == nullptr) return {};
   if (TIFFFieldDataType(known) != type) {
-    fail("field " + std::to_string(tag),
-         "has TIFF type " + std::to_string(TIFFFieldDataType(known)) + " instead of " +
-             std::to_string(type),
-         "check that it is a complete GeoTIFF file (gdalinfo)");
+    throw fault("has TIFF type " + std::to_string(TIFFFieldDataType(known)) + " instead of " +
+                std::to_string(type))
+        .at("field " + std::to_string(tag))
+        .remedy("check that it is a complete GeoTIFF file (gdalinfo)");
   }
   const auto size = static_cast<std::size_t>(TIFFDataWidth(static_cast<TIFFDataType>(type)));
   return {static_cast<const std::byte*>(data), count * size};
@@ -232,10 +235,6 @@ std::string GeoTiffHandle::text(std::uint32_t tag) const {
   std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   while (!text.empty() && text.back() == '\0') text.pop_back();
   return text;
-}
-
-void GeoTiffHandle::fail(std::string where, std::string cause, std::string remedy) const {
-  throw Error(file_, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
 }
 
 }  // namespace terrace::stream

@@ -59,7 +59,7 @@ class GeoTiffHandle {
     return found;
   }
 
-  [[noreturn]] void fail(std::string where, std::string cause, std::string remedy = {}) const;
+  [[nodiscard]] Error fault(std::string cause) const { return {file_, std::move(cause)}; }
 
  private:
   struct Io;

@@ -61,20 +61,20 @@ void check_codec(const GeoTiffHandle& handle, const GeoTiffLayout& layout) {
                            std::to_string(layout.compression) + ")";
   const char* remedy = "convert it: gdal_translate -co COMPRESS=DEFLATE -co TILED=YES";
   if (TIFFIsCODECConfigured(layout.compression) == 0) {
-    handle.fail({}, "compression " + name + " is not in this system's libtiff", remedy);
+    throw handle.fault("compression " + name + " is not in this system's libtiff").remedy(remedy);
   }
   switch (layout.compression) {
     case COMPRESSION_OJPEG:
     case COMPRESSION_SGILOG:
     case COMPRESSION_SGILOG24:
-      handle.fail({}, "compression " + name + " is not supported", remedy);
+      throw handle.fault("compression " + name + " is not supported").remedy(remedy);
     default:
       break;
   }
   const auto photometric = handle.value_or<std::uint16_t>(TIFFTAG_PHOTOMETRIC, 1);
   if (photometric == PHOTOMETRIC_YCBCR) {
     if (layout.compression != COMPRESSION_JPEG || layout.separate) {
-      handle.fail({}, "YCbCr colours are not supported", remedy);
+      throw handle.fault("YCbCr colours are not supported").remedy(remedy);
     }
     TIFFSetField(handle.tiff(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
   }
@@ -84,28 +84,28 @@ void read_size(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   const auto columns = handle.value<std::uint32_t>(TIFFTAG_IMAGEWIDTH);
   const auto rows = handle.value<std::uint32_t>(TIFFTAG_IMAGELENGTH);
   if (!columns || !rows || *columns == 0 || *rows == 0) {
-    handle.fail({}, "has no size", "check the file (tiffinfo)");
+    throw handle.fault("has no size").remedy("check the file (tiffinfo)");
   }
   layout.columns = *columns;
   layout.rows = *rows;
   if (layout.columns >= kMostCells || layout.rows >= kMostCells) {
-    handle.fail({},
-                std::to_string(layout.columns) + " x " + std::to_string(layout.rows) +
-                    " cells: columns and rows must each be fewer than 2^30",
-                "split it (gdal_translate -srcwin)");
+    throw handle
+        .fault(std::to_string(layout.columns) + " x " + std::to_string(layout.rows) +
+               " cells: columns and rows must each be fewer than 2^30")
+        .remedy("split it (gdal_translate -srcwin)");
   }
   if (handle.value_or<std::uint32_t>(TIFFTAG_IMAGEDEPTH, 1) > 1) {
-    handle.fail({}, "is a volume (ImageDepth), not a raster");
+    throw handle.fault("is a volume (ImageDepth), not a raster");
   }
 }
 
 void read_sample(const GeoTiffHandle& handle, GeoTiffLayout& layout, int band) {
   layout.bands = handle.value_or<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
-  if (layout.bands == 0) handle.fail({}, "has no bands", "check the file (tiffinfo)");
+  if (layout.bands == 0) throw handle.fault("has no bands").remedy("check the file (tiffinfo)");
   if (band < 1 || static_cast<std::uint32_t>(band) > layout.bands) {
-    handle.fail({},
-                "has no band " + std::to_string(band) + ", only " + std::to_string(layout.bands),
-                "choose another band");
+    throw handle
+        .fault("has no band " + std::to_string(band) + ", only " + std::to_string(layout.bands))
+        .remedy("choose another band");
   }
   layout.band = static_cast<std::uint32_t>(band - 1);
   layout.separate = layout.bands > 1 && handle.value_or<std::uint16_t>(TIFFTAG_PLANARCONFIG, 1) ==
@@ -120,8 +120,9 @@ void read_sample(const GeoTiffHandle& handle, GeoTiffLayout& layout, int band) {
     const std::string format = layout.sample_format < std::size(kFormats)
                                    ? kFormats[layout.sample_format]
                                    : "SampleFormat " + std::to_string(layout.sample_format);
-    handle.fail({}, std::to_string(layout.bits) + "-bit " + format + " samples are not supported",
-                "convert it: gdal_translate -ot Float32");
+    throw handle
+        .fault(std::to_string(layout.bits) + "-bit " + format + " samples are not supported")
+        .remedy("convert it: gdal_translate -ot Float32");
   }
   layout.type = *type;
 }
@@ -139,10 +140,10 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   const char* const what = layout.tiled ? "tile" : "strip";
   if (layout.block_columns == 0 || layout.block_rows == 0 ||
       layout.block_columns > (1u << 31) - 1 || layout.block_rows > (1u << 31) - 1) {
-    handle.fail({},
-                std::string("invalid ") + what + " size " + std::to_string(layout.block_columns) +
-                    " x " + std::to_string(layout.block_rows),
-                "check the file (tiffinfo)");
+    throw handle
+        .fault(std::string("invalid ") + what + " size " + std::to_string(layout.block_columns) +
+               " x " + std::to_string(layout.block_rows))
+        .remedy("check the file (tiffinfo)");
   }
   layout.blocks_across = (layout.columns + layout.block_columns - 1) / layout.block_columns;
   layout.blocks_down = (layout.rows + layout.block_rows - 1) / layout.block_rows;
@@ -153,10 +154,10 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   // `planes`, which is below 2^16.
   if (across * down > handle.file_bytes() || across * down * planes > handle.file_bytes() ||
       across * down * planes > UINT32_MAX) {
-    handle.fail({},
-                "claims " + std::to_string(across) + " x " + std::to_string(down) + " " + what +
-                    "s, more than a file of " + counted(handle.file_bytes(), "byte") + " can list",
-                "the file is damaged or truncated: download it again");
+    throw handle
+        .fault("claims " + std::to_string(across) + " x " + std::to_string(down) + " " + what +
+               "s, more than a file of " + counted(handle.file_bytes(), "byte") + " can list")
+        .remedy("the file is damaged or truncated: download it again");
   }
 }
 

@@ -158,18 +158,19 @@ class AsciiReader {
     columns_ = header_.count("ncols");
     rows_ = header_.count("nrows");
     if (header_.has("byteorder")) {
-      header_.fail({}, "is the header of a binary grid", "name the .flt or .bil next to it");
+      throw header_.fault("is the header of a binary grid")
+          .remedy("name the .flt or .bil next to it");
     }
     if (!header_.has("cellsize") && !(header_.has("dx") && header_.has("dy"))) {
-      header_.fail("cellsize", "is missing");
+      throw header_.fault("is missing").at("cellsize");
     }
     static_cast<void>(grid(ScalarType::f64));  // checks columns and rows
     // Each number has a digit and something between it and the next.
     if (input_.size() && columns_ * rows_ > *input_.size() / 2 + 1) {
-      header_.fail({},
-                   "promises " + std::to_string(columns_) + " x " + std::to_string(rows_) +
-                       " numbers, more than fit into " + counted(*input_.size(), "byte"),
-                   "the file is truncated: download it again");
+      throw header_
+          .fault("promises " + std::to_string(columns_) + " x " + std::to_string(rows_) +
+                 " numbers, more than fit into " + counted(*input_.size(), "byte"))
+          .remedy("the file is truncated: download it again");
     }
   }
 
@@ -201,28 +202,28 @@ class AsciiReader {
       if (cell % kCheckEvery == 0 && stop_.stop_requested()) throw Stopped();
       double value = 0;
       if (word_.empty()) {
-        header_.fail({},
-                     "holds " + counted(cell, "number") + " where " + std::to_string(columns_) +
-                         " x " + std::to_string(rows_) + " are expected",
-                     "the file is truncated: download it again");
+        throw header_
+            .fault("holds " + counted(cell, "number") + " where " + std::to_string(columns_) +
+                   " x " + std::to_string(rows_) + " are expected")
+            .remedy("the file is truncated: download it again");
       }
       if (parse_sample(word_, value) != word_.data() + word_.size()) {
         if (is_void(word_)) {
           value = std::numeric_limits<double>::quiet_NaN();
         } else {
-          header_.fail("row " + std::to_string(cell / columns_) + ", column " +
-                           std::to_string(cell % columns_),
-                       in_quotes(word_) + " is not a number",
-                       "correct it, or make it the NODATA_value if it means no data");
+          throw header_.fault(in_quotes(word_) + " is not a number")
+              .at("row " + std::to_string(cell / columns_) + ", column " +
+                  std::to_string(cell % columns_))
+              .remedy("correct it, or make it the NODATA_value if it means no data");
         }
       }
       if (!take(value)) return;
     }
     if (!word_.empty()) {
-      header_.fail({},
-                   "holds more numbers than the " + std::to_string(columns_) + " x " +
-                       std::to_string(rows_) + " that its header promises",
-                   "correct the header");
+      throw header_
+          .fault("holds more numbers than the " + std::to_string(columns_) + " x " +
+                 std::to_string(rows_) + " that its header promises")
+          .remedy("correct the header");
     }
   }
 
@@ -240,9 +241,10 @@ class AsciiReader {
   /// size of its cells.
   void translate_grass_header() {
     const auto coordinate = [&](const char* key) {
-      if (!header_.has(key)) header_.fail(key, "is missing");
+      if (!header_.has(key)) throw header_.fault("is missing").at(key);
       const std::optional<double> value = grass_coordinate(header_.text(key));
-      if (!value) header_.fail(key, "is " + in_quotes(header_.text(key)) + ", not a coordinate");
+      if (!value)
+        throw header_.fault("is " + in_quotes(header_.text(key)) + ", not a coordinate").at(key);
       return *value;
     };
     const auto set = [&](const char* key, double value) {
@@ -253,10 +255,10 @@ class AsciiReader {
     const double north = coordinate("north:"), south = coordinate("south:"),
                  east = coordinate("east:"), west = coordinate("west:");
     const std::uint64_t columns = header_.count("cols:"), rows = header_.count("rows:");
-    if (columns == 0 || rows == 0) header_.fail("rows:", "the grid has no cells");
+    if (columns == 0 || rows == 0) throw header_.fault("the grid has no cells").at("rows:");
     const double width = (east - west) / static_cast<double>(columns);
     const double height = (north - south) / static_cast<double>(rows);
-    if (!(width > 0 && height > 0)) header_.fail("north:", "the borders enclose no area");
+    if (!(width > 0 && height > 0)) throw header_.fault("the borders enclose no area").at("north:");
     header_.set("ncols", header_.text("cols:"));
     header_.set("nrows", header_.text("rows:"));
     set("dx", width);
@@ -265,7 +267,7 @@ class AsciiReader {
     set("ulymap", north - height / 2);
     header_.set("nodata_value", header_.has("null:") ? header_.text("null:") : "*");
     scale_ = header_.number("multiplier:").value_or(1);
-    if (scale_ == 0) header_.fail("multiplier:", "is zero");
+    if (scale_ == 0) throw header_.fault("is zero").at("multiplier:");
   }
 
   static constexpr std::uint64_t kCheckEvery = 1u << 16;

@@ -27,7 +27,7 @@ constexpr std::uint64_t kMostHeaderBytes = 64u << 10;
 std::string text_of(const fs::path& path) {
   const std::unique_ptr<ByteSource> bytes = open_file(path);
   if (bytes->size() > kMostHeaderBytes) {
-    refuse_grid(path.string(), {}, "is not the header of a grid: it is longer than 64 KiB");
+    throw grid_fault(path.string(), "is not the header of a grid: it is longer than 64 KiB");
   }
   std::string text(bytes->size(), '\0');
   bytes->read(0, std::as_writable_bytes(std::span(text)));
@@ -49,10 +49,11 @@ ScalarType sample_type_of(const GridHeader& header, bool floats) {
   if (!has_floats && bits == 8) return is_signed ? ScalarType::i8 : ScalarType::u8;
   if (!has_floats && bits == 16) return is_signed ? ScalarType::i16 : ScalarType::u16;
   if (!has_floats && bits == 32) return is_signed ? ScalarType::i32 : ScalarType::u32;
-  header.fail(
-      "nbits",
-      "is " + std::to_string(bits) + (has_floats ? " for floats" : "") + ", which is not supported",
-      "convert it: gdal_translate FILE out.tif");
+  throw header
+      .fault("is " + std::to_string(bits) + (has_floats ? " for floats" : "") +
+             ", which is not supported")
+      .at("nbits")
+      .remedy("convert it: gdal_translate FILE out.tif");
 }
 
 std::endian order_of(const GridHeader& header) {
@@ -60,13 +61,14 @@ std::endian order_of(const GridHeader& header) {
   if (order.empty()) return std::endian::native;
   if (order.starts_with('i') || order.starts_with('l')) return std::endian::little;
   if (order.starts_with('m')) return std::endian::big;
-  header.fail("byteorder", "is " + in_quotes(order) + ", neither I (LSBFIRST) nor M (MSBFIRST)");
+  throw header.fault("is " + in_quotes(order) + ", neither I (LSBFIRST) nor M (MSBFIRST)")
+      .at("byteorder");
 }
 
 /// The product of two sizes. Throws: Error if it is too large, because headers may claim anything.
 std::uint64_t product(const GridHeader& header, const std::string& key, std::uint64_t a,
                       std::uint64_t b) {
-  if (b != 0 && a > (std::uint64_t{1} << 62) / b) header.fail(key, "is too large");
+  if (b != 0 && a > (std::uint64_t{1} << 62) / b) throw header.fault("is too large").at(key);
   return a * b;
 }
 
@@ -113,7 +115,8 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
 
   constexpr std::uint64_t kMostBands = 65535;
   const std::uint64_t bands = header.count("nbands", 1);
-  if (bands == 0 || bands > kMostBands) header.fail("nbands", "is not between 1 and 65535");
+  if (bands == 0 || bands > kMostBands)
+    throw header.fault("is not between 1 and 65535").at("nbands");
   check_band(file, band, bands);
   const auto before = static_cast<std::uint64_t>(band - 1);
   const std::string layout = lower_case(header.text("layout"));
@@ -133,10 +136,10 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
         header.count("totalrowbytes", product(header, "bandrowbytes", bands, band_row));
     band_start = product(header, "bandrowbytes", before, band_row);
   } else {
-    header.fail("layout", "is " + in_quotes(layout) + ", not BIL, BIP or BSQ");
+    throw header.fault("is " + in_quotes(layout) + ", not BIL, BIP or BSQ").at("layout");
   }
   if (grid.row_bytes < ((columns - 1) * grid.sample_step + 1) * size) {
-    header.fail("totalrowbytes", "is less than the size of a row");
+    throw header.fault("is less than the size of a row").at("totalrowbytes");
   }
   grid.first += band_start;
   grid.info.world = header.world(rows, grid.info.comments);
@@ -146,8 +149,8 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
 std::unique_ptr<Raster> open_binary_grid(const std::string& file, const RasterOptions& options) {
   const fs::path header_file = binary_header_of(file);
   if (header_file.empty()) {
-    refuse_grid(file, {}, "has no header file next to it (.hdr)",
-                "download that too: it has the size, type and place of the grid");
+    throw grid_fault(file, "has no header file next to it (.hdr)")
+        .remedy("download that too: it has the size, type and place of the grid");
   }
   const GridHeader header = read_binary_header(header_file.string(), text_of(header_file));
   const bool floats = lower_case(fs::path(file).extension().string()) == ".flt";

@@ -27,7 +27,7 @@ std::optional<double> GridHeader::number(const std::string& key) const {
   double value = 0;
   const char* const end = digits.data() + digits.size();
   if (parse_real(digits.data(), end, value) != end || !std::isfinite(value)) {
-    fail(key, "is " + in_quotes(text(key)) + ", not a number");
+    throw fault("is " + in_quotes(text(key)) + ", not a number").at(key);
   }
   return value;
 }
@@ -36,9 +36,9 @@ std::uint64_t GridHeader::count(const std::string& key,
                                 std::optional<std::uint64_t> otherwise) const {
   const std::optional<double> value = number(key);
   if (!value && otherwise) return *otherwise;
-  if (!value) fail(key, "is missing");
+  if (!value) throw fault("is missing").at(key);
   if (!(*value >= 0 && *value < 0x1p53) || *value != std::floor(*value)) {
-    fail(key, "is " + in_quotes(text(key)) + ", not a count");
+    throw fault("is " + in_quotes(text(key)) + ", not a count").at(key);
   }
   return static_cast<std::uint64_t>(*value);
 }
@@ -53,26 +53,25 @@ WorldTransform GridHeader::world(std::uint64_t rows, std::vector<std::string>& c
   };
   const double width = first_of({"xdim", "dx", "cellsize"}).value_or(1);
   const double height = first_of({"ydim", "dy", "cellsize"}).value_or(1);
-  if (!(width > 0 && height > 0)) fail("cellsize", "is not positive");
+  if (!(width > 0 && height > 0)) throw fault("is not positive").at("cellsize");
   const double below = static_cast<double>(rows - 1) * height;
   std::optional<double> x = first_of({"ulxmap", "xllcenter"}), y = number("ulymap");
   if (const auto corner = number("xllcorner"); corner && !x) x = *corner + width / 2;
   if (const auto center = number("yllcenter"); center && !y) y = *center + below;
   if (const auto corner = number("yllcorner"); corner && !y) y = *corner + below + height / 2;
   if (x.has_value() != y.has_value()) {
-    fail(x ? "yllcorner" : "xllcorner", "is missing, but the other one is given");
+    throw fault("is missing, but the other one is given").at(x ? "yllcorner" : "xllcorner");
   }
   if (!x) {
     comments.push_back(kNoGeoreferencing);
     return kPlainWorld;
   }
-  if (!std::isfinite(*x) || !std::isfinite(*y)) fail("cellsize", "is too large");
+  if (!std::isfinite(*x) || !std::isfinite(*y)) throw fault("is too large").at("cellsize");
   return {{width, 0, *x, 0, -height, *y}};
 }
 
-void GridHeader::fail(const std::string& key, const std::string& cause,
-                      const std::string& remedy) const {
-  throw Error(file_, cause).at(key).remedy(remedy);
+Error GridHeader::fault(std::string cause) const {
+  return Error(file_, std::move(cause)).remedy("correct the header");
 }
 
 }  // namespace terrace::stream

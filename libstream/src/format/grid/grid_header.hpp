@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/schema.hpp"
 
 namespace terrace::stream {
@@ -37,8 +38,7 @@ class GridHeader {
   /// size is not positive.
   [[nodiscard]] WorldTransform world(std::uint64_t rows, std::vector<std::string>& comments) const;
 
-  [[noreturn]] void fail(const std::string& key, const std::string& cause,
-                         const std::string& remedy = "correct the header") const;
+  [[nodiscard]] Error fault(std::string cause) const;
 
  private:
   std::string file_;

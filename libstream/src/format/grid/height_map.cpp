@@ -163,9 +163,8 @@ bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
 
 [[noreturn]] void complain(const std::string& file, const PngReading& reading) {
   if (reading.error) std::rethrow_exception(reading.error);
-  refuse_grid(file, {},
-              std::string("cannot be read as PNG: ") +
-                  (reading.message[0] == '\0' ? "out of memory" : reading.message));
+  throw grid_fault(file, std::string("cannot be read as PNG: ") +
+                             (reading.message[0] == '\0' ? "out of memory" : reading.message));
 }
 
 std::unique_ptr<Spool> decode_rows(const std::string& file, std::uint64_t row_bytes) {
@@ -205,16 +204,15 @@ void check_size(const std::string& file, const PngHead& image, std::uint64_t pac
                                                                                            : 1U);
   const std::uint64_t stored = image.columns * bits / 8 + 1;
   if (image.rows > packed * kDeflateGrowth / stored) {
-    refuse_grid(file, {},
-                "claims " + std::to_string(image.columns) + " x " + std::to_string(image.rows) +
-                    " pixels, which do not fit into " + counted(packed, "packed byte"));
+    throw grid_fault(file, "claims " + std::to_string(image.columns) + " x " +
+                               std::to_string(image.rows) + " pixels, which do not fit into " +
+                               counted(packed, "packed byte"));
   }
   // libpng holds two rows besides ours.
   if (row_bytes > memory_bytes / 4) {
-    refuse_grid(file, {},
-                "its rows need " + std::to_string((row_bytes >> 18) + 1) + " MiB, the limit is " +
-                    std::to_string(memory_bytes >> 20) + " MiB",
-                "allow more memory, or convert it: gdal_translate -co TILED=YES FILE out.tif");
+    throw grid_fault(file, "its rows need " + std::to_string((row_bytes >> 18) + 1) +
+                               " MiB, the limit is " + std::to_string(memory_bytes >> 20) + " MiB")
+        .remedy("allow more memory, or convert it: gdal_translate -co TILED=YES FILE out.tif");
   }
 }
 
@@ -239,14 +237,15 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
   const bool grey = image.colour_type == PNG_COLOR_TYPE_GRAY;
   const HeightsOfColour colours = options.heights_of_colour;
   if (!grey && colours == HeightsOfColour::none) {
-    refuse_grid(
-        file, {}, "is a colour picture, not a height map",
-        "if its colours encode heights, set `heights_of_colour` to mapbox or terrarium; otherwise "
-        "look for the GeoTIFF");
+    throw grid_fault(file, "is a colour picture, not a height map")
+        .remedy(
+            "if its colours encode heights, set `heights_of_colour` to mapbox or terrarium; "
+            "otherwise "
+            "look for the GeoTIFF");
   }
   if (colours != HeightsOfColour::none &&
       (grey || image.bits == 16 || image.colour_type == PNG_COLOR_TYPE_GRAY_ALPHA)) {
-    refuse_grid(file, {}, "has no 8-bit colours", "leave `heights_of_colour` out");
+    throw grid_fault(file, "has no 8-bit colours").remedy("leave `heights_of_colour` out");
   }
   const ScalarType type = !grey              ? ScalarType::u32
                           : image.bits == 16 ? ScalarType::u16

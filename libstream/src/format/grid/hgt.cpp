@@ -69,9 +69,9 @@ std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, st
   const auto side =
       static_cast<std::uint64_t>(std::lround(std::sqrt(static_cast<double>(bytes) / 2)));
   if (side < 2 || side > (1u << 20) || bytes != 2 * side * side) {
-    refuse_grid(file, {},
-                "has " + counted(bytes, "byte") + ", which is not a square of 16-bit samples",
-                "the file is truncated or not an SRTM tile: download it again");
+    throw grid_fault(file,
+                     "has " + counted(bytes, "byte") + ", which is not a square of 16-bit samples")
+        .remedy("the file is truncated or not an SRTM tile: download it again");
   }
   return {side, side};
 }
@@ -83,8 +83,9 @@ PlainGrid describe_tile(const std::string& file, const std::string& packed_name,
   std::optional<Corner> corner = corner_of(packed_name);
   if (!corner) corner = corner_of(file);
   if (!corner) {
-    refuse_grid(file, packed_name, "its name does not show its place",
-                "rename it after its south-west corner, such as N46E008.hgt");
+    throw grid_fault(file, "its name does not show its place")
+        .at(packed_name)
+        .remedy("rename it after its south-west corner, such as N46E008.hgt");
   }
   const auto [columns, rows] = size_of_tile(file, bytes);
   PlainGrid grid = plain_grid("hgt", file, columns, rows, ScalarType::i16, "-32768");

@@ -71,10 +71,10 @@ class PlainRaster final : public Raster {
     const std::uint64_t row = ((info.columns - 1) * grid_.sample_step + 1) * size_;
     const std::uint64_t present = bytes_->size() > grid_.first ? bytes_->size() - grid_.first : 0;
     if (present >= row && (present - row) / grid_.row_bytes >= info.rows - 1) return;
-    refuse_grid(bytes_->name(), {},
-                "has " + counted(bytes_->size(), "byte") + ", too few for " +
-                    std::to_string(info.columns) + " x " + std::to_string(info.rows) +
-                    " samples of " + std::string(name_of(info.sample.type)));
+    throw grid_fault(bytes_->name(), "has " + counted(bytes_->size(), "byte") + ", too few for " +
+                                         std::to_string(info.columns) + " x " +
+                                         std::to_string(info.rows) + " samples of " +
+                                         std::string(name_of(info.sample.type)));
   }
 
   PlainGrid grid_;
@@ -86,18 +86,17 @@ class PlainRaster final : public Raster {
 
 }  // namespace
 
-void refuse_grid(const std::string& file, std::string where, std::string cause,
-                 std::string remedy) {
-  throw Error(file, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
+Error grid_fault(std::string file, std::string cause) {
+  return Error(std::move(file), std::move(cause)).remedy(kFetchAgain);
 }
 
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,
                      std::uint64_t rows, ScalarType type, const std::string& nodata) {
   if (columns == 0 || rows == 0 || columns >= kMostGridCells || rows >= kMostGridCells) {
-    refuse_grid(file, {},
-                std::to_string(columns) + " x " + std::to_string(rows) +
-                    " cells: columns and rows must each be at least 1 and fewer than 2^30",
-                "check its header, or split it (gdal_translate -srcwin)");
+    throw grid_fault(file,
+                     std::to_string(columns) + " x " + std::to_string(rows) +
+                         " cells: columns and rows must each be at least 1 and fewer than 2^30")
+        .remedy("check its header, or split it (gdal_translate -srcwin)");
   }
   PlainGrid grid;
   grid.info.format = std::move(format);
@@ -122,8 +121,8 @@ void set_nodata(const std::string& text, PlainGrid& grid) {
 
 void check_band(const std::string& file, int band, std::uint64_t bands) {
   if (band >= 1 && static_cast<std::uint64_t>(band) <= bands) return;
-  refuse_grid(file, {}, "has no band " + std::to_string(band) + ", only " + std::to_string(bands),
-              "choose another band");
+  throw grid_fault(file, "has no band " + std::to_string(band) + ", only " + std::to_string(bands))
+      .remedy("choose another band");
 }
 
 std::unique_ptr<Raster> open_plain_grid(PlainGrid grid, std::unique_ptr<ByteSource> bytes) {

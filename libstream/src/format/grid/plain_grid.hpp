@@ -10,6 +10,7 @@
 
 #include "raster/nodata.hpp"
 #include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
@@ -30,9 +31,8 @@ inline constexpr const char* kFetchAgain = "the file is damaged or truncated: do
 /// Maximum expansion factor of Deflate.
 inline constexpr std::uint64_t kDeflateGrowth = 1032;
 
-/// Throws: Error, always.
-[[noreturn]] void refuse_grid(const std::string& file, std::string where, std::string cause,
-                              std::string remedy = kFetchAgain);
+/// Returns an Error with the remedy kFetchAgain.
+Error grid_fault(std::string file, std::string cause);
 
 /// Describes a grid of one file: format, name, size, sample type and nodata (as the file's text).
 /// Rows are contiguous. Throws: Error if it has no cells, or 2^30 or more columns or rows.

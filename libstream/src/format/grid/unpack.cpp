@@ -23,9 +23,9 @@ constexpr std::size_t kUnpackBytes = 256u << 10;
 void check_growth(const std::string& file, const std::string& where, std::uint64_t packed,
                   std::uint64_t unpacked) {
   if (unpacked / kDeflateGrowth <= packed) return;
-  refuse_grid(
-      file, where,
-      "states " + counted(unpacked, "byte") + ", too many for " + counted(packed, "packed byte"));
+  throw grid_fault(file, "states " + counted(unpacked, "byte") + ", too many for " +
+                             counted(packed, "packed byte"))
+      .at(where);
 }
 
 /// Collects unpacked bytes, never more than stated.
@@ -35,19 +35,19 @@ class Unpacked {
       : file_(file), packed_(packed), spool_(std::make_unique<Spool>(file)) {}
 
   void append(std::span<const std::byte> bytes) {
-    if (bytes.size() > packed_.size - spool_->size()) differs("more");
+    if (bytes.size() > packed_.size - spool_->size()) throw differs("more");
     spool_->append(bytes);
   }
   std::unique_ptr<ByteSource> take() {
-    if (spool_->size() != packed_.size) differs("fewer");
+    if (spool_->size() != packed_.size) throw differs("fewer");
     return std::move(spool_);
   }
 
  private:
-  [[noreturn]] void differs(const char* relation) const {
-    refuse_grid(file_, packed_.name,
-                "unpacks to " + std::string(relation) + " than the " +
-                    counted(packed_.size, "byte") + " that it states");
+  [[nodiscard]] Error differs(const char* relation) const {
+    return grid_fault(file_, "unpacks to " + std::string(relation) + " than the " +
+                                 counted(packed_.size, "byte") + " that it states")
+        .at(packed_.name);
   }
 
   const std::string& file_;
@@ -65,7 +65,7 @@ ZipArchive::ZipArchive(const std::string& file) : file_(file) {
     zip_error_init_with_code(&reason, error);
     const std::string text = zip_error_strerror(&reason);
     zip_error_fini(&reason);
-    refuse_grid(file, "zip", text);
+    throw grid_fault(file, text).at("zip");
   }
 }
 
@@ -86,7 +86,8 @@ std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
     found.push_back({.name = status.name, .size = status.size, .number = number});
   }
   if (found.empty()) {
-    refuse_grid(file_, {}, "has no " + std::string(ending) + " file", "unpack it: 'unzip FILE'");
+    throw grid_fault(file_, "has no " + std::string(ending) + " file")
+        .remedy("unpack it: 'unzip FILE'");
   }
   return found;
 }
@@ -94,7 +95,7 @@ std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
 std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
   zip_file_t* const member = zip_fopen_index(archive_, packed.number, 0);
   if (member == nullptr) {
-    refuse_grid(file_, packed.name, zip_strerror(archive_), "unpack it yourself");
+    throw grid_fault(file_, zip_strerror(archive_)).at(packed.name).remedy("unpack it yourself");
   }
   struct Close {
     void operator()(zip_file_t* open) const { zip_fclose(open); }
@@ -105,7 +106,7 @@ std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
   for (;;) {
     const zip_int64_t got = zip_fread(member, piece.data(), piece.size());
     if (got < 0) {
-      refuse_grid(file_, packed.name, zip_error_strerror(zip_file_get_error(member)));
+      throw grid_fault(file_, zip_error_strerror(zip_file_get_error(member))).at(packed.name);
     }
     if (got == 0) return unpacked.take();
     unpacked.append({piece.data(), static_cast<std::size_t>(got)});
@@ -115,7 +116,7 @@ std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
 PackedFile find_in_gzip(const std::string& file) {
   const std::unique_ptr<ByteSource> bytes = open_file(file);
   constexpr std::uint64_t kLeast = 18;  // a header of 10 bytes and a trailer of 8
-  if (bytes->size() < kLeast) refuse_grid(file, "gzip", "is truncated");
+  if (bytes->size() < kLeast) throw grid_fault(file, "is truncated").at("gzip");
   std::array<std::byte, 4> trailer{};
   bytes->read(bytes->size() - trailer.size(), trailer);
   PackedFile packed;
@@ -142,7 +143,7 @@ std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFil
     if (stream.avail_in == 0) {
       const auto more =
           static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), bytes->size() - at));
-      if (more == 0) refuse_grid(file, "gzip", "is truncated");
+      if (more == 0) throw grid_fault(file, "is truncated").at("gzip");
       bytes->read(at, {in.data(), more});
       at += more;
       stream.next_in = reinterpret_cast<Bytef*>(in.data());
@@ -152,8 +153,9 @@ std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFil
     stream.avail_out = static_cast<uInt>(out.size());
     state = inflate(&stream, Z_NO_FLUSH);
     if (state != Z_OK && state != Z_STREAM_END && state != Z_BUF_ERROR) {
-      refuse_grid(file, "gzip",
-                  "is damaged: " + std::string(stream.msg == nullptr ? "zlib" : stream.msg));
+      throw grid_fault(file,
+                       "is damaged: " + std::string(stream.msg == nullptr ? "zlib" : stream.msg))
+          .at("gzip");
     }
     unpacked.append({out.data(), out.size() - stream.avail_out});
   }

@@ -74,7 +74,7 @@ struct Head {
 
 Head head_of(std::string_view record, const std::string& file) {
   const auto not_a_number = [&](std::size_t at, const char* what) {
-    refuse_grid(file, "byte " + std::to_string(at), std::string(what) + " is not a number");
+    throw grid_fault(file, std::string(what) + " is not a number").at_byte(at);
   };
   const auto integer = [&](std::size_t at, const char* what) {
     const auto value = integer_in(record.substr(at, kInteger));
@@ -92,8 +92,8 @@ Head head_of(std::string_view record, const std::string& file) {
   head.ground_unit = integer(kGroundUnit, "the unit of the ground");
   head.feet = integer(kHeightUnit, "the unit of heights") == 1;
   if (integer(kPattern, "the pattern") != 1 || integer(kSides, "the number of sides") != 4) {
-    refuse_grid(file, {}, "is not a regular grid with four sides",
-                "convert it: gdal_translate FILE out.tif");
+    throw grid_fault(file, "is not a regular grid with four sides")
+        .remedy("convert it: gdal_translate FILE out.tif");
   }
   head.ground = system == 0 || head.ground_unit == 3 ? Head::Ground::seconds
                 : system == 1                        ? Head::Ground::utm
@@ -106,7 +106,7 @@ Head head_of(std::string_view record, const std::string& file) {
   head.height = real(kResolution + kShortReal, kShortReal, "the resolution in y");
   head.step = real(kResolution + 2 * kShortReal, kShortReal, "the resolution of heights");
   if (!(head.width > 0 && head.height > 0 && head.step > 0)) {
-    refuse_grid(file, "byte " + std::to_string(kResolution), "a resolution is not positive");
+    throw grid_fault(file, "a resolution is not positive").at_byte(kResolution);
   }
   head.west = std::min(corners[0], corners[2]);
   head.south = std::min(corners[1], corners[7]);
@@ -119,7 +119,7 @@ Head head_of(std::string_view record, const std::string& file) {
   }
   const double rows = std::floor((head.north - head.south) / head.height + 1.5);
   if (!(rows >= 1 && rows <= kMostRows)) {
-    refuse_grid(file, {}, "its corners leave no rows, or too many");
+    throw grid_fault(file, "its corners leave no rows, or too many");
   }
   head.rows = static_cast<std::uint64_t>(rows);
   head.south = head.north - (rows - 1) * head.height;
@@ -166,13 +166,13 @@ class Fields {
   std::int32_t integer(const char* what) {
     const std::string_view field = next(kInteger);
     const auto value = integer_in(field);
-    if (!value) refuse(field, what);
+    if (!value) throw unreadable(field, what);
     return *value;
   }
   double real(const char* what) {
     const std::string_view field = next(kReal);
     const auto value = real_in(field);
-    if (!value) refuse(field, what);
+    if (!value) throw unreadable(field, what);
     return *value;
   }
 
@@ -201,10 +201,10 @@ class Fields {
     last_ = static_cast<std::size_t>(end - begin);
     return window.substr(0, last_);
   }
-  [[noreturn]] void refuse(std::string_view field, const char* what) const {
-    const std::string where = "byte " + std::to_string(input_.offset());
-    if (field.empty()) refuse_grid(file_, where, std::string("the file ends before a ") + what);
-    refuse_grid(file_, where, in_quotes(field) + " is not a " + what);
+  [[nodiscard]] Error unreadable(std::string_view field, const char* what) const {
+    return grid_fault(file_, field.empty() ? std::string("the file ends before a ") + what
+                                           : in_quotes(field) + " is not a " + what)
+        .at_byte(input_.offset());
   }
 
   Input& input_;
@@ -265,13 +265,13 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
     // A quadrangle fills most of its grid, so a nearly empty grid is a forgery.
     constexpr std::uint64_t kMostRowsPerByte = 1;
     if (column * head.rows > kMostRowsPerByte * input.offset()) {
-      refuse_grid(file, where, "the grid has hardly any samples");
+      throw grid_fault(file, "the grid has hardly any samples").at(where);
     }
     fields.integer("number of a row");
     fields.integer("number of a profile");
     const std::int32_t samples = fields.integer("number of samples");
     if (fields.integer("number of columns") != 1 || samples < 0) {
-      refuse_grid(file, where, "is not one column of samples");
+      throw grid_fault(file, "is not one column of samples").at(where);
     }
     const double x = fields.real("coordinate"), y = fields.real("coordinate");
     const double datum = fields.real("local datum");
@@ -279,15 +279,16 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
     fields.real("greatest height");
     if (column == 0) west = x;
     if (!(std::abs(x - west - static_cast<double>(column) * head.width) < head.width)) {
-      refuse_grid(file, where, "is not next to the previous one");
+      throw grid_fault(file, "is not next to the previous one").at(where);
     }
     const double offset = datum / head.step;
     if (std::abs(offset) > 1e9 || std::abs(offset - std::round(offset)) > 1e-6) {
-      refuse_grid(file, where, "its local datum is not a multiple of the resolution of heights",
-                  "convert it: gdal_translate FILE out.tif");
+      throw grid_fault(file, "its local datum is not a multiple of the resolution of heights")
+          .at(where)
+          .remedy("convert it: gdal_translate FILE out.tif");
     }
     const double up = std::floor((y - head.south) / head.height + 0.5);
-    if (!(std::abs(up) < 0x1p31)) refuse_grid(file, where, "is outside the grid");
+    if (!(std::abs(up) < 0x1p31)) throw grid_fault(file, "is outside the grid").at(where);
     spool.begin(column);
     for (std::int32_t i = 0; i < samples; ++i) {
       const std::int32_t raw = fields.integer("height");
@@ -328,7 +329,7 @@ std::unique_ptr<Raster> open_usgs_dem(const std::string& file, const std::stop_t
   Input input(file, stop);
   const std::string_view record = input.fill(kRecord);
   if (record.size() < kOldEnd) {
-    refuse_grid(input.name(), {}, "is shorter than the header of a USGS DEM");
+    throw grid_fault(input.name(), "is shorter than the header of a USGS DEM");
   }
   // In the old form, record B follows immediately if there is no padding.
   const std::string_view rest =

@@ -28,9 +28,8 @@ constexpr std::size_t kUserBytes = 16;
 constexpr std::uint64_t kMostEvlrBytes = 1u << 20;
 constexpr std::uint64_t kMostEvlrs = 1u << 16;
 
-[[noreturn]] void fail(const Input& input, std::string where, std::string cause,
-                       std::string remedy = kBadHeader) {
-  throw Error(input.name(), std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
+Error header_fault(const Input& input, std::string cause) {
+  return Error(input.name(), std::move(cause)).at("header").remedy(kBadHeader);
 }
 
 std::string text_of_field(const char* at, std::size_t bytes) {
@@ -62,7 +61,8 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
       return;
     }
     const std::string_view head = input.fill(kLasVlrHeaderBytes);
-    if (head.size() < kLasVlrHeaderBytes) fail(input, "VLR " + std::to_string(i), "the file ends");
+    if (head.size() < kLasVlrHeaderBytes)
+      throw header_fault(input, "the file ends").at("VLR " + std::to_string(i));
     LasVlr record{.user = text_of_field(head.data() + 2, kUserBytes),
                   .id = load_little_endian<std::uint16_t>(head.data() + 18),
                   .data = {}};
@@ -74,11 +74,13 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
     }
     input.consume(kLasVlrHeaderBytes);
     if (!is_used(record)) {
-      if (!input.skip(bytes)) fail(input, "VLR " + std::to_string(i), "the file ends");
+      if (!input.skip(bytes))
+        throw header_fault(input, "the file ends").at("VLR " + std::to_string(i));
       continue;
     }
     const std::string_view data = input.fill(bytes);
-    if (data.size() < bytes) fail(input, "VLR " + std::to_string(i), "the file ends");
+    if (data.size() < bytes)
+      throw header_fault(input, "the file ends").at("VLR " + std::to_string(i));
     record.data = data.substr(0, bytes);
     input.consume(bytes);
     header.vlrs.push_back(std::move(record));
@@ -188,29 +190,27 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
                           const OnDamage& on_damage) {
   std::string_view head = input.fill(kLasFirstBytes);
   if (!head.starts_with("LASF")) {
-    fail(input, "header", "does not begin with 'LASF'", "this is not a LAS file");
+    throw header_fault(input, "does not begin with 'LASF'").remedy("this is not a LAS file");
   }
-  if (head.size() < kLasFirstBytes) fail(input, "header", "the file ends in its header");
+  if (head.size() < kLasFirstBytes) throw header_fault(input, "the file ends in its header");
   LasHeader header;
   const auto major = static_cast<unsigned char>(head[24]);
   header.minor = static_cast<unsigned char>(head[25]);
   if (major != 1 || header.minor > 4) {
-    fail(input, "header",
-         "is LAS " + std::to_string(major) + "." + std::to_string(header.minor) +
-             "; versions 1.0 to 1.4 are read",
-         "convert it, e.g. 'pdal translate FILE out.las'");
+    throw header_fault(input, "is LAS " + std::to_string(major) + "." +
+                                  std::to_string(header.minor) + "; versions 1.0 to 1.4 are read")
+        .remedy("convert it, e.g. 'pdal translate FILE out.las'");
   }
   const std::size_t header_bytes = load_little_endian<std::uint16_t>(head.data() + 94);
   const std::size_t least = header.minor == 4   ? kLas14HeaderBytes
                             : header.minor == 3 ? std::size_t{235}
                                                 : kLasFirstBytes;
   if (header_bytes < least) {
-    fail(input, "header",
-         "says that it has " + counted(header_bytes, "byte") + "; LAS 1." +
-             std::to_string(header.minor) + " has " + std::to_string(least));
+    throw header_fault(input, "says that it has " + counted(header_bytes, "byte") + "; LAS 1." +
+                                  std::to_string(header.minor) + " has " + std::to_string(least));
   }
   head = input.fill(header_bytes);
-  if (head.size() < header_bytes) fail(input, "header", "the file ends in its header");
+  if (head.size() < header_bytes) throw header_fault(input, "the file ends in its header");
   const char* const at = head.data();
 
   const unsigned encoding = load_little_endian<std::uint16_t>(at + 6);
@@ -239,20 +239,20 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   input.consume(header_bytes);
 
   if (header.point_format > kLastLasPointFormat) {
-    fail(input, "header",
-         "point format " + std::to_string(header.point_format) + " is not known; 0 to 10 are");
+    throw header_fault(input, "point format " + std::to_string(header.point_format) +
+                                  " is not known; 0 to 10 are");
   }
   const std::size_t record = las_record_bytes(header.point_format);
   if (header.record_bytes < record) {
-    fail(input, "header",
-         "records of point format " + std::to_string(header.point_format) + " take " +
-             counted(record, "byte") + ", not " + std::to_string(header.record_bytes));
+    throw header_fault(input, "records of point format " + std::to_string(header.point_format) +
+                                  " take " + counted(record, "byte") + ", not " +
+                                  std::to_string(header.record_bytes));
   }
   if (header.points_offset < header_bytes) {
-    fail(input, "header", "the points begin inside the header");
+    throw header_fault(input, "the points begin inside the header");
   }
   if (!has_lattice(header)) {
-    fail(input, "header", "the scale is not positive, or scale or offset are not finite");
+    throw header_fault(input, "the scale is not positive, or scale or offset are not finite");
   }
   if (header.scale[0] != header.scale[1]) {
     comments.emplace_back(
@@ -261,11 +261,11 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   if (const auto size = input.size(); size && !header.compressed && !on_damage) {
     const std::uint64_t left = *size - std::min(*size, header.points_offset);
     if (header.points > left / header.record_bytes) {
-      fail(input, "byte " + std::to_string(header.points_offset),
-           "the header promises " + counted(header.points, "point") + " of " +
-               counted(header.record_bytes, "byte") + ", but only " + counted(left, "byte") +
-               (left == 1 ? " is" : " are") + " left",
-           "the file is truncated or its header is wrong: download it again");
+      throw header_fault(input, "the header promises " + counted(header.points, "point") + " of " +
+                                    counted(header.record_bytes, "byte") + ", but only " +
+                                    counted(left, "byte") + (left == 1 ? " is" : " are") + " left")
+          .at_byte(header.points_offset)
+          .remedy("the file is truncated or its header is wrong: download it again");
     }
     // EVLRs or packets of waveforms may follow the points.
     const std::uint64_t others = evlrs > 0 ? evlr_offset : *size;
@@ -287,7 +287,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
     header.unread_evlrs = evlrs > 0;
   }
   if (!input.skip(header.points_offset - input.offset())) {
-    fail(input, "byte " + std::to_string(input.offset()), "the file ends before its points");
+    throw header_fault(input, "the file ends before its points").at_byte(input.offset());
   }
   return header;
 }
@@ -304,8 +304,8 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
   by_wkt.wkt = wkt_of_records(header, comments);
   if (header.wkt && by_wkt.wkt.empty() && header.unread_evlrs) {
     throw Error(name,
-                "the record of its coordinate reference system (an EVLR) follows the "
-                "points, so it cannot be read from a pipe")
+                "the record of its coordinate reference system (an EVLR) follows the points, so it "
+                "cannot be read from a pipe")
         .remedy("name the file, or the system: `crs` EPSG:n");
   }
   if (header.wkt && !by_wkt.wkt.empty()) return by_wkt;

@@ -41,7 +41,7 @@ class LazChunkReader final : public PartReader {
       }
       return step.points * file_->layout.vlr.record_length();
     } catch (const laz::Corrupt& error) {
-      fail_chunk(file_->bytes->name(), number_, begin() + error.offset(), error.what());
+      throw chunk_fault(file_->bytes->name(), number_, begin() + error.offset(), error.what());
     }
   }
 
@@ -59,14 +59,12 @@ class LazChunkReader final : public PartReader {
 
 }  // namespace
 
-void fail_laz(const std::string& file, std::string where, std::string cause) {
-  throw Error(file, std::move(cause))
-      .at(std::move(where))
-      .remedy("the file is damaged: download it again");
+Error laz_fault(std::string file, std::string cause) {
+  return Error(std::move(file), std::move(cause)).remedy("the file is damaged: download it again");
 }
-void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
-                const std::string& cause) {
-  fail_laz(file, "chunk " + std::to_string(chunk) + ", byte " + std::to_string(byte), cause);
+Error chunk_fault(std::string file, std::uint64_t chunk, std::uint64_t byte, std::string cause) {
+  return laz_fault(std::move(file), std::move(cause))
+      .at("chunk " + std::to_string(chunk) + ", byte " + std::to_string(byte));
 }
 
 RecordParts laz_parts(std::unique_ptr<ByteSource> file, LazLayout layout) {

@@ -8,6 +8,7 @@
 
 #include "format/record_parts.hpp"
 #include "terrace/stream/byte_source.hpp"
+#include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
 
 /// Reads chunks of LAZ in any order.
@@ -21,10 +22,9 @@ struct LazLayout {
   std::uint64_t first = 0;           ///< byte of the first chunk
 };
 
-/// Throws: Error with the remedy for a damaged file; `where` names the position in it.
-[[noreturn]] void fail_laz(const std::string& file, std::string where, std::string cause);
-[[noreturn]] void fail_chunk(const std::string& file, std::uint64_t chunk, std::uint64_t byte,
-                             const std::string& cause);
+/// Returns an Error with the remedy for a damaged file.
+Error laz_fault(std::string file, std::string cause);
+Error chunk_fault(std::string file, std::uint64_t chunk, std::uint64_t byte, std::string cause);
 
 /// One part per chunk of the layout. A reader holds the coded bytes of one chunk and the models of
 /// a decoder.

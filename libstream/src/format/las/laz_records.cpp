@@ -31,10 +31,11 @@ laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
       return laz::Vlr::parse(std::as_bytes(std::span(record.data)), header.point_format,
                              header.record_bytes);
     } catch (const laz::Corrupt& error) {
-      fail_laz(name, "header", error.what());
+      throw laz_fault(name, error.what()).at("header");
     }
   }
-  fail_laz(name, "header", "its points are compressed, but the VLR that describes how is missing");
+  throw laz_fault(name, "its points are compressed, but the VLR that describes how is missing")
+      .at("header");
 }
 
 /// The chunks as the file's table lists them; empty if the writer omitted the table.
@@ -48,14 +49,13 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
   };
   const std::uint64_t position_at = layout.first - kPositionBytes;
   if (file.size() < layout.first) {
-    fail_chunk(file.name(), 0, file.size(), "the file ends before its points");
+    throw chunk_fault(file.name(), 0, file.size(), "the file ends before its points");
   }
   std::uint64_t at = number_at(position_at);
   if (at == ~std::uint64_t{0}) at = number_at(file.size() - kPositionBytes);
   if (at == position_at) return {};
   if (at < layout.first || at > file.size() || file.size() - at < kHeadBytes) {
-    fail_laz(file.name(), "byte " + std::to_string(position_at),
-             "the chunk table is outside the file");
+    throw laz_fault(file.name(), "the chunk table is outside the file").at_byte(position_at);
   }
   // An entry takes at most 12 bytes; other data may follow the table.
   const std::uint64_t chunks = number_at(at) >> 32;
@@ -64,7 +64,7 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
   try {
     return laz::read_chunk_table(table, layout.vlr, points, at - layout.first);
   } catch (const laz::Corrupt& error) {
-    fail_laz(file.name(), "byte " + std::to_string(at + error.offset()), error.what());
+    throw laz_fault(file.name(), error.what()).at_byte(at + error.offset());
   }
 }
 
@@ -138,12 +138,12 @@ class LazInTurn final : public RecordReader {
         chunk_left_ = chunk.points;
         chunk_bytes_ = chunk.bytes;
       } catch (const laz::Corrupt& error) {
-        fail(error);
+        throw fault(error);
       }
     } else if (layout_.vlr.compressor == laz::Compressor::pointwise_chunked) {
       chunk_left_ = std::min<std::uint64_t>(left_, layout_.vlr.chunk_size);
     }
-    if (chunk_left_ == 0) fail(laz::Corrupt("the chunks end before the points", 0));
+    if (chunk_left_ == 0) throw fault(laz::Corrupt("the chunks end before the points", 0));
     decoder_.start(chunk_left_);
   }
 
@@ -165,20 +165,20 @@ class LazInTurn final : public RecordReader {
       input_->consume(step.bytes);
       return step;
     } catch (const laz::Corrupt& error) {
-      fail(error);
+      throw fault(error);
     }
   }
 
   void end_chunk() {
     const std::uint64_t used = input_->offset() - begin_;
     if (chunk_bytes_ && used != *chunk_bytes_) {
-      fail(laz::Corrupt("coded bytes are left over", used));
+      throw fault(laz::Corrupt("coded bytes are left over", used));
     }
     ++number_;
   }
 
-  [[noreturn]] void fail(const laz::Corrupt& error) const {
-    fail_chunk(input_->name(), number_, begin_ + error.offset(), error.what());
+  [[nodiscard]] Error fault(const laz::Corrupt& error) const {
+    return chunk_fault(input_->name(), number_, begin_ + error.offset(), error.what());
   }
 
   Input* input_;
@@ -229,7 +229,7 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
           .remedy("name the file");
     }
     if (!input.skip(kPositionBytes)) {
-      fail_chunk(input.name(), 0, input.offset(), "the file ends before its points");
+      throw chunk_fault(input.name(), 0, input.offset(), "the file ends before its points");
     }
   }
   return std::make_unique<LazInTurn>(input, std::move(layout), header.points, options.on_damage);
@@ -239,7 +239,8 @@ RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& he
                            const Octree& octree) {
   LazLayout layout{.vlr = laz_vlr(header, file->name())};
   if (layout.vlr.compressor != laz::Compressor::layered) {
-    fail_laz(file->name(), "header", "its points are not coded in layers, as COPC requires");
+    throw laz_fault(file->name(), "its points are not coded in layers, as COPC requires")
+        .at("header");
   }
   for (const OctreeNode& node : octree.nodes) {
     layout.chunks.push_back({.offset = node.offset, .bytes = node.bytes, .points = node.points});

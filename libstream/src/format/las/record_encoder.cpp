@@ -129,10 +129,6 @@ void LasRecords::pack(const PointBlock& block, Records& out) const {
   count_returns(out);
 }
 
-void LasRecords::fail(std::string where, std::string cause, std::string remedy) const {
-  throw Error(path_, std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
-}
-
 void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const {
   const double scale = lattice_.scale[axis], offset = lattice_.offset[axis];
   constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
@@ -146,10 +142,10 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
     const double value = block.positions[i][axis];
     const double step = ((value - offset) / scale + kToInteger) - kToInteger;
     if (!(step >= kLeast && step <= kMost)) {
-      fail("point " + std::to_string(out.first + i),
-           std::string("its ") + "xyz"[axis] + " is out of range for 32 bits in steps of " +
-               text_of(scale),
-           "write PLY, or build a store and write its points, whose bounds are known");
+      throw Error(path_, std::string("its ") + "xyz"[axis] + " is out of range for 32 bits in steps of " +
+                  text_of(scale))
+          .at("point " + std::to_string(out.first + i))
+          .remedy("write PLY, or build a store and write its points, whose bounds are known");
     }
     const auto stored = static_cast<std::int32_t>(step);
     std::memcpy(to, &stored, sizeof stored);
@@ -215,9 +211,9 @@ Value LasRecords::converted(const std::byte* from, const Channel& channel, const
                                         : static_cast<double>((1U << field.bits) - 1);
     if (!(whole >= static_cast<double>(std::numeric_limits<Value>::min()) && whole <= most &&
           std::abs(step - whole) <= exact)) {
-      fail("point " + std::to_string(point),
-           text_of(real) + " does not fit into the field " + field.channel.name + " of LAS",
-           "rename the column, so that it becomes extra bytes");
+      throw Error(path_, text_of(real) + " does not fit into the field " + field.channel.name + " of LAS")
+          .at("point " + std::to_string(point))
+          .remedy("rename the column, so that it becomes extra bytes");
     }
     return static_cast<Value>(whole);
   }

@@ -58,7 +58,6 @@ class LasRecords {
  private:
   struct Records;
 
-  [[noreturn]] void fail(std::string where, std::string cause, std::string remedy) const;
   void pack(const PointBlock& block, Records& out) const;
   void put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const;
   void put_attribute(const std::byte* from, const Channel& channel, const LasField& field,

@@ -26,10 +26,10 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::string_view kGlbRemedy = "the file is damaged: export it again";
-constexpr std::string_view kTruncatedRemedy = "the file is truncated: download it again";
+constexpr const char* kGlbRemedy = "the file is damaged: export it again";
+constexpr const char* kTruncatedRemedy = "the file is truncated: download it again";
 constexpr const char* kInfinite = "has a vertex with an infinite coordinate";
-constexpr std::string_view kPlainRemedy = "export it as plain glTF 2.0 in one .glb file";
+constexpr const char* kPlainRemedy = "export it as plain glTF 2.0 in one .glb file";
 
 /// A linear map and a translation: three rows of four numbers.
 using Transform = std::array<double, 12>;
@@ -134,12 +134,11 @@ class GlbParser final : public MeshParser {
     std::uint64_t corners = 0, mode = glb::kTriangles;
   };
 
-  [[noreturn]] void fail(std::string where, std::string cause,
-                         std::string_view remedy = kGlbRemedy) const {
-    throw Error(input_->name(), std::move(cause)).at(std::move(where)).remedy(std::string(remedy));
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error(input_->name(), std::move(cause)).remedy(kGlbRemedy);
   }
-  [[noreturn]] void fail_here(std::string cause, std::string_view remedy = kGlbRemedy) const {
-    fail("byte " + std::to_string(input_->offset()), std::move(cause), remedy);
+  [[nodiscard]] Error fault_here(std::string cause) const {
+    return fault(std::move(cause)).at_byte(input_->offset());
   }
 
   // The chunks (4.4).
@@ -150,20 +149,22 @@ class GlbParser final : public MeshParser {
 
   void read_chunks() {
     constexpr std::size_t kHeaders = glb::kHeaderBytes + glb::kChunkHeaderBytes;
-    if (input_->fill(kHeaders).size() < kHeaders) fail_here("is too short for GLB");
-    if (word(0) != glb::kMagic) fail_here("does not begin with glTF");
+    if (input_->fill(kHeaders).size() < kHeaders) throw fault_here("is too short for GLB");
+    if (word(0) != glb::kMagic) throw fault_here("does not begin with glTF");
     if (word(4) != glb::kVersion) {
-      fail_here("is glTF of version " + std::to_string(word(4)) + ", not 2", kPlainRemedy);
+      throw fault_here("is glTF of version " + std::to_string(word(4)) + ", not 2")
+          .remedy(kPlainRemedy);
     }
     const std::uint64_t all = word(8), json_bytes = word(12);
     if (input_->size() && *input_->size() < all) {
-      fail_here("is truncated: its header promises " + counted(all, "byte") + ", but it has " +
-                    std::to_string(*input_->size()),
-                kTruncatedRemedy);
+      throw fault_here("is truncated: its header promises " + counted(all, "byte") +
+                       ", but it has " + std::to_string(*input_->size()))
+          .remedy(kTruncatedRemedy);
     }
-    if (word(16) != glb::kJson) fail_here("its first chunk is not JSON");
-    if (all < kHeaders + json_bytes) fail_here("its JSON is larger than the file");
-    if (json_bytes > kMostJsonBytes) fail_here("its JSON is larger than 64 MiB", kPlainRemedy);
+    if (word(16) != glb::kJson) throw fault_here("its first chunk is not JSON");
+    if (all < kHeaders + json_bytes) throw fault_here("its JSON is larger than the file");
+    if (json_bytes > kMostJsonBytes)
+      throw fault_here("its JSON is larger than 64 MiB").remedy(kPlainRemedy);
     input_->consume(kHeaders);
     parse(input_->fill(json_bytes).substr(0, json_bytes), json_bytes);
     input_->consume(json_bytes);
@@ -171,17 +172,17 @@ class GlbParser final : public MeshParser {
     std::uint64_t left = all - kHeaders - json_bytes;
     if (left < glb::kChunkHeaderBytes) return;
     if (input_->fill(glb::kChunkHeaderBytes).size() < glb::kChunkHeaderBytes)
-      fail_here("ends before its second chunk");
+      throw fault_here("ends before its second chunk");
     std::uint64_t bytes = word(0);
     const bool binary = word(4) == glb::kBinary;
     input_->consume(glb::kChunkHeaderBytes);
     left -= glb::kChunkHeaderBytes;
     if (!binary) return;
-    if (bytes > left) fail_here("its binary chunk is larger than the file");
+    if (bytes > left) throw fault_here("its binary chunk is larger than the file");
     // Positions and corners may be in any order and are read in parallel, so keep them in a file.
     while (bytes > 0) {
       const std::string_view some = input_->fill(1);
-      if (some.empty()) fail_here("ends within its binary chunk", kTruncatedRemedy);
+      if (some.empty()) throw fault_here("ends within its binary chunk").remedy(kTruncatedRemedy);
       const auto taken = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, some.size()));
       numbers_.append(std::as_bytes(std::span(some.data(), taken)));
       input_->consume(taken);
@@ -190,18 +191,19 @@ class GlbParser final : public MeshParser {
   }
 
   void parse(std::string_view text, std::uint64_t promised) {
-    if (text.size() < promised) fail_here("ends within its JSON", kTruncatedRemedy);
+    if (text.size() < promised) throw fault_here("ends within its JSON").remedy(kTruncatedRemedy);
     try {
       // Even a scene of many thousand nodes has far fewer than a million values, and a million fit
       // into memory.
-      json_ = parse_bounded_json(text, {.depth = 16, .values = std::size_t{1} << 20},
-                                 [this](const char* cause) { fail_here(cause, kPlainRemedy); });
+      json_ = parse_bounded_json(
+          text, {.depth = 16, .values = std::size_t{1} << 20},
+          [this](const char* cause) { throw fault_here(cause).remedy(kPlainRemedy); });
     } catch (const Json::parse_error& error) {
-      fail("byte " + std::to_string(input_->offset() + error.byte), "is not JSON");
+      throw fault("is not JSON").at_byte(input_->offset() + error.byte);
     } catch (const Json::out_of_range&) {
-      fail_here("its JSON has a number too large for a double");
+      throw fault_here("its JSON has a number too large for a double");
     }
-    if (!json_.is_object()) fail_here("its JSON is not an object");
+    if (!json_.is_object()) throw fault_here("its JSON is not an object");
   }
 
   // Access to the JSON.
@@ -211,7 +213,7 @@ class GlbParser final : public MeshParser {
     static const Json none = Json::array();
     const auto found = object.find(name);
     if (found == object.end()) return none;
-    if (!found->is_array()) fail(name, "is not a list");
+    if (!found->is_array()) throw fault("is not a list").at(name);
     return *found;
   }
 
@@ -219,7 +221,7 @@ class GlbParser final : public MeshParser {
   const Json& entry(const char* name, std::uint64_t index) const {
     const Json& all = list(json_, name);
     if (index >= all.size() || !all[index].is_object()) {
-      fail(std::string(name) + " " + std::to_string(index), "is missing");
+      throw fault("is missing").at(std::string(name) + " " + std::to_string(index));
     }
     return all[index];
   }
@@ -233,7 +235,7 @@ class GlbParser final : public MeshParser {
     const auto found = object.find(name);
     if (found == object.end()) return std::nullopt;
     const std::optional<std::uint64_t> value = whole(*found);
-    if (!value) fail(name, "is not a number from 0 to " + std::to_string(kMost));
+    if (!value) throw fault("is not a number from 0 to " + std::to_string(kMost)).at(name);
     return value;
   }
 
@@ -242,12 +244,12 @@ class GlbParser final : public MeshParser {
     if (!object.contains(name)) return false;
     const Json& all = list(object, name);
     if (all.size() != out.size()) {
-      fail(name, "does not have " + counted(out.size(), "number"));
+      throw fault("does not have " + counted(out.size(), "number")).at(name);
     }
     for (std::size_t i = 0; i < out.size(); ++i) {
-      if (!all[i].is_number()) fail(name, "is not a list of numbers");
+      if (!all[i].is_number()) throw fault("is not a list of numbers").at(name);
       out[i] = all[i].get<double>();
-      if (!std::isfinite(out[i])) fail(name, "has a number that is not finite");
+      if (!std::isfinite(out[i])) throw fault("has a number that is not finite").at(name);
     }
     return true;
   }
@@ -256,21 +258,23 @@ class GlbParser final : public MeshParser {
   Accessor accessor(std::uint64_t index, const char* type, std::uint64_t& component) const {
     const std::string where = "accessors " + std::to_string(index);
     const Json& json = entry("accessors", index);
-    if (json.value("type", Json()) != type) fail(where, std::string("is not of type ") + type);
+    if (json.value("type", Json()) != type)
+      throw fault(std::string("is not of type ") + type).at(where);
     component = count(json, "componentType").value_or(0);
     const std::uint64_t bytes = component == glb::kUnsignedByte                              ? 1
                                 : component == glb::kUnsignedShort                           ? 2
                                 : component == glb::kUnsignedInt || component == glb::kFloat ? 4
                                                                                              : 0;
-    if (bytes == 0) fail(where, "has a number type that is not supported", kPlainRemedy);
+    if (bytes == 0)
+      throw fault("has a number type that is not supported").at(where).remedy(kPlainRemedy);
     const std::optional<std::uint64_t> view_index = count(json, "bufferView");
     if (json.contains("sparse") || !view_index) {
-      fail(where, "is sparse, which is not supported", kPlainRemedy);
+      throw fault("is sparse, which is not supported").at(where).remedy(kPlainRemedy);
     }
     const Json& view = entry("bufferViews", *view_index);
     const std::uint64_t buffer = count(view, "buffer").value_or(0);
     if (buffer != 0 || entry("buffers", 0).contains("uri")) {
-      fail(where, "is in another file, which is not supported", kPlainRemedy);
+      throw fault("is in another file, which is not supported").at(where).remedy(kPlainRemedy);
     }
     Accessor out;
     out.bytes = bytes * (std::string_view(type) == "VEC3" ? 3 : 1);
@@ -279,10 +283,10 @@ class GlbParser final : public MeshParser {
     const std::uint64_t offset = count(json, "byteOffset").value_or(0);
     const std::uint64_t view_bytes = count(view, "byteLength").value_or(0);
     out.begin = count(view, "byteOffset").value_or(0);
-    if (out.stride < out.bytes) fail(where, "has elements that overlap");
+    if (out.stride < out.bytes) throw fault("has elements that overlap").at(where);
     if (out.begin > numbers_.size() || view_bytes > numbers_.size() - out.begin ||
         (out.count > 0 && offset + (out.count - 1) * out.stride + out.bytes > view_bytes)) {
-      fail(where, "extends beyond the binary chunk");
+      throw fault("extends beyond the binary chunk").at(where);
     }
     out.begin += offset;
     return out;
@@ -295,7 +299,7 @@ class GlbParser final : public MeshParser {
       const std::string name = extension.is_string() ? extension.get<std::string>() : "?";
       const auto begins = [&](const char* text) { return name.starts_with(text); };
       if (begins("KHR_materials_") || begins("KHR_texture_") || begins("EXT_texture_")) continue;
-      fail({}, "needs the extension " + name + ", which is not supported", kPlainRemedy);
+      throw fault("needs the extension " + name + ", which is not supported").remedy(kPlainRemedy);
     }
   }
 
@@ -338,7 +342,7 @@ class GlbParser final : public MeshParser {
     const auto add = [&](const Json& nodes) {
       for (const Json& node : nodes) {
         const std::optional<std::uint64_t> number = whole(node);
-        if (!number) fail("nodes", "a node index is invalid");
+        if (!number) throw fault("a node index is invalid").at("nodes");
         out.push_back(*number);
       }
     };
@@ -366,14 +370,15 @@ class GlbParser final : public MeshParser {
       const auto [index, above] = stack.back();
       stack.pop_back();
       const Json& node = entry("nodes", index);
-      if (seen[index]) fail("nodes " + std::to_string(index), "is in the scene twice");
+      if (seen[index]) throw fault("is in the scene twice").at("nodes " + std::to_string(index));
       seen[index] = true;
       const Transform transform = product(above, transform_of(node));
       if (const auto mesh = count(node, "mesh")) add_mesh(*mesh, transform);
       const Json& children = list(node, "children");
       for (std::size_t i = children.size(); i-- > 0;) {
         const std::optional<std::uint64_t> child = whole(children[i]);
-        if (!child) fail("nodes " + std::to_string(index), "the index of a child is invalid");
+        if (!child)
+          throw fault("the index of a child is invalid").at("nodes " + std::to_string(index));
         stack.emplace_back(*child, transform);
       }
     }
@@ -394,7 +399,8 @@ class GlbParser final : public MeshParser {
       part.mode = count(primitive, "mode").value_or(glb::kTriangles);
       std::uint64_t component = 0;
       part.positions = accessor(*positions, "VEC3", component);
-      if (component != glb::kFloat) fail(where, "has positions that are not floats", kPlainRemedy);
+      if (component != glb::kFloat)
+        throw fault("has positions that are not floats").at(where).remedy(kPlainRemedy);
       part.vertices = part.positions.count;
       part.first = vertices_;
       const auto [same, is_new] = placed.emplace(*positions, vertices_);
@@ -403,29 +409,31 @@ class GlbParser final : public MeshParser {
         part.positions.count = 0;
       } else {
         vertices_ += part.vertices;
-        if (vertices_ >= kMost) fail(where, "has more vertices than can be numbered");
+        if (vertices_ >= kMost) throw fault("has more vertices than can be numbered").at(where);
       }
       if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
       moved_ = moved_ || transform != kIdentity;
       if (parts_.size() == kMostParts) {
-        fail(where, "is one of more than " + std::to_string(kMostParts) + " placed primitives",
-             kPlainRemedy);
+        throw fault("is one of more than " + std::to_string(kMostParts) + " placed primitives")
+            .at(where)
+            .remedy(kPlainRemedy);
       }
       parts_.push_back(part);
     }
   }
 
   void add_corners(const Json& primitive, const std::string& where, Part& part) const {
-    if (part.mode > glb::kFan) fail(where, "has a drawing mode that glTF does not have");
+    if (part.mode > glb::kFan) throw fault("has a drawing mode that glTF does not have").at(where);
     part.corners = part.vertices;
     if (const auto indices = count(primitive, "indices")) {
       std::uint64_t component = 0;
       part.indices = accessor(*indices, "SCALAR", component);
-      if (component == glb::kFloat) fail(where, "has vertex indices that are floats");
+      if (component == glb::kFloat) throw fault("has vertex indices that are floats").at(where);
       part.corners = part.indices->count;
     }
     if (part.mode == glb::kTriangles && part.corners % 3 != 0) {
-      fail(where, "has " + counted(part.corners, "corner") + ", not three for each triangle");
+      throw fault("has " + counted(part.corners, "corner") + ", not three for each triangle")
+          .at(where);
     }
   }
 
@@ -444,14 +452,14 @@ class GlbParser final : public MeshParser {
     Point3 p;
     for (double& value : p) {
       value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
-      if (std::isinf(value)) fail({}, kInfinite);
+      if (std::isinf(value)) throw fault(kInfinite);
       at += sizeof(float);
     }
     Point3 world;
     for (std::size_t row = 0; row < 3; ++row) {
       const double* const t = parts_[at_].transform.data() + 4 * row;
       world[row] = moved_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
-      if (std::isinf(world[row])) fail({}, kInfinite);
+      if (std::isinf(world[row])) throw fault(kInfinite);
     }
     vertex_ = {world[0], 0.0 - world[2], world[1]};  // from y up to z up, without negative zero
     return true;
@@ -467,7 +475,7 @@ class GlbParser final : public MeshParser {
                                           : load_little_endian<std::uint32_t>(at);
     }
     if (vertex >= part.vertices) {
-      fail({}, "a face names the vertex " + std::to_string(vertex) + ", which does not exist");
+      throw fault("a face names the vertex " + std::to_string(vertex) + ", which does not exist");
     }
     return static_cast<std::uint32_t>(part.first + vertex);
   }

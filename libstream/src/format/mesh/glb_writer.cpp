@@ -48,17 +48,17 @@ class GlbWriter final : public MeshWriter {
         frame_(header.frame.value_or(MeshFrame{})),
         counts_(header),
         stride_(4 * (3 + header.attributes.size())) {
-    const auto refuse = [&](std::string cause) {
-      throw Error(path, std::move(cause)).remedy("write PLY, or a smaller part");
+    const auto refused = [&](const char* cause) {
+      return Error(path, cause).remedy("write PLY, or a smaller part");
     };
-    if (stride_ > kMaxStride) refuse("GLB holds at most 60 attributes");
+    if (stride_ > kMaxStride) throw refused("GLB holds at most 60 attributes");
     // Check two sizes that cannot overflow first, then the sum.
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
     if (header.vertices >= kMost / stride_ || header.triangles >= kMost / 12 ||
         glb::kHeaderBytes + 2 * glb::kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
                 8 * frame_.crs.size() + binary_bytes() >
             kMost) {
-      refuse("GLB holds at most 4 GiB");
+      throw refused("GLB holds at most 4 GiB");
     }
     if (header.bounds && !header.bounds->empty()) {
       origin_ = glb_origin(*header.bounds);

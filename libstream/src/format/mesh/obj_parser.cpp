@@ -48,7 +48,7 @@ class ObjParser final : public MeshParser {
       }
       const std::string_view word = take_word(line);
       if (word == "v") {
-        if (!read_vertex(line, vertex_)) fail("a vertex needs three coordinates");
+        if (!read_vertex(line, vertex_)) throw fault("a vertex needs three coordinates");
         ++vertices_;
         return Item::vertex;
       }
@@ -64,8 +64,8 @@ class ObjParser final : public MeshParser {
  private:
   static constexpr std::size_t kMostComments = 64;
 
-  [[noreturn]] void fail(std::string cause) const {
-    throw Error(input_->name(), std::move(cause))
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error(input_->name(), std::move(cause))
         .at_line(lines_.number())
         .remedy("the file is damaged: export it again");
   }
@@ -81,8 +81,8 @@ class ObjParser final : public MeshParser {
       const bool continued = line.ends_with('\\');
       joined_.append(line.substr(0, line.size() - (continued ? 1 : 0))).append(" ");
       if (joined_.size() > LineReader::kMaxLine) {
-        fail("a line and its continuations are longer than " +
-             counted(LineReader::kMaxLine, "byte"));
+        throw fault("a line and its continuations are longer than " +
+                    counted(LineReader::kMaxLine, "byte"));
       }
       more = continued && lines_.next(line);
       if (more) line = trim(line);
@@ -103,7 +103,7 @@ class ObjParser final : public MeshParser {
       const std::int64_t vertex = number < 0 ? number + vertices_ : number - 1;
       if (error != std::errc{} || !ends || vertex < 0 || vertex >= vertices_ ||
           vertex >= std::numeric_limits<std::uint32_t>::max()) {
-        fail("a face names the vertex " + in_quotes(word) + ", which does not exist");
+        throw fault("a face names the vertex " + in_quotes(word) + ", which does not exist");
       }
       face_.push_back(static_cast<std::uint32_t>(vertex));
     }

@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::string_view kOffRemedy = "the file is damaged: export it again";
+constexpr const char* kOffRemedy = "the file is damaged: export it again";
 
 /// Parses Geomview's OFF as text: "OFF" (or "COFF", "NOFF", "CNOFF", "STOFF", which have more
 /// numbers per vertex, which are ignored), the counts of vertices, faces and edges, then a line for
@@ -24,20 +24,20 @@ class OffParser final : public MeshParser {
  public:
   OffParser(Input& input, bool faces) : input_(&input), lines_(input), wants_faces_(faces) {
     std::string_view line;
-    if (!next_line(line)) fail("is empty");
+    if (!next_line(line)) throw fault("is empty");
     const std::size_t key = line.find("OFF");
-    if (key == std::string_view::npos || key > 4) fail("does not begin with OFF");
+    if (key == std::string_view::npos || key > 4) throw fault("does not begin with OFF");
     line.remove_prefix(key + 3);
     line = trim(line);
     if (line.starts_with("BINARY")) {
-      fail("is binary OFF, which is not supported", "export it as text");
+      throw fault("is binary OFF, which is not supported").remedy("export it as text");
     }
     if (!line.empty() && (line.front() == '4' || line.front() == 'n')) {
-      fail("is OFF of another dimension than three", "export plain OFF");
+      throw fault("is OFF of another dimension than three").remedy("export plain OFF");
     }
-    if (line.empty() && !next_line(line)) fail("ends before its counts");
+    if (line.empty() && !next_line(line)) throw fault("ends before its counts");
     if (!take_count(line, vertices_) || !take_count(line, faces_)) {
-      fail("does not state how many vertices and faces it has");
+      throw fault("does not state how many vertices and faces it has");
     }
   }
 
@@ -49,16 +49,16 @@ class OffParser final : public MeshParser {
     std::string_view line;
     if (read_ < vertices_) {
       if (!next_line(line)) {
-        fail("ends after " + std::to_string(read_) + " of " + counted(vertices_, "vertex"));
+        throw fault("ends after " + std::to_string(read_) + " of " + counted(vertices_, "vertex"));
       }
-      if (!read_vertex(line, vertex_)) fail("a vertex needs three coordinates");
+      if (!read_vertex(line, vertex_)) throw fault("a vertex needs three coordinates");
       ++read_;
       return Item::vertex;
     }
     while (wants_faces_ && faces_read_ < faces_) {
       if (!next_line(line)) {
-        fail("ends after " + std::to_string(faces_read_) + " of " + std::to_string(faces_) +
-             " faces");
+        throw fault("ends after " + std::to_string(faces_read_) + " of " + std::to_string(faces_) +
+                    " faces");
       }
       read_face(line);
       ++faces_read_;
@@ -69,10 +69,8 @@ class OffParser final : public MeshParser {
   }
 
  private:
-  [[noreturn]] void fail(std::string cause, std::string_view remedy = kOffRemedy) const {
-    throw Error(input_->name(), std::move(cause))
-        .at_line(lines_.number())
-        .remedy(std::string(remedy));
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error(input_->name(), std::move(cause)).at_line(lines_.number()).remedy(kOffRemedy);
   }
 
   /// The next line that is neither blank nor a comment.
@@ -96,12 +94,12 @@ class OffParser final : public MeshParser {
   void read_face(std::string_view text) {
     face_.clear();
     std::uint64_t corners = 0;
-    if (!take_count(text, corners)) fail("a face lacks the number of its corners");
+    if (!take_count(text, corners)) throw fault("a face lacks the number of its corners");
     for (std::uint64_t i = 0; i < corners; ++i) {
       std::uint64_t vertex = 0;
-      if (!take_count(text, vertex)) fail("a face has fewer corners than it states");
+      if (!take_count(text, vertex)) throw fault("a face has fewer corners than it states");
       if (vertex >= vertices_ || vertex >= std::numeric_limits<std::uint32_t>::max()) {
-        fail("a face names the vertex " + std::to_string(vertex) + ", which does not exist");
+        throw fault("a face names the vertex " + std::to_string(vertex) + ", which does not exist");
       }
       face_.push_back(static_cast<std::uint32_t>(vertex));
     }

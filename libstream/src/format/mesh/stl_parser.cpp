@@ -16,7 +16,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::string_view kStlRemedy = "the file is damaged: export it again";
+constexpr const char* kStlRemedy = "the file is damaged: export it again";
 
 /// Common part of both forms: delivers three vertices, then their face.
 class StlParser : public MeshParser {
@@ -34,7 +34,8 @@ class StlParser : public MeshParser {
       return Item::vertex;
     }
     constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max() / 3;
-    if (faces_ == kMost) fail("has more triangles than can be numbered", "read it as points");
+    if (faces_ == kMost)
+      throw fault("has more triangles than can be numbered").remedy("read it as points");
     const auto first = static_cast<std::uint32_t>(3 * faces_);
     face_ = {first, first + 1, first + 2};
     begin_face();
@@ -44,7 +45,7 @@ class StlParser : public MeshParser {
  protected:
   /// Reads the next corner to vertex_; false after the last.
   virtual bool read_corner() = 0;
-  [[noreturn]] virtual void fail(std::string cause, std::string_view remedy = kStlRemedy) const = 0;
+  [[nodiscard]] virtual Error fault(std::string cause) const = 0;
 
   std::uint64_t faces_ = 0;  ///< number of finished faces
   unsigned corner_ = 0;      ///< corners of the current face that have been read
@@ -73,16 +74,16 @@ class StlText final : public StlParser {
       line = trim_left(line);
       if (line.starts_with("vertex") || line.starts_with("VERTEX")) {
         line.remove_prefix(6);
-        if (!in_loop_) fail("a vertex is outside a loop");
-        if (!read_vertex(line, vertex_)) fail("a vertex needs three coordinates");
+        if (!in_loop_) throw fault("a vertex is outside a loop");
+        if (!read_vertex(line, vertex_)) throw fault("a vertex needs three coordinates");
         if (corner_ == 2) in_loop_ = false;
         return true;
       }
       if (line.starts_with("outer") || line.starts_with("OUTER")) {
-        if (corner_ != 0) fail("a loop has fewer than three vertices");
+        if (corner_ != 0) throw fault("a loop has fewer than three vertices");
         in_loop_ = true;
       } else if (line.starts_with("endloop") || line.starts_with("ENDLOOP")) {
-        if (corner_ != 0) fail("a loop has fewer than three vertices");
+        if (corner_ != 0) throw fault("a loop has fewer than three vertices");
         in_loop_ = false;
       } else if (line.starts_with("endsolid") || line.starts_with("ENDSOLID")) {
         ended_ = true;
@@ -91,15 +92,13 @@ class StlText final : public StlParser {
       }
     }
     if (corner_ != 0 || !ended_)
-      fail("ends within a solid", "the file is truncated: download it again");
+      throw fault("ends within a solid").remedy("the file is truncated: download it again");
     lines_.release();
     return false;
   }
 
-  [[noreturn]] void fail(std::string cause, std::string_view remedy = kStlRemedy) const override {
-    throw Error(input_->name(), std::move(cause))
-        .at_line(lines_.number())
-        .remedy(std::string(remedy));
+  [[nodiscard]] Error fault(std::string cause) const override {
+    return Error(input_->name(), std::move(cause)).at_line(lines_.number()).remedy(kStlRemedy);
   }
 
  private:
@@ -114,11 +113,11 @@ class StlBinary final : public StlParser {
  public:
   StlBinary(Input& input, bool faces) : StlParser(faces), input_(&input) {
     const std::string_view head = input.fill(kHeadBytes);
-    if (head.size() < kHeadBytes) fail("is too short for STL");
+    if (head.size() < kHeadBytes) throw fault("is too short for STL");
     count_ = load_little_endian<std::uint32_t>(head.data() + 80);
     if (input.size() && (*input.size() - kHeadBytes) / kFaceBytes < count_) {
-      fail("promises " + counted(count_, "triangle") + " but has bytes for " +
-           std::to_string((*input.size() - kHeadBytes) / kFaceBytes));
+      throw fault("promises " + counted(count_, "triangle") + " but has bytes for " +
+                  std::to_string((*input.size() - kHeadBytes) / kFaceBytes));
     }
     input.consume(kHeadBytes);
   }
@@ -133,24 +132,22 @@ class StlBinary final : public StlParser {
       if (faces_ == count_) return false;
       if (faces_ > 0) input_->consume(kFaceBytes);
       if (input_->fill(kFaceBytes).size() < kFaceBytes) {
-        fail("ends after " + std::to_string(faces_) + " of " + counted(count_, "triangle"));
+        throw fault("ends after " + std::to_string(faces_) + " of " + counted(count_, "triangle"));
       }
     }
     const char* at = input_->window().data() + kNormalBytes + std::size_t{12} * corner_;
     for (double& value : vertex_) {
       value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
       if (std::isinf(value)) {
-        fail("triangle " + std::to_string(faces_) + " has an infinite coordinate");
+        throw fault("triangle " + std::to_string(faces_) + " has an infinite coordinate");
       }
       at += 4;
     }
     return true;
   }
 
-  [[noreturn]] void fail(std::string cause, std::string_view remedy = kStlRemedy) const override {
-    throw Error(input_->name(), std::move(cause))
-        .at_byte(input_->offset())
-        .remedy(std::string(remedy));
+  [[nodiscard]] Error fault(std::string cause) const override {
+    return Error(input_->name(), std::move(cause)).at_byte(input_->offset()).remedy(kStlRemedy);
   }
 
  private:

@@ -26,21 +26,22 @@ class HeaderReader {
   std::string_view next() {
     std::string_view line;
     if (input_->offset() > kMaxHeaderBytes) {
-      fail("the header is longer than " + counted(kMaxHeaderBytes, "byte"),
-           "this is not a PLY file, or its end_header is missing");
+      throw fault("the header is longer than " + counted(kMaxHeaderBytes, "byte"))
+          .remedy("this is not a PLY file, or its end_header is missing");
     }
     if (!lines_.next(line)) {
       if (lines_.number() == 0) {
         throw Error(input_->name(), "the file is empty");
       }
-      fail("the file ends before end_header", "the file is truncated: download it again");
+      throw fault("the file ends before end_header")
+          .remedy("the file is truncated: download it again");
     }
     return line;
   }
-  [[noreturn]] void fail(std::string cause, std::string remedy) const {
-    throw Error(input_->name(), std::move(cause))
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error(input_->name(), std::move(cause))
         .at_line(lines_.number())
-        .remedy(std::move(remedy));
+        .remedy("correct the header");
   }
   std::uint64_t finish() {
     lines_.release();
@@ -54,23 +55,23 @@ class HeaderReader {
 
 PlyEncoding parse_format(const std::vector<std::string_view>& words, const HeaderReader& reader) {
   if (words.size() != 3 || words[2] != "1.0") {
-    reader.fail("not a format of PLY 1.0", "expected 'format ascii 1.0' or the like");
+    throw reader.fault("not a format of PLY 1.0").remedy("expected 'format ascii 1.0' or the like");
   }
   if (words[1] == "ascii") return PlyEncoding::ascii;
   if (words[1] == "binary_little_endian") return PlyEncoding::little_endian;
   if (words[1] == "binary_big_endian") return PlyEncoding::big_endian;
-  reader.fail("unknown format " + in_quotes(words[1]),
-              "known are ascii, binary_little_endian and binary_big_endian");
+  throw reader.fault("unknown format " + in_quotes(words[1]))
+      .remedy("known are ascii, binary_little_endian and binary_big_endian");
 }
 
 PlyElement parse_element(const std::vector<std::string_view>& words, const HeaderReader& reader) {
   PlyElement element;
-  if (words.size() != 3) reader.fail("not 'element NAME COUNT'", "correct the header");
+  if (words.size() != 3) throw reader.fault("not 'element NAME COUNT'");
   element.name = words[1];
   const char* const end = words[2].data() + words[2].size();
   const auto [rest, error] = std::from_chars(words[2].data(), end, element.count);
   if (error != std::errc{} || rest != end) {
-    reader.fail(in_quotes(words[2]) + " is not a number of items", "correct the header");
+    throw reader.fault(in_quotes(words[2]) + " is not a number of items");
   }
   return element;
 }
@@ -78,7 +79,7 @@ PlyElement parse_element(const std::vector<std::string_view>& words, const Heade
 PlyProperty parse_property(const std::vector<std::string_view>& words, const HeaderReader& reader) {
   const auto type_of = [&](std::string_view word) {
     const std::optional<ScalarType> type = scalar_type_of(word);
-    if (!type) reader.fail("unknown type " + in_quotes(word), "correct the header");
+    if (!type) throw reader.fault("unknown type " + in_quotes(word));
     return *type;
   };
   PlyProperty property;
@@ -86,13 +87,13 @@ PlyProperty parse_property(const std::vector<std::string_view>& words, const Hea
     property.list = true;
     property.count_type = type_of(words[2]);
     if (property.count_type == ScalarType::f32 || property.count_type == ScalarType::f64) {
-      reader.fail("the length of a list is not an integer", "correct the header");
+      throw reader.fault("the length of a list is not an integer");
     }
     property.type = type_of(words[3]);
   } else if (words.size() == 3) {
     property.type = type_of(words[1]);
   } else {
-    reader.fail("not 'property TYPE NAME' or 'property list TYPE TYPE NAME'", "correct the header");
+    throw reader.fault("not 'property TYPE NAME' or 'property list TYPE TYPE NAME'");
   }
   property.name = words.back();
   return property;
@@ -138,7 +139,7 @@ PlyHeader read_ply_header(Input& input) {
   PlyHeader header;
   HeaderReader reader(input);
   if (trim(reader.next()) != "ply")
-    reader.fail("does not begin with 'ply'", "this is not a PLY file");
+    throw reader.fault("does not begin with 'ply'").remedy("this is not a PLY file");
   bool format_seen = false;
   for (;;) {
     const std::string_view line = reader.next();
@@ -149,44 +150,45 @@ PlyHeader read_ply_header(Input& input) {
       if (words[0] == "comment") text = trim_left(text.substr(words[0].size()));
       header.comments.emplace_back(text);
     } else if (words[0] == "format") {
-      if (format_seen) reader.fail("a second format line", "correct the header");
+      if (format_seen) throw reader.fault("a second format line");
       header.encoding = parse_format(words, reader);
       format_seen = true;
     } else if (words[0] == "element") {
       PlyElement element = parse_element(words, reader);
       for (const PlyElement& other : header.elements) {
         if (other.name == element.name) {
-          reader.fail("a second element " + in_quotes(element.name), "correct the header");
+          throw reader.fault("a second element " + in_quotes(element.name));
         }
       }
       header.elements.push_back(std::move(element));
     } else if (words[0] == "property") {
       if (header.elements.empty()) {
-        reader.fail("a property before the first element", "correct the header");
+        throw reader.fault("a property before the first element");
       }
       auto& properties = header.elements.back().properties;
       PlyProperty property = parse_property(words, reader);
       for (const PlyProperty& other : properties) {
         if (other.name == property.name) {
-          reader.fail("a second property " + in_quotes(property.name), "correct the header");
+          throw reader.fault("a second property " + in_quotes(property.name));
         }
       }
       properties.push_back(std::move(property));
       if (properties.size() > kMaxProperties) {
-        reader.fail("more than " + std::to_string(kMaxProperties) + " properties",
-                    "this is not a file of points");
+        throw reader.fault("more than " + std::to_string(kMaxProperties) + " properties")
+            .remedy("this is not a file of points");
       }
     } else if (words[0] == "end_header") {
       break;
     } else {
-      reader.fail("unknown keyword " + in_quotes(words[0]), "this is not a PLY 1.0 header");
+      throw reader.fault("unknown keyword " + in_quotes(words[0]))
+          .remedy("this is not a PLY 1.0 header");
     }
     if (header.elements.size() > kMaxElements) {
-      reader.fail("more than " + std::to_string(kMaxElements) + " elements",
-                  "this is not a file of points");
+      throw reader.fault("more than " + std::to_string(kMaxElements) + " elements")
+          .remedy("this is not a file of points");
     }
   }
-  if (!format_seen) reader.fail("the header has no format line", "correct the header");
+  if (!format_seen) throw reader.fault("the header has no format line");
   header.lines = reader.finish();
   check_counts(header, input);
   return header;

@@ -54,7 +54,7 @@ class PlySource final : public PointSource {
     const auto vertex = std::find_if(header_.elements.begin(), header_.elements.end(),
                                      [](const PlyElement& e) { return e.name == "vertex"; });
     if (vertex == header_.elements.end()) {
-      throw Error(input_.name(), "there is no element 'vertex'")
+      throw fault("there is no element 'vertex'")
           .at("header")
           .remedy("name a PLY file of points or of a mesh");
     }
@@ -94,8 +94,9 @@ class PlySource final : public PointSource {
       } else if (corners == nullptr) {
         if (past_vertices_) skip_element(element);
       } else if (!past_vertices_) {
-        fail("header", "the element " + in_quotes(element.name) + " precedes the vertices",
-             "export the file with the vertices first");
+        throw fault("the element " + in_quotes(element.name) + " precedes the vertices")
+            .at("header")
+            .remedy("export the file with the vertices first");
       } else if (item_ < element.count) {
         read_corners(element, *corners, item_++);
         if (element.name == "tristrips") {
@@ -124,13 +125,12 @@ class PlySource final : public PointSource {
   }
 
  private:
-  [[noreturn]] void fail(std::string where, std::string cause, std::string remedy) const {
-    throw Error(input_.name(), std::move(cause)).at(std::move(where)).remedy(std::move(remedy));
-  }
-  [[noreturn]] void fail_end(const std::string& element, std::uint64_t item) const {
-    fail("byte " + std::to_string(input_.offset()),
-         "the file ends in item " + std::to_string(item) + " of element " + in_quotes(element),
-         "the file is truncated or its header is wrong: download it again");
+  [[nodiscard]] Error fault(std::string cause) const { return {input_.name(), std::move(cause)}; }
+  [[nodiscard]] Error early_end(const std::string& element, std::uint64_t item) const {
+    return fault("the file ends in item " + std::to_string(item) + " of element " +
+                 in_quotes(element))
+        .at_byte(input_.offset())
+        .remedy("the file is truncated or its header is wrong: download it again");
   }
 
   void make_fields(const PlyElement& vertex) {
@@ -143,8 +143,9 @@ class PlySource final : public PointSource {
         const std::size_t axis = std::string_view("xyz").find(property.name);
         if (property.name.size() == 1 && axis != std::string_view::npos) {
           if (size_of(property.type) == 8 && property.type != ScalarType::f64) {
-            fail("header", "the coordinate " + in_quotes(property.name) + " is a 64-bit integer",
-                 "store it as double");
+            throw fault("the coordinate " + in_quotes(property.name) + " is a 64-bit integer")
+                .at("header")
+                .remedy("store it as double");
           }
           field.axis = static_cast<int>(axis);
           found[axis] = true;
@@ -159,8 +160,9 @@ class PlySource final : public PointSource {
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!found[axis]) {
-        fail("header", std::string("the vertices have no property '") + "xyz"[axis] + "'",
-             "name a PLY file of points or of a mesh");
+        throw fault(std::string("the vertices have no property '") + "xyz"[axis] + "'")
+            .at("header")
+            .remedy("name a PLY file of points or of a mesh");
       }
     }
   }
@@ -169,20 +171,20 @@ class PlySource final : public PointSource {
     if (element.properties.empty()) return;
     if (header_.encoding == PlyEncoding::ascii) {
       for (std::uint64_t i = 0; i < element.count; ++i) {
-        if (!lines_.skip()) fail_end(element.name, i);
+        if (!lines_.skip()) throw early_end(element.name, i);
       }
     } else if (!element.has_lists()) {
       const std::uint64_t bytes = element.binary_bytes();
       if (element.count > std::numeric_limits<std::uint64_t>::max() / bytes ||
           !input_.skip(element.count * bytes)) {
-        fail_end(element.name, 0);
+        throw early_end(element.name, 0);
       }
     } else {
       for (std::uint64_t i = 0; i < element.count; ++i) {
         for (const PlyProperty& property : element.properties) {
           const bool good = property.list ? skip_list(property, element.name, i)
                                           : input_.skip(size_of(property.type));
-          if (!good) fail_end(element.name, i);
+          if (!good) throw early_end(element.name, i);
         }
       }
     }
@@ -204,10 +206,10 @@ class PlySource final : public PointSource {
     if (!read_scalar(property.count_type, raw.data())) return false;
     const std::int64_t length = to_integer(raw.data(), property.count_type);
     if (length < 0) {
-      fail("byte " + std::to_string(input_.offset()),
-           "list " + in_quotes(property.name) + " in item " + std::to_string(item) +
-               " of element " + in_quotes(element) + " has the length " + std::to_string(length),
-           "the file is damaged: export it again");
+      throw fault("list " + in_quotes(property.name) + " in item " + std::to_string(item) +
+                  " of element " + in_quotes(element) + " has the length " + std::to_string(length))
+          .at_byte(input_.offset())
+          .remedy("the file is damaged: export it again");
     }
     const auto size = static_cast<std::uint64_t>(size_of(property.type));
     const auto items = static_cast<std::uint64_t>(length);
@@ -240,7 +242,7 @@ class PlySource final : public PointSource {
           std::min(wanted - done, std::max<std::size_t>(1, kChunkBytes / stride_));
       const std::string_view window = input_.fill(rows * stride_);
       if (window.size() < rows * stride_) {
-        fail_end("vertex", read_ + done + window.size() / stride_);
+        throw early_end("vertex", read_ + done + window.size() / stride_);
       }
       for (const Field& field : fields_) {
         const PackedColumn column{.rows = window.data() + field.offset,
@@ -266,7 +268,7 @@ class PlySource final : public PointSource {
     for (const Field& field : fields_) {
       const bool good = field.property.list ? skip_list(field.property, "vertex", read_ + i)
                                             : read_scalar(field.property.type, raw.data());
-      if (!good) fail_end("vertex", read_ + i);
+      if (!good) throw early_end("vertex", read_ + i);
       store(block, field, i, raw.data());
     }
   }
@@ -275,7 +277,7 @@ class PlySource final : public PointSource {
   void read_line(PointBlock& block, std::size_t i) {
     std::string_view line;
     do {
-      if (!lines_.next(line)) fail_end("vertex", read_ + i);
+      if (!lines_.next(line)) throw early_end("vertex", read_ + i);
       line = trim_left(line);
     } while (line.empty());
     std::array<std::byte, 8> raw{};
@@ -286,8 +288,8 @@ class PlySource final : public PointSource {
         const std::int64_t length = to_integer(raw.data(), property.count_type);
         // Each item takes at least two bytes of the line, except the last, which may take one.
         if (length < 0 || static_cast<std::uint64_t>(length) > line.size()) {
-          fail_line("list " + in_quotes(property.name) + " has the length " +
-                    std::to_string(length));
+          throw line_fault("list " + in_quotes(property.name) + " has the length " +
+                           std::to_string(length));
         }
         for (std::int64_t n = 0; n < length; ++n) {
           read_word(line, property.type, property, raw.data());
@@ -296,7 +298,7 @@ class PlySource final : public PointSource {
         store(block, field, i, raw.data());
       }
     }
-    if (!line.empty()) fail_line("has more values than the vertex has properties");
+    if (!line.empty()) throw line_fault("has more values than the vertex has properties");
   }
 
   /// The property with the vertices of an element's items; null if they are not faces or strips.
@@ -313,7 +315,7 @@ class PlySource final : public PointSource {
     const bool is_ascii = header_.encoding == PlyEncoding::ascii;
     std::string_view line;
     while (is_ascii && line.empty()) {
-      if (!lines_.next(line)) fail_end(element.name, item);
+      if (!lines_.next(line)) throw early_end(element.name, item);
       line = trim_left(line);
     }
     std::array<std::byte, 8> raw{};
@@ -321,7 +323,7 @@ class PlySource final : public PointSource {
       if (is_ascii) {
         read_word(line, type, property, raw.data());
       } else if (!read_scalar(type, raw.data())) {
-        fail_end(element.name, item);
+        throw early_end(element.name, item);
       }
     };
     for (const PlyProperty& property : element.properties) {
@@ -329,9 +331,10 @@ class PlySource final : public PointSource {
       if (!property.list) continue;
       const std::int64_t length = to_integer(raw.data(), property.count_type);
       if (length < 0) {
-        fail(element.name + " " + std::to_string(item),
-             "list " + in_quotes(property.name) + " has the length " + std::to_string(length),
-             "the file is damaged: export it again");
+        throw fault("list " + in_quotes(property.name) + " has the length " +
+                    std::to_string(length))
+            .at(element.name + " " + std::to_string(item))
+            .remedy("the file is damaged: export it again");
       }
       const bool is_wanted = &property == &wanted;
       if (is_wanted) corners_.clear();
@@ -340,7 +343,8 @@ class PlySource final : public PointSource {
         if (is_wanted) corners_.push_back(corner(property.type, raw.data(), element, item));
       }
     }
-    if (!line.empty()) fail_line("has more values than the " + element.name + " has properties");
+    if (!line.empty())
+      throw line_fault("has more values than the " + element.name + " has properties");
   }
 
   /// The number of a vertex; negative ones end a strip.
@@ -352,8 +356,9 @@ class PlySource final : public PointSource {
         number < std::numeric_limits<std::uint32_t>::max()) {
       return number < 0.0 ? -1 : static_cast<std::int64_t>(number);
     }
-    fail(element.name + " " + std::to_string(item), "names a vertex that does not exist",
-         "the file is damaged: export it again");
+    throw fault("names a vertex that does not exist")
+        .at(element.name + " " + std::to_string(item))
+        .remedy("the file is damaged: export it again");
   }
 
   void add_triangle(std::vector<TriangleIndices>& triangles, std::size_t a, std::size_t b,
@@ -378,9 +383,10 @@ class PlySource final : public PointSource {
     }
   }
 
-  [[noreturn]] void fail_line(std::string cause) const {
-    fail("line " + std::to_string(header_.lines + lines_.number()), std::move(cause),
-         "the file is damaged or its header is wrong: export it again");
+  [[nodiscard]] Error line_fault(std::string cause) const {
+    return fault(std::move(cause))
+        .at_line(header_.lines + lines_.number())
+        .remedy("the file is damaged or its header is wrong: export it again");
   }
 
   /// Reads the first word of `line` as a value of `type`; removes it and the blanks after it.
@@ -390,9 +396,10 @@ class PlySource final : public PointSource {
     const char* const rest = parse_scalar(line.data(), end, type, raw);
     if (rest == nullptr) {
       const std::string_view word = line.substr(0, line.find_first_of(" \t"));
-      fail_line(word.empty() ? "the line ends before property " + in_quotes(property.name)
-                             : in_quotes(word) + " is not of type " + std::string(name_of(type)) +
-                                   " for property " + in_quotes(property.name));
+      throw line_fault(word.empty()
+                           ? "the line ends before property " + in_quotes(property.name)
+                           : in_quotes(word) + " is not of type " + std::string(name_of(type)) +
+                                 " for property " + in_quotes(property.name));
     }
     line = trim_left({rest, static_cast<std::size_t>(end - rest)});
   }
@@ -419,8 +426,9 @@ class PlySource final : public PointSource {
   void check_infinite(const PointBlock& block) const {
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (!is_infinite(block.positions[i])) continue;
-      fail("vertex " + std::to_string(read_ + i), "a coordinate is infinite",
-           "leave such vertices out");
+      throw fault("a coordinate is infinite")
+          .at("vertex " + std::to_string(read_ + i))
+          .remedy("leave such vertices out");
     }
   }
 

@@ -201,12 +201,12 @@ class XyzSource final : public PointSource {
       if (!parse_row_(begin, end, types_, row_.data())) {
         const std::string_view text = trim_left(line);
         if (text.empty() || is_comment(text)) continue;
-        if (!parse_fields(line)) refuse(line);
+        if (!parse_fields(line)) throw fault(line);
       }
       const Point3 point{row_[ix], row_[iy], row_[iz]};
       // A number minus itself is not zero only if it is infinite or NaN.
       if (!((point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0.0)) {
-        if (is_infinite(point)) refuse(line);
+        if (is_infinite(point)) throw fault(line);
         ++nodata_;
         continue;
       }
@@ -297,8 +297,8 @@ class XyzSource final : public PointSource {
                                    ", is an integer that a double cannot hold")
         .at_line(lines_.number())
         .remedy(
-            "move this line to the top of the first file, which makes the column "
-            "64-bit integers if all its values are integers and none is missing, or "
+            "move this line to the top of the first file, which makes the column 64-bit integers "
+            "if all its values are integers and none is missing, or "
             "leave the column out (`drop` of build and convert)");
   }
 
@@ -325,18 +325,16 @@ class XyzSource final : public PointSource {
     return parse_number(field.data(), end, type, value) == end;
   }
 
-  /// Throws: Error that says what is wrong with a line that is not a point.
-  [[noreturn]] void refuse(std::string_view line) const {
-    const auto fail = [&](std::string cause, std::string remedy) {
-      throw Error(input_.name(), std::move(cause))
-          .at_line(lines_.number())
-          .remedy(std::move(remedy));
+  /// Returns the error of a line that is not a point.
+  [[nodiscard]] Error fault(std::string_view line) const {
+    const auto line_fault = [&](std::string cause) {
+      return Error(input_.name(), std::move(cause)).at_line(lines_.number());
     };
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {
-      fail("has " + counted(fields.size(), "column") + ", but the previous lines have " +
-               std::to_string(layout_.columns),
-           "every line needs the same columns");
+      return line_fault("has " + counted(fields.size(), "column") +
+                        ", but the previous lines have " + std::to_string(layout_.columns))
+          .remedy("every line needs the same columns");
     }
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const std::string_view field = fields[i];
@@ -348,23 +346,24 @@ class XyzSource final : public PointSource {
         const std::string cause =
             column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
         if (!real) {
-          fail(cause + " an integer that fits into " + std::string(name_of(types_[i])) +
-                   ", as the previous ones do",
-               "correct it, or leave the column out (`drop` of build and convert)");
+          return line_fault(cause + " an integer that fits into " +
+                            std::string(name_of(types_[i])) + ", as the previous ones do")
+              .remedy("correct it, or leave the column out (`drop` of build and convert)");
         }
-        fail(cause + " a number that fits into a double",
-             field.find(',') != field.npos ? "write numbers with a decimal point"
-             : coordinate                  ? "write numbers, or nothing or NA for missing values"
-                          : "write numbers, or nothing or NA for missing values, or leave the "
-                            "column out (`drop` of build and convert)");
+        return line_fault(cause + " a number that fits into a double")
+            .remedy(field.find(',') != field.npos ? "write numbers with a decimal point"
+                    : coordinate
+                        ? "write numbers, or nothing or NA for missing values"
+                        : "write numbers, or nothing or NA for missing values, or leave the "
+                          "column out (`drop` of build and convert)");
       }
       if (coordinate && std::isinf(value)) {
-        fail(column + " is " + std::string(field) + ", but a coordinate must be finite",
-             "leave the line out");
+        return line_fault(column + " is " + std::string(field) +
+                          ", but a coordinate must be finite")
+            .remedy("leave the line out");
       }
     }
-    fail("is not a point", "each line needs the same number of columns");
-    std::abort();
+    return line_fault("is not a point").remedy("each line needs the same number of columns");
   }
 
   Input input_;

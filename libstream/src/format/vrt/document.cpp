@@ -50,12 +50,10 @@ class VrtReader {
   }
 
  private:
-  static constexpr std::string_view kAsGeoTiff =
-      "convert it to GeoTIFF: gdal_translate FILE out.tif";
+  static constexpr const char* kAsGeoTiff = "convert it to GeoTIFF: gdal_translate FILE out.tif";
 
-  [[noreturn]] void fail(std::string where, std::string cause,
-                         std::string_view remedy = "make it again: gdalbuildvrt") const {
-    throw Error(file_, std::move(cause)).at(std::move(where)).remedy(std::string(remedy));
+  [[nodiscard]] Error fault(std::string cause) const {
+    return Error(file_, std::move(cause)).remedy("make it again: gdalbuildvrt");
   }
 
   [[nodiscard]] double number(const std::string& text, const std::string& where) const {
@@ -65,7 +63,7 @@ class VrtReader {
         parse_real(trimmed.data(), trimmed.data() + trimmed.size(), value) !=
             trimmed.data() + trimmed.size() ||
         !std::isfinite(value)) {
-      fail(where, in_quotes(text) + " is not a number");
+      throw fault(in_quotes(text) + " is not a number").at(where);
     }
     return value;
   }
@@ -94,9 +92,11 @@ class VrtReader {
   }
 
   void read_dataset(const XmlElement& root) {
-    if (root.name != "VRTDataset") fail("", "is XML, but not a VRTDataset");
+    if (root.name != "VRTDataset") throw fault("is XML, but not a VRTDataset");
     if (const std::string kind = root.attribute("subClass"); !kind.empty()) {
-      fail("VRTDataset", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
+      throw fault("is a " + in_quotes(kind) + ", which computes its samples")
+          .at("VRTDataset")
+          .remedy(kAsGeoTiff);
     }
     info_.columns = size_of_side(root, "rasterXSize");
     info_.rows = size_of_side(root, "rasterYSize");
@@ -106,7 +106,7 @@ class VrtReader {
     const double value = number(root.attribute(name), name);
     if (!(value >= 1) || value >= static_cast<double>(kMostVrtCells) ||
         value != std::floor(value)) {
-      fail(name, "is not a number of cells from 1 to 2^30 - 1");
+      throw fault("is not a number of cells from 1 to 2^30 - 1").at(name);
     }
     return static_cast<std::uint64_t>(value);
   }
@@ -122,7 +122,7 @@ class VrtReader {
       return;
     }
     const std::vector<std::string_view> words = split_fields(trim(transform->text), ',');
-    if (words.size() != 6) fail("GeoTransform", "does not have six numbers");
+    if (words.size() != 6) throw fault("does not have six numbers").at("GeoTransform");
     std::array<double, 6> g{};
     for (std::size_t i = 0; i < 6; ++i) g[i] = number(std::string(words[i]), "GeoTransform");
     // From the corner of the first cell to its middle.
@@ -130,15 +130,16 @@ class VrtReader {
                       g[4], g[5], g[3] + 0.5 * (g[4] + g[5])};
     const double area = g[1] * g[5] - g[2] * g[4];
     if (!std::isfinite(area) || area == 0) {
-      fail("GeoTransform", "does not map cells to distinct places");
+      throw fault("does not map cells to distinct places").at("GeoTransform");
     }
   }
 
   void read_band(const XmlElement& root) {
-    if (root.child("MaskBand") != nullptr) fail("MaskBand", "is not supported", kAsGeoTiff);
+    if (root.child("MaskBand") != nullptr)
+      throw fault("is not supported").at("MaskBand").remedy(kAsGeoTiff);
     if (wanted_ > bands_) {
-      fail("", "has no band " + std::to_string(wanted_) + ", only " + std::to_string(bands_),
-           "choose another band, or make it again: gdalbuildvrt");
+      throw fault("has no band " + std::to_string(wanted_) + ", only " + std::to_string(bands_))
+          .remedy("choose another band, or make it again: gdalbuildvrt");
     }
     int number_of_band = 0;
     for (const XmlElement& element : root.children) {
@@ -151,7 +152,9 @@ class VrtReader {
 
   void read_kind(const XmlElement& band) {
     if (const std::string kind = band.attribute("subClass"); !kind.empty()) {
-      fail("VRTRasterBand", "is a " + in_quotes(kind) + ", which computes its samples", kAsGeoTiff);
+      throw fault("is a " + in_quotes(kind) + ", which computes its samples")
+          .at("VRTRasterBand")
+          .remedy(kAsGeoTiff);
     }
     info_.sample.name = "height";
     info_.sample.type = type_of(band.attribute("dataType"));
@@ -173,17 +176,17 @@ class VrtReader {
       if (name == known) return type;
     }
     if (name.empty()) return ScalarType::u8;  // GDAL's default
-    fail("dataType", in_quotes(name) + " is not a type of heights", kAsGeoTiff);
+    throw fault(in_quotes(name) + " is not a type of heights").at("dataType").remedy(kAsGeoTiff);
   }
 
   void read_part(const XmlElement& part) {
     if (part.name.ends_with("Source") || part.name == "MaskBand") {
-      fail(part.name, "is not supported", kAsGeoTiff);
+      throw fault("is not supported").at(part.name).remedy(kAsGeoTiff);
     } else if (part.name == "NoDataValue") {
       nodata_ = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
     } else if (part.name == "Scale") {
       info_.sample.scale = number(part.text, "Scale");
-      if (info_.sample.scale == 0) fail("Scale", "is zero");
+      if (info_.sample.scale == 0) throw fault("is zero").at("Scale");
     } else if (part.name == "Offset") {
       info_.sample.offset = number(part.text, "Offset");
     } else if (part.name == "UnitType") {
@@ -201,7 +204,7 @@ class VrtReader {
         }
       } else if (part.name == "SourceBand") {
         const double band = number(part.text, "SourceBand");
-        if (!(band >= 1 && band < 65536)) fail("SourceBand", "is not a band number");
+        if (!(band >= 1 && band < 65536)) throw fault("is not a band number").at("SourceBand");
         source.band = static_cast<int>(band);
       } else if (part.name == "NODATA") {
         source.nodata = std::string(trim(part.text));
@@ -210,10 +213,10 @@ class VrtReader {
         continue;
       } else if (part.name != "SrcRect" && part.name != "DstRect" &&
                  part.name != "SourceProperties") {
-        fail(element.name, in_quotes(part.name) + " is not supported", kAsGeoTiff);
+        throw fault(in_quotes(part.name) + " is not supported").at(element.name).remedy(kAsGeoTiff);
       }
     }
-    if (source.file.empty()) fail(element.name, "names no file");
+    if (source.file.empty()) throw fault("names no file").at(element.name);
     place(element, source);
     return source;
   }
@@ -233,12 +236,13 @@ class VrtReader {
         r.v[i] = std::round(value);
         const double off = std::abs(value - r.v[i]);
         if (off > kNearestCell) {
-          fail(name, "is not on whole cells, so its source would be resampled",
-               "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
+          throw fault("is not on whole cells, so its source would be resampled")
+              .at(name)
+              .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
         }
         farthest_ = std::max(farthest_, off);
         if (!(r.v[i] >= (i < 2 ? 0 : 1)) || r.v[i] >= static_cast<double>(kMostVrtCells)) {
-          fail(name, "is outside the raster", kAsGeoTiff);
+          throw fault("is outside the raster").at(name).remedy(kAsGeoTiff);
         }
       }
       return r;
@@ -247,11 +251,12 @@ class VrtReader {
     const Rect whole{{0, 0, columns, rows}};
     const Rect from = rect("SrcRect").value_or(whole), to = rect("DstRect").value_or(whole);
     if (from.v[2] != to.v[2] || from.v[3] != to.v[3]) {
-      fail("DstRect", "is not as large as its SrcRect, so its source would be resampled",
-           "align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
+      throw fault("is not as large as its SrcRect, so its source would be resampled")
+          .at("DstRect")
+          .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
     }
     if (to.v[0] + to.v[2] > columns || to.v[1] + to.v[3] > rows) {
-      fail("DstRect", "is outside the raster", kAsGeoTiff);
+      throw fault("is outside the raster").at("DstRect").remedy(kAsGeoTiff);
     }
     const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
     source.from_column = cells(from.v[0]);

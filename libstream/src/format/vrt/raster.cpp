@@ -63,8 +63,8 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
   if (recognise_vrt(std::as_bytes(std::span(head)))) {
     throw Error(file, "is a virtual raster inside another, which is not supported")
         .remedy(
-            "name the rasters of both: gdalbuildvrt, or convert it to GeoTIFF: "
-            "gdal_translate FILE out.tif");
+            "name the rasters of both: gdalbuildvrt, or convert it to GeoTIFF: gdal_translate FILE "
+            "out.tif");
   }
   for (const Kind& kind : kKinds) {
     if (kind.format().recognise(std::as_bytes(std::span(head)))) return kind.open(file, options);
@@ -249,19 +249,20 @@ class VrtRaster final : public Raster {
       raster = std::make_unique<WholeNumbers>(std::move(raster), type);
     }
     const RasterInfo& found = raster->info();
-    const auto refuse = [&](const std::string& cause) {
-      throw Error(info_.files.front(), cause)
+    const auto fault = [&](const std::string& cause) {
+      return Error(info_.files.front(), cause)
           .at(source.file)
           .remedy("convert it to GeoTIFF: gdal_translate FILE out.tif");
     };
     if (found.sample.type != info_.sample.type) {
-      refuse("its samples are " + std::string(name_of(found.sample.type)) +
-             ", but those of the virtual raster are " + std::string(name_of(info_.sample.type)));
+      throw fault("its samples are " + std::string(name_of(found.sample.type)) +
+                  ", but those of the virtual raster are " +
+                  std::string(name_of(info_.sample.type)));
     }
     if (source.from_column + source.columns > found.columns ||
         source.from_row + source.rows > found.rows) {
-      refuse("has " + std::to_string(found.columns) + " x " + std::to_string(found.rows) +
-             " cells, fewer than the virtual raster uses");
+      throw fault("has " + std::to_string(found.columns) + " x " + std::to_string(found.rows) +
+                  " cells, fewer than the virtual raster uses");
     }
     return raster;
   }

@@ -141,12 +141,12 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
       XML_ParserCreate(nullptr), &XML_ParserFree);
   if (!parser) throw std::bad_alloc();
   XmlReading reading{.parser = parser.get(), .take = &take};
-  const auto fail = [&](const std::string& cause) {
-    throw Error(file, cause)
+  const auto fault = [&](const std::string& cause) {
+    return Error(file, cause)
         .at_line(XML_GetCurrentLineNumber(parser.get()))
         .remedy("the file is damaged: export it again");
   };
-  if (bytes->size() > kMostBytes) fail("is too large for a description");
+  if (bytes->size() > kMostBytes) throw fault("is too large for a description");
   XML_SetUserData(parser.get(), &reading);
   XML_SetElementHandler(parser.get(), &on_start, &on_end);
   XML_SetCharacterDataHandler(parser.get(), &on_text);
@@ -162,11 +162,11 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
     const XML_Status status = XML_Parse(parser.get(), piece.data(), static_cast<int>(size),
                                         at == bytes->size() ? XML_TRUE : XML_FALSE);
     if (reading.failure) std::rethrow_exception(reading.failure);
-    if (!reading.refusal.empty()) fail(reading.refusal);
+    if (!reading.refusal.empty()) throw fault(reading.refusal);
     // Some versions of the parser look at an incomplete tag again only when it has doubled.
-    if (at > reading.parsed + 2 * kMostTagBytes) fail("has a tag that is too long");
+    if (at > reading.parsed + 2 * kMostTagBytes) throw fault("has a tag that is too long");
     if (status != XML_STATUS_OK) {
-      fail(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
+      throw fault(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
     }
   } while (at < bytes->size());
   return std::move(reading.root);

@@ -175,9 +175,9 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
   if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
-    throw Error(w.staging.target().string(),
-                "its coordinates are not finite in the CRS: scale or offset of the input "
-                "are too large")
+    throw Error(
+        w.staging.target().string(),
+        "its coordinates are not finite in the CRS: scale or offset of the input are too large")
         .remedy("correct the scale and the offset of the input");
   }
 
