@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/vrt/document.hpp"
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
@@ -132,9 +134,10 @@ class WithAuxXml final : public Raster {
   bool takes(bool file_says_it, bool differs, bool overrides, const std::string& what) {
     if (!file_says_it) return true;
     if (differs) {
-      info_.notes.push_back(sidecar_ + ": its " + what +
-                            (overrides ? " overrides that of the file, as in GDAL"
-                                       : " is ignored, as in GDAL: the file has its own"));
+      info_.notes.push_back(fmt::format("{}: its {}{}", sidecar_, what,
+                                        overrides
+                                            ? " overrides that of the file, as in GDAL"
+                                            : " is ignored, as in GDAL: the file has its own"));
     }
     return overrides;
   }

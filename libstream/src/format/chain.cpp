@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "crs_agreement.hpp"
 #include "format/selection.hpp"
 #include "io/peek.hpp"
@@ -35,9 +37,9 @@ std::string difference(const SourceInfo& first, const SourceInfo& other) {
   const std::string& name = first.files.front();
   const std::string more = list_of(other.attributes, first.attributes);
   const std::string less = list_of(first.attributes, other.attributes);
-  if (less.empty()) return "it has attributes that " + name + " lacks: " + more;
-  if (more.empty()) return "it lacks attributes that " + name + " has: " + less;
-  return "it has the attributes " + more + " where " + name + " has " + less;
+  if (less.empty()) return fmt::format("it has attributes that {} lacks: {}", name, more);
+  if (more.empty()) return fmt::format("it lacks attributes that {} has: {}", name, less);
+  return fmt::format("it has the attributes {} where {} has {}", more, name, less);
 }
 
 void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreement& crs) {
@@ -46,9 +48,10 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreem
         .remedy("convert one of them, or read them separately");
   };
   if (first.coordinates != other.coordinates) {
-    throw refused("its coordinates are " + std::string(name_of(other.coordinates[0].type)) +
-                  ", but those of " + first.files.front() + " are " +
-                  std::string(name_of(first.coordinates[0].type)) + ", or their units differ");
+    throw refused(
+        fmt::format("its coordinates are {}, but those of {} are {}, or their units differ",
+                    name_of(other.coordinates[0].type), first.files.front(),
+                    name_of(first.coordinates[0].type)));
   }
   if (first.attributes != other.attributes) {
     throw refused(difference(first, other))

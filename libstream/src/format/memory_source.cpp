@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/missing.hpp"
 #include "format/selection.hpp"
 #include "io/text.hpp"
@@ -27,8 +29,9 @@ class ColumnSource final : public PointSource {
   ColumnSource(MemoryPoints points, const SourceOptions& options)
       : points_(std::move(points)), block_points_(std::max<std::size_t>(options.block_points, 1)) {
     if (points_.attributes.size() != points_.info.attributes.size()) {
-      throw std::invalid_argument("there are " + counted(points_.attributes.size(), "column") +
-                                  " for " + counted(points_.info.attributes.size(), "attribute"));
+      throw std::invalid_argument(
+          fmt::format("there are {} for {}", counted(points_.attributes.size(), "column"),
+                      counted(points_.info.attributes.size(), "attribute")));
     }
     points_.info.points = points_.count;
     if (options.crs) points_.info.crs = *options.crs;
@@ -81,7 +84,7 @@ class ColumnSource final : public PointSource {
         if (std::isinf(value)) {
           throw Error(points_.info.files.empty() ? "" : points_.info.files.front(),
                       "its " + points_.info.coordinates[axis].name + " is infinite")
-              .at("point " + std::to_string(read_ + i))
+              .at(fmt::format("point {}", read_ + i))
               .remedy("leave such points out");
         }
         block.positions[i][axis] = value;

@@ -8,6 +8,8 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/packed_column.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -74,9 +76,7 @@ class CubeCheckingReader final : public PartReader {
 }  // namespace
 
 std::string name_of(const OctreeNode& node) {
-  std::string name = std::to_string(node.depth);
-  for (const std::uint32_t place : node.place) name.append("-").append(std::to_string(place));
-  return name;
+  return fmt::format("{}-{}-{}-{}", node.depth, node.place[0], node.place[1], node.place[2]);
 }
 
 bool before(const OctreeNode& a, const OctreeNode& b) {

@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cstring>
 
+#include <fmt/core.h>
+
 #include "io/bytes.hpp"
 #include "io/number.hpp"
 #include "with_type.hpp"
@@ -36,7 +38,7 @@ OutputColumns::OutputColumns(std::span<const Channel> attributes) {
              std::any_of(columns_.begin(), columns_.end(),
                          [&](const OutputColumn& column) { return column.name == name; });
     };
-    for (int n = 2; taken(); ++n) name = word + "_" + std::to_string(n);
+    for (int n = 2; taken(); ++n) name = fmt::format("{}_{}", word, n);
     const bool real = channel.scale != 1.0 || channel.offset != 0.0;
     columns_.push_back({.name = name,
                         .stored = channel.type,

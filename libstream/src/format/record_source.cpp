@@ -12,6 +12,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/common_placement.hpp"
 #include "format/packed_column.hpp"
 #include "terrace/stream/error.hpp"
@@ -189,7 +191,7 @@ class RecordSource final : public PointSource {
     return stream_.input ? stream_.input->name() : stream_.info.files.front();
   }
   [[nodiscard]] Error fault(std::size_t point, std::string cause) const {
-    return Error(file(), std::move(cause)).at("point " + std::to_string(delivered_ + point));
+    return Error(file(), std::move(cause)).at(fmt::format("point {}", delivered_ + point));
   }
 
   /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
@@ -234,8 +236,9 @@ class RecordSource final : public PointSource {
                       std::abs(offset))) {
       return;
     }
-    throw Error(file(), std::string("the scale and the offset of ") + "xyz"[axis] +
-                            " give coordinates that are not finite")
+    throw Error(file(),
+                fmt::format("the scale and the offset of {} give coordinates that are not finite",
+                            "xyz"[axis]))
         .at("header")
         .remedy("the header is wrong: export the file again");
   }
@@ -248,8 +251,8 @@ class RecordSource final : public PointSource {
             is_wide_integer(types_[axis]) ? 0x1p53 : std::numeric_limits<double>::max();
         const auto [scale, offset] = scale_and_offset(axis);
         if (!(std::abs(value) <= most) || !std::isfinite(value * scale + offset)) {
-          throw fault(
-              i, std::string("its ") + "xyz"[axis] + " is not a number that can be kept exactly")
+          throw fault(i,
+                      fmt::format("its {} is not a number that can be kept exactly", "xyz"[axis]))
               .remedy("the file is damaged: download it again");
         }
       }
@@ -262,8 +265,9 @@ class RecordSource final : public PointSource {
     try {
       move_ = move_between(info, placement);
     } catch (const std::domain_error& axis) {
-      throw Error(file(), std::string(axis.what()) + " is not on the lattice of the other " +
-                              "files: its scale or the fraction of its offset differs")
+      throw Error(file(), fmt::format("{} is not on the lattice of the other files: its scale or "
+                                      "the fraction of its offset differs",
+                                      axis.what()))
           .remedy("name files instead of pipes, or read it separately");
     }
     info.world = placement.world;

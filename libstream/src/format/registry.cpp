@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/ept/metadata.hpp"
 #include "format/foreign_format.hpp"
 #include "format/formats.hpp"
@@ -63,7 +65,7 @@ bool is_ept_name(const std::string& file) {
 }
 
 Error unsupported(const std::string& file, const ForeignFormat& format) {
-  return Error(shown_name(file), "is " + std::string(format.name) + ", which cannot be read")
+  return Error(shown_name(file), fmt::format("is {}, which cannot be read", format.name))
       .remedy(std::string(format.remedy));
 }
 
@@ -76,8 +78,8 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
     for (const Format& format : formats()) {
       if (format.name == options.format) return format;
     }
-    throw std::invalid_argument("unknown input format '" + options.format + "'; known are " +
-                                known_formats());
+    throw std::invalid_argument(
+        fmt::format("unknown input format '{}'; known are {}", options.format, known_formats()));
   }
   const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
   const auto bytes = std::as_bytes(std::span(head));
@@ -119,8 +121,8 @@ std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
   for (const std::string& file : files) {
     const Format& other = format_of(file, options);
     if (&other != &format) {
-      throw Error(shown_name(file),
-                  "is " + other.name + ", but " + shown_name(files.front()) + " is " + format.name)
+      throw Error(shown_name(file), fmt::format("is {}, but {} is {}", other.name,
+                                                shown_name(files.front()), format.name))
           .remedy("name files of one format, or select files of a folder by `format`");
     }
     if (is_seekable(file) || packed_format_of(file) == &format) continue;

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include <fmt/core.h>
+
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
@@ -66,14 +68,14 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
       continue;
     }
     if (to_stdout && !row.streams) {
-      throw Error("standard output", std::string(row.name) + " cannot be written to a pipe")
+      throw Error("standard output", fmt::format("{} cannot be written to a pipe", row.name))
           .remedy("name a file");
     }
     return i;
   }
   if (!options.format.empty()) {
-    throw std::invalid_argument("unknown output format '" + options.format + "'; known are " +
-                                known(table));
+    throw std::invalid_argument(
+        fmt::format("unknown output format '{}'; known are {}", options.format, known(table)));
   }
   throw Error(path, "no output format has its ending").remedy("known are " + known(table));
 }

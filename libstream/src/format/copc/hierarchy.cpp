@@ -9,6 +9,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/bytes.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -67,7 +69,7 @@ class HierarchyReader {
     const auto bytes = load_little_endian<std::int32_t>(at + 24);
     const auto points = load_little_endian<std::int32_t>(at + 28);
     if (depth < 0 || depth > static_cast<std::int32_t>(kDeepestNode)) {
-      throw damaged(file_, byte, "a node of the COPC hierarchy has depth " + std::to_string(depth));
+      throw damaged(file_, byte, fmt::format("a node of the COPC hierarchy has depth {}", depth));
     }
     node.depth = static_cast<unsigned>(depth);
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -200,8 +202,8 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
   check_disjoint(file, octree);
   if (const std::uint64_t found = octree.points(); found != points) {
     throw damaged(file, root.offset,
-                  "the nodes of the COPC hierarchy have " + counted(found, "point") +
-                      ", but the header promises " + std::to_string(points));
+                  fmt::format("the nodes of the COPC hierarchy have {}, but the header promises {}",
+                              counted(found, "point"), points));
   }
   return octree;
 }

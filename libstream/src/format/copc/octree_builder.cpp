@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -217,9 +219,10 @@ OctreeBuilder::NodePoints OctreeBuilder::load(const OctreeNode& node, Bucket buc
 OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node, Bucket bucket) {
   const std::uint64_t count = file_.records(bucket);
   if (count > most_together_) {
-    throw Error(name_, counted(count, "point") +
-                           " are in one place, more than a node of COPC can have in this memory: " +
-                           std::to_string(most_together_))
+    throw Error(
+        name_,
+        fmt::format("{} are in one place, more than a node of COPC can have in this memory: {}",
+                    counted(count, "point"), most_together_))
         .remedy("raise `memory_bytes`, leave them out, or write LAZ");
   }
   NodePoints points = load(node, std::move(bucket));

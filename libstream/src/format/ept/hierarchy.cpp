@@ -12,6 +12,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "format/ept/metadata.hpp"
@@ -72,8 +73,8 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
     if (value == 0) return true;
     // Compared before adding, because the sum could overflow.
     if (value > reading_.points - reading_.found) {
-      throw ept_fault(file_, "the nodes have more points than ept.json promises: " +
-                                 std::to_string(reading_.points))
+      throw ept_fault(file_, fmt::format("the nodes have more points than ept.json promises: {}",
+                                         reading_.points))
           .at("node " + name_);
     }
     node.points = value;
@@ -84,7 +85,7 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
   bool number_integer(number_integer_t value) override {
     const NodeKey key = key_of(place());
     if (value != -1)
-      throw ept_fault(file_, "has " + std::to_string(value) + " points").at("node " + name_);
+      throw ept_fault(file_, fmt::format("has {} points", value)).at("node " + name_);
     if (!reading_.seen.insert(key).second) {
       throw ept_fault(file_, "its part of the hierarchy is referred to twice").at("node " + name_);
     }
@@ -145,8 +146,8 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
   }
   if (reading.found != points) {
     throw ept_fault((folder / "ept-hierarchy").string(),
-                    "its nodes have " + counted(reading.found, "point") +
-                        ", but ept.json promises " + std::to_string(points));
+                    fmt::format("its nodes have {}, but ept.json promises {}",
+                                counted(reading.found, "point"), points));
   }
   return std::move(reading.nodes);
 }

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "io/bounded_json.hpp"
@@ -177,7 +178,8 @@ class EptMetadataReader {
       if (type == "unsigned") return kUnsigned[i];
       if (is_float && bytes >= 4) return bytes == 4 ? ScalarType::f32 : ScalarType::f64;
     }
-    throw fault(in_quotes(type) + " of " + size.dump() + " bytes is not a type").at(where);
+    throw fault(fmt::format("{} of {} bytes is not a type", in_quotes(type), size.dump()))
+        .at(where);
   }
 
   [[nodiscard]] Dimension dimension(const Json& json, const std::string& where) const {
@@ -210,7 +212,7 @@ class EptMetadataReader {
     std::set<std::string> names;
     if (schema.size() > kMostDimensions) throw fault("has too many dimensions").at("schema");
     for (std::size_t i = 0; i < schema.size(); ++i) {
-      const std::string where = "dimension " + std::to_string(i) + " of the schema";
+      const std::string where = fmt::format("dimension {} of the schema", i);
       const auto [name, channel] = dimension(schema[i], where);
       const std::size_t offset = stream.record_bytes;
       stream.record_bytes += size_of(channel.type);

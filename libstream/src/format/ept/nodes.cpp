@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <zstd.h>
 
 #include "format/las/laz_records.hpp"
@@ -23,8 +24,8 @@ namespace terrace::stream {
 namespace {
 
 Error miscounted(std::string file, std::uint64_t points, const std::string& found) {
-  return ept_fault(std::move(file),
-                   "the hierarchy counts " + counted(points, "point") + ", but the file " + found);
+  return ept_fault(std::move(file), fmt::format("the hierarchy counts {}, but the file {}",
+                                                counted(points, "point"), found));
 }
 
 /// Records compressed with Zstandard, in one frame or several.
@@ -132,9 +133,8 @@ class NodeReader final : public PartReader {
   void check_size(const OctreeNode& node) const {
     const std::uint64_t bytes = input_->size().value_or(0), record = nodes_->record_bytes;
     if (bytes % record != 0 || bytes / record != node.points) {
-      throw miscounted(
-          input_->name(), node.points,
-          "has " + counted(bytes, "byte") + " in records of " + std::to_string(record));
+      throw miscounted(input_->name(), node.points,
+                       fmt::format("has {} in records of {}", counted(bytes, "byte"), record));
     }
   }
 
@@ -142,7 +142,7 @@ class NodeReader final : public PartReader {
     std::vector<std::string> comments;
     const LasHeader header = read_las_header(*input_, file, comments);
     if (header.points != node.points) {
-      throw miscounted(file, node.points, "has " + std::to_string(header.points));
+      throw miscounted(file, node.points, fmt::format("has {}", header.points));
     }
     const LasHeader& first = nodes_->first;
     if (header.point_format != first.point_format || header.record_bytes != first.record_bytes ||

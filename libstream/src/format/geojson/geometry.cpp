@@ -5,6 +5,7 @@
 #include <array>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "io/text.hpp"
@@ -224,7 +225,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
   [[nodiscard]] Error fault(std::string cause) const {
     return Error(file_, std::move(cause))
-        .at("the feature at byte " + std::to_string(offset_))
+        .at(fmt::format("the feature at byte {}", offset_))
         .remedy("the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr");
   }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "io/bounded_json.hpp"
@@ -63,8 +64,7 @@ char GeoJsonItems::at(std::size_t place) {
   window_ = input_->window();
   if (place < window_.size()) return window_[place];
   if (place >= most_bytes_) {
-    throw Error(input_->name(),
-                "a feature has more than " + std::to_string(most_bytes_ >> 20) + " MiB")
+    throw Error(input_->name(), fmt::format("a feature has more than {} MiB", most_bytes_ >> 20))
         .at_byte(input_->offset())
         .remedy("raise `memory_bytes`, or split the feature's lines");
   }

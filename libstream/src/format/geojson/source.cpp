@@ -16,6 +16,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/chain.hpp"
 #include "format/formats.hpp"
 #include "format/geojson/geometry.hpp"
@@ -48,7 +50,7 @@ class GeoJsonSource final : public PointSource {
     if (most_vertices_ == 1) return;
     for (std::size_t vertex = 2; vertex <= most_vertices_; ++vertex) {
       for (const char* const axis : kAxes) {
-        info_.attributes.push_back({.name = axis + std::to_string(vertex)});
+        info_.attributes.push_back({.name = fmt::format("{}{}", axis, vertex)});
       }
     }
     info_.attributes.push_back({.name = "line", .type = ScalarType::u32});

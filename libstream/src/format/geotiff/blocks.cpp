@@ -6,6 +6,8 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/geotiff/tags.hpp"
 #include "format/geotiff/unpack.hpp"
 #include "io/text.hpp"
@@ -96,18 +98,19 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
   if (fits || by_rows_) return;
   const bool countable = row <= UINT64_MAX / layout_.block_rows;
   throw handle_
-      .fault(std::string(layout_.tiled ? "tiles" : "strips") + " of " +
-             std::to_string(layout_.block_columns) + " x " +
-             std::to_string(layout_.tiled ? layout_.block_rows : 1) + " cells need " +
-             (countable ? std::to_string((row * (layout_.tiled ? layout_.block_rows : 1) >> 20) + 1)
-                        : "beyond 2^44") +
-             " MiB each, the limit is " + std::to_string(memory_bytes_ >> 20) + " MiB")
+      .fault(fmt::format(
+          "{} of {} x {} cells need {} MiB each, the limit is {} MiB",
+          layout_.tiled ? "tiles" : "strips", layout_.block_columns,
+          layout_.tiled ? layout_.block_rows : 1,
+          countable ? fmt::format("{}", (row * (layout_.tiled ? layout_.block_rows : 1) >> 20) + 1)
+                    : "beyond 2^44",
+          memory_bytes_ >> 20))
       .remedy("allow more memory, or convert it to small tiles: gdal_translate -co TILED=YES");
 }
 
 Error GeoTiffBlocks::fault(const Part& part, std::uint64_t offset, std::string cause) const {
   return handle_.fault(std::move(cause))
-      .at(layout_.place(part.across, part.down) + " (byte " + std::to_string(offset) + ")")
+      .at(fmt::format("{} (byte {})", layout_.place(part.across, part.down), offset))
       .remedy(kDamaged);
 }
 
@@ -184,15 +187,15 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
   if (bytes == 0) return fill_sparse(part, out);
   if (offset > handle_.file_bytes() || bytes > handle_.file_bytes() - offset) {
     throw fault(part, offset,
-                "claims " + counted(bytes, "byte") + ", beyond the end of the file at byte " +
-                    std::to_string(handle_.file_bytes()));
+                fmt::format("claims {}, beyond the end of the file at byte {}",
+                            counted(bytes, "byte"), handle_.file_bytes()));
   }
   if (layout_.plain) return read_plain(part, offset, bytes, out);
   if (by_rows_) {
     if (bytes > memory_bytes_) {
-      throw fault(part, offset,
-                  "needs " + std::to_string((bytes >> 20) + 1) + " MiB, the limit is " +
-                      std::to_string(memory_bytes_ >> 20) + " MiB")
+      throw fault(
+          part, offset,
+          fmt::format("needs {} MiB, the limit is {} MiB", (bytes >> 20) + 1, memory_bytes_ >> 20))
           .remedy("allow more memory, or convert it to tiles: gdal_translate -co TILED=YES");
     }
     return read_by_rows(part, out);
@@ -213,8 +216,8 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
   const std::uint32_t rows = layout_.rows_in_image(part.down);
   if (bytes / row_bytes < rows) {
     throw fault(part, offset,
-                "has " + counted(bytes, "byte") + " where " + counted(rows, "row") + " of " +
-                    counted(row_bytes, "byte") + " are expected");
+                fmt::format("has {} where {} of {} are expected", counted(bytes, "byte"),
+                            counted(rows, "row"), counted(row_bytes, "byte")));
   }
   const std::uint64_t pixel_bytes = layout_.samples_per_pixel() * size_of(layout_.type);
   // Read whole rows, unless the part is so narrow that most bytes would be read in vain.
@@ -253,7 +256,7 @@ bool GeoTiffBlocks::read_by_rows(const Part& part, const CellBuffer& out) {
     const auto row = static_cast<std::uint32_t>(next_row_);
     if (TIFFReadScanline(handle_.tiff(), block_.data(), row, sample) != 1) {
       throw fault(part, TIFFGetStrileOffset(handle_.tiff(), layout_.block(part.across, part.down)),
-                  "row " + std::to_string(row) + " cannot be decoded: " + handle_.take_complaint());
+                  fmt::format("row {} cannot be decoded: {}", row, handle_.take_complaint()));
     }
     if (next_row_ < first) continue;
     any |= overlay_part_row(part, block_.data(), part.column,
@@ -358,7 +361,7 @@ void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t
   if (bytes > kMostGrowth * due + kMostOverhead) {
     throw fault(
         part, offset,
-        "claims " + counted(bytes, "byte") + " for " + counted(due, "byte") + " of samples");
+        fmt::format("claims {} for {} of samples", counted(bytes, "byte"), counted(due, "byte")));
   }
   if (raw_.size() < bytes) raw_.resize(bytes);
   if (!handle_.read(offset, std::span(raw_.data(), bytes))) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <string_view>
 
+#include <fmt/core.h>
+
 #include "format/geotiff/tags.hpp"
 #include "format/world_file.hpp"
 #include "raster/plain_world.hpp"
@@ -108,8 +110,9 @@ void compare_with_world_file(const std::string& file, RasterInfo& info) {
     }
   }
   if (most <= kNearestCell * cell) return;
-  info.notes.push_back(world_file->name + " is ignored: " + file +
-                       " itself places the raster elsewhere; remove the wrong one");
+  info.notes.push_back(
+      fmt::format("{} is ignored: {} itself places the raster elsewhere; remove the wrong one",
+                  world_file->name, file));
 }
 
 }  // namespace
@@ -126,8 +129,7 @@ void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo&
   const std::size_t points = handle.doubles(kModelTiepoint).size() / 6;
   if (points > 1 && info.world == kPlainWorld) {
     throw handle
-        .fault("has " + std::to_string(points) +
-               " ground control points instead of a transformation")
+        .fault(fmt::format("has {} ground control points instead of a transformation", points))
         .at("ModelTiepoint")
         .remedy("rectify it first: gdalwarp");
   }
@@ -136,7 +138,7 @@ void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo&
 BandMetadata band_metadata(const std::string& xml, unsigned band) {
   BandMetadata found;
   std::string_view rest = xml;
-  const std::string sample = std::to_string(band);
+  const std::string sample = fmt::format("{}", band);
   for (;;) {
     const std::size_t begin = rest.find("<Item");
     if (begin == rest.npos) return found;

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/formats.hpp"
 #include "format/geotiff/blocks.hpp"
 #include "format/geotiff/georeference.hpp"
@@ -107,13 +109,14 @@ class GeoTiffRaster final : public Raster {
     const std::uint16_t* kinds = nullptr;
     if (TIFFGetField(handle_.tiff(), TIFFTAG_EXTRASAMPLES, &extra, &kinds) == 1 && extra > 0 &&
         kinds[extra - 1] != EXTRASAMPLE_UNSPECIFIED) {
-      info_.comments.push_back("band " + std::to_string(layout_.bands) +
-                               " is alpha, which is ignored; if it marks cells without data, write "
-                               "a nodata value: gdalwarp -dstnodata");
+      info_.comments.push_back(
+          fmt::format("band {} is alpha, which is ignored; if it marks cells without data, write a "
+                      "nodata value: gdalwarp -dstnodata",
+                      layout_.bands));
     }
     if (nodata_.unmatched) {
-      info_.comments.push_back("nodata " + nodata_text_ + " is not a value of type " +
-                               std::string(name_of(layout_.type)));
+      info_.comments.push_back(
+          fmt::format("nodata {} is not a value of type {}", nodata_text_, name_of(layout_.type)));
     }
     info_.comments.insert(info_.comments.end(), keys.faults().begin(), keys.faults().end());
     info_.comments.insert(info_.comments.end(), handle_.warnings().begin(),

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -146,7 +147,7 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
       warnings_.clear();
       const bool read = TIFFReadDirectory(tiff_) == 1;
       const std::string complaint = take_complaint();
-      const std::string where = "directory " + std::to_string(directory);
+      const std::string where = fmt::format("directory {}", directory);
       if (!read && complaint.empty())
         throw fault("has no image that is not an overview").at(where).remedy(remedy);
       if (!read || is_fatal(complaint))
@@ -207,9 +208,8 @@ std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) con
   }
   if (found != 1 || data == nullptr) return {};
   if (TIFFFieldDataType(known) != type) {
-    throw fault("has TIFF type " + std::to_string(TIFFFieldDataType(known)) + " instead of " +
-                std::to_string(type))
-        .at("field " + std::to_string(tag))
+    throw fault(fmt::format("has TIFF type {} instead of {}", static_cast<int>(TIFFFieldDataType(known)), type))
+        .at(fmt::format("field {}", tag))
         .remedy("check that it is a complete GeoTIFF file (gdalinfo)");
   }
   const auto size = static_cast<std::size_t>(TIFFDataWidth(static_cast<TIFFDataType>(type)));

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/geotiff/tags.hpp"
 #include "io/text.hpp"
 
@@ -39,7 +41,7 @@ std::string unit_name(std::uint16_t code) {
   for (const UnitCode& unit : kUnitCodes) {
     if (unit.code == code) return std::string(unit.name);
   }
-  return code == 0 || code == kUserDefined ? std::string() : "EPSG:" + std::to_string(code);
+  return code == 0 || code == kUserDefined ? std::string() : fmt::format("EPSG:{}", code);
 }
 
 /// The EPSG code of a unit by its name in Crs, 0 if it has none.
@@ -66,8 +68,8 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
   const std::size_t present = directory.size() / 4 - 1;
   std::size_t count = directory[3];
   if (count > present) {
-    faults_.push_back("GeoKeyDirectory claims " + counted(count, "key") + " but has " +
-                      std::to_string(present));
+    faults_.push_back(
+        fmt::format("GeoKeyDirectory claims {} but has {}", counted(count, "key"), present));
     count = present;
   }
   for (std::size_t i = 1; i <= count; ++i) {
@@ -79,7 +81,7 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
       numbers_[key] = directory[value];
     } else if (place == kGeoAsciiParams) {
       if (value > ascii.size() || length > ascii.size() - value) {
-        faults_.push_back("GeoKey " + std::to_string(key) + " points outside GeoAsciiParams");
+        faults_.push_back(fmt::format("GeoKey {} points outside GeoAsciiParams", key));
         continue;
       }
       std::string text = ascii.substr(value, length);
@@ -87,7 +89,7 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
       texts_[key] = text;
     } else if (place == kGeoDoubleParams) {
       if (value > doubles.size() || length > doubles.size() - value) {
-        faults_.push_back("GeoKey " + std::to_string(key) + " points outside GeoDoubleParams");
+        faults_.push_back(fmt::format("GeoKey {} points outside GeoDoubleParams", key));
         continue;
       }
       const auto part = doubles.subspan(value, length);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <optional>
 
+#include <fmt/core.h>
+
 #include "io/text.hpp"
 
 namespace terrace::stream {
@@ -57,8 +59,8 @@ std::optional<ScalarType> type_in_memory(std::uint16_t format, unsigned bits) {
 }
 
 void check_codec(const GeoTiffHandle& handle, const GeoTiffLayout& layout) {
-  const std::string name = std::string(name_of_codec(layout.compression)) + " (" +
-                           std::to_string(layout.compression) + ")";
+  const std::string name =
+      fmt::format("{} ({})", name_of_codec(layout.compression), layout.compression);
   const char* remedy = "convert it: gdal_translate -co COMPRESS=DEFLATE -co TILED=YES";
   if (TIFFIsCODECConfigured(layout.compression) == 0) {
     throw handle.fault("compression " + name + " is not in this system's libtiff").remedy(remedy);
@@ -90,8 +92,8 @@ void read_size(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   layout.rows = *rows;
   if (layout.columns >= kMostCells || layout.rows >= kMostCells) {
     throw handle
-        .fault(std::to_string(layout.columns) + " x " + std::to_string(layout.rows) +
-               " cells: columns and rows must each be fewer than 2^30")
+        .fault(fmt::format("{} x {} cells: columns and rows must each be fewer than 2^30",
+                           layout.columns, layout.rows))
         .remedy("split it (gdal_translate -srcwin)");
   }
   if (handle.value_or<std::uint32_t>(TIFFTAG_IMAGEDEPTH, 1) > 1) {
@@ -103,8 +105,7 @@ void read_sample(const GeoTiffHandle& handle, GeoTiffLayout& layout, int band) {
   layout.bands = handle.value_or<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
   if (layout.bands == 0) throw handle.fault("has no bands").remedy("check the file (tiffinfo)");
   if (band < 1 || static_cast<std::uint32_t>(band) > layout.bands) {
-    throw handle
-        .fault("has no band " + std::to_string(band) + ", only " + std::to_string(layout.bands))
+    throw handle.fault(fmt::format("has no band {}, only {}", band, layout.bands))
         .remedy("choose another band");
   }
   layout.band = static_cast<std::uint32_t>(band - 1);
@@ -119,9 +120,8 @@ void read_sample(const GeoTiffHandle& handle, GeoTiffLayout& layout, int band) {
         "undefined", "complex integer",  "complex float"};
     const std::string format = layout.sample_format < std::size(kFormats)
                                    ? kFormats[layout.sample_format]
-                                   : "SampleFormat " + std::to_string(layout.sample_format);
-    throw handle
-        .fault(std::to_string(layout.bits) + "-bit " + format + " samples are not supported")
+                                   : fmt::format("SampleFormat {}", layout.sample_format);
+    throw handle.fault(fmt::format("{}-bit {} samples are not supported", layout.bits, format))
         .remedy("convert it: gdal_translate -ot Float32");
   }
   layout.type = *type;
@@ -141,8 +141,8 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   if (layout.block_columns == 0 || layout.block_rows == 0 ||
       layout.block_columns > (1u << 31) - 1 || layout.block_rows > (1u << 31) - 1) {
     throw handle
-        .fault(std::string("invalid ") + what + " size " + std::to_string(layout.block_columns) +
-               " x " + std::to_string(layout.block_rows))
+        .fault(
+            fmt::format("invalid {} size {} x {}", what, layout.block_columns, layout.block_rows))
         .remedy("check the file (tiffinfo)");
   }
   layout.blocks_across = (layout.columns + layout.block_columns - 1) / layout.block_columns;
@@ -155,8 +155,8 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   if (across * down > handle.file_bytes() || across * down * planes > handle.file_bytes() ||
       across * down * planes > UINT32_MAX) {
     throw handle
-        .fault("claims " + std::to_string(across) + " x " + std::to_string(down) + " " + what +
-               "s, more than a file of " + counted(handle.file_bytes(), "byte") + " can list")
+        .fault(fmt::format("claims {} x {} {}s, more than a file of {} can list", across, down,
+                           what, counted(handle.file_bytes(), "byte")))
         .remedy("the file is damaged or truncated: download it again");
   }
 }
@@ -164,8 +164,8 @@ void read_blocks(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
 }  // namespace
 
 std::string GeoTiffLayout::place(std::uint32_t across, std::uint32_t down) const {
-  if (tiled) return "tile " + std::to_string(across) + "," + std::to_string(down);
-  return "strip " + std::to_string(down);
+  if (tiled) return fmt::format("tile {},{}", across, down);
+  return fmt::format("strip {}", down);
 }
 
 GeoTiffLayout geotiff_layout(const GeoTiffHandle& handle, int band) {

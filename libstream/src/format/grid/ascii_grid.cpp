@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/formats.hpp"
 #include "format/grid/grid_header.hpp"
 #include "format/grid/plain_grid.hpp"
@@ -168,8 +170,8 @@ class AsciiReader {
     // Each number has a digit and something between it and the next.
     if (input_.size() && columns_ * rows_ > *input_.size() / 2 + 1) {
       throw header_
-          .fault("promises " + std::to_string(columns_) + " x " + std::to_string(rows_) +
-                 " numbers, more than fit into " + counted(*input_.size(), "byte"))
+          .fault(fmt::format("promises {} x {} numbers, more than fit into {}", columns_, rows_,
+                             counted(*input_.size(), "byte")))
           .remedy("the file is truncated: download it again");
     }
   }
@@ -203,8 +205,8 @@ class AsciiReader {
       double value = 0;
       if (word_.empty()) {
         throw header_
-            .fault("holds " + counted(cell, "number") + " where " + std::to_string(columns_) +
-                   " x " + std::to_string(rows_) + " are expected")
+            .fault(fmt::format("holds {} where {} x {} are expected", counted(cell, "number"),
+                               columns_, rows_))
             .remedy("the file is truncated: download it again");
       }
       if (parse_sample(word_, value) != word_.data() + word_.size()) {
@@ -212,8 +214,7 @@ class AsciiReader {
           value = std::numeric_limits<double>::quiet_NaN();
         } else {
           throw header_.fault(in_quotes(word_) + " is not a number")
-              .at("row " + std::to_string(cell / columns_) + ", column " +
-                  std::to_string(cell % columns_))
+              .at(fmt::format("row {}, column {}", cell / columns_, cell % columns_))
               .remedy("correct it, or make it the NODATA_value if it means no data");
         }
       }
@@ -221,8 +222,8 @@ class AsciiReader {
     }
     if (!word_.empty()) {
       throw header_
-          .fault("holds more numbers than the " + std::to_string(columns_) + " x " +
-                 std::to_string(rows_) + " that its header promises")
+          .fault(fmt::format("holds more numbers than the {} x {} that its header promises",
+                             columns_, rows_))
           .remedy("correct the header");
     }
   }

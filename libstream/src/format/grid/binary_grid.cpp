@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/formats.hpp"
 #include "format/raster_points.hpp"
 #include "format/world_file.hpp"
@@ -50,8 +52,7 @@ ScalarType sample_type_of(const GridHeader& header, bool floats) {
   if (!has_floats && bits == 16) return is_signed ? ScalarType::i16 : ScalarType::u16;
   if (!has_floats && bits == 32) return is_signed ? ScalarType::i32 : ScalarType::u32;
   throw header
-      .fault("is " + std::to_string(bits) + (has_floats ? " for floats" : "") +
-             ", which is not supported")
+      .fault(fmt::format("is {}{}, which is not supported", bits, has_floats ? " for floats" : ""))
       .at("nbits")
       .remedy("convert it: gdal_translate FILE out.tif");
 }

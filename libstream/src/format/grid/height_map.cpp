@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <png.h>
 
 #include "format/formats.hpp"
@@ -204,14 +205,13 @@ void check_size(const std::string& file, const PngHead& image, std::uint64_t pac
                                                                                            : 1U);
   const std::uint64_t stored = image.columns * bits / 8 + 1;
   if (image.rows > packed * kDeflateGrowth / stored) {
-    throw grid_fault(file, "claims " + std::to_string(image.columns) + " x " +
-                               std::to_string(image.rows) + " pixels, which do not fit into " +
-                               counted(packed, "packed byte"));
+    throw grid_fault(file, fmt::format("claims {} x {} pixels, which do not fit into {}",
+                                       image.columns, image.rows, counted(packed, "packed byte")));
   }
   // libpng holds two rows besides ours.
   if (row_bytes > memory_bytes / 4) {
-    throw grid_fault(file, "its rows need " + std::to_string((row_bytes >> 18) + 1) +
-                               " MiB, the limit is " + std::to_string(memory_bytes >> 20) + " MiB")
+    throw grid_fault(file, fmt::format("its rows need {} MiB, the limit is {} MiB",
+                                       (row_bytes >> 18) + 1, memory_bytes >> 20))
         .remedy("allow more memory, or convert it: gdal_translate -co TILED=YES FILE out.tif");
   }
 }
@@ -251,8 +251,8 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
                           : image.bits == 16 ? ScalarType::u16
                                              : ScalarType::u8;
   std::string nodata;
-  if (!grey) nodata = std::to_string(kNoColour);
-  if (image.transparent_grey) nodata = std::to_string(*image.transparent_grey);
+  if (!grey) nodata = fmt::format("{}", kNoColour);
+  if (image.transparent_grey) nodata = fmt::format("{}", *image.transparent_grey);
   if (options.nodata) nodata = *options.nodata;
   PlainGrid grid = plain_grid("png", file, image.columns, image.rows, type, nodata);
   check_size(file, image, bytes->size(), grid.row_bytes, options.memory_bytes);

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/packed_column.hpp"
 #include "io/text.hpp"
 #include "raster/overlay.hpp"
@@ -71,10 +73,9 @@ class PlainRaster final : public Raster {
     const std::uint64_t row = ((info.columns - 1) * grid_.sample_step + 1) * size_;
     const std::uint64_t present = bytes_->size() > grid_.first ? bytes_->size() - grid_.first : 0;
     if (present >= row && (present - row) / grid_.row_bytes >= info.rows - 1) return;
-    throw grid_fault(bytes_->name(), "has " + counted(bytes_->size(), "byte") + ", too few for " +
-                                         std::to_string(info.columns) + " x " +
-                                         std::to_string(info.rows) + " samples of " +
-                                         std::string(name_of(info.sample.type)));
+    throw grid_fault(bytes_->name(), fmt::format("has {}, too few for {} x {} samples of {}",
+                                                 counted(bytes_->size(), "byte"), info.columns,
+                                                 info.rows, name_of(info.sample.type)));
   }
 
   PlainGrid grid_;
@@ -93,9 +94,10 @@ Error grid_fault(std::string file, std::string cause) {
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,
                      std::uint64_t rows, ScalarType type, const std::string& nodata) {
   if (columns == 0 || rows == 0 || columns >= kMostGridCells || rows >= kMostGridCells) {
-    throw grid_fault(file,
-                     std::to_string(columns) + " x " + std::to_string(rows) +
-                         " cells: columns and rows must each be at least 1 and fewer than 2^30")
+    throw grid_fault(
+        file,
+        fmt::format("{} x {} cells: columns and rows must each be at least 1 and fewer than 2^30",
+                    columns, rows))
         .remedy("check its header, or split it (gdal_translate -srcwin)");
   }
   PlainGrid grid;
@@ -114,14 +116,14 @@ void set_nodata(const std::string& text, PlainGrid& grid) {
   grid.nodata = NodataRule::parse(text, type);
   grid.info.nodata = grid.nodata.value;
   if (grid.nodata.unmatched) {
-    grid.info.comments.push_back("nodata " + text + " is not a value of type " +
-                                 std::string(name_of(type)));
+    grid.info.comments.push_back(
+        fmt::format("nodata {} is not a value of type {}", text, name_of(type)));
   }
 }
 
 void check_band(const std::string& file, int band, std::uint64_t bands) {
   if (band >= 1 && static_cast<std::uint64_t>(band) <= bands) return;
-  throw grid_fault(file, "has no band " + std::to_string(band) + ", only " + std::to_string(bands))
+  throw grid_fault(file, fmt::format("has no band {}, only {}", band, bands))
       .remedy("choose another band");
 }
 

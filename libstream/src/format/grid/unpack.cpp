@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include <fmt/core.h>
 #include <zip.h>
 #include <zlib.h>
 
@@ -23,8 +24,8 @@ constexpr std::size_t kUnpackBytes = 256u << 10;
 void check_growth(const std::string& file, const std::string& where, std::uint64_t packed,
                   std::uint64_t unpacked) {
   if (unpacked / kDeflateGrowth <= packed) return;
-  throw grid_fault(file, "states " + counted(unpacked, "byte") + ", too many for " +
-                             counted(packed, "packed byte"))
+  throw grid_fault(file, fmt::format("states {}, too many for {}", counted(unpacked, "byte"),
+                                     counted(packed, "packed byte")))
       .at(where);
 }
 
@@ -45,8 +46,8 @@ class Unpacked {
 
  private:
   [[nodiscard]] Error differs(const char* relation) const {
-    return grid_fault(file_, "unpacks to " + std::string(relation) + " than the " +
-                                 counted(packed_.size, "byte") + " that it states")
+    return grid_fault(file_, fmt::format("unpacks to {} than the {} that it states", relation,
+                                         counted(packed_.size, "byte")))
         .at(packed_.name);
   }
 
@@ -86,7 +87,7 @@ std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
     found.push_back({.name = status.name, .size = status.size, .number = number});
   }
   if (found.empty()) {
-    throw grid_fault(file_, "has no " + std::string(ending) + " file")
+    throw grid_fault(file_, fmt::format("has no {} file", ending))
         .remedy("unpack it: 'unzip FILE'");
   }
   return found;
@@ -154,7 +155,7 @@ std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFil
     state = inflate(&stream, Z_NO_FLUSH);
     if (state != Z_OK && state != Z_STREAM_END && state != Z_BUF_ERROR) {
       throw grid_fault(file,
-                       "is damaged: " + std::string(stream.msg == nullptr ? "zlib" : stream.msg))
+                       fmt::format("is damaged: {}", stream.msg == nullptr ? "zlib" : stream.msg))
           .at("gzip");
     }
     unpacked.append({out.data(), out.size() - stream.avail_out});

@@ -15,6 +15,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/formats.hpp"
 #include "format/grid/plain_grid.hpp"
 #include "format/raster_points.hpp"
@@ -74,7 +76,7 @@ struct Head {
 
 Head head_of(std::string_view record, const std::string& file) {
   const auto not_a_number = [&](std::size_t at, const char* what) {
-    throw grid_fault(file, std::string(what) + " is not a number").at_byte(at);
+    throw grid_fault(file, fmt::format("{} is not a number", what)).at_byte(at);
   };
   const auto integer = [&](std::size_t at, const char* what) {
     const auto value = integer_in(record.substr(at, kInteger));
@@ -261,7 +263,7 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
   ColumnSpool spool(file, head.columns, head.rows);
   for (std::uint64_t column = 0; column < head.columns; ++column) {
     if (stop.stop_requested()) throw Stopped();
-    const std::string where = "profile " + std::to_string(column + 1);
+    const std::string where = fmt::format("profile {}", column + 1);
     // A quadrangle fills most of its grid, so a nearly empty grid is a forgery.
     constexpr std::uint64_t kMostRowsPerByte = 1;
     if (column * head.rows > kMostRowsPerByte * input.offset()) {
@@ -341,7 +343,7 @@ std::unique_ptr<Raster> open_usgs_dem(const std::string& file, const std::stop_t
   const std::size_t bytes = cut ? kOldEnd : std::min(record.size(), kRecord);
   const Head head = head_of(record.substr(0, old ? kOldEnd : bytes), input.name());
   PlainGrid grid = plain_grid("usgs-dem", input.name(), head.columns, head.rows, ScalarType::i32,
-                              std::to_string(kNone));
+                              fmt::format("{}", kNone));
   grid.info.files = {file};
   input.consume(bytes);
   double west = head.west;

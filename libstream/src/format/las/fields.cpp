@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/bytes.hpp"
 #include "io/distinct_names.hpp"
 #include "io/number.hpp"
@@ -134,7 +136,7 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
       break;
     }
     for (std::size_t i = 0; i < count; ++i) {
-      Channel channel{.name = opaque || count > 1 ? name + "_" + std::to_string(i) : name,
+      Channel channel{.name = opaque || count > 1 ? fmt::format("{}_{}", name, i) : name,
                       .type = scalar};
       if (!opaque && (options & 8U) != 0) {
         channel.scale = load_little_endian<double>(row + 112 + 8 * i);
@@ -158,14 +160,14 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
         } else {
           append_number(value, load_little_endian<std::int64_t>(no_data));
         }
-        comments.push_back("extra bytes " + name + ": " + value + " means no data");
+        comments.push_back(fmt::format("extra bytes {}: {} means no data", name, value));
       }
       add(std::move(channel));
     }
   }
   const std::size_t left = record_bytes - list.offset;
   for (std::size_t i = 0; i < left; ++i) {
-    add({.name = "extra_" + std::to_string(i), .type = ScalarType::u8});
+    add({.name = fmt::format("extra_{}", i), .type = ScalarType::u8});
   }
   return list.fields;
 }

@@ -7,6 +7,8 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/copc/hierarchy.hpp"
 #include "format/geotiff/keys.hpp"
 #include "format/geotiff/tags.hpp"
@@ -56,31 +58,30 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint64_t left = header.points_offset - input.offset();
     if (left < kLasVlrHeaderBytes) {
-      comments.push_back("the header counts " + std::to_string(count) + " VLRs, but there are " +
-                         std::to_string(i));
+      comments.push_back(fmt::format("the header counts {} VLRs, but there are {}", count, i));
       return;
     }
     const std::string_view head = input.fill(kLasVlrHeaderBytes);
     if (head.size() < kLasVlrHeaderBytes)
-      throw header_fault(input, "the file ends").at("VLR " + std::to_string(i));
+      throw header_fault(input, "the file ends").at(fmt::format("VLR {}", i));
     LasVlr record{.user = text_of_field(head.data() + 2, kUserBytes),
                   .id = load_little_endian<std::uint16_t>(head.data() + 18),
                   .data = {}};
     const std::size_t bytes = load_little_endian<std::uint16_t>(head.data() + 20);
     if (bytes > left - kLasVlrHeaderBytes) {
-      comments.push_back("VLR " + std::to_string(i) +
-                         " extends into the points: it and the rest are ignored");
+      comments.push_back(
+          fmt::format("VLR {} extends into the points: it and the rest are ignored", i));
       return;
     }
     input.consume(kLasVlrHeaderBytes);
     if (!is_used(record)) {
       if (!input.skip(bytes))
-        throw header_fault(input, "the file ends").at("VLR " + std::to_string(i));
+        throw header_fault(input, "the file ends").at(fmt::format("VLR {}", i));
       continue;
     }
     const std::string_view data = input.fill(bytes);
     if (data.size() < bytes)
-      throw header_fault(input, "the file ends").at("VLR " + std::to_string(i));
+      throw header_fault(input, "the file ends").at(fmt::format("VLR {}", i));
     record.data = data.substr(0, bytes);
     input.consume(bytes);
     header.vlrs.push_back(std::move(record));
@@ -92,8 +93,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
   std::array<char, kLasEvlrHeaderBytes> head{};
   for (std::uint32_t i = 0; i < count; ++i) {
     if (at > file.size() || file.size() - at < kLasEvlrHeaderBytes || i == kMostEvlrs) {
-      comments.push_back("the header counts " + std::to_string(count) + " EVLRs, but only " +
-                         std::to_string(i) + " are read");
+      comments.push_back(fmt::format("the header counts {} EVLRs, but only {} are read", count, i));
       return;
     }
     file.read(at, std::as_writable_bytes(std::span(head)));
@@ -103,7 +103,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
                   .data = {}};
     const auto bytes = load_little_endian<std::uint64_t>(head.data() + 20);
     if (bytes > file.size() - at) {
-      comments.push_back("EVLR " + std::to_string(i) + " is cut off");
+      comments.push_back(fmt::format("EVLR {} is cut off", i));
       return;
     }
     if (is_used(record) && bytes <= kMostEvlrBytes) {
@@ -197,8 +197,8 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   const auto major = static_cast<unsigned char>(head[24]);
   header.minor = static_cast<unsigned char>(head[25]);
   if (major != 1 || header.minor > 4) {
-    throw header_fault(input, "is LAS " + std::to_string(major) + "." +
-                                  std::to_string(header.minor) + "; versions 1.0 to 1.4 are read")
+    throw header_fault(
+        input, fmt::format("is LAS {}.{}; versions 1.0 to 1.4 are read", major, header.minor))
         .remedy("convert it, e.g. 'pdal translate FILE out.las'");
   }
   const std::size_t header_bytes = load_little_endian<std::uint16_t>(head.data() + 94);
@@ -206,8 +206,8 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
                             : header.minor == 3 ? std::size_t{235}
                                                 : kLasFirstBytes;
   if (header_bytes < least) {
-    throw header_fault(input, "says that it has " + counted(header_bytes, "byte") + "; LAS 1." +
-                                  std::to_string(header.minor) + " has " + std::to_string(least));
+    throw header_fault(input, fmt::format("says that it has {}; LAS 1.{} has {}",
+                                          counted(header_bytes, "byte"), header.minor, least));
   }
   head = input.fill(header_bytes);
   if (head.size() < header_bytes) throw header_fault(input, "the file ends in its header");
@@ -231,22 +231,23 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
     evlrs = load_little_endian<std::uint32_t>(at + 243);
     const auto points = load_little_endian<std::uint64_t>(at + 247);
     if (header.points != 0 && points != 0 && points != header.points) {
-      comments.push_back("the header counts " + counted(points, "point") + " and, for old " +
-                         "readers, " + std::to_string(header.points) + ": the former is used");
+      comments.push_back(
+          fmt::format("the header counts {} and, for old readers, {}: the former is used",
+                      counted(points, "point"), header.points));
     }
     if (points != 0) header.points = points;
   }
   input.consume(header_bytes);
 
   if (header.point_format > kLastLasPointFormat) {
-    throw header_fault(input, "point format " + std::to_string(header.point_format) +
-                                  " is not known; 0 to 10 are");
+    throw header_fault(
+        input, fmt::format("point format {} is not known; 0 to 10 are", header.point_format));
   }
   const std::size_t record = las_record_bytes(header.point_format);
   if (header.record_bytes < record) {
-    throw header_fault(input, "records of point format " + std::to_string(header.point_format) +
-                                  " take " + counted(record, "byte") + ", not " +
-                                  std::to_string(header.record_bytes));
+    throw header_fault(
+        input, fmt::format("records of point format {} take {}, not {}", header.point_format,
+                           counted(record, "byte"), header.record_bytes));
   }
   if (header.points_offset < header_bytes) {
     throw header_fault(input, "the points begin inside the header");
@@ -261,9 +262,10 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   if (const auto size = input.size(); size && !header.compressed && !on_damage) {
     const std::uint64_t left = *size - std::min(*size, header.points_offset);
     if (header.points > left / header.record_bytes) {
-      throw header_fault(input, "the header promises " + counted(header.points, "point") + " of " +
-                                    counted(header.record_bytes, "byte") + ", but only " +
-                                    counted(left, "byte") + (left == 1 ? " is" : " are") + " left")
+      throw header_fault(
+          input, fmt::format("the header promises {} of {}, but only {}{} left",
+                             counted(header.points, "point"), counted(header.record_bytes, "byte"),
+                             counted(left, "byte"), left == 1 ? " is" : " are"))
           .at_byte(header.points_offset)
           .remedy("the file is truncated or its header is wrong: download it again");
     }

@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <string_view>
 
+#include <fmt/core.h>
+
 #include "io/bytes.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -80,7 +82,7 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     // If a name has the maximal length, its end is replaced by the number that makes it distinct.
     std::string name = channel.name.empty() ? "extra" : channel.name.substr(0, kExtraNameBytes);
     for (int n = 2; std::find(names.begin(), names.end(), name) != names.end(); ++n) {
-      const std::string number = std::string("_").append(std::to_string(n));
+      const std::string number = fmt::format("_{}", n);
       name = channel.name.substr(0, kExtraNameBytes - number.size()) + number;
     }
     names.push_back(name);

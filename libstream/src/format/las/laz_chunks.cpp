@@ -5,6 +5,8 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {
@@ -64,7 +66,7 @@ Error laz_fault(std::string file, std::string cause) {
 }
 Error chunk_fault(std::string file, std::uint64_t chunk, std::uint64_t byte, std::string cause) {
   return laz_fault(std::move(file), std::move(cause))
-      .at("chunk " + std::to_string(chunk) + ", byte " + std::to_string(byte));
+      .at(fmt::format("chunk {}, byte {}", chunk, byte));
 }
 
 RecordParts laz_parts(std::unique_ptr<ByteSource> file, LazLayout layout) {

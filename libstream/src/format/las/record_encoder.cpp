@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/geotiff/keys.hpp"
 #include "format/geotiff/tags.hpp"
 #include "format/las/header.hpp"
@@ -142,9 +144,9 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
     const double value = block.positions[i][axis];
     const double step = ((value - offset) / scale + kToInteger) - kToInteger;
     if (!(step >= kLeast && step <= kMost)) {
-      throw Error(path_, std::string("its ") + "xyz"[axis] + " is out of range for 32 bits in steps of " +
-                  text_of(scale))
-          .at("point " + std::to_string(out.first + i))
+      throw Error(path_, fmt::format("its {} is out of range for 32 bits in steps of {}",
+                                     "xyz"[axis], text_of(scale)))
+          .at(fmt::format("point {}", out.first + i))
           .remedy("write PLY, or build a store and write its points, whose bounds are known");
     }
     const auto stored = static_cast<std::int32_t>(step);
@@ -211,8 +213,9 @@ Value LasRecords::converted(const std::byte* from, const Channel& channel, const
                                         : static_cast<double>((1U << field.bits) - 1);
     if (!(whole >= static_cast<double>(std::numeric_limits<Value>::min()) && whole <= most &&
           std::abs(step - whole) <= exact)) {
-      throw Error(path_, text_of(real) + " does not fit into the field " + field.channel.name + " of LAS")
-          .at("point " + std::to_string(point))
+      throw Error(path_, fmt::format("{} does not fit into the field {} of LAS", text_of(real),
+                                     field.channel.name))
+          .at(fmt::format("point {}", point))
           .remedy("rename the column, so that it becomes extra bytes");
     }
     return static_cast<Value>(whole);

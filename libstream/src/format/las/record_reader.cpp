@@ -19,11 +19,10 @@ std::string_view PlainRecords::read(std::uint64_t wanted) {
       std::min<std::uint64_t>(wanted, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
   const std::string_view window = input_->fill(static_cast<std::size_t>(records) * record_bytes_);
   if (window.size() < records * record_bytes_) {
-    const Error damage(
-        {.file = input_->name(),
-         .where = "byte " + std::to_string(input_->offset() + window.size()),
-         .cause = "the file ends before the points that its header promises",
-         .remedy = "the file is truncated or its header is wrong: download it again"});
+    const Error damage =
+        Error(input_->name(), "the file ends before the points that its header promises")
+            .at_byte(input_->offset() + window.size())
+            .remedy("the file is truncated or its header is wrong: download it again");
     if (!on_damage_) throw damage;
     records = window.size() / record_bytes_;
     if (records == 0) {

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/chain.hpp"
 #include "format/common_placement.hpp"
 #include "format/copc/hierarchy.hpp"
@@ -54,10 +56,10 @@ class LasOpener {
       info.crs = las_crs(header_, stream_.input->name(), info.comments);
     }
     if (header_.uncounted > 0) {
-      info.note = stream_.input->name() + ": the header counts " +
-                  counted(header_.points, "point") + ", but the bytes of " +
-                  std::to_string(header_.uncounted) +
-                  " more follow, which are left out; a writer may have been interrupted";
+      info.note = fmt::format(
+          "{}: the header counts {}, but the bytes of {} more follow, which are left out; a writer "
+          "may have been interrupted",
+          stream_.input->name(), counted(header_.points, "point"), header_.uncounted);
       info.comments.push_back(info.note);
     }
     state_bounds();

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/las/fields.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -30,8 +32,8 @@ RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments) {
   const std::size_t standard = las_record_bytes(header.point_format);
   if (header.record_bytes - standard > kMostExtraBytes) {
-    throw Error(name, "its records have " + std::to_string(header.record_bytes - standard) +
-                          " extra bytes; up to " + std::to_string(kMostExtraBytes) + " are read")
+    throw Error(name, fmt::format("its records have {} extra bytes; up to {} are read",
+                                  header.record_bytes - standard, kMostExtraBytes))
         .at("header")
         .remedy("the file is damaged or its header is wrong: export it again");
   }

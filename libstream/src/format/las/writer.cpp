@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/las/header.hpp"
 #include "format/las/laz_encoders.hpp"
 #include "format/las/record_encoder.hpp"
@@ -82,9 +84,9 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
   const std::uint64_t chunk = vlr.chunk_size * vlr.record_length();
   const std::uint64_t chunks = options.memory_bytes / chunk;
   if (chunks < 2) {
-    throw Error(path, "writing LAZ with " + counted(vlr.record_length(), "byte") +
-                          " per point needs " + std::to_string((2 * chunk >> 20) + 1) +
-                          "M of memory, more than it may use")
+    throw Error(
+        path, fmt::format("writing LAZ with {} per point needs {}M of memory, more than it may use",
+                          counted(vlr.record_length(), "byte"), (2 * chunk >> 20) + 1))
         .remedy("raise `memory_bytes`");
   }
   const std::uint64_t most = chunks < 5 ? 1 : (chunks - 3) / 2;

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "format/mesh/glb.hpp"
@@ -152,13 +153,12 @@ class GlbParser final : public MeshParser {
     if (input_->fill(kHeaders).size() < kHeaders) throw fault_here("is too short for GLB");
     if (word(0) != glb::kMagic) throw fault_here("does not begin with glTF");
     if (word(4) != glb::kVersion) {
-      throw fault_here("is glTF of version " + std::to_string(word(4)) + ", not 2")
-          .remedy(kPlainRemedy);
+      throw fault_here(fmt::format("is glTF of version {}, not 2", word(4))).remedy(kPlainRemedy);
     }
     const std::uint64_t all = word(8), json_bytes = word(12);
     if (input_->size() && *input_->size() < all) {
-      throw fault_here("is truncated: its header promises " + counted(all, "byte") +
-                       ", but it has " + std::to_string(*input_->size()))
+      throw fault_here(fmt::format("is truncated: its header promises {}, but it has {}",
+                                   counted(all, "byte"), *input_->size()))
           .remedy(kTruncatedRemedy);
     }
     if (word(16) != glb::kJson) throw fault_here("its first chunk is not JSON");
@@ -221,7 +221,7 @@ class GlbParser final : public MeshParser {
   const Json& entry(const char* name, std::uint64_t index) const {
     const Json& all = list(json_, name);
     if (index >= all.size() || !all[index].is_object()) {
-      throw fault("is missing").at(std::string(name) + " " + std::to_string(index));
+      throw fault("is missing").at(fmt::format("{} {}", name, index));
     }
     return all[index];
   }
@@ -235,7 +235,7 @@ class GlbParser final : public MeshParser {
     const auto found = object.find(name);
     if (found == object.end()) return std::nullopt;
     const std::optional<std::uint64_t> value = whole(*found);
-    if (!value) throw fault("is not a number from 0 to " + std::to_string(kMost)).at(name);
+    if (!value) throw fault(fmt::format("is not a number from 0 to {}", kMost)).at(name);
     return value;
   }
 
@@ -256,7 +256,7 @@ class GlbParser final : public MeshParser {
 
   /// An accessor (3.6.2); its elements must be entirely in the binary chunk.
   Accessor accessor(std::uint64_t index, const char* type, std::uint64_t& component) const {
-    const std::string where = "accessors " + std::to_string(index);
+    const std::string where = fmt::format("accessors {}", index);
     const Json& json = entry("accessors", index);
     if (json.value("type", Json()) != type)
       throw fault(std::string("is not of type ") + type).at(where);
@@ -370,7 +370,7 @@ class GlbParser final : public MeshParser {
       const auto [index, above] = stack.back();
       stack.pop_back();
       const Json& node = entry("nodes", index);
-      if (seen[index]) throw fault("is in the scene twice").at("nodes " + std::to_string(index));
+      if (seen[index]) throw fault("is in the scene twice").at(fmt::format("nodes {}", index));
       seen[index] = true;
       const Transform transform = product(above, transform_of(node));
       if (const auto mesh = count(node, "mesh")) add_mesh(*mesh, transform);
@@ -378,7 +378,7 @@ class GlbParser final : public MeshParser {
       for (std::size_t i = children.size(); i-- > 0;) {
         const std::optional<std::uint64_t> child = whole(children[i]);
         if (!child)
-          throw fault("the index of a child is invalid").at("nodes " + std::to_string(index));
+          throw fault("the index of a child is invalid").at(fmt::format("nodes {}", index));
         stack.emplace_back(*child, transform);
       }
     }
@@ -387,7 +387,7 @@ class GlbParser final : public MeshParser {
   void add_mesh(std::uint64_t index, const Transform& transform) {
     // The first vertex of each accessor in this mesh: primitives may share their vertices.
     std::map<std::uint64_t, std::uint64_t> placed;
-    const std::string where = "meshes " + std::to_string(index);
+    const std::string where = fmt::format("meshes {}", index);
     for (const Json& primitive : list(entry("meshes", index), "primitives")) {
       const auto attributes = primitive.find("attributes");
       const std::optional<std::uint64_t> positions =
@@ -414,7 +414,7 @@ class GlbParser final : public MeshParser {
       if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
       moved_ = moved_ || transform != kIdentity;
       if (parts_.size() == kMostParts) {
-        throw fault("is one of more than " + std::to_string(kMostParts) + " placed primitives")
+        throw fault(fmt::format("is one of more than {} placed primitives", kMostParts))
             .at(where)
             .remedy(kPlainRemedy);
       }
@@ -475,7 +475,7 @@ class GlbParser final : public MeshParser {
                                           : load_little_endian<std::uint32_t>(at);
     }
     if (vertex >= part.vertices) {
-      throw fault("a face names the vertex " + std::to_string(vertex) + ", which does not exist");
+      throw fault(fmt::format("a face names the vertex {}, which does not exist", vertex));
     }
     return static_cast<std::uint32_t>(part.first + vertex);
   }

@@ -7,6 +7,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/mesh/parser.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
@@ -49,7 +51,7 @@ class OffParser final : public MeshParser {
     std::string_view line;
     if (read_ < vertices_) {
       if (!next_line(line)) {
-        throw fault("ends after " + std::to_string(read_) + " of " + counted(vertices_, "vertex"));
+        throw fault(fmt::format("ends after {} of {}", read_, counted(vertices_, "vertex")));
       }
       if (!read_vertex(line, vertex_)) throw fault("a vertex needs three coordinates");
       ++read_;
@@ -57,8 +59,7 @@ class OffParser final : public MeshParser {
     }
     while (wants_faces_ && faces_read_ < faces_) {
       if (!next_line(line)) {
-        throw fault("ends after " + std::to_string(faces_read_) + " of " + std::to_string(faces_) +
-                    " faces");
+        throw fault(fmt::format("ends after {} of {} faces", faces_read_, faces_));
       }
       read_face(line);
       ++faces_read_;
@@ -99,7 +100,7 @@ class OffParser final : public MeshParser {
       std::uint64_t vertex = 0;
       if (!take_count(text, vertex)) throw fault("a face has fewer corners than it states");
       if (vertex >= vertices_ || vertex >= std::numeric_limits<std::uint32_t>::max()) {
-        throw fault("a face names the vertex " + std::to_string(vertex) + ", which does not exist");
+        throw fault(fmt::format("a face names the vertex {}, which does not exist", vertex));
       }
       face_.push_back(static_cast<std::uint32_t>(vertex));
     }

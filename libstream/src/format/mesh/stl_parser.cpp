@@ -7,6 +7,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/mesh/parser.hpp"
 #include "io/bytes.hpp"
 #include "io/line_reader.hpp"
@@ -116,8 +118,8 @@ class StlBinary final : public StlParser {
     if (head.size() < kHeadBytes) throw fault("is too short for STL");
     count_ = load_little_endian<std::uint32_t>(head.data() + 80);
     if (input.size() && (*input.size() - kHeadBytes) / kFaceBytes < count_) {
-      throw fault("promises " + counted(count_, "triangle") + " but has bytes for " +
-                  std::to_string((*input.size() - kHeadBytes) / kFaceBytes));
+      throw fault(fmt::format("promises {} but has bytes for {}", counted(count_, "triangle"),
+                              (*input.size() - kHeadBytes) / kFaceBytes));
     }
     input.consume(kHeadBytes);
   }
@@ -132,14 +134,14 @@ class StlBinary final : public StlParser {
       if (faces_ == count_) return false;
       if (faces_ > 0) input_->consume(kFaceBytes);
       if (input_->fill(kFaceBytes).size() < kFaceBytes) {
-        throw fault("ends after " + std::to_string(faces_) + " of " + counted(count_, "triangle"));
+        throw fault(fmt::format("ends after {} of {}", faces_, counted(count_, "triangle")));
       }
     }
     const char* at = input_->window().data() + kNormalBytes + std::size_t{12} * corner_;
     for (double& value : vertex_) {
       value = std::bit_cast<float>(load_little_endian<std::uint32_t>(at));
       if (std::isinf(value)) {
-        throw fault("triangle " + std::to_string(faces_) + " has an infinite coordinate");
+        throw fault(fmt::format("triangle {} has an infinite coordinate", faces_));
       }
       at += 4;
     }

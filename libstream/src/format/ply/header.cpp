@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -111,10 +113,11 @@ void check_counts(const PlyHeader& header, const Input& input) {
                                     : element.binary_bytes();
     if (least == 0) continue;
     if (element.count > left / least) {
-      throw Error(input.name(), "the header promises " + counted(element.count, "item") + " of " +
-                                    in_quotes(element.name) + " of at least " +
-                                    counted(least, "byte") + ", but only " + counted(left, "byte") +
-                                    (left == 1 ? " is" : " are") + " left")
+      throw Error(
+          input.name(),
+          fmt::format("the header promises {} of {} of at least {}, but only {}{} left",
+                      counted(element.count, "item"), in_quotes(element.name),
+                      counted(least, "byte"), counted(left, "byte"), left == 1 ? " is" : " are"))
           .at_byte(input.offset())
           .remedy("the file is truncated or its header is wrong: download it again");
     }
@@ -174,7 +177,7 @@ PlyHeader read_ply_header(Input& input) {
       }
       properties.push_back(std::move(property));
       if (properties.size() > kMaxProperties) {
-        throw reader.fault("more than " + std::to_string(kMaxProperties) + " properties")
+        throw reader.fault(fmt::format("more than {} properties", kMaxProperties))
             .remedy("this is not a file of points");
       }
     } else if (words[0] == "end_header") {
@@ -184,7 +187,7 @@ PlyHeader read_ply_header(Input& input) {
           .remedy("this is not a PLY 1.0 header");
     }
     if (header.elements.size() > kMaxElements) {
-      throw reader.fault("more than " + std::to_string(kMaxElements) + " elements")
+      throw reader.fault(fmt::format("more than {} elements", kMaxElements))
           .remedy("this is not a file of points");
     }
   }

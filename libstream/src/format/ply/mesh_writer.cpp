@@ -3,6 +3,8 @@
 #include <limits>
 #include <string>
 
+#include <fmt/core.h>
+
 #include "format/output_columns.hpp"
 #include "format/ply/writer.hpp"
 #include "format/writers.hpp"
@@ -33,16 +35,17 @@ class PlyMeshWriter final : public MeshWriter {
         attributes_(header.attributes.size()),
         ascii_(ascii) {
     std::string text = ply_preamble(ascii, header.comments);
-    text += "element vertex " + std::to_string(header.vertices) +
-            "\nproperty double x\nproperty double y\nproperty double z\n";
+    text +=
+        fmt::format("element vertex {}\nproperty double x\nproperty double y\nproperty double z\n",
+                    header.vertices);
     const OutputColumns columns(float_channels(header.attributes));
     for (std::size_t i = 0; i < columns.size(); ++i) {
       text += "property float " + columns.name(i) + "\n";
     }
     // Most programs expect signed indices, so those are written wherever they suffice.
     const bool fits = header.vertices <= std::numeric_limits<std::int32_t>::max();
-    text += "element face " + std::to_string(header.triangles) + "\nproperty list uchar " +
-            (fits ? "int" : "uint") + " vertex_indices\nend_header\n";
+    text += fmt::format("element face {}\nproperty list uchar {} vertex_indices\nend_header\n",
+                        header.triangles, fits ? "int" : "uint");
     sink_.write(text);
   }
 

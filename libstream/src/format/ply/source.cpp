@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/chain.hpp"
 #include "format/formats.hpp"
 #include "format/mesh/triangles.hpp"
@@ -127,8 +129,7 @@ class PlySource final : public PointSource {
  private:
   [[nodiscard]] Error fault(std::string cause) const { return {input_.name(), std::move(cause)}; }
   [[nodiscard]] Error early_end(const std::string& element, std::uint64_t item) const {
-    return fault("the file ends in item " + std::to_string(item) + " of element " +
-                 in_quotes(element))
+    return fault(fmt::format("the file ends in item {} of element {}", item, in_quotes(element)))
         .at_byte(input_.offset())
         .remedy("the file is truncated or its header is wrong: download it again");
   }
@@ -160,7 +161,7 @@ class PlySource final : public PointSource {
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       if (!found[axis]) {
-        throw fault(std::string("the vertices have no property '") + "xyz"[axis] + "'")
+        throw fault(fmt::format("the vertices have no property '{}'", "xyz"[axis]))
             .at("header")
             .remedy("name a PLY file of points or of a mesh");
       }
@@ -206,8 +207,8 @@ class PlySource final : public PointSource {
     if (!read_scalar(property.count_type, raw.data())) return false;
     const std::int64_t length = to_integer(raw.data(), property.count_type);
     if (length < 0) {
-      throw fault("list " + in_quotes(property.name) + " in item " + std::to_string(item) +
-                  " of element " + in_quotes(element) + " has the length " + std::to_string(length))
+      throw fault(fmt::format("list {} in item {} of element {} has the length {}",
+                              in_quotes(property.name), item, in_quotes(element), length))
           .at_byte(input_.offset())
           .remedy("the file is damaged: export it again");
     }
@@ -288,8 +289,8 @@ class PlySource final : public PointSource {
         const std::int64_t length = to_integer(raw.data(), property.count_type);
         // Each item takes at least two bytes of the line, except the last, which may take one.
         if (length < 0 || static_cast<std::uint64_t>(length) > line.size()) {
-          throw line_fault("list " + in_quotes(property.name) + " has the length " +
-                           std::to_string(length));
+          throw line_fault(
+              fmt::format("list {} has the length {}", in_quotes(property.name), length));
         }
         for (std::int64_t n = 0; n < length; ++n) {
           read_word(line, property.type, property, raw.data());
@@ -331,9 +332,8 @@ class PlySource final : public PointSource {
       if (!property.list) continue;
       const std::int64_t length = to_integer(raw.data(), property.count_type);
       if (length < 0) {
-        throw fault("list " + in_quotes(property.name) + " has the length " +
-                    std::to_string(length))
-            .at(element.name + " " + std::to_string(item))
+        throw fault(fmt::format("list {} has the length {}", in_quotes(property.name), length))
+            .at(fmt::format("{} {}", element.name, item))
             .remedy("the file is damaged: export it again");
       }
       const bool is_wanted = &property == &wanted;
@@ -357,7 +357,7 @@ class PlySource final : public PointSource {
       return number < 0.0 ? -1 : static_cast<std::int64_t>(number);
     }
     throw fault("names a vertex that does not exist")
-        .at(element.name + " " + std::to_string(item))
+        .at(fmt::format("{} {}", element.name, item))
         .remedy("the file is damaged: export it again");
   }
 
@@ -398,8 +398,8 @@ class PlySource final : public PointSource {
       const std::string_view word = line.substr(0, line.find_first_of(" \t"));
       throw line_fault(word.empty()
                            ? "the line ends before property " + in_quotes(property.name)
-                           : in_quotes(word) + " is not of type " + std::string(name_of(type)) +
-                                 " for property " + in_quotes(property.name));
+                           : fmt::format("{} is not of type {} for property {}", in_quotes(word),
+                                         name_of(type), in_quotes(property.name)));
     }
     line = trim_left({rest, static_cast<std::size_t>(end - rest)});
   }
@@ -427,7 +427,7 @@ class PlySource final : public PointSource {
     for (std::size_t i = 0; i < block.size(); ++i) {
       if (!is_infinite(block.positions[i])) continue;
       throw fault("a coordinate is infinite")
-          .at("vertex " + std::to_string(read_ + i))
+          .at(fmt::format("vertex {}", read_ + i))
           .remedy("leave such vertices out");
     }
   }

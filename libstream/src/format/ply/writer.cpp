@@ -4,6 +4,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/plain_point_writer.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
@@ -17,7 +19,7 @@ constexpr std::size_t kCountWidth = 20;
 
 /// A count, padded with blanks to that width.
 std::string count_field(std::uint64_t count) {
-  std::string text = std::to_string(count);
+  std::string text = fmt::format("{}", count);
   text.resize(kCountWidth, ' ');
   return text;
 }
@@ -32,7 +34,7 @@ class PlyWriter final : public PlainPointWriter {
     text += count_field(0);
     text += "\nproperty double x\nproperty double y\nproperty double z\n";
     for (std::size_t i = 0; i < columns().size(); ++i) {
-      text += "property " + ply_type_name(columns().type(i)) + " " + columns().name(i) + "\n";
+      text += fmt::format("property {} {}\n", ply_type_name(columns().type(i)), columns().name(i));
     }
     text += "end_header\n";
     sink().write(text);

@@ -5,6 +5,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/distinct_names.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
@@ -67,14 +69,15 @@ void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
   const NamedAxes found = named_axes(names);
   if (found.twice) {
     const std::size_t axis = axis_named(names[*found.twice])->axis;
-    throw Error(file, "columns " + in_quotes(names[*found.columns[axis]]) + " and " +
-                          in_quotes(names[*found.twice]) + " name the same coordinate")
+    throw Error(file,
+                fmt::format("columns {} and {} name the same coordinate",
+                            in_quotes(names[*found.columns[axis]]), in_quotes(names[*found.twice])))
         .at(where)
         .remedy("rename one of them");
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!found.columns[axis]) {
-      throw Error(file, std::string("the header names no ") + "xyz"[axis] + " column")
+      throw Error(file, fmt::format("the header names no {} column", "xyz"[axis]))
           .at(where)
           .remedy(found.none() ? "name the columns x, y and z, or lon, lat and height; "
                                  "without the header, the first three are x, y and z"
@@ -95,7 +98,7 @@ void name_attributes(const std::vector<std::string_view>& names, TextLayout& lay
   for (std::size_t i = 0; i < layout.columns; ++i) {
     if (std::find(layout.xyz.begin(), layout.xyz.end(), i) != layout.xyz.end()) continue;
     std::string name = i < names.size() ? std::string(names[i]) : std::string();
-    if (name.empty()) name.append("a").append(std::to_string(i));
+    if (name.empty()) name = fmt::format("a{}", i);
     layout.attributes.push_back(i);
     layout.names.push_back(distinct.add(name));
   }
@@ -234,7 +237,7 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   }
   const char between_names = layout.separator == '\t' ? '\t' : separator_of(title);
   layout.columns = split_fields(line, layout.separator).size();
-  const std::string where = "line " + std::to_string(lines.number());
+  const std::string where = fmt::format("line {}", lines.number());
   if (layout.columns < 3) {
     throw Error(file, "has " + counted(layout.columns, "column") + ", but a point needs x, y and z")
         .at(where)
@@ -243,7 +246,7 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   if (layout.columns > TextLayout::kMaxColumns) {
     throw Error(file, "has " + counted(layout.columns, "column"))
         .at(where)
-        .remedy("at most " + std::to_string(TextLayout::kMaxColumns) + " are read");
+        .remedy(fmt::format("at most {} are read", TextLayout::kMaxColumns));
   }
   if (header_line == 0 &&
       is_header_comment(header_names(last_comment, between_names), layout.columns)) {
@@ -252,13 +255,12 @@ TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   }
   const std::vector<std::string_view> names = header_names(header, between_names);
   if (header_line != 0 && names.size() != layout.columns) {
-    throw Error(file, "has " + counted(layout.columns, "column") + ", but the header in " +
-                          "line " + std::to_string(header_line) + " names " +
-                          std::to_string(names.size()))
+    throw Error(file, fmt::format("has {}, but the header in line {} names {}",
+                                  counted(layout.columns, "column"), header_line, names.size()))
         .at(where)
         .remedy("one of them is wrong");
   }
-  if (!header.empty()) find_axes(names, layout, file, "line " + std::to_string(header_line));
+  if (!header.empty()) find_axes(names, layout, file, fmt::format("line {}", header_line));
   name_attributes(names, layout);
   lines.hold();
   return layout;

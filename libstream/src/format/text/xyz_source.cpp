@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/chain.hpp"
 #include "format/formats.hpp"
 #include "format/missing.hpp"
@@ -251,9 +253,9 @@ class XyzSource final : public PointSource {
       const std::string& unit = layout_.units[axis];
       const bool known = axis < 2 && layout_.geographic ? unit == "degree" : is_length_unit(unit);
       if (unit.empty() || known) continue;
-      info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") + in_quotes(unit) +
-                    " in the header, after the name of " + "xyz"[axis] +
-                    ", is not a known unit and is ignored";
+      info_.note += fmt::format(
+          "{}{} in the header, after the name of {}, is not a known unit and is ignored",
+          info_.note.empty() ? input_.name() + ": " : "; ", in_quotes(unit), "xyz"[axis]);
     }
     if (!layout_.geographic && x != y && (is_length_unit(x) || is_length_unit(y))) {
       info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") +
@@ -293,8 +295,8 @@ class XyzSource final : public PointSource {
   void check_exact(std::string_view line, std::size_t column) const {
     const std::string_view field = unquoted(split_row(line, layout_)[column]);
     if (!is_integer(field) || is_exact(field, row_[column])) return;
-    throw Error(input_.name(), "column " + std::to_string(column + 1) + ", " + in_quotes(field) +
-                                   ", is an integer that a double cannot hold")
+    throw Error(input_.name(), fmt::format("column {}, {}, is an integer that a double cannot hold",
+                                           column + 1, in_quotes(field)))
         .at_line(lines_.number())
         .remedy(
             "move this line to the top of the first file, which makes the column 64-bit integers "
@@ -332,13 +334,13 @@ class XyzSource final : public PointSource {
     };
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {
-      return line_fault("has " + counted(fields.size(), "column") +
-                        ", but the previous lines have " + std::to_string(layout_.columns))
+      return line_fault(fmt::format("has {}, but the previous lines have {}",
+                                    counted(fields.size(), "column"), layout_.columns))
           .remedy("every line needs the same columns");
     }
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const std::string_view field = fields[i];
-      const std::string column = "column " + std::to_string(i + 1);
+      const std::string column = fmt::format("column {}", i + 1);
       const bool coordinate = is_coordinate(i);
       double value = 0;
       const bool real = types_[i] == ScalarType::f64, missing = is_missing_value(field);
@@ -346,8 +348,8 @@ class XyzSource final : public PointSource {
         const std::string cause =
             column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
         if (!real) {
-          return line_fault(cause + " an integer that fits into " +
-                            std::string(name_of(types_[i])) + ", as the previous ones do")
+          return line_fault(fmt::format("{} an integer that fits into {}, as the previous ones do",
+                                        cause, name_of(types_[i])))
               .remedy("correct it, or leave the column out (`drop` of build and convert)");
         }
         return line_fault(cause + " a number that fits into a double")
@@ -358,8 +360,7 @@ class XyzSource final : public PointSource {
                           "column out (`drop` of build and convert)");
       }
       if (coordinate && std::isinf(value)) {
-        return line_fault(column + " is " + std::string(field) +
-                          ", but a coordinate must be finite")
+        return line_fault(fmt::format("{} is {}, but a coordinate must be finite", column, field))
             .remedy("leave the line out");
       }
     }

@@ -14,6 +14,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
@@ -138,7 +140,7 @@ class VrtReader {
     if (root.child("MaskBand") != nullptr)
       throw fault("is not supported").at("MaskBand").remedy(kAsGeoTiff);
     if (wanted_ > bands_) {
-      throw fault("has no band " + std::to_string(wanted_) + ", only " + std::to_string(bands_))
+      throw fault(fmt::format("has no band {}, only {}", wanted_, bands_))
           .remedy("choose another band, or make it again: gdalbuildvrt");
     }
     int number_of_band = 0;

@@ -17,6 +17,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "format/formats.hpp"
 #include "format/grid/ascii_grid.hpp"
 #include "format/grid/binary_grid.hpp"
@@ -115,9 +117,10 @@ class WholeNumbers final : public Raster {
       const double end = std::ldexp(1.0, std::numeric_limits<T>::digits);
       if (!(real >= static_cast<double>(std::numeric_limits<T>::min()) && real < end) ||
           real != std::trunc(real)) {
-        throw Error(info_.files.front(), "has samples that are not " +
-                                             std::string(name_of(info_.sample.type)) +
-                                             ", the sample type of the virtual raster")
+        throw Error(
+            info_.files.front(),
+            fmt::format("has samples that are not {}, the sample type of the virtual raster",
+                        name_of(info_.sample.type)))
             .remedy("make the virtual raster again: gdalbuildvrt");
       }
       const T number = static_cast<T>(real);
@@ -231,9 +234,10 @@ class VrtRaster final : public Raster {
     noted_ = true;
     std::string value;
     append_number(value, *file.nodata);
-    info_.notes.push_back(info_.files.front() + ": declares no nodata value, so that of " +
-                          source.file + ", " + value +
-                          ", is used; GDAL reads such cells as heights");
+    info_.notes.push_back(
+        fmt::format("{}: declares no nodata value, so that of {}, {}, is used; GDAL reads such "
+                    "cells as heights",
+                    info_.files.front(), source.file, value));
   }
 
   /// nodata: see RasterOptions.
@@ -255,14 +259,13 @@ class VrtRaster final : public Raster {
           .remedy("convert it to GeoTIFF: gdal_translate FILE out.tif");
     };
     if (found.sample.type != info_.sample.type) {
-      throw fault("its samples are " + std::string(name_of(found.sample.type)) +
-                  ", but those of the virtual raster are " +
-                  std::string(name_of(info_.sample.type)));
+      throw fault(fmt::format("its samples are {}, but those of the virtual raster are {}",
+                              name_of(found.sample.type), name_of(info_.sample.type)));
     }
     if (source.from_column + source.columns > found.columns ||
         source.from_row + source.rows > found.rows) {
-      throw fault("has " + std::to_string(found.columns) + " x " + std::to_string(found.rows) +
-                  " cells, fewer than the virtual raster uses");
+      throw fault(fmt::format("has {} x {} cells, fewer than the virtual raster uses",
+                              found.columns, found.rows));
     }
     return raster;
   }
