@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/xattr.h>
@@ -32,8 +33,8 @@ constexpr const char* kNoteName = "user.terrace";
 
 /// Returns the attribute's value, which is different after every change of a file.
 std::string note_of(const struct stat& status) {
-  return "written, " + std::to_string(status.st_size) + " bytes, " +
-         std::to_string(status.st_mtim.tv_sec) + "." + std::to_string(status.st_mtim.tv_nsec);
+  return fmt::format("written, {} bytes, {}.{}", status.st_size, status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <memory>
 #include <new>
 
+#include <fmt/core.h>
 #include <libdeflate.h>
 
 #include "io/text.hpp"
@@ -57,8 +58,8 @@ std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t mo
   if (!is_gzip(bytes) || bytes.size() < kLeast) throw fault(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
   if (size > most) {
-    throw fault(name, "states " + counted(size, "byte") + ", more than the limit of " +
-                          std::to_string(most));
+    throw fault(name,
+                fmt::format("states {}, more than the limit of {}", counted(size, "byte"), most));
   }
   const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
       libdeflate_alloc_decompressor());

@@ -8,6 +8,7 @@
 #include <new>
 #include <utility>
 
+#include <fmt/core.h>
 #include <zlib.h>
 
 #include "terrace/stream/error.hpp"
@@ -43,7 +44,7 @@ GzipStream::~GzipStream() = default;
 
 Error GzipStream::fault(std::string cause) const {
   return Error(name_, std::move(cause))
-      .at("byte " + std::to_string(used_) + " of the gzip data")
+      .at(fmt::format("byte {} of the gzip data", used_))
       .remedy("the file is damaged or truncated: download it again");
 }
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -29,7 +30,7 @@ std::string prefix_of(const fs::path& target) {
   if (name.size() > kMostNamed) {
     std::uint64_t hash = 0xcbf29ce484222325;
     for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-    name = "terrace-" + std::to_string(hash);
+    name = fmt::format("terrace-{}", hash);
   }
   return std::string(".").append(name).append(".tmp-");
 }
@@ -128,8 +129,8 @@ fs::path folder_of(const fs::path& target) {
 }
 
 std::string temporary_name(const fs::path& target, int attempt) {
-  std::string name = prefix_of(target) + std::to_string(::getpid());
-  return attempt == 0 ? name : name + '-' + std::to_string(attempt);
+  std::string name = fmt::format("{}{}", prefix_of(target), ::getpid());
+  return attempt == 0 ? name : fmt::format("{}-{}", name, attempt);
 }
 
 void sweep_temporaries(const fs::path& target, const std::string& mark) {

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "laz/coder.hpp"
 #include "laz/layered.hpp"
 #include "laz/layout.hpp"
@@ -166,9 +168,8 @@ Decoder::Step Decoder::Impl::step_layered(Bytes bytes, bool last, std::uint8_t* 
       return {};
     }
     if (head.points != points) {
-      throw Corrupt(
-          "the chunk has " + std::to_string(head.points) + " points, not " + std::to_string(points),
-          layout.length);
+      throw Corrupt(fmt::format("the chunk has {} points, not {}", head.points, points),
+                    layout.length);
     }
     begin_layers(bytes);
     std::memcpy(records, bytes.data(), layout.length);

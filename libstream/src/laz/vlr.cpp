@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <string>
 
+#include <fmt/core.h>
+
 #include "laz/bytes.hpp"
 #include "laz/layout.hpp"
 #include "terrace/stream/laz.hpp"
@@ -46,7 +48,7 @@ std::vector<Item> standard_items(unsigned point_format) {
     case 10:
       return {kPoint14, kRgbNir14, kWave14};
     default:
-      throw std::invalid_argument("unknown point format " + std::to_string(point_format));
+      throw std::invalid_argument(fmt::format("unknown point format {}", point_format));
   }
 }
 
@@ -75,9 +77,8 @@ Vlr Vlr::of(unsigned point_format, std::size_t record_length, std::uint32_t chun
   vlr.items = standard_items(point_format);
   const std::size_t standard = vlr.record_length();
   if (record_length < standard || record_length > 0xffff) {
-    throw std::invalid_argument("point format " + std::to_string(point_format) +
-                                " does not have records of " + std::to_string(record_length) +
-                                " bytes");
+    throw std::invalid_argument(fmt::format("point format {} does not have records of {} bytes",
+                                            point_format, record_length));
   }
   if (record_length > standard) {
     const auto extra = static_cast<std::uint16_t>(record_length - standard);
@@ -96,8 +97,7 @@ Vlr Vlr::parse(std::span<const std::byte> payload, unsigned point_format,
   Vlr vlr;
   const auto compressor = load<std::uint16_t>(bytes + kCompressorAt);
   if (compressor > 3) {
-    throw Corrupt("LASzip's compressor " + std::to_string(compressor) + " is unknown",
-                  kCompressorAt);
+    throw Corrupt(fmt::format("LASzip's compressor {} is unknown", compressor), kCompressorAt);
   }
   vlr.compressor = static_cast<Compressor>(compressor);
   if (load<std::uint16_t>(bytes + kCoderAt) != 0) {

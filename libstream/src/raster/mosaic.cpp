@@ -8,6 +8,8 @@
 #include <sstream>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "crs_agreement.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
@@ -34,7 +36,7 @@ std::string all_digits(double value) {
 }
 
 Error differs(const std::string& first, const std::string& other, const std::string& what) {
-  return {other, "does not match " + first + ": " + what};
+  return {other, fmt::format("does not match {}: {}", first, what)};
 }
 
 /// Returns the column and row of `frame` at x, y.
@@ -72,9 +74,10 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
         std::max(std::abs(at[0] - origin[0] - c), std::abs(at[1] - origin[1] - r));
     off = std::max({off, std::abs(at[0] - column - c), std::abs(at[1] - row - r)});
     if (!(stretch <= kNearestCell)) {
-      throw differs(a, b,
-                    "its cells are " + all_digits(m[0]) + " x " + all_digits(m[4]) + ", not " +
-                        all_digits(first.world.xy[0]) + " x " + all_digits(first.world.xy[4]))
+      throw differs(
+          a, b,
+          fmt::format("its cells are {} x {}, not {} x {}", all_digits(m[0]), all_digits(m[4]),
+                      all_digits(first.world.xy[0]), all_digits(first.world.xy[4])))
           .remedy(align);
     }
   }
@@ -82,8 +85,8 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
   off = std::max(off, shift);
   if (!(shift <= kNearestCell)) {
     throw differs(a, b,
-                  "its cells are shifted by " + shown(origin[0] - column) + ", " +
-                      shown(origin[1] - row) + " of a cell")
+                  fmt::format("its cells are shifted by {}, {} of a cell",
+                              shown(origin[0] - column), shown(origin[1] - row)))
         .remedy(align);
   }
   if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
@@ -105,21 +108,21 @@ void check_samples(const RasterInfo& first, const RasterInfo& other) {
   const std::string &a = first.files.front(), &b = other.files.front();
   if (first.sample.type != other.sample.type) {
     throw differs(a, b,
-                  "its samples are " + std::string(name_of(other.sample.type)) + ", not " +
-                      std::string(name_of(first.sample.type)))
+                  fmt::format("its samples are {}, not {}", name_of(other.sample.type),
+                              name_of(first.sample.type)))
         .remedy("convert one: gdal_translate -ot");
   }
   if (first.sample.scale != other.sample.scale || first.sample.offset != other.sample.offset) {
     throw differs(a, b,
-                  "its scale and offset are " + all_digits(other.sample.scale) + ", " +
-                      all_digits(other.sample.offset) + ", not " + all_digits(first.sample.scale) +
-                      ", " + all_digits(first.sample.offset))
+                  fmt::format("its scale and offset are {}, {}, not {}, {}",
+                              all_digits(other.sample.scale), all_digits(other.sample.offset),
+                              all_digits(first.sample.scale), all_digits(first.sample.offset)))
         .remedy("make them agree: gdal_translate -unscale");
   }
   if (first.sample.unit != other.sample.unit) {
-    throw differs(
-        a, b,
-        "its heights are in " + named(other.sample.unit) + ", not " + named(first.sample.unit))
+    throw differs(a, b,
+                  fmt::format("its heights are in {}, not {}", named(other.sample.unit),
+                              named(first.sample.unit)))
         .remedy("give both the same unit (gdal_edit.py -units), or convert one (gdal_calc.py)");
   }
 }
@@ -149,7 +152,7 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
     return;
   }
   throw differs(first.files.front(), other.files.front(),
-                "its CRS is " + described(b) + ", not " + described(a))
+                fmt::format("its CRS is {}, not {}", described(b), described(a)))
       .remedy("reproject one (gdalwarp -t_srs), or give the CRS of all");
 }
 
@@ -248,9 +251,10 @@ class Mosaic final : public Raster {
       }
     }
     if (farthest > kSameCell) {
-      notes_.push_back("the cells of " + farthest_file + " are up to " + shown(farthest) +
-                       " of a cell off those of " + files.front() +
-                       ", and are placed on the nearest cells");
+      notes_.push_back(
+          fmt::format("the cells of {} are up to {} of a cell off those of {}, and are placed on "
+                      "the nearest cells",
+                      farthest_file, shown(farthest), files.front()));
     }
     unite(*first, crs.value_or(first->crs));
     info_.notes = std::move(notes_);
@@ -329,9 +333,9 @@ class Mosaic final : public Raster {
     info_.rows = static_cast<std::uint64_t>(bottom - top);
     if (info_.columns >= kMostMosaicCells || info_.rows >= kMostMosaicCells) {
       throw Error(members_.front().file,
-                  "the mosaic of the " + std::to_string(members_.size()) + " files has " +
-                      std::to_string(info_.columns) + " x " + std::to_string(info_.rows) +
-                      " cells: columns and rows must each be fewer than 2^30")
+                  fmt::format("the mosaic of the {} files has {} x {} cells: columns and rows must "
+                              "each be fewer than 2^30",
+                              members_.size(), info_.columns, info_.rows))
           .remedy("read the files separately");
     }
     auto& m = info_.world.xy;

@@ -9,6 +9,8 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "raster/order.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
@@ -104,9 +106,8 @@ std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t 
 void check_count(const SourceInfo& info, const CellWindow& crop) {
   constexpr std::uint64_t kMostReadableCells = std::uint64_t{1} << 48;
   if (cells_of(crop) <= kMostReadableCells) return;
-  throw Error(info.files.front(), "has " + std::to_string(crop.columns) + " x " +
-                                      std::to_string(crop.rows) +
-                                      " cells, more than the limit of 2^48")
+  throw Error(info.files.front(), fmt::format("has {} x {} cells, more than the limit of 2^48",
+                                              crop.columns, crop.rows))
       .remedy("select a part (`region`, gdal_translate -srcwin), or correct its size");
 }
 
