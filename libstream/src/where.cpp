@@ -15,6 +15,8 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/number.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -85,7 +87,7 @@ class Where::Parser {
 
   [[nodiscard]] Error fault(std::string cause) const {
     return Error("the condition " + in_quotes(text_), std::move(cause))
-        .at("character " + std::to_string(at_ + 1));
+        .at(fmt::format("character {}", at_ + 1));
   }
 
   static bool is_letter(char c) {

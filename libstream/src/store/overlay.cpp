@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "store/manifest.hpp"
 #include "store/overlay_page.hpp"
 #include "terrace/stream/byte_source.hpp"
@@ -67,10 +69,11 @@ void Overlay::Impl::read_header(const Store& store) {
     // Checked before anything that may differ in a newer version.
     const auto version = load<std::uint32_t>(bytes.data() + kOverlayMarkBytes);
     if (version > kOverlayVersion) {
-      throw Error(file->name(),
-                  "overlay version " + std::to_string(version) +
-                      " was written by a newer terrace; this one reads up to version " +
-                      std::to_string(kOverlayVersion))
+      throw Error(
+          file->name(),
+          fmt::format(
+              "overlay version {} was written by a newer terrace; this one reads up to version {}",
+              version, kOverlayVersion))
           .remedy("update");
     }
     ByteReader in(ByteView(bytes).subspan(kOverlayMarkBytes + 4));
@@ -90,9 +93,10 @@ void Overlay::Impl::read_header(const Store& store) {
     }
     channel.assign(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(name));
     if (made_for != store.checksum()) {
-      throw Error(file->name(), "was made for the store with the checksum " +
-                                    hexadecimal(made_for) + ", " + store.path().string() + " has " +
-                                    hexadecimal(store.checksum()))
+      throw Error(
+          file->name(),
+          fmt::format("was made for the store with the checksum {}, {} has {}",
+                      hexadecimal(made_for), store.path().string(), hexadecimal(store.checksum())))
           .remedy("give the store that it was made for, or write the overlay again");
     }
     read_directory(count, end, store.points());

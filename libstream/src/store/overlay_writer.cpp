@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/text.hpp"
 #include "store/overlay_page.hpp"
 #include "terrace/stream/atomic_file.hpp"
@@ -54,10 +56,9 @@ struct OverlayWriter::Impl {
   }
 
   [[noreturn]] void refuse(ClusterId cluster, std::uint32_t index, const std::string& why) const {
-    throw std::invalid_argument("value " + std::to_string(values) + " of the overlay, cluster " +
-                                std::to_string(level_of(cluster)) + "/" +
-                                std::to_string(ordinal_of(cluster)) + ", point " +
-                                std::to_string(index) + ": " + why);
+    throw std::invalid_argument(fmt::format("value {} of the overlay, cluster {}/{}, point {}: {}",
+                                            values, level_of(cluster), ordinal_of(cluster), index,
+                                            why));
   }
 
   void look_up(ClusterId cluster, std::uint32_t index) {

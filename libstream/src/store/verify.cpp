@@ -5,6 +5,7 @@
 #include <string>
 #include <type_traits>
 
+#include <fmt/core.h>
 #include <terrace/base/random.hpp>
 #include <terrace/base/thread_team.hpp>
 
@@ -118,7 +119,7 @@ class Verification {
     if (report_) report_(problem);
   }
   std::string about_cluster(unsigned level, std::uint64_t ordinal, const std::string& what) const {
-    return "cluster " + std::to_string(level) + "/" + std::to_string(ordinal) + ": " + what;
+    return fmt::format("cluster {}/{}: {}", level, ordinal, what);
   }
 
   void check_stop() const {
@@ -194,8 +195,8 @@ class Verification {
     }
     if (sums_[l].members != manifest_.levels[l].members) {
       problem(manifest_file_.name(), 0,
-              "level " + std::to_string(l) + " has " + std::to_string(sums_[l].members) +
-                  " members, not " + std::to_string(manifest_.levels[l].members));
+              fmt::format("level {} has {} members, not {}", l, sums_[l].members,
+                          manifest_.levels[l].members));
     }
   }
 
@@ -267,7 +268,7 @@ class Verification {
         page.problem(
             level.data().name(), offset,
             about_cluster(l, ordinal,
-                          "values of attribute " + std::to_string(a) + " are outside their range"));
+                          fmt::format("values of attribute {} are outside their range", a)));
       }
       at += size_of(type);
     }
@@ -319,8 +320,7 @@ class Verification {
         const std::uint64_t child = points.children[i * l + j];
         std::vector<bool>::reference headed = sums_[j].headed[static_cast<std::size_t>(child)];
         if (headed) {
-          problem("cluster " + std::to_string(j) + "/" + std::to_string(child) +
-                  " is headed twice");
+          problem(fmt::format("cluster {}/{} is headed twice", j, child));
         }
         headed = true;
         sums_[j].heads += hash_of(child, points.positions[i], payload,
@@ -368,8 +368,9 @@ class Verification {
                             "no point above heads it"));
     } else if (sums.heads != sums.representatives) {
       problem(levels_[l]->data().name(), 0,
-              "the representatives of level " + std::to_string(l) +
-                  " are not the points above that head its clusters");
+              fmt::format(
+                  "the representatives of level {} are not the points above that head its clusters",
+                  l));
     }
   }
 

@@ -11,6 +11,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "io/text.hpp"
 #include "store/read/view.hpp"
 #include "terrace/stream/error.hpp"
@@ -362,7 +364,8 @@ class Store::ConditionView final : public Store::View {
 Store Store::where(const std::string& condition) const {
   if (condition.empty()) return *this;
   Where parsed(condition, schema());
-  if (view_) parsed = Where('(' + view_->condition().text() + ") && (" + condition + ')', schema());
+  if (view_)
+    parsed = Where(fmt::format("({}) && ({})", view_->condition().text(), condition), schema());
   Store view = *this;
   view.view_ = std::make_shared<const ConditionView>(std::move(parsed));
   return view;

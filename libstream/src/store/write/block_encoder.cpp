@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "differing_bits.hpp"
 #include "io/text.hpp"
 #include "store/codec/column_codec.hpp"
@@ -267,9 +269,8 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   members_ = block_->order.subspan(first_, block_->first[cluster + 1] - first_);
   const auto n = static_cast<std::uint32_t>(members_.size());
   if (n > layout_->most_points()) {
-    throw Error({}, "a cluster has " + counted(n, "point") +
-                        " of this size, more than the limit of " +
-                        std::to_string(layout_->most_points()))
+    throw Error({}, fmt::format("a cluster has {} of this size, more than the limit of {}",
+                                counted(n, "point"), layout_->most_points()))
         .remedy("make the blocks smaller");
   }
   Entry entry;

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/base/thread_team.hpp>
 
 #include "store/read/directory.hpp"
@@ -36,7 +37,7 @@ void put_box(Bytes& out, const Box& box) {
 }
 
 std::string file_name(unsigned level, const char* what) {
-  return "level-" + std::to_string(level) + ".0." + what;
+  return fmt::format("level-{}.0.{}", level, what);
 }
 
 void add(const Counts& counts, Counts& to) {
