@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/cluster/linkage.hpp>
 
 #include "base/units.hpp"
@@ -39,8 +40,9 @@ std::string general_help() {
       "terrace turns point sets too large for memory into a store, and serves any part of it at "
       "any\nresolution.\n\nUsage: terrace VERB [OPTIONS]\n\nVerbs:\n";
   for (const Verb& verb : verbs()) {
-    text += "  " + verb.name + std::string(10 - std::min<std::size_t>(verb.name.size(), 9), ' ') +
-            verb.brief + '\n';
+    text +=
+        fmt::format("  {}{}{}\n", verb.name,
+                    std::string(10 - std::min<std::size_t>(verb.name.size(), 9), ' '), verb.brief);
   }
   return text +
          "\n`terrace VERB --help` lists options; `terrace --version` shows version, build and "
@@ -50,8 +52,8 @@ std::string general_help() {
 
 std::string version_text() {
   const cluster::CudaStatus cuda = cluster::cuda_available();
-  return std::string("terrace ") + kVersion + "\nbuild: " + kBuild +
-         "\nparts: linkage on a GPU: " + (cuda.available ? cuda.device : "no GPU") + "\n";
+  return fmt::format("terrace {}\nbuild: {}\nparts: linkage on a GPU: {}\n", kVersion, kBuild,
+                     cuda.available ? cuda.device : "no GPU");
 }
 
 /// Planned verbs and options. Naming them here keeps users from taking them for typing errors.
@@ -68,7 +70,7 @@ void refuse_planned_options(const Verb& verb, std::span<const std::string> argum
     if (argument == "--") return;
     for (const auto& [name, option] : kPlannedOptions) {
       if (verb.name == name && argument.substr(0, argument.find('=')) == option) {
-        throw UsageError(std::string(option) + " is not available yet");
+        throw UsageError(fmt::format("{} is not available yet", option));
       }
     }
   }
@@ -150,9 +152,9 @@ void check_memory(const Verb& verb, const CommonOptions& common) {
     if (name == verb.name) least = mebibytes;
   }
   if (!common.memory_bytes || *common.memory_bytes >= least << 20) return;
-  throw std::runtime_error("--memory is " + readable_bytes(*common.memory_bytes) +
-                           ", but `terrace " + verb.name + "` needs " + std::to_string(least) +
-                           " MiB at least; raise --memory");
+  throw std::runtime_error(
+      fmt::format("--memory is {}, but `terrace {}` needs {} MiB at least; raise --memory",
+                  readable_bytes(*common.memory_bytes), verb.name, least));
 }
 
 const Verb& find_verb(const std::string& name) {
@@ -162,8 +164,8 @@ const Verb& find_verb(const std::string& name) {
   }
   std::vector<std::string> names;
   for (const Verb& verb : verbs()) names.push_back(verb.name);
-  throw UsageError("unknown verb '" + name + "'; " + suggestion(name, names) +
-                   "`terrace --help` lists them");
+  throw UsageError(fmt::format("unknown verb '{}'; {}`terrace --help` lists them", name,
+                               suggestion(name, names)));
 }
 
 /// Returns parse(text). Puts the option's name in front of the message of a UsageError.
@@ -227,7 +229,7 @@ bool writes_to_stdout(const CLI::App& app) {
 
 /// Runs one verb with the arguments that follow its name.
 int run_verb(const Verb& verb, std::vector<std::string> arguments) {
-  CLI::App app{verb.brief.empty() ? "" : "terrace " + verb.name + ": " + verb.brief + ".",
+  CLI::App app{verb.brief.empty() ? "" : fmt::format("terrace {}: {}.", verb.name, verb.brief),
                "terrace " + verb.name};
   app.set_help_flag("-h,--help", "print this help")->group("Common options");
   app.footer("Example:\n  " + verb.example);
@@ -251,14 +253,14 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
     const std::vector<std::string> extras = app.remaining();
     const bool option = !extras.empty() && extras.front().starts_with("--");
     if (!option && dynamic_cast<const CLI::ExtrasError*>(&error) == nullptr) {
-      throw UsageError(std::string(error.what()) + "; `terrace " + verb.name +
-                       " --help` lists the options");
+      throw UsageError(
+          fmt::format("{}; `terrace {} --help` lists the options", error.what(), verb.name));
     }
     const std::size_t more = option ? 0 : extras.size() - 1;
-    throw UsageError("'" + extras.front() + "'" +
-                     (more > 0 ? " and " + std::to_string(more) + " more" : "") +
-                     ": no such argument or option; " + suggested_option(app, extras.front()) +
-                     "`terrace " + verb.name + " --help` lists them");
+    throw UsageError(
+        fmt::format("'{}'{}: no such argument or option; {}`terrace {} --help` lists them",
+                    extras.front(), more > 0 ? fmt::format(" and {} more", more) : "",
+                    suggested_option(app, extras.front()), verb.name));
   }
   refuse_empty_values(app);
   if (common.json && writes_to_stdout(app)) {
@@ -341,11 +343,12 @@ double number_of_option(const std::string& name, const std::string& text,
                         const NumberRange& range) {
   const double value = parse_number(text, name);
   if (value < range.least || (range.above_least && value == range.least) || value > range.most) {
-    std::string expected = range.above_least        ? "above " + plain_number(range.least)
-                           : std::isinf(range.most) ? "at least " + plain_number(range.least)
-                                                    : "from " + plain_number(range.least) + " to " +
-                                                          plain_number(range.most);
-    throw UsageError(name + " must be " + expected + ", not " + text);
+    std::string expected =
+        range.above_least ? "above " + plain_number(range.least)
+        : std::isinf(range.most)
+            ? "at least " + plain_number(range.least)
+            : fmt::format("from {} to {}", plain_number(range.least), plain_number(range.most));
+    throw UsageError(fmt::format("{} must be {}, not {}", name, expected, text));
   }
   return value;
 }

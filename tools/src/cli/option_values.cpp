@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "base/geojson_crs.hpp"
@@ -19,8 +20,7 @@ namespace {
 unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
   const unsigned top = store.top();
   if (level && *level > top) {
-    throw UsageError("the store has no level " + std::to_string(*level) + ": its top is level " +
-                     std::to_string(top));
+    throw UsageError(fmt::format("the store has no level {}: its top is level {}", *level, top));
   }
   return level.value_or(top);
 }
@@ -188,7 +188,7 @@ Line parse_line(const std::string& text) {
     collect_line(*json, 0, lines);
     line.crs = crs_of_geojson(*json, text);
   } catch (const nlohmann::json::exception& error) {
-    throw bad(std::string("is not GeoJSON (") + error.what() + ")");
+    throw bad(fmt::format("is not GeoJSON ({})", error.what()));
   }
   if (lines.size() != 1) throw bad("holds " + counted(lines.size(), "line"));
   if (lines.front().size() < 2) throw bad("the line has fewer than two places");

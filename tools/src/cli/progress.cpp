@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
@@ -49,10 +50,10 @@ void ProgressMeter::show(std::uint64_t count, double fraction, double seconds) {
         left < 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(left);
     std::fprintf(stderr, "%s\n", line.dump().c_str());
   } else {
-    std::string text = with_commas(count) + ' ' + what_ + ", " + readable_rate(rate);
+    std::string text = fmt::format("{} {}, {}", with_commas(count), what_, readable_rate(rate));
     if (left >= 0) {
-      text += ", " + std::to_string(static_cast<int>(fraction * 100)) + " %, " +
-              readable_seconds(left) + " left";
+      text +=
+          fmt::format(", {} %, {} left", static_cast<int>(fraction * 100), readable_seconds(left));
     }
     std::fprintf(stderr, "\r%s\033[K", text.c_str());
     line_shown_ = true;

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/stream/input.hpp>
 
 #include "cli/cli.hpp"
@@ -26,12 +27,13 @@ std::vector<std::string> names_in(const std::string& text, const std::string& op
     if (list.peek() == '"') {
       list >> std::quoted(name);
       if (list.get() != ',' && !list.eof()) {
-        throw terrain::UsageError(option + ": no comma after " + name + " in '" + text + "'");
+        throw terrain::UsageError(fmt::format("{}: no comma after {} in '{}'", option, name, text));
       }
     } else {
       std::getline(list, name, ',');
     }
-    if (name.empty()) throw terrain::UsageError(option + ": a name is empty in '" + text + "'");
+    if (name.empty())
+      throw terrain::UsageError(fmt::format("{}: a name is empty in '{}'", option, text));
     names.push_back(name);
   }
   return names;
@@ -78,11 +80,11 @@ terrain::RegionConversion SelectionOptions::conversion(
       }
       const bool stated = region.crs() && !region.crs()->name.empty();
       if (region_crs_.empty() && !stated) return {};
-      throw terrain::UsageError(
-          (region_crs_.empty() ? "the crs of " + region.crs()->file + " makes it necessary to look"
-                               : std::string("--region-crs looks")) +
-          " up the CRS of the input before it is read: " + input +
-          " can be read only once; name a file");
+      throw terrain::UsageError(fmt::format(
+          "{} up the CRS of the input before it is read: {} can be read only once; name a file",
+          region_crs_.empty() ? "the crs of " + region.crs()->file + " makes it necessary to look"
+                              : std::string("--region-crs looks"),
+          input));
     }
   }
   return terrain::RegionConversion(stream::open_source(inputs, reading)->info(), region_crs_,

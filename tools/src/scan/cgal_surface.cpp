@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/base/stop_check.hpp>
 #include <terrace/tri/delaunay3.hpp>
 
@@ -29,9 +30,10 @@ Sides checked_box(std::span<const tri::Point3> points) {
     for (const double c : points[i]) {
       // `!(x <= limit)` also rejects NaN.
       if (!(std::abs(c) <= kLargest)) {
-        throw std::invalid_argument("point " + std::to_string(i) +
-                                    ": a coordinate is not finite or beyond 1e100, too large for "
-                                    "this method; scale the points");
+        throw std::invalid_argument(
+            fmt::format("point {}: a coordinate is not finite or beyond 1e100, too large for this "
+                        "method; scale the points",
+                        i));
       }
     }
   }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <charconv>
 
+#include <fmt/core.h>
+
 namespace terrace::tools {
 namespace {
 
@@ -43,7 +45,7 @@ bool lists(std::string_view tags, std::string_view tag) {
 
 /// Returns whether a Host header names the loopback interface at this port.
 bool names_this_server(std::string_view host, std::uint16_t port) {
-  const std::string ending = ':' + std::to_string(port);
+  const std::string ending = fmt::format(":{}", port);
   if (host.ends_with(ending)) {
     host.remove_suffix(ending.size());
   } else if (port != 80) {  // the only port that browsers omit
@@ -204,20 +206,18 @@ Answer answer_to(const Request& request, const Site& site, const Access& access)
 std::string header_of(const Answer& a) {
   const bool bodiless = a.status == 304;
   const std::string body = a.bytes || bodiless || a.reason.empty() ? "" : a.reason + "\n";
-  std::string text = "HTTP/1.1 " + std::to_string(a.status) + " " + phrase(a.status) + "\r\n";
+  std::string text = fmt::format("HTTP/1.1 {} {}\r\n", a.status, phrase(a.status));
   const auto field = [&](std::string_view name, const std::string& value) {
     text.append(name).append(": ").append(value).append("\r\n");
   };
   if (!bodiless) {
-    field("Content-Length", std::to_string(a.bytes ? a.length : body.size()));
+    field("Content-Length", fmt::format("{}", a.bytes ? a.length : body.size()));
     field("Content-Type", a.bytes ? a.type : "text/plain; charset=utf-8");
   }
   if (a.status == 206) {
-    field("Content-Range", "bytes " + std::to_string(a.first) + "-" +
-                               std::to_string(a.first + a.length - 1) + "/" +
-                               std::to_string(a.size));
+    field("Content-Range", fmt::format("bytes {}-{}/{}", a.first, a.first + a.length - 1, a.size));
   }
-  if (a.status == 416) field("Content-Range", "bytes */" + std::to_string(a.size));
+  if (a.status == 416) field("Content-Range", fmt::format("bytes */{}", a.size));
   if (!a.tag.empty()) field("ETag", a.tag);
   if (a.status == 405) field("Allow", "GET, HEAD");
   field("Accept-Ranges", "bytes");

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <system_error>
 
+#include <fmt/core.h>
 #include <unistd.h>
 
 namespace terrace::tools {
@@ -36,7 +37,7 @@ std::string socket_of_client(const std::string& client, std::uint16_t server_por
     if (local != client || !remote.ends_with(end_text(0, server_port).substr(8))) continue;
     for (int i = 0; i < 4; ++i) fields >> skipped;  // state, queues, timer, retransmissions
     fields >> user >> skipped >> socket;
-    return user == std::to_string(::geteuid()) && socket != "0" ? socket : std::string();
+    return user == fmt::format("{}", ::geteuid()) && socket != "0" ? socket : std::string();
   }
   return {};
 }

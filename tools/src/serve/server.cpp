@@ -18,6 +18,7 @@
 #include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
+#include <fmt/core.h>
 #include <netinet/in.h>
 #include <unistd.h>
 
@@ -262,7 +263,7 @@ Server::Server(std::function<const Site&()> site, std::uint16_t port, const Serv
     impl_->acceptor.bind(here);
     impl_->acceptor.listen();
   } catch (const boost::system::system_error& error) {
-    throw stream::Error("127.0.0.1:" + std::to_string(port),
+    throw stream::Error(fmt::format("127.0.0.1:{}", port),
                         "cannot be served: " + error.code().message())
         .remedy("name another port");
   }

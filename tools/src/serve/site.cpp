@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <sys/stat.h>
 #include <zlib.h>
@@ -111,7 +112,7 @@ std::string name_of(const stream::Store& store, const std::vector<std::string>& 
       return unique == other || unique == other + kStartEnding || other == unique + kStartEnding;
     });
   };
-  for (int i = 2; is_taken(); ++i) unique = name + "-" + std::to_string(i);
+  for (int i = 2; is_taken(); ++i) unique = fmt::format("{}-{}", name, i);
   return unique;
 }
 
@@ -254,7 +255,7 @@ Site make_site(std::span<const stream::Store> stores) {
             .remedy("replace it with the file itself");
       }
       std::shared_ptr<const stream::ByteSource> bytes = stream::open_file(path);
-      const std::string tag = '"' + checksum + "-" + hexadecimal(bytes->size()) + '"';
+      const std::string tag = fmt::format("\"{}-{}\"", checksum, hexadecimal(bytes->size()));
       site[folder + file] = {std::move(bytes), type_of(file), tag};
     }
     add_text(site, "stores/" + name + kStartEnding, start_file(store));

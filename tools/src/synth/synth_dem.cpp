@@ -11,6 +11,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include <terrace/base/ordered_work.hpp>
 
 #include "base/units.hpp"
@@ -135,10 +137,11 @@ class Maker {
   static stream::GeoTiffOptions checked(stream::GeoTiffOptions tiff, std::uint64_t memory_bytes) {
     const std::uint64_t table = stream::geotiff_table_bytes(tiff);
     if (table <= memory_bytes / 4) return tiff;
-    throw std::runtime_error("a raster of " + with_commas(tiff.columns) + " x " +
-                             with_commas(tiff.rows) + " cells needs " + readable_bytes(4 * table) +
-                             " of memory, `memory_bytes` allows " + readable_bytes(memory_bytes) +
-                             "; give a smaller --size or more --memory");
+    throw std::runtime_error(
+        fmt::format("a raster of {} x {} cells needs {} of memory, `memory_bytes` allows {}; give "
+                    "a smaller --size or more --memory",
+                    with_commas(tiff.columns), with_commas(tiff.rows), readable_bytes(4 * table),
+                    readable_bytes(memory_bytes)));
   }
 
   static stream::GeoTiffOptions writer_options(const SynthDemOptions& options) {

@@ -3,6 +3,8 @@
 
 #include <string_view>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
@@ -15,8 +17,7 @@ namespace terrace::tools {
 namespace {
 
 std::string row_text(const cluster::Merge& merge) {
-  return std::to_string(merge.a) + ',' + std::to_string(merge.b) + ',' + number_text(merge.height) +
-         ',' + std::to_string(merge.size) + '\n';
+  return fmt::format("{},{},{},{}\n", merge.a, merge.b, number_text(merge.height), merge.size);
 }
 
 bool parse_row(std::string_view text, cluster::Merge& merge) {
@@ -43,8 +44,8 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
     throw stream::Error(path, cause)
         .at(where)
         .remedy(
-            "rows must be a,b,height,size as written by 'terrace cluster "
-            "--dendrogram' and SciPy's linkage()");
+            "rows must be a,b,height,size as written by 'terrace cluster --dendrogram' and SciPy's "
+            "linkage()");
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};

@@ -3,6 +3,8 @@
 
 #include <fstream>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
@@ -31,14 +33,14 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     const bool ended = !file.eof() && !file.fail();  // by '\n', included in gcount()
     std::string line(buffer.data(), static_cast<std::size_t>(file.gcount()) - (ended ? 1 : 0));
     if (!line.empty() && line.back() == '\r') line.pop_back();
-    const std::string where = "line " + std::to_string(labels.size() + 1);
+    const std::string where = fmt::format("line {}", labels.size() + 1);
     const std::uint32_t label = number_from<std::uint32_t>(line).value_or(kNoCluster);
     if (label == kNoCluster && line != "-1") {
       throw stream::Error(path, "'" + line.substr(0, 40) + "' is not a cluster number")
           .at(where)
           .remedy(
-              "write one whole number from 0 to 4294967294 per line, or -1 "
-              "for a point without a cluster");
+              "write one whole number from 0 to 4294967294 per line, or -1 for a point without a "
+              "cluster");
     }
     labels.push_back(label);
     if (labels.size() > points) {
@@ -51,8 +53,8 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     throw stream::Error(path, "cannot be read").at_line(labels.size() + 1).remedy("check the disk");
   }
   if (labels.size() < points) {
-    throw stream::Error(
-        path, "has " + counted(labels.size(), "label") + " for " + counted(points, "point"))
+    throw stream::Error(path, fmt::format("has {} for {}", counted(labels.size(), "label"),
+                                          counted(points, "point")))
         .remedy("give the labels of these points, in the order of the input");
   }
   return labels;
@@ -63,7 +65,7 @@ void write_labels(const std::string& path, std::span<const std::uint32_t> labels
   std::string text;
   for (const std::uint32_t label : labels) {
     check_interrupt();
-    text += label == kNoCluster ? "-1" : std::to_string(label);
+    text += label == kNoCluster ? "-1" : fmt::format("{}", label);
     text += '\n';
   }
   stream::Sink file(path, replace, stop_token());

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "cli/output.hpp"
 #include "tables/csv_rows.hpp"
@@ -40,15 +42,14 @@ class Checker {
     for (const std::uint32_t node : {row.a, row.b}) {
       if (node < nodes) continue;
       if (tree_ && node >= points_ && node < 2 * points_ - 1) {
-        return "names node " + std::to_string(node) + " before the row that creates it";
+        return fmt::format("names node {} before the row that creates it", node);
       }
-      return "names " + std::string(tree_ ? "node " : "point ") + std::to_string(node) +
-             ", but there are " + counted(points_, "point");
+      return fmt::format("names {}{}, but there are {}", tree_ ? "node " : "point ", node,
+                         counted(points_, "point"));
     }
-    if (row.a == row.b) return "joins " + std::to_string(row.a) + " with itself";
+    if (row.a == row.b) return fmt::format("joins {} with itself", row.a);
     for (const std::uint32_t node : {row.a, row.b}) {
-      if (taken_[node])
-        return "joins " + std::to_string(node) + ", which an earlier row has joined";
+      if (taken_[node]) return fmt::format("joins {}, which an earlier row has joined", node);
     }
     if (!(row.distance >= 0 && std::isfinite(row.distance))) {
       return "has the distance " + plain_number(row.distance);
@@ -57,11 +58,11 @@ class Checker {
     if (!tree_) return {};
     const Node &a = nodes_[row.a], &b = nodes_[row.b];
     if (row.size != a.size + b.size) {
-      return "says that its node has " + counted(row.size, "point") + " below; it has " +
-             std::to_string(a.size + b.size);
+      return fmt::format("says that its node has {} below; it has {}", counted(row.size, "point"),
+                         a.size + b.size);
     }
     if (row.level <= std::max(a.level, b.level)) {
-      return "is of level " + std::to_string(row.level) + ", not above the nodes that it joins";
+      return fmt::format("is of level {}, not above the nodes that it joins", row.level);
     }
     nodes_[nodes] = {row.size, row.level};
     return {};
@@ -88,8 +89,8 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
     throw stream::Error(path, cause)
         .at(where)
         .remedy(
-            "pass the unchanged result of 'terrace match', and with "
-            "--points the file that it was made from");
+            "pass the unchanged result of 'terrace match', and with --points the file that it was "
+            "made from");
   };
   std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
@@ -102,7 +103,7 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
   for (std::string_view line; rows->next(line);) {
     Row row;
     if (!parse(line, result.tree, row)) {
-      fail(rows->where(), "is not a row " + std::string(result.tree ? kTreeHead : kPairsHead));
+      fail(rows->where(), fmt::format("is not a row {}", result.tree ? kTreeHead : kPairsHead));
     }
     if (result.lines.size() == most) {
       fail(rows->where(), "is one row too many for " + counted(points, "point"));
@@ -113,8 +114,8 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
     result.top = std::max(result.top, row.level);
   }
   if (result.tree && result.lines.size() < most) {
-    fail("", "has " + counted(result.lines.size(), "row") + "; a tree of " +
-                 counted(points, "point") + " has " + with_commas(most));
+    fail("", fmt::format("has {}; a tree of {} has {}", counted(result.lines.size(), "row"),
+                         counted(points, "point"), with_commas(most)));
   }
   return result;
 }
@@ -124,8 +125,8 @@ void MatchingPicture::keep_levels(const std::string& level) {
   std::uint32_t highest = 0;
   std::string_view text = level;
   if (!take_cell(text, highest, true) || highest > result.top) {
-    throw UsageError("'--level " + level + "': the lines are of the levels 1 to " +
-                     std::to_string(result.top) + " (0: points only)");
+    throw UsageError(fmt::format(
+        "'--level {}': the lines are of the levels 1 to {} (0: points only)", level, result.top));
   }
   std::erase_if(result.lines, [&](const MatchingLine& line) { return line.level > highest; });
 }
@@ -148,7 +149,7 @@ MatchingPicture read_matching_picture(const std::string& path, const std::string
     for (const double x : positions.back()) {
       if (std::isfinite(x)) continue;
       throw stream::Error(points_file, "has a coordinate that is not finite")
-          .at("point " + std::to_string(positions.size() - 1))
+          .at(fmt::format("point {}", positions.size() - 1))
           .remedy("match and draw the points without it");
     }
   }

@@ -5,6 +5,8 @@
 #include <memory>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
@@ -29,8 +31,9 @@ std::vector<double> PointTable::column(const std::string& name) const {
     }
     return values;
   }
-  throw UsageError("the points have no column '" + name + "'" +
-                   (known.empty() ? ": they have only x, y and z" : "; there are: " + known));
+  throw UsageError(
+      fmt::format("the points have no column '{}'{}", name,
+                  known.empty() ? ": they have only x, y and z" : "; there are: " + known));
 }
 
 void writing_within_memory(const stream::PointWriter& writer, const std::string& file,
@@ -38,9 +41,8 @@ void writing_within_memory(const stream::PointWriter& writer, const std::string&
   const std::uint64_t writing = writer.writing_bytes();
   const std::uint64_t needed = kProgramMemory + reading + writing;
   if (writing == 0 || needed <= memory_bytes) return;
-  throw stream::Error(file, "writing it needs " + std::to_string((needed >> 20) + 1) +
-                                "M of memory, --memory allows " +
-                                std::to_string(memory_bytes >> 20) + "M")
+  throw stream::Error(file, fmt::format("writing it needs {}M of memory, --memory allows {}M",
+                                        (needed >> 20) + 1, memory_bytes >> 20))
       .remedy("raise --memory, or write another format");
 }
 
@@ -48,9 +50,8 @@ std::uint64_t reading_within_memory(const stream::PointSource& source, std::uint
   const std::uint64_t reading = source.reading_bytes();
   if (reading == 0 || kProgramMemory + reading <= memory_bytes) return reading;
   throw stream::Error(source.info().files.front(),
-                      "reading it needs " + std::to_string(((kProgramMemory + reading) >> 20) + 1) +
-                          "M of memory, --memory allows " + std::to_string(memory_bytes >> 20) +
-                          "M")
+                      fmt::format("reading it needs {}M of memory, --memory allows {}M",
+                                  ((kProgramMemory + reading) >> 20) + 1, memory_bytes >> 20))
       .remedy(source.info().grid ? "raise --memory, or rewrite large strips and tiles as small "
                                    "tiles: gdal_translate -co TILED=YES"
                                  : "raise --memory");
@@ -96,11 +97,10 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     const std::size_t count = table.size() + block.size();
     const bool grows = count > table.positions.capacity();
     if (count > (grows ? most / 2 : most)) {
-      throw stream::Error(file, "has more points than " + readable_bytes(memory_bytes) +
-                                    " can hold (" + with_commas(table.size()) + " so far)")
-          .remedy(
-              "raise --memory, or build a store, which takes points of any "
-              "number");
+      throw stream::Error(file,
+                          fmt::format("has more points than {} can hold ({} so far)",
+                                      readable_bytes(memory_bytes), with_commas(table.size())))
+          .remedy("raise --memory, or build a store, which takes points of any number");
     }
     table.positions.insert(table.positions.end(), block.positions.begin(), block.positions.end());
     table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #ifdef __GLIBC__
 #include <malloc.h>
 #endif
@@ -115,7 +117,7 @@ class BuildCommand final : public Command {
     if (!crs_.empty()) request_.crs = crs_named(crs_);
     request_.datum_shift = parse_datum_shift(shift_);
     if (block_ < 2 || block_ > 1'000'000) {
-      throw UsageError("--block must be between 2 and 1000000, not " + std::to_string(block_));
+      throw UsageError(fmt::format("--block must be between 2 and 1000000, not {}", block_));
     }
     request_.block_points = block_;
     request_.metric = MetricChoice::parse(metric_);
@@ -161,11 +163,11 @@ class BuildCommand final : public Command {
                     {"reordered", outcome.order.reordered},
                     {"spread", outcome.order.spread},
                     {"temporary_bytes", outcome.order.temporary_bytes}};
-    const std::string outliers = std::isfinite(request_.outlier_price)
-                                     ? with_commas(outcome.outliers) + " of them" +
-                                           (outcome.outliers == 1 ? " is" : " are") +
-                                           " marked: outlier = 1\n"
-                                     : std::string();
+    const std::string outliers =
+        std::isfinite(request_.outlier_price)
+            ? fmt::format("{} of them{} marked: outlier = 1\n", with_commas(outcome.outliers),
+                          outcome.outliers == 1 ? " is" : " are")
+            : std::string();
     std::string left_out;
     if (outcome.nodata > 0) {
       left_out = outcome.raster ? counted(outcome.nodata, "cell") + " without data"
@@ -176,11 +178,11 @@ class BuildCommand final : public Command {
                   counted(outcome.excluded, "point", "that was", "that were") + " not selected";
     }
     if (!left_out.empty()) left_out = " (" + left_out + " left out)";
-    summary.text = counted(outcome.points, entity()) + left_out + " in " +
-                   readable_seconds(seconds) + ", " + readable_rate(rate) + "\n" + outliers +
-                   output_ + ": " + counted(outcome.top + 1, "level") + ", " +
-                   readable_bytes(outcome.store_bytes) + ", peak memory " +
-                   readable_bytes(peak_rss_bytes()) + "\n";
+    summary.text =
+        fmt::format("{}{} in {}, {}\n{}{}: {}, {}, peak memory {}\n",
+                    counted(outcome.points, entity()), left_out, readable_seconds(seconds),
+                    readable_rate(rate), outliers, output_, counted(outcome.top + 1, "level"),
+                    readable_bytes(outcome.store_bytes), readable_bytes(peak_rss_bytes()));
     return summary;
   }
 
@@ -228,8 +230,9 @@ class BuildCommand final : public Command {
                       {"store_bytes", nullptr},
                       {"seconds", nullptr},
                       {"temporary_bytes", nullptr}};
-      summary.text = "the number of points is unknown until the end of the input; a million take " +
-                     readable_seconds(seconds) + " and " + readable_bytes(trial.store_bytes) + "\n";
+      summary.text = fmt::format(
+          "the number of points is unknown until the end of the input; a million take {} and {}\n",
+          readable_seconds(seconds), readable_bytes(trial.store_bytes));
     } else {
       const auto bytes = static_cast<std::uint64_t>(static_cast<double>(trial.store_bytes) * scale);
       const auto temporary =
@@ -238,11 +241,12 @@ class BuildCommand final : public Command {
                       {"store_bytes", bytes},
                       {"seconds", seconds * scale},
                       {"temporary_bytes", temporary}};
-      summary.text = "about " + counted(static_cast<std::uint64_t>(points), entity()) + ", " +
-                     readable_bytes(bytes) + " of disk" +
-                     (temporary > 0 ? " and " + readable_bytes(temporary) + " more while it runs"
-                                    : std::string()) +
-                     ", " + readable_seconds(seconds * scale) + "; nothing was written\n";
+      summary.text =
+          fmt::format("about {}, {} of disk{}, {}; nothing was written\n",
+                      counted(static_cast<std::uint64_t>(points), entity()), readable_bytes(bytes),
+                      temporary > 0 ? " and " + readable_bytes(temporary) + " more while it runs"
+                                    : std::string(),
+                      readable_seconds(seconds * scale));
     }
     return summary;
   }

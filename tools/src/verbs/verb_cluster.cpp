@@ -15,6 +15,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/cluster/block.hpp>
 #include <terrace/cluster/dendrogram.hpp>
 #include <terrace/cluster/facility_location.hpp>
@@ -184,8 +185,8 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
       cluster::linear_points(squared ? cluster::Euclidean{} : problem.metric, problem.points);
   if (!linear) {
     throw UsageError(
-        "--method k-means sums squares: it takes --metric euclidean, squared, or "
-        "elliptical with one region for all points");
+        "--method k-means sums squares: it takes --metric euclidean, squared, or elliptical with "
+        "one region for all points");
   }
   const std::vector<Point3>& points = *linear;
   const cluster::KMeansResult result = cluster::k_means(points, problem.weights,
@@ -205,8 +206,9 @@ ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityP
     label = number[label];
   }
   if (used < request.k) {
-    outcome.notes.push_back(std::string(used == 1 ? "there is only " : "there are only ") +
-                            counted(used, "distinct point") + ", and therefore no more clusters");
+    outcome.notes.push_back(fmt::format("{}{}, and therefore no more clusters",
+                                        used == 1 ? "there is only " : "there are only ",
+                                        counted(used, "distinct point")));
   }
   if (!result.converged) {
     outcome.notes.push_back("k-means stopped after " + counted(result.iterations, "iteration") +
@@ -296,9 +298,8 @@ ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityP
   const std::size_t clusters =
       std::size_t{*std::max_element(outcome.labels.begin(), outcome.labels.end())} + 1;
   if (request.k != 0 && clusters < request.k) {
-    outcome.notes.push_back("merges of equal height leave no cut into " +
-                            counted(request.k, "cluster") + ": there are " +
-                            std::to_string(clusters));
+    outcome.notes.push_back(fmt::format("merges of equal height leave no cut into {}: there are {}",
+                                        counted(request.k, "cluster"), clusters));
   }
   outcome.representatives = cluster::nearest_to_means(problem.points, outcome.labels, clusters);
   return outcome;
@@ -311,10 +312,8 @@ ClusterOutcome run_clustering(const ClusterRequest& request, const cluster::Faci
   // Checked here so that the message names the point for every method.
   cluster::check(problem);
   if (request.k > problem.points.size()) {
-    throw UsageError("-k " + std::to_string(request.k) +
-                     " asks for more clusters than there are "
-                     "points (" +
-                     std::to_string(problem.points.size()) + ")");
+    throw UsageError(fmt::format("-k {} asks for more clusters than there are points ({})",
+                                 request.k, problem.points.size()));
   }
   progress(0.0);
   switch (request.method) {
@@ -452,15 +451,15 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
   if (cost) {
     text += "cost " + rounded(*cost);
     if (outcome.opening_cost) {
-      text += " = " + rounded(*outcome.opening_cost) + " for opening + " +
-              rounded(*outcome.connection_cost) + " for connecting";
+      text += fmt::format(" = {} for opening + {} for connecting", rounded(*outcome.opening_cost),
+                          rounded(*outcome.connection_cost));
     }
     if (outliers > 0) text += " + " + rounded(*outcome.outlier_cost) + " for outliers";
     text += "\n";
   }
   if (gap) {
-    text += "lower bound " + rounded(*outcome.lower_bound) + ": at most " +
-            readable_bound(100 * *gap) + " % above the optimum\n";
+    text += fmt::format("lower bound {}: at most {} % above the optimum\n",
+                        rounded(*outcome.lower_bound), readable_bound(100 * *gap));
   }
   return summary;
 }
@@ -613,12 +612,11 @@ class ClusterCommand final : public Command {
     const std::uint64_t needed = held + table.size() * each;
     const std::uint64_t memory = common.memory_or(0);
     if (needed > memory) {
-      throw stream::Error(input_, "clustering its " + counted(table.size(), "point") + " by " +
-                                      method_ + " needs " + std::to_string((needed >> 20) + 1) +
-                                      " MiB, --memory is " + readable_bytes(memory))
-          .remedy(
-              "raise --memory, or build a store, which takes points of any "
-              "number");
+      throw stream::Error(input_,
+                          fmt::format("clustering its {} by {} needs {} MiB, --memory is {}",
+                                      counted(table.size(), "point"), method_, (needed >> 20) + 1,
+                                      readable_bytes(memory)))
+          .remedy("raise --memory, or build a store, which takes points of any number");
     }
     request_.memory_bytes = memory - held;
   }
@@ -653,8 +651,8 @@ class ClusterCommand final : public Command {
     }
     if (!tree && (!dendrogram_.empty() || request_.height)) {
       throw UsageError(
-          "--dendrogram and --height are for the methods of linkage: single, complete, "
-          "average, weighted, ward, centroid and median");
+          "--dendrogram and --height are for the methods of linkage: single, complete, average, "
+          "weighted, ward, centroid and median");
     }
     if (request_.cuda && (!tree || (request_.linkage != cluster::LinkageMethod::single &&
                                     request_.linkage != cluster::LinkageMethod::complete))) {
@@ -675,8 +673,7 @@ class ClusterCommand final : public Command {
         (outlier_price_ || strategy_ != "automatic" || !request_.iterations.empty() ||
          request_.batch != 1)) {
       throw UsageError(
-          "--outlier-price, --strategy, --iterations and --batch are for --method "
-          "facility");
+          "--outlier-price, --strategy, --iterations and --batch are for --method facility");
     }
     for (const auto& [a, b] : {std::pair(&output_, &labels_), std::pair(&output_, &dendrogram_),
                                std::pair(&labels_, &dendrogram_)}) {

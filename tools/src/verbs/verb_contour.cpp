@@ -4,6 +4,7 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -61,10 +62,9 @@ class ContourCommand final : public Command {
     summary.json = {
         {"lines", outcome.lines}, {"closed", outcome.closed}, {"points", outcome.points}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(outcome.lines, "line") + ", " +
-                   with_commas(outcome.closed) + " of them closed, " +
-                   counted(outcome.points, "point") + " in " + readable_seconds(watch.seconds()) +
-                   "\n";
+    summary.text = fmt::format("{}: {}, {} of them closed, {} in {}\n", output_,
+                               counted(outcome.lines, "line"), with_commas(outcome.closed),
+                               counted(outcome.points, "point"), readable_seconds(watch.seconds()));
     return summary;
   }
 

@@ -11,6 +11,7 @@
 #include <terrace/base/ordered_work.hpp>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include "base/units.hpp"
 #include "build/damage_report.hpp"
@@ -132,9 +133,9 @@ class ConvertCommand : public Command {
       left_out += (left_out.empty() ? "" : ", ") + counted(done.empty_values, "attribute") +
                   " without a value are NaN";
     }
-    summary.text = output_ + ": " + counted(writer->points(), "point") +
-                   (left_out.empty() ? "" : " (" + left_out + ")") + ", " +
-                   readable_seconds(watch.seconds()) + '\n';
+    summary.text = fmt::format("{}: {}{}, {}\n", output_, counted(writer->points(), "point"),
+                               left_out.empty() ? "" : " (" + left_out + ")",
+                               readable_seconds(watch.seconds()));
     report_rounding(*writer, summary);
     return summary;
   }

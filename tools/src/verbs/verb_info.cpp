@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include "base/stored_entities.hpp"
 #include "base/units.hpp"
@@ -92,10 +93,10 @@ Json channels_of(const stream::Schema& schema) {
 /// Returns "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", with the operation to WGS 84 that
 /// applies to the data. `bounds` is in the CRS.
 std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
-  std::string text = crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : "";
+  std::string text = crs.epsg != 0 ? fmt::format("EPSG:{}", crs.epsg) : "";
   if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
   if (text.empty()) text = crs.wkt.empty() ? "unknown" : crs.wkt.substr(0, 60) + "...";
-  if (crs.vertical_epsg != 0) text += " + EPSG:" + std::to_string(crs.vertical_epsg);
+  if (crs.vertical_epsg != 0) text += fmt::format(" + EPSG:{}", crs.vertical_epsg);
   try {
     const std::optional<CrsDefinition> known = definition_of(crs);
     if (!known) return text;
@@ -137,13 +138,13 @@ std::string text_of(const stream::Channel& channel) {
 }
 
 std::string raster_line(const stream::Schema& schema) {
-  return "raster:    " + std::to_string(schema.columns) + " x " + std::to_string(schema.rows) +
-         " cells of " + text_of(schema.coordinates[2]) + '\n';
+  return fmt::format("raster:    {} x {} cells of {}\n", schema.columns, schema.rows,
+                     text_of(schema.coordinates[2]));
 }
 
 std::string heights_line(double low, double high, double mean) {
-  return "heights:   " + readable_number(low, 6) + " to " + readable_number(high, 6) + ", mean " +
-         readable_number(mean, 6) + '\n';
+  return fmt::format("heights:   {} to {}, mean {}\n", readable_number(low, 6),
+                     readable_number(high, 6), readable_number(mean, 6));
 }
 
 std::string channels_line(const stream::Schema& schema) {
@@ -322,20 +323,19 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   text += '\n';
   if (info.grid) {
     text += raster_line(info);
-    text += "cell:      " + readable_number(info.world.xy[0], 10) + ' ' +
-            readable_number(info.world.xy[4], 10) + '\n';
-    text += "nodata:    " + counted(contents.nodata, "cell") +
-            (info.nodata ? ", value " + plain_number(*info.nodata) : std::string()) + '\n';
+    text += fmt::format("cell:      {} {}\n", readable_number(info.world.xy[0], 10),
+                        readable_number(info.world.xy[4], 10));
+    text += fmt::format("nodata:    {}{}\n", counted(contents.nodata, "cell"),
+                        info.nodata ? ", value " + plain_number(*info.nodata) : std::string());
   }
-  text += "points:    " + with_commas(contents.points) +
-          (!info.grid && contents.nodata > 0
-               ? ", and " + with_commas(contents.nodata) + " without a coordinate"
-               : std::string()) +
-          '\n';
+  text += fmt::format("points:    {}{}\n", with_commas(contents.points),
+                      !info.grid && contents.nodata > 0
+                          ? ", and " + with_commas(contents.nodata) + " without a coordinate"
+                          : std::string());
   if (info.octree) {
-    text += "octree:    " + counted(info.octree->nodes, "node") + " of " +
-            counted(info.octree->depths, "depth") + ", the root's points " +
-            readable_number(info.octree->spacing, 6) + " apart\n";
+    text += fmt::format("octree:    {} of {}, the root's points {} apart\n",
+                        counted(info.octree->nodes, "node"), counted(info.octree->depths, "depth"),
+                        readable_number(info.octree->spacing, 6));
   }
   if (contents.empty_values > 0) {
     text += "empty:     " + counted(contents.empty_values, "attribute") +
@@ -383,11 +383,11 @@ Summary info_of_store(const std::string& path) {
   json["bytes"] = store.bytes();
 
   std::string& text = summary.text;
-  text += "format:    terrace store, version " + std::to_string(store.version()) + ", " +
-          readable_bytes(store.bytes()) + " (from " + schema.format + ")\n";
+  text += fmt::format("format:    terrace store, version {}, {} (from {})\n", store.version(),
+                      readable_bytes(store.bytes()), schema.format);
   if (schema.grid) text += raster_line(schema);
-  text +=
-      "points:    " + with_commas(store.points()) + ", nodata " + with_commas(schema.nodata) + '\n';
+  text += fmt::format("points:    {}, nodata {}\n", with_commas(store.points()),
+                      with_commas(schema.nodata));
   text += "crs:       " + printable_line(text_of(schema.crs, bounds)) + '\n';
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
@@ -414,11 +414,11 @@ Summary info_of_store(const std::string& path) {
                                 {"p95", sizes.percentiles[3]},
                                 {"max", sizes.percentiles[4]},
                                 {"mean", sizes.mean}}}});
-    text += padded(std::to_string(level.level), 5) + padded(with_commas(level.points), 16) +
+    text += padded(fmt::format("{}", level.level), 5) + padded(with_commas(level.points), 16) +
             padded(with_commas(level.clusters), 12) + padded(readable_bytes(level.bytes), 13) +
-            padded(std::to_string(sizes.percentiles[1]), 20) +
-            padded(std::to_string(sizes.percentiles[2]), 8) +
-            padded(std::to_string(sizes.percentiles[3]), 7) + '\n';
+            padded(fmt::format("{}", sizes.percentiles[1]), 20) +
+            padded(fmt::format("{}", sizes.percentiles[2]), 8) +
+            padded(fmt::format("{}", sizes.percentiles[3]), 7) + '\n';
   }
   return summary;
 }

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/matching/bounding_volume_hierarchy.hpp>
@@ -85,9 +86,9 @@ void check_memory(std::uint64_t needed, const MatchRequest& request, std::size_t
                   const char* remedy) {
   needed += request.held_bytes;
   if (request.memory_bytes == 0 || needed <= request.memory_bytes) return;
-  throw std::runtime_error("matching " + counted(points, "point") + " takes about " +
-                           readable_bytes(needed) + " and --memory is " +
-                           readable_bytes(request.memory_bytes) + ": " + remedy);
+  throw std::runtime_error(fmt::format("matching {} takes about {} and --memory is {}: {}",
+                                       counted(points, "point"), readable_bytes(needed),
+                                       readable_bytes(request.memory_bytes), remedy));
 }
 
 std::size_t distinct(std::span<const std::uint32_t> labels) {
@@ -293,9 +294,9 @@ class MatchCommand final : public Command {
       Summary summary = summary_of(outcome, watch);
       summary.json["depth"] = hierarchy.depth();
       summary.json["surface_area_cost"] = hierarchy.surface_area_cost();
-      summary.text += "as a bounding volume hierarchy: depth " + with_commas(hierarchy.depth()) +
-                      ", surface area cost " + readable_number(hierarchy.surface_area_cost(), 4) +
-                      '\n';
+      summary.text += fmt::format(
+          "as a bounding volume hierarchy: depth {}, surface area cost {}\n",
+          with_commas(hierarchy.depth()), readable_number(hierarchy.surface_area_cost(), 4));
       return summary;
     }
     MatchOutcome outcome;
@@ -339,7 +340,7 @@ class MatchCommand final : public Command {
       if (b <= a || b >= outcome.mate.size()) continue;
       const stream::Point3 &p = positions_[a], &q = positions_[b];
       const double distance = base::hypot(base::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
-      text += std::to_string(a) + ',' + std::to_string(b) + ',' + number_text(distance) + '\n';
+      text += fmt::format("{},{},{}\n", a, b, number_text(distance));
       ++pairs;
     }
     return text;
@@ -374,9 +375,8 @@ class MatchCommand final : public Command {
     std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
     for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
       check_interrupt();
-      text += std::to_string(row.a) + ',' + std::to_string(row.b) + ',' +
-              number_text(row.distance) + ',' + std::to_string(row.size) + ',' +
-              std::to_string(row.level);
+      text += fmt::format("{},{},{},{},{}", row.a, row.b, number_text(row.distance), row.size,
+                          row.level);
       if (boxed) {
         matching::Box<3> box = boxes[row.a];
         for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -415,7 +415,7 @@ class MatchCommand final : public Command {
     summary.text = counted(pairs, "pair") + ", total distance " + readable_number(outcome.cost, 6);
     summary.text += guarantee(outcome);
     if (odd) {
-      summary.text += ", point " + std::to_string(alone - outcome.mate.begin()) + " left over";
+      summary.text += fmt::format(", point {} left over", alone - outcome.mate.begin());
     }
     finish(summary, watch);
     return summary;
@@ -435,8 +435,9 @@ class MatchCommand final : public Command {
                     {"unmatched", 0},
                     {"levels", levels},
                     {"clusters", outcome.clusters}};
-    summary.text = "a tree of " + counted(outcome.tree.rows.size(), "pair") + " on " +
-                   counted(levels, "level") + ", total distance " + readable_number(cost, 6);
+    summary.text = fmt::format("a tree of {} on {}, total distance {}",
+                               counted(outcome.tree.rows.size(), "pair"), counted(levels, "level"),
+                               readable_number(cost, 6));
     finish(summary, watch);
     return summary;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <cstdlib>  // defines __GLIBC__
 #ifdef __GLIBC__
+#include <fmt/core.h>
 #include <malloc.h>
 #endif
 
@@ -159,22 +160,24 @@ class MeshCommand final : public Command {
     report_coordinates(result.coordinates, common, summary);
     const bool all = result.uncovered == 0;
     summary.text =
-        output_ + ": " + counted(result.vertices, "vertex") + ", " +
-        counted(result.triangles, "triangle") + ", within " + readable_bound(result.max_error) +
-        " m of " + (all ? "all " : with_commas(result.samples - result.uncovered) + " of ") +
-        counted(result.samples, "sample") + " (RMS " + readable_number(result.rms_error) +
-        " m), in " + readable_seconds(watch.seconds()) + "\n";
+        fmt::format("{}: {}, {}, within {} m of {}{} (RMS {} m), in {}\n", output_,
+                    counted(result.vertices, "vertex"), counted(result.triangles, "triangle"),
+                    readable_bound(result.max_error),
+                    all ? "all " : with_commas(result.samples - result.uncovered) + " of ",
+                    counted(result.samples, "sample"), readable_number(result.rms_error),
+                    readable_seconds(watch.seconds()));
     if (!all) {
-      summary.text += counted(result.uncovered, "sample", "is", "are") + " on no triangle: " +
-                      why_uncovered(result, store.schema().grid, options.region.has_value()) + "\n";
+      summary.text +=
+          fmt::format("{} on no triangle: {}\n", counted(result.uncovered, "sample", "is", "are"),
+                      why_uncovered(result, store.schema().grid, options.region.has_value()));
     }
     if (result.duplicates > 0) {
-      summary.text +=
-          counted(result.duplicates, "sample", "shares", "share") + " the place of another: " +
-          (duplicates == "all" ? "the bound holds for each of them"
-                               : "the bound holds for the " + counting(duplicates) +
-                                     " of each place (--duplicates " + duplicates + ")") +
-          "\n";
+      summary.text += fmt::format(
+          "{} the place of another: {}\n", counted(result.duplicates, "sample", "shares", "share"),
+          duplicates == "all"
+              ? "the bound holds for each of them"
+              : fmt::format("the bound holds for the {} of each place (--duplicates {})",
+                            counting(duplicates), duplicates));
     }
     return summary;
   }
@@ -248,12 +251,13 @@ class MeshCommand final : public Command {
     summary.json = {{"vertices", mesh.positions.size()}, {"triangles", mesh.triangles.size()}};
     summary.add_cost(watch);
     report_coordinates(coordinates, common, summary);
-    summary.text = output_ + ": " + counted(mesh.positions.size(), "vertex") + ", " +
-                   counted(mesh.triangles.size(), "triangle") + " in " +
-                   readable_seconds(watch.seconds()) + "\n";
+    summary.text =
+        fmt::format("{}: {}, {} in {}\n", output_, counted(mesh.positions.size(), "vertex"),
+                    counted(mesh.triangles.size(), "triangle"), readable_seconds(watch.seconds()));
     if (writer) {
       summary.json["overlay_values"] = writer->values();
-      summary.text += save_overlay_ + ": " + counted(writer->values(), "changed height") + "\n";
+      summary.text +=
+          fmt::format("{}: {}\n", save_overlay_, counted(writer->values(), "changed height"));
     }
     return summary;
   }

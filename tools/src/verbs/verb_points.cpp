@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/overlay.hpp>
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/sink.hpp>
@@ -91,12 +92,12 @@ class PointsCommand final : public Command {
     Summary summary;
     summary.json = {{"vertices", points}, {"triangles", 0}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(points, "point") + " in " +
-                   readable_seconds(watch.seconds()) + "\n";
+    summary.text = fmt::format("{}: {} in {}\n", output_, counted(points, "point"),
+                               readable_seconds(watch.seconds()));
     report_rounding(*writer, summary);
     if (overlay) {
       summary.json["overlay_values"] = replaced;
-      summary.text += counted(replaced, "height") + " from " + overlay_ + "\n";
+      summary.text += fmt::format("{} from {}\n", counted(replaced, "height"), overlay_);
     }
     return summary;
   }
@@ -155,9 +156,9 @@ class PointsCommand final : public Command {
     Summary summary;
     summary.json = {{"lines", lines.lines.size()}, {"vertices", lines.vertices.size()}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(lines.lines.size(), "line") + " of " +
-                   counted(lines.vertices.size(), "vertex") + " in " +
-                   readable_seconds(watch.seconds()) + "\n";
+    summary.text =
+        fmt::format("{}: {} of {} in {}\n", output_, counted(lines.lines.size(), "line"),
+                    counted(lines.vertices.size(), "vertex"), readable_seconds(watch.seconds()));
     return summary;
   }
 
@@ -182,9 +183,10 @@ class PointsCommand final : public Command {
     const stream::Box3 box = world_box(store.schema(), store.whole().bounds());
     const auto& [x, y] = place.xy;
     if (!(x >= box.min[0] && x <= box.max[0] && y >= box.min[1] && y <= box.max[1])) {
-      common.say(near_ + " is outside the store: in its CRS X is from " + plain_number(box.min[0]) +
-                 " to " + plain_number(box.max[0]) + ", Y from " + plain_number(box.min[1]) +
-                 " to " + plain_number(box.max[1]));
+      common.say(
+          fmt::format("{} is outside the store: in its CRS X is from {} to {}, Y from {} to {}",
+                      near_, plain_number(box.min[0]), plain_number(box.max[0]),
+                      plain_number(box.min[1]), plain_number(box.max[1])));
     }
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
@@ -202,8 +204,8 @@ class PointsCommand final : public Command {
     if (!found.empty()) {
       summary.json["nearest_metres"] = found.front().distance;
       summary.json["farthest_metres"] = found.back().distance;
-      summary.text += ", " + readable_number(found.front().distance) + " to " +
-                      readable_number(found.back().distance) + " m away";
+      summary.text += fmt::format(", {} to {} m away", readable_number(found.front().distance),
+                                  readable_number(found.back().distance));
     }
     summary.text += ", in " + readable_seconds(watch.seconds()) + "\n";
     report_rounding(*writer, summary);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -62,9 +63,9 @@ class ProfileCommand final : public Command {
     summary.json = {
         {"points", outcome.points}, {"answered", outcome.answered}, {"metres", outcome.metres}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(outcome.points, "place") + " on " +
-                   readable_number(outcome.metres, 6) + " m in " +
-                   readable_seconds(watch.seconds()) + "\n";
+    summary.text =
+        fmt::format("{}: {} on {} m in {}\n", output_, counted(outcome.points, "place"),
+                    readable_number(outcome.metres, 6), readable_seconds(watch.seconds()));
     return summary;
   }
 

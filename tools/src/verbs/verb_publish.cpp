@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
@@ -38,9 +39,9 @@ class PublishCommand final : public Command {
     summary.json = {
         {"stores", stores.size()}, {"files", published.files}, {"bytes", published.bytes}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(published.files, "file") + ", " +
-                   readable_bytes(published.bytes) + ", in " + readable_seconds(watch.seconds()) +
-                   "; copy the folder to any web server\n";
+    summary.text = fmt::format("{}: {}, {}, in {}; copy the folder to any web server\n", output_,
+                               counted(published.files, "file"), readable_bytes(published.bytes),
+                               readable_seconds(watch.seconds()));
     return summary;
   }
 

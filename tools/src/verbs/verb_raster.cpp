@@ -4,6 +4,7 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
@@ -66,10 +67,11 @@ class RasterCommand final : public Command {
                     {"cells", outcome.columns * outcome.rows},
                     {"nodata", outcome.columns * outcome.rows - outcome.cells_with_data}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + with_commas(outcome.columns) + " x " +
-                   with_commas(outcome.rows) + " cells, " +
-                   with_commas(outcome.columns * outcome.rows - outcome.cells_with_data) +
-                   " without data, in " + readable_seconds(watch.seconds()) + "\n";
+    summary.text =
+        fmt::format("{}: {} x {} cells, {} without data, in {}\n", output_,
+                    with_commas(outcome.columns), with_commas(outcome.rows),
+                    with_commas(outcome.columns * outcome.rows - outcome.cells_with_data),
+                    readable_seconds(watch.seconds()));
     return summary;
   }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/tri/interpolation.hpp>
 
 #include "base/stored_entities.hpp"
@@ -130,10 +131,9 @@ std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, 
   const std::uint64_t fixed = kProgramMemory + size.width * size.height * kBytesPerPixel;
   const std::uint64_t memory = common.memory_or(0);
   if (fixed + bytes <= memory) return memory - fixed;
-  throw stream::Error(path, "drawing it with " + std::to_string(size.width) + " x " +
-                                std::to_string(size.height) + " pixels needs " +
-                                std::to_string(((fixed + bytes) >> 20) + 1) + " MiB, --memory is " +
-                                readable_bytes(memory))
+  throw stream::Error(
+      path, fmt::format("drawing it with {} x {} pixels needs {} MiB, --memory is {}", size.width,
+                        size.height, ((fixed + bytes) >> 20) + 1, readable_bytes(memory)))
       .remedy("give a smaller --size, a coarser --level, or more --memory");
 }
 
@@ -189,10 +189,10 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
 std::string finest_level(const stream::Store& store, const std::string& region) {
   const RegionConversion regions(store);
   constexpr std::uint64_t kMost = 4000000;
-  if (region.empty()) return std::to_string(level_within(store, kMost));
+  if (region.empty()) return fmt::format("{}", level_within(store, kMost));
   for (unsigned level = 0; level < store.top(); ++level) {
-    const Detail detail = parse_detail(store, std::to_string(level), region, {}, regions);
-    if (wanted_points(store, detail) <= kMost) return std::to_string(level);
+    const Detail detail = parse_detail(store, fmt::format("{}", level), region, {}, regions);
+    if (wanted_points(store, detail) <= kMost) return fmt::format("{}", level);
   }
   return "top";
 }
@@ -315,10 +315,9 @@ double slope_degrees(const std::array<float, 3>& normal) {
 class RenderCommand : public Command {
  public:
   void define(CLI::App& app) override {
-    app.add_option(
-           "input", input_,
-           "store, raster, mesh (PLY, GLB, OBJ, OFF, STL), cloud of points, dendrogram (CSV), "
-           "or pairs or tree of 'match' (CSV)")
+    app.add_option("input", input_,
+                   "store, raster, mesh (PLY, GLB, OBJ, OFF, STL), cloud of points, dendrogram "
+                   "(CSV), or pairs or tree of 'match' (CSV)")
         ->required()
         ->type_name("FILE");
     add_output(app, output_, "the PNG file to write; - is standard output");
@@ -413,8 +412,7 @@ class RenderCommand : public Command {
     stream::write_png(output_, size.width, size.height, 3, canvas.resolve(), replace, stop_token());
     Summary summary;
     summary.json = {{"width", size.width}, {"height", size.height}};
-    summary.text = output_ + ": " + std::to_string(size.width) + " x " +
-                   std::to_string(size.height) + " pixels, ";
+    summary.text = fmt::format("{}: {} x {} pixels, ", output_, size.width, size.height);
     return summary;
   }
 
@@ -426,8 +424,8 @@ class RenderCommand : public Command {
     summary.json["points"] = tree.points;
     summary.json["merges"] = tree.merges.size();
     summary.add_cost(watch);
-    summary.text += "a dendrogram of " + counted(tree.points, "point") + ", " +
-                    readable_seconds(watch.seconds()) + '\n';
+    summary.text += fmt::format("a dendrogram of {}, {}\n", counted(tree.points, "point"),
+                                readable_seconds(watch.seconds()));
     return summary;
   }
 
@@ -462,9 +460,10 @@ class RenderCommand : public Command {
     summary.json["lines"] = result.lines.size();
     summary.json["levels"] = result.top;
     summary.add_cost(watch);
-    summary.text += counted(result.lines.size(), result.tree ? "line" : "pair") +
-                    (result.tree ? " of a tree of " : " of ") + counted(result.points, "point") +
-                    ", " + readable_seconds(watch.seconds()) + '\n';
+    summary.text +=
+        fmt::format("{}{}{}, {}\n", counted(result.lines.size(), result.tree ? "line" : "pair"),
+                    result.tree ? " of a tree of " : " of ", counted(result.points, "point"),
+                    readable_seconds(watch.seconds()));
     return summary;
   }
 
@@ -502,7 +501,7 @@ class RenderCommand : public Command {
                                            : "grey";
     }
     const auto fail_without = [&](const std::string& what) {
-      throw UsageError("--color " + by + ": '" + input_ + "' has no " + what);
+      throw UsageError(fmt::format("--color {}: '{}' has no {}", by, input_, what));
     };
     std::vector<Rgb> colours(mesh.positions.size(), Rgb{205, 205, 200});
     if (by == "rgb") {

@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/sink.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -66,10 +67,10 @@ class SampleCommand final : public Command {
                     {"seconds", watch.seconds()},
                     {"points_per_second", static_cast<double>(counts.points) / watch.seconds()},
                     {"peak_rss_bytes", peak_rss_bytes()}};
-    summary.text = counted(counts.points, "point") + ", " +
-                   with_commas(counts.points - counts.answered) + " of them without a height, in " +
-                   readable_seconds(watch.seconds()) + ", " +
-                   readable_rate(static_cast<double>(counts.points) / watch.seconds()) + "\n";
+    summary.text =
+        fmt::format("{}, {} of them without a height, in {}, {}\n", counted(counts.points, "point"),
+                    with_commas(counts.points - counts.answered), readable_seconds(watch.seconds()),
+                    readable_rate(static_cast<double>(counts.points) / watch.seconds()));
     return summary;
   }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/store.hpp>
 
 #include "base/units.hpp"
@@ -28,8 +29,8 @@ class SurfaceCommand final : public Command {
   void define(CLI::App& app) override {
     part_.define(app, "only points inside");
     add_output(app, output_,
-               "the file to write: " + endings_of(outputs::kMeshFile) +
-                   " (GLB in metres); with --tetrahedra " + endings_of(outputs::kTetrahedraFile));
+               fmt::format("the file to write: {} (GLB in metres); with --tetrahedra {}",
+                           endings_of(outputs::kMeshFile), endings_of(outputs::kTetrahedraFile)));
     app.add_option("--format", format_, "ply, ply-ascii, obj or glb (default: from the ending)");
     app.add_option("--criterion", criterion_,
                    "how to find the inside: poles uses the angles between circumspheres; gabriel "
@@ -106,7 +107,8 @@ class SurfaceCommand final : public Command {
                     {"lids", surface.lids}};
     if (surface.samples_off) summary.json["samples_off"] = *surface.samples_off;
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(surface.mesh.positions.size(), "vertex") + ", ";
+    summary.text =
+        fmt::format("{}: {}, ", output_, counted(surface.mesh.positions.size(), "vertex"));
     if (tetrahedra_) {
       summary.json["tetrahedra"] = surface.tetrahedra.size();
       summary.text += counted(surface.tetrahedra.size(), "tetrahedron");

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 
 #include "base/parallel.hpp"
 #include "base/units.hpp"
@@ -100,12 +101,11 @@ class SynthCommand : public Command {
                     {"rms_step", result.rms_step},
                     {"bytes", result.bytes}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + std::to_string(dem_.size.width) + " x " +
-                   std::to_string(dem_.size.height) + " cells, heights " +
-                   plain_number(std::round(result.minimum)) + " to " +
-                   plain_number(std::round(result.maximum)) + ", RMS step " +
-                   readable_number(result.rms_step) + ", " + readable_bytes(result.bytes) + ", " +
-                   readable_seconds(watch.seconds()) + '\n';
+    summary.text =
+        fmt::format("{}: {} x {} cells, heights {} to {}, RMS step {}, {}, {}\n", output_,
+                    dem_.size.width, dem_.size.height, plain_number(std::round(result.minimum)),
+                    plain_number(std::round(result.maximum)), readable_number(result.rms_step),
+                    readable_bytes(result.bytes), readable_seconds(watch.seconds()));
     return summary;
   }
 
@@ -144,8 +144,8 @@ class SynthCommand : public Command {
     Summary summary;
     summary.json = {{"points", points}, {"bytes", bytes}};
     summary.add_cost(watch);
-    summary.text =
-        output_ + ": " + counted(points, "point") + ", " + readable_seconds(watch.seconds()) + '\n';
+    summary.text = fmt::format("{}: {}, {}\n", output_, counted(points, "point"),
+                               readable_seconds(watch.seconds()));
     return summary;
   }
 

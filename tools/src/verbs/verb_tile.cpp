@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -97,14 +98,14 @@ class TileCommand final : public Command {
     nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
     for (const TileZoom& zoom : result.zooms) {
       zooms.push_back({{"zoom", zoom.zoom}, {"tiles", zoom.tiles}, {"max_error", zoom.max_error}});
-      summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile") +
-                      ", within " + readable_bound(zoom.max_error) + " m\n";
+      summary.text += fmt::format("zoom {}: {}, within {} m\n", zoom.zoom,
+                                  counted(zoom.tiles, "tile"), readable_bound(zoom.max_error));
     }
     summary.json = {{"tiles", result.tiles}, {"bytes", result.bytes},     {"made", result.made},
                     {"kept", result.kept},   {"removed", result.removed}, {"zooms", zooms}};
     summary.add_cost(watch);
-    summary.text += output_ + ": " + counted(result.tiles, "tile") + ", " +
-                    readable_bytes(result.bytes) + ", in " + readable_seconds(watch.seconds());
+    summary.text += fmt::format("{}: {}, {}, in {}", output_, counted(result.tiles, "tile"),
+                                readable_bytes(result.bytes), readable_seconds(watch.seconds()));
     if (result.made < result.tiles) {
       summary.text += "; " + with_commas(result.tiles - result.made) + " already existed";
     }

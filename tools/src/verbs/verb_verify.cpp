@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
 
@@ -25,7 +26,7 @@ namespace {
 /// Adds a problem to both forms of the summary.
 void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
   list.push_back({{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
-  text += problem.file + ": byte " + std::to_string(problem.offset) + ": " + problem.what + "\n";
+  text += fmt::format("{}: byte {}: {}\n", problem.file, problem.offset, problem.what);
 }
 
 class VerifyCommand final : public Command {
@@ -74,9 +75,10 @@ class VerifyCommand final : public Command {
     for (const stream::LevelInfo& level : store.levels()) clusters += level.clusters;
     summary.json = {
         {"ok", ok}, {"problems", problems}, {"clusters", clusters}, {"points", store.points()}};
-    summary.text += std::string(ok ? "sound: " : "damaged: ") + counted(store.points(), "point") +
-                    " in " + counted(clusters, "cluster") + ", " + readable_bytes(store.bytes()) +
-                    ", checked in " + readable_seconds(watch.seconds()) + "\n";
+    summary.text += fmt::format("{}{} in {}, {}, checked in {}\n",
+                                ok ? "sound: " : "damaged: ", counted(store.points(), "point"),
+                                counted(clusters, "cluster"), readable_bytes(store.bytes()),
+                                readable_seconds(watch.seconds()));
     summary.exit_code = ok ? 0 : 1;
     return summary;
   }
@@ -102,19 +104,19 @@ class VerifyCommand final : public Command {
     nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
     for (const ZoomCheck& zoom : result.zooms) {
       nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
-      summary.text += "zoom " + std::to_string(zoom.zoom) + ": " + counted(zoom.tiles, "tile");
+      summary.text += fmt::format("zoom {}: {}", zoom.zoom, counted(zoom.tiles, "tile"));
       if (store) {
         line["samples"] = zoom.samples;
         line["covered"] = zoom.samples - zoom.uncovered;
         line["uncovered"] = zoom.uncovered;
         line["max_error"] = zoom.max_error;
-        summary.text +=
-            ", within " + readable_bound(zoom.max_error) + " m of " +
-            (zoom.uncovered == 0 ? "all " : with_commas(zoom.samples - zoom.uncovered) + " of ") +
-            counted(zoom.samples, "sample");
+        summary.text += fmt::format(
+            ", within {} m of {}{}", readable_bound(zoom.max_error),
+            zoom.uncovered == 0 ? "all " : with_commas(zoom.samples - zoom.uncovered) + " of ",
+            counted(zoom.samples, "sample"));
         if (zoom.uncovered > 0) {
-          summary.text += " (" + with_commas(zoom.uncovered) +
-                          (zoom.uncovered == 1 ? " is" : " are") + " on no triangle)";
+          summary.text += fmt::format(" ({}{} on no triangle)", with_commas(zoom.uncovered),
+                                      zoom.uncovered == 1 ? " is" : " are");
         }
       }
       summary.text += "\n";
@@ -132,8 +134,9 @@ class VerifyCommand final : public Command {
                     {"samples", result.samples},
                     {"left_over", result.torn},
                     {"zooms", zooms}};
-    summary.text += std::string(ok ? "sound: " : "damaged: ") + counted(result.tiles, "tile") +
-                    ", checked in " + readable_seconds(watch.seconds()) + "\n";
+    summary.text += fmt::format("{}{}, checked in {}\n",
+                                ok ? "sound: " : "damaged: ", counted(result.tiles, "tile"),
+                                readable_seconds(watch.seconds()));
     summary.exit_code = ok ? 0 : 1;
     return summary;
   }

@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <spawn.h>
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
@@ -52,11 +53,10 @@ class ViewCommand final : public Command {
     LiveSite site(stores_, [](const std::string& path) { return open_store(path); });
     Server server([&site]() -> const Site& { return site.now(); },
                   static_cast<std::uint16_t>(port_));
-    const std::string address = "http://127.0.0.1:" + std::to_string(server.access().port) +
-                                "/?token=" + server.access().token;
-    common.say(address + " shows " +
-               (stores_.size() == 1 ? "the store" : counted(stores_.size(), "store")) +
-               " until Ctrl-C");
+    const std::string address =
+        fmt::format("http://127.0.0.1:{}/?token={}", server.access().port, server.access().token);
+    common.say(fmt::format("{} shows {} until Ctrl-C", address,
+                           stores_.size() == 1 ? "the store" : counted(stores_.size(), "store")));
     if (!no_open_ && !open_browser(address)) {
       common.say("xdg-open not found; open the address in a browser yourself");
     }
