@@ -59,11 +59,17 @@ RESTRICTED = [
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'CLI/', ['tools']),
+    (r'fmt/', ['libstream/src', 'tools/src']),
     (r'pybind11/|Python\.h', ['python']),
     (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'libterrain/fuzz', 'tools', 'tests'] + IN_STREAM),
     (r'gtest/|gmock/', TESTS + ['tools', 'viewer/tests']),
     (r'benchmark/', BENCHES),
 ]
+
+# These folders build texts with {fmt}, except in the sources that the Makefile of the browser's core also compiles, which
+# have only the standard library, and in headers, which every source would pay for.
+FORMATTED = ['libstream/src', 'tools/src']
+CORE_MAKEFILE = 'viewer/core/Makefile'
 
 # Functions of the C library whose last bit differs from release to release and from processor to
 # processor. Where bytes depend on them the same input gives other bytes elsewhere, so sources use
@@ -196,6 +202,32 @@ def check_inexact(root):
         yield f'{path}: is in MAY_DIFFER and uses nothing of the kind'
 
 
+def core_sources(root):
+    """The sources of libstream that also compile to WebAssembly."""
+    if not os.path.isfile(os.path.join(root, CORE_MAKEFILE)):
+        return set()
+    listed = re.search(r'^STREAM := (.*)$', read(root, CORE_MAKEFILE).replace('\\\n', ' '), re.MULTILINE)
+    return {f'libstream/src/{name}.cpp' for name in listed.group(1).split()}
+
+
+def check_texts(root):
+    """Texts are built in one way: with {fmt}, or with std::to_string where that is not available."""
+    core = core_sources(root)
+    for path in sorted(core):
+        if not os.path.isfile(os.path.join(root, path)):
+            yield f'{path}: is in {CORE_MAKEFILE} and does not exist'
+    for folder in FORMATTED:
+        for path in files_below(root, folder):
+            if not path.endswith(('.cpp', '.hpp')):
+                continue
+            plain = path in core or path.endswith('.hpp')
+            for number, line in enumerate(read(root, path).split('\n'), 1):
+                if plain and (re.search(r'\bfmt::', line) or re.match(r'\s*#\s*include\s*<fmt/', line)):
+                    yield f'{path}:{number}: uses {{fmt}}, which neither headers nor the sources in {CORE_MAKEFILE} may'
+                if not plain and re.search(r'\bstd::to_string\b', line.split('//')[0]):
+                    yield f'{path}:{number}: uses std::to_string; build the text with fmt::format'
+
+
 def strings_of(line):
     """The string literals of a line, without those in a comment after it."""
     return re.findall(r'"(?:[^"\\]|\\.)*"', re.sub(r'("(?:[^"\\]|\\.)*")|//.*', lambda m: m.group(1) or '', line))
@@ -291,6 +323,7 @@ def breaches(root):
     yield from check_sources(root)
     yield from check_inexact(root)
     yield from check_command(root)
+    yield from check_texts(root)
     yield from check_meson(root)
     yield from check_versions(root)
     yield from check_folders(root)

@@ -78,6 +78,29 @@ class CheckLayout(unittest.TestCase):
         text = head('python') + '#include <pybind11/numpy.h>\n#include <terrace/matching/a.hpp>\n#include <terrace/terrain/a.hpp>\n'
         self.assertEqual(self.breaches(lambda root: write(root, 'python/src/b.cpp', text)), [])
 
+    def test_texts_are_built_in_one_way(self):
+        makefile = 'STREAM := io/core \\\n  io/more\nTRI := delaunay2\n'
+
+        def found(path, line, listed=('io/core', 'io/more')):
+            def change(root):
+                write(root, check_layout.CORE_MAKEFILE, makefile)
+                for name in listed:
+                    write(root, f'libstream/src/{name}.cpp', head('libstream'))
+                write(root, path, head(path) + line)
+            return self.breaches(change)
+
+        uses_fmt, uses_to_string = '#include <fmt/core.h>\n', 'auto text = std::to_string(1);\n'
+        for path in ('libstream/src/b.cpp', 'libstream/src/io/b.cpp', 'tools/src/b.cpp'):
+            self.assertEqual(found(path, uses_fmt), [])
+            self.assertEqual(found(path, uses_to_string), [f'{path}:2: uses std::to_string; build the text with fmt::format'])
+        for path in ('libstream/src/io/more.cpp', 'libstream/src/io/b.hpp', 'tools/src/b.hpp'):
+            self.assertEqual(found(path, uses_to_string), [])
+            for line in (uses_fmt, 'auto text = fmt::format("{}", 1);\n'):
+                self.assertEqual(found(path, line), [f'{path}:2: uses {{fmt}}, which neither headers nor the sources in '
+                                                     f'{check_layout.CORE_MAKEFILE} may'])
+        self.assertEqual(found('libstream/src/b.cpp', '', listed=['io/core']),
+                         [f'libstream/src/io/more.cpp: is in {check_layout.CORE_MAKEFILE} and does not exist'])
+
     def test_each_breach_is_found(self):
         apache = '// SPDX-License-Identifier: Apache-2.0\n'
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
@@ -98,6 +121,7 @@ class CheckLayout(unittest.TestCase):
             ('libterrain/src/base/b.cpp', apache + '#include <pybind11/numpy.h>\n', 'which only'),
             ('libterrain/src/earth/b.cpp', gpl + '#include <geos_c.h>\n', 'which only'),
             ('libcluster/src/b.cpp', apache + '#include <lemon/matching.h>\n', 'which only'),
+            ('libterrain/src/base/b.cpp', apache + '#include <fmt/core.h>\n', 'which only'),
             ('libcluster/src/b.cpp', '#include <vector>\n', 'no SPDX line'),
             ('libcluster/src/b.cpp', gpl, 'not Apache-2.0'),
             ('libtri/src/b.cpp', head('libtri') + '#include <CGAL/Alpha_wrap_3/internal/gate_comparator.h>\n', 'is GPL'),
