@@ -6,6 +6,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
 #include "terrace/stream/error.hpp"
@@ -43,21 +45,22 @@ stream::Naming may_replace(const std::string& path, bool force) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);  // follows links
   if (status.type() == fs::file_type::not_found) return naming;
-  const auto refuse = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error(path, cause).remedy(remedy);
-  };
   if (error) throw stream::system_error(path, "cannot be examined", error.value());
   if (!fs::is_regular_file(status)) {
-    refuse("is not a regular file", "name another output; - is standard output");
+    throw stream::Error(path, "is not a regular file")
+        .remedy("name another output; - is standard output");
   }
-  if (!force) refuse("exists already", "name another output, or give --force to replace it");
+  if (!force) {
+    throw stream::Error(path, "exists already")
+        .remedy("name another output, or give --force to replace it");
+  }
   if (!written_by_terrace(path)) {
     const bool has_mark = marked_by_terrace(path).has_value();
-    refuse(std::string("was not written by terrace, ") +
-               (has_mark ? "according to its format"
-                         : "or was changed or copied since (text files carry no mark)") +
-               ", so --force does not replace it",
-           "remove it yourself or name another output");
+    throw stream::Error(
+        path, fmt::format("was not written by terrace, {}, so --force does not replace it",
+                          has_mark ? "according to its format"
+                                   : "or was changed or copied since (text files carry no mark)"))
+        .remedy("remove it yourself or name another output");
   }
   return naming;
 }

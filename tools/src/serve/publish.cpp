@@ -22,10 +22,6 @@ namespace fs = std::filesystem;
 constexpr const char* kMark = "stores.json";
 constexpr std::size_t kCopied = std::size_t{1} << 20;
 
-stream::Error refused(const fs::path& path, const std::string& cause, const std::string& remedy) {
-  return stream::Error(path.string(), cause).remedy(remedy);
-}
-
 /// Returns the contents of stores.json; null unless terrace published the folder.
 nlohmann::json list_of(const fs::path& folder) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20;
@@ -127,7 +123,9 @@ Published publish(std::span<const stream::Store> stores, const fs::path& folder,
   const fs::path &staged = site_folder.folder(), &target = site_folder.target();
   // Check before the work; commit() checks again.
   if (std::error_code error; fs::symlink_status(target, error).type() != fs::file_type::not_found) {
-    if (!replace) throw refused(target, "exists already", "name another folder, or give --force");
+    if (!replace)
+      throw stream::Error(target.string(), "exists already")
+          .remedy("name another folder, or give --force");
     if (const stream::Ownership found = ownership_of_site(target); !found.ours) {
       throw stream::not_replaced(target.string(), found);
     }

@@ -40,24 +40,23 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
   std::optional<CsvRows> rows = CsvRows::open(path, kDendrogramHead);
   if (!rows) return std::nullopt;
   cluster::Dendrogram dendrogram;
-  const auto fail = [&](const std::string& where, const std::string& cause) {
-    throw stream::Error(path, cause)
-        .at(where)
+  const auto refused = [&](const std::string& cause) {
+    return stream::Error(path, cause)
         .remedy(
             "rows must be a,b,height,size as written by 'terrace cluster --dendrogram' and SciPy's "
             "linkage()");
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};
-    if (!parse_row(line, merge)) fail(rows->where(), "is not a row of a dendrogram");
+    if (!parse_row(line, merge)) throw refused("is not a row of a dendrogram").at(rows->where());
     dendrogram.merges.push_back(merge);
     if (dendrogram.merges.size() >= cluster::kMostDendrogramPoints) {
-      fail(rows->where(), "is one row too many");
+      throw refused("is one row too many").at(rows->where());
     }
   }
   dendrogram.points = dendrogram.merges.size() + 1;
   const std::string fault = cluster::dendrogram_fault(dendrogram);
-  if (!fault.empty()) fail("", "is not a dendrogram: " + fault);
+  if (!fault.empty()) throw refused("is not a dendrogram: " + fault);
   return dendrogram;
 }
 

@@ -85,9 +85,8 @@ bool is_matching_result(const std::string& path) {
 }
 
 MatchingResult read_matching_result(const std::string& path, std::size_t points) {
-  const auto fail = [&](const std::string& where, const std::string& cause) {
-    throw stream::Error(path, cause)
-        .at(where)
+  const auto refused = [&](const std::string& cause) {
+    return stream::Error(path, cause)
         .remedy(
             "pass the unchanged result of 'terrace match', and with --points the file that it was "
             "made from");
@@ -95,27 +94,28 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
   std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
   if (result.tree) rows = CsvRows::open(path, kTreeHead);
-  if (!rows) fail("", "is not a result of 'terrace match'");
+  if (!rows) throw refused("is not a result of 'terrace match'");
   // Tree nodes have 32-bit numbers.
-  if (points > std::numeric_limits<std::uint32_t>::max() / 2) fail("", "has too many points");
+  if (points > std::numeric_limits<std::uint32_t>::max() / 2) throw refused("has too many points");
   const std::size_t most = result.tree ? points - std::min<std::size_t>(points, 1) : points / 2;
   Checker checker(points, result.tree);
   for (std::string_view line; rows->next(line);) {
     Row row;
     if (!parse(line, result.tree, row)) {
-      fail(rows->where(), fmt::format("is not a row {}", result.tree ? kTreeHead : kPairsHead));
+      throw refused(fmt::format("is not a row {}", result.tree ? kTreeHead : kPairsHead))
+          .at(rows->where());
     }
     if (result.lines.size() == most) {
-      fail(rows->where(), "is one row too many for " + counted(points, "point"));
+      throw refused("is one row too many for " + counted(points, "point")).at(rows->where());
     }
     const std::string fault = checker.fault(row, result.lines.size());
-    if (!fault.empty()) fail(rows->where(), fault);
+    if (!fault.empty()) throw refused(fault).at(rows->where());
     result.lines.push_back({row.a, row.b, row.level});
     result.top = std::max(result.top, row.level);
   }
   if (result.tree && result.lines.size() < most) {
-    fail("", fmt::format("has {}; a tree of {} has {}", counted(result.lines.size(), "row"),
-                         counted(points, "point"), with_commas(most)));
+    throw refused(fmt::format("has {}; a tree of {} has {}", counted(result.lines.size(), "row"),
+                              counted(points, "point"), with_commas(most)));
   }
   return result;
 }
