@@ -9,9 +9,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "earth/geography_patch.hpp"
+#include "earth/geography.hpp"
 #include "earth/geoid_heights.hpp"
-#include "earth/grid_geography.hpp"
 #include "terrace/terrain/crs.hpp"
 
 namespace {

@@ -13,7 +13,7 @@
 #include "base/fixed_text.hpp"
 #include "contour/contour_levels.hpp"
 #include "contour/line_joiner.hpp"
-#include "earth/geography_patch.hpp"
+#include "earth/geography.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/contours.hpp"
 #include "terrace/terrain/crs.hpp"

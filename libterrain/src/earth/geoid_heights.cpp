@@ -12,7 +12,7 @@
 #include "earth/crs/operation_choice.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"
-#include "earth/smooth_offsets.hpp"
+#include "earth/polynomial_patch.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "earth/polynomial_patch.hpp"
 #include "tile/make/raster_tile_surface.hpp"
 
 namespace terrace::terrain {
@@ -20,46 +22,7 @@ constexpr std::size_t kSmallestHeight = 8, kLargestHeight = 64;
 /// The most samples to read at once, unless a single cell needs more.
 constexpr std::size_t kMostWaterSamples = 65536;
 
-/// Parameters at which a quadratic through values at 0, 1/2 and 1 is farthest from a cubic.
-constexpr double kWorst = 0.2113248654051871;
-
-/// A rectangle of cells.
-struct WaterPart {
-  std::size_t column, row, columns, rows;
-};
-
-/// The polynomial of second degree in both directions through 3 x 3 values. Row k of the
-/// coefficients contains those of t^k, in powers of s along the row.
-struct QuadraticPatch {
-  std::array<std::array<double, 3>, 3> coefficients{};
-
-  /// values: at 0, 1/2 and 1 along each axis, row by row.
-  explicit QuadraticPatch(const std::array<double, 9>& values) {
-    const auto through = [](double a, double b, double c) {
-      return std::array{a, 4.0 * b - 3.0 * a - c, 2.0 * (a - 2.0 * b + c)};
-    };
-    std::array<std::array<double, 3>, 3> along{};
-    for (std::size_t j = 0; j < 3; ++j) {
-      along[j] = through(values[3 * j], values[3 * j + 1], values[3 * j + 2]);
-    }
-    for (std::size_t m = 0; m < 3; ++m) {
-      const auto down = through(along[0][m], along[1][m], along[2][m]);
-      for (std::size_t k = 0; k < 3; ++k) coefficients[k][m] = down[k];
-    }
-  }
-  /// The coefficients along the row at t.
-  [[nodiscard]] std::array<double, 3> at_row(double t) const {
-    std::array<double, 3> row{};
-    for (std::size_t m = 0; m < 3; ++m) {
-      row[m] = (coefficients[2][m] * t + coefficients[1][m]) * t + coefficients[0][m];
-    }
-    return row;
-  }
-  static double value(const std::array<double, 3>& row, double s) {
-    return (row[2] * s + row[1]) * s + row[0];
-  }
-  [[nodiscard]] double value(double s, double t) const { return value(at_row(t), s); }
-};
+using WaterPatch = PolynomialPatch<2, 2>;
 
 /// Fills a mask of cells in rows and columns, part by part. View: reads a window of heights.
 template <class View>
@@ -74,17 +37,21 @@ class WaterMask {
         columns_(columns),
         out_(out) {}
 
-  void fill(const WaterPart& part);
+  void fill(const LatticePart& whole) {
+    divide(whole, [this](const LatticePart& part) { return is_filled(part); });
+  }
   /// Fills the part cell by cell.
-  void fill_exactly(const WaterPart& part);
+  void fill_exactly(const LatticePart& part);
 
  private:
+  /// Fills the part if it is small, uniform or smooth; returns false otherwise.
+  bool is_filled(const LatticePart& part);
   /// Whether all cells with places between these are equal; if so, sets them.
-  bool is_uniform(const WaterPart& part, std::span<const Point2> nodes);
+  bool is_uniform(const LatticePart& part, std::span<const Point2> nodes);
   /// Rounds the places of a part to the nearest samples, row by row, and reads those.
-  void look(const WaterPart& part, std::span<Point2> places);
-  void read(const WaterPart& part, std::span<const Point2> places, std::size_t stride);
-  void set(const WaterPart& part, bool wet) {
+  void look(const LatticePart& part, std::span<Point2> places);
+  void read(const LatticePart& part, std::span<const Point2> places, std::size_t stride);
+  void set(const LatticePart& part, bool wet) {
     for (std::size_t row = part.row; row < part.row + part.rows; ++row) {
       std::fill_n(out_.begin() + static_cast<std::ptrdiff_t>(row * columns_ + part.column),
                   part.columns, wet ? std::uint8_t{1} : std::uint8_t{0});
@@ -99,7 +66,7 @@ class WaterMask {
 };
 
 template <class View>
-bool WaterMask<View>::is_uniform(const WaterPart& part, std::span<const Point2> nodes) {
+bool WaterMask<View>::is_uniform(const LatticePart& part, std::span<const Point2> nodes) {
   Point2 low = nodes[0], high = nodes[0];
   for (const Point2& p : nodes) {
     low = {std::min(low[0], p[0]), std::min(low[1], p[1])};
@@ -139,7 +106,7 @@ bool WaterMask<View>::is_uniform(const WaterPart& part, std::span<const Point2> 
 }
 
 template <class View>
-void WaterMask<View>::read(const WaterPart& part, std::span<const Point2> places,
+void WaterMask<View>::read(const LatticePart& part, std::span<const Point2> places,
                            std::size_t stride) {
   LatticeWindow window;
   std::int64_t right = 0, bottom = 0;
@@ -183,7 +150,7 @@ void WaterMask<View>::read(const WaterPart& part, std::span<const Point2> places
 }
 
 template <class View>
-void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
+void WaterMask<View>::look(const LatticePart& part, std::span<Point2> places) {
   const stream::StoreSchema& schema = raster_.store.schema();
   const double right = static_cast<double>(schema.columns);
   const double bottom = static_cast<double>(schema.rows);
@@ -196,7 +163,7 @@ void WaterMask<View>::look(const WaterPart& part, std::span<Point2> places) {
 }
 
 template <class View>
-void WaterMask<View>::fill_exactly(const WaterPart& part) {
+void WaterMask<View>::fill_exactly(const LatticePart& part) {
   std::vector<Point2> places;
   places.reserve(part.columns * part.rows);
   for (std::size_t row = part.row; row < part.row + part.rows; ++row) {
@@ -209,54 +176,32 @@ void WaterMask<View>::fill_exactly(const WaterPart& part) {
 }
 
 template <class View>
-void WaterMask<View>::fill(const WaterPart& part) {
-  if (part.columns < kSmallestHeight || part.rows < kSmallestHeight) return fill_exactly(part);
+bool WaterMask<View>::is_filled(const LatticePart& part) {
+  if (part.columns < kSmallestHeight || part.rows < kSmallestHeight) {
+    fill_exactly(part);
+    return true;
+  }
   const std::size_t corner = part.row * columns_ + part.column;
   const std::size_t last = corner + (part.rows - 1) * columns_ + part.columns - 1;
-  const double west = longitude_[corner], width = longitude_[last] - west;
-  const double north = latitude_[corner], height = latitude_[last] - north;
-  std::array<Point2, 13> places;
-  for (std::size_t k = 0; k < 9; ++k) {
-    places[k] = {west + 0.5 * static_cast<double>(k % 3) * width,
-                 north + 0.5 * static_cast<double>(k / 3) * height};
-  }
-  const auto worst = [](bool far) { return far ? 1.0 - kWorst : kWorst; };
-  for (std::size_t k = 0; k < 4; ++k) {
-    places[9 + k] = {west + worst((k & 1) != 0) * width, north + worst((k & 2) != 0) * height};
-  }
+  const double west = longitude_[corner], north = latitude_[corner];
+  auto places =
+      WaterPatch::places({west, north}, {longitude_[last] - west, latitude_[last] - north});
   raster_.places.to_stored(places);
-  std::array<double, 9> x{}, y{};
-  for (std::size_t k = 0; k < 9; ++k) {
-    x[k] = places[k][0];
-    y[k] = places[k][1];
-  }
-  const QuadraticPatch column(x), row(y);
-  bool good = true;
-  for (std::size_t k = 0; k < 4; ++k) {
-    const double s = worst((k & 1) != 0), t = worst((k & 2) != 0);
-    // `!(x <= y)` also rejects NaN.
-    good = good && std::abs(column.value(s, t) - places[9 + k][0]) <= kTolerance &&
-           std::abs(row.value(s, t) - places[9 + k][1]) <= kTolerance;
-  }
-  if (good && is_uniform(part, std::span(places).first(9))) return;
-  if (!good || part.columns > kLargestHeight || part.rows > kLargestHeight) {
-    const std::size_t left = part.columns / 2, upper = part.rows / 2;
-    fill({part.column, part.row, left, upper});
-    fill({part.column + left, part.row, part.columns - left, upper});
-    fill({part.column, part.row + upper, left, part.rows - upper});
-    fill({part.column + left, part.row + upper, part.columns - left, part.rows - upper});
-    return;
-  }
+  const std::optional<WaterPatch> patch = WaterPatch::through(places, kTolerance);
+  if (!patch) return false;
+  if (is_uniform(part, std::span(places).first(9))) return true;
+  if (part.columns > kLargestHeight || part.rows > kLargestHeight) return false;
   std::vector<Point2> between(part.columns * part.rows);
   for (std::size_t j = 0; j < part.rows; ++j) {
     const double t = static_cast<double>(j) / static_cast<double>(part.rows - 1);
-    const std::array<double, 3> a = column.at_row(t), b = row.at_row(t);
+    const WaterPatch::Row row = patch->row(t);
     for (std::size_t i = 0; i < part.columns; ++i) {
       const double s = static_cast<double>(i) / static_cast<double>(part.columns - 1);
-      between[j * part.columns + i] = {QuadraticPatch::value(a, s), QuadraticPatch::value(b, s)};
+      between[j * part.columns + i] = {row(0, s), row(1, s)};
     }
   }
   look(part, between);
+  return true;
 }
 
 /// Whether every `step`-th number is equally spaced.

@@ -130,31 +130,30 @@ void StoredPlaces::fit_polynomials(const stream::Store& store) {
                     world_bounds_.max[1] - world_bounds_.min[1]};
   const bool turns = bounds_.west == -180.0 || bounds_.east == 180.0;
   if (crs_.is_geographic() || turns || !(std::min(size[0], size[1]) > 0.0)) return;
-  plane_ = {{bounds_.west, bounds_.south},
-            {bounds_.east, bounds_.north},
-            {kPatchDegrees, kPatchDegrees},
-            kPlaneTolerance / (std::max(size[0], size[1]) * crs_.metres_per_unit()),
-            [&](std::span<Point2> places) {
-              crs_.from_geographic(places);
-              for (Point2& p : places) {
-                for (std::size_t k = 0; k < 2; ++k) p[k] = (p[k] - world_bounds_.min[k]) / size[k];
-              }
-            }};
+  const double tolerance = kPlaneTolerance / (std::max(size[0], size[1]) * crs_.metres_per_unit());
+  plane_ = PatchGrid({bounds_.west, bounds_.south}, {bounds_.east, bounds_.north},
+                     {kPatchDegrees, kPatchDegrees}, [&](const Point2& low, const Point2& sides) {
+                       auto places = PlacePatch::places(low, sides);
+                       crs_.from_geographic(places);
+                       for (Point2& p : places) {
+                         for (std::size_t k = 0; k < 2; ++k) {
+                           p[k] = (p[k] - world_bounds_.min[k]) / size[k];
+                         }
+                       }
+                       return PlacePatch::through(places, tolerance);
+                     });
 }
 
 void StoredPlaces::from_geographic(std::span<Point2> places) const {
-  std::size_t exact = 0;  // the places before this index are done
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    Point2 place = places[i];
-    if (!plane_.convert(place)) continue;
-    if (exact < i) crs_.from_geographic(places.subspan(exact, i - exact));
-    for (std::size_t k = 0; k < 2; ++k) {
-      const double low = world_bounds_.min[k];
-      places[i][k] = low + place[k] * (world_bounds_.max[k] - low);
-    }
-    exact = i + 1;
-  }
-  if (exact < places.size()) crs_.from_geographic(places.subspan(exact));
+  plane_.convert(
+      places, [this](std::span<Point2> some) { crs_.from_geographic(some); },
+      [this](Point2 place) {
+        for (std::size_t k = 0; k < 2; ++k) {
+          const double low = world_bounds_.min[k];
+          place[k] = low + place[k] * (world_bounds_.max[k] - low);
+        }
+        return place;
+      });
 }
 
 Point2 StoredPlaces::world(const Point2& stored) const {

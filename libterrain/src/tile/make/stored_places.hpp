@@ -10,7 +10,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/geography_patch.hpp"
+#include "earth/geography.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "tile/format/tile_address.hpp"
@@ -67,7 +67,7 @@ class StoredPlaces {
 
   CoordinateSystem crs_;
   std::optional<BoxGeography> geography_;  ///< for irregular points
-  GeographyPatches plane_;                 ///< to shares of world_bounds_; for projected stores
+  PatchGrid plane_;                        ///< to shares of world_bounds_; for projected stores
   stream::Box3 world_bounds_{};
   stream::Placement placement_;
   StoredBox stored_;

@@ -5,7 +5,7 @@
 
 #include <terrace/stream/store.hpp>
 
-#include "earth/grid_geography.hpp"
+#include "earth/geography.hpp"
 #include "surface/point_hull.hpp"
 #include "surface/store_window.hpp"
 #include "tile/make/height_blocks.hpp"

@@ -1,20 +1,132 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "earth/smooth_offsets.hpp"
+#include "earth/polynomial_patch.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <terrace/base/random.hpp>
 
-#include "earth/quintic_surface.hpp"
-
 namespace terrace::terrain {
 namespace {
+
+/// Returns the patch of two functions of the plane.
+template <class Patch, class F, class G>
+std::optional<Patch> fit(const Point2& low, const Point2& size, double tolerance, const F& f,
+                         const G& g) {
+  auto places = Patch::places(low, size);
+  for (Point2& p : places) p = {f(p[0], p[1]), g(p[0], p[1])};
+  return Patch::through(places, tolerance);
+}
+
+template <class Patch, class F, class G>
+void expect_equal(const F& f, const G& g) {
+  const Point2 low{0.3, -0.2}, size{2, 0.5};
+  const auto patch = fit<Patch>(low, size, 1e-9, f, g);
+  ASSERT_TRUE(patch);
+  for (double t = 0; t <= 1; t += 0.125) {
+    const auto row = patch->row(t);
+    for (double s = 0; s <= 1; s += 0.125) {
+      const double x = low[0] + s * size[0], y = low[1] + t * size[1];
+      EXPECT_NEAR(row(0, s), f(x, y), 1e-9);
+      EXPECT_NEAR(row(1, s), g(x, y), 1e-9);
+      EXPECT_EQ(row(0, s), patch->at(0, s, t));
+    }
+  }
+}
+
+TEST(PolynomialPatch, ReproducesPolynomials) {
+  const auto plane = [](double x, double y) { return 3 - 2 * x + y + 0.5 * x * y; };
+  const auto quadratic = [](double x, double y) { return 1 + x * x * y * y - y * y + x; };
+  const auto quintic = [](double x, double y) {
+    return 3 + x * (1 - y * y * y) + 0.01 * x * x * x * x * x * y - y * y;
+  };
+  expect_equal<PolynomialPatch<2, 2>>(plane, quadratic);
+  expect_equal<PolynomialPatch<5, 2>>(quintic, quadratic);
+  EXPECT_FALSE((fit<PolynomialPatch<2, 2>>({0.3, -0.2}, {2, 0.5}, 1e-9, plane, quintic)));
+  const auto both = fit<PolynomialPatch<5, 2>>({0, 0}, {1, 1}, 1e-9, plane, quintic);
+  ASSERT_TRUE(both);
+  EXPECT_TRUE(both->is_bilinear(0, 1e-9));
+  EXPECT_FALSE(both->is_bilinear(1, 0.1));
+  EXPECT_NEAR(both->bilinear_at(0, 0.3, 0.7), plane(0.3, 0.7), 1e-12);
+}
+
+TEST(PolynomialPatch, RefusesAnErrorAtAnyCheckedPlace) {
+  const auto values = PlacePatch::places({0, 0}, {1, 1});  // a linear function
+  EXPECT_TRUE(PlacePatch::through(values, 1e-10));
+  for (std::size_t i = 36; i < PlacePatch::kPlaces; ++i) {
+    for (const double off : {1e-6, -1e-6, std::nan("")}) {
+      auto changed = values;
+      changed[i][i % 2] += off;
+      EXPECT_FALSE(PlacePatch::through(changed, 1e-6));
+    }
+  }
+}
+
+/// The stated bound: wherever a patch of a smooth function is made, it is within the tolerance in
+/// the whole box.
+template <std::size_t kDegree>
+void expect_bound(double tolerance) {
+  using Patch = PolynomialPatch<kDegree, 2>;
+  std::size_t made = 0, refused = 0;
+  for (std::uint64_t seed = 1; seed <= 600; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    std::uint64_t state = seed;
+    const auto unit = [&state] {
+      state = base::splitmix64(state);
+      return base::unit_interval(state);
+    };
+    // A wave, and a function with a pole near the box, as projections have.
+    const double angle = 6.3 * unit(), phase = 6.3 * unit();
+    const Point2 wave{std::cos(angle), std::sin(angle)}, pole{-0.2 - 5 * unit(), 2 * unit() - 0.5};
+    const auto f = [&](double x, double y) { return std::sin(phase + wave[0] * x + wave[1] * y); };
+    const auto g = [&](double x, double y) {
+      return std::log(std::hypot(x - pole[0], y - pole[1]));
+    };
+    const double width = std::pow(10, 1 - 4 * unit()), height = width * unit();
+    const auto patch = fit<Patch>({0, 0}, {width, height}, tolerance, f, g);
+    ++(patch ? made : refused);
+    if (!patch) continue;
+    double worst = 0;
+    for (int j = 0; j <= 40; ++j) {
+      for (int i = 0; i <= 40; ++i) {
+        const double s = i / 40.0, t = j / 40.0;
+        worst = std::max({worst, std::abs(patch->at(0, s, t) - f(s * width, t * height)),
+                          std::abs(patch->at(1, s, t) - g(s * width, t * height))});
+      }
+    }
+    EXPECT_LE(worst, tolerance);
+  }
+  EXPECT_GT(made, 100U);
+  EXPECT_GT(refused, 100U);
+}
+
+TEST(PolynomialPatch, KeepsItsBoundBetweenCheckedPlaces) {
+  expect_bound<5>(1e-6);
+  expect_bound<2>(1e-3);
+}
+
+TEST(LatticePart, DividesIntoEveryCellOnce) {
+  constexpr std::size_t kAcross = 37, kDown = 20;
+  std::vector<int> seen(kAcross * kDown);
+  divide({0, 0, kAcross, kDown}, [&](const LatticePart& part) {
+    if (part.columns * part.rows > 12) return false;
+    for (std::size_t j = part.row; j < part.row + part.rows; ++j) {
+      for (std::size_t i = part.column; i < part.column + part.columns; ++i) {
+        ++seen[j * kAcross + i];
+      }
+    }
+    return true;
+  });
+  EXPECT_EQ(std::count(seen.begin(), seen.end(), 1), static_cast<int>(seen.size()));
+}
 
 constexpr double kTolerance = 1e-5;
 
@@ -114,24 +226,6 @@ TEST_F(SmoothOffsets, EndAtGridBorder) {
     some[i][i % 2] = std::numeric_limits<double>::quiet_NaN();
   }
   check(some, [](const Point2& p) { return p[0] + p[1]; });
-}
-
-TEST(QuinticSurface, ReproducesPolynomials) {
-  const auto f = [](double s, double t) {
-    return 3 + s * (1 - t * t * t) + 2 * s * s * s * s * s * t - t * t;
-  };
-  std::array<double, QuinticSurface::kPlaces> values{};
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    values[i] = f(QuinticSurface::places()[i][0], QuinticSurface::places()[i][1]);
-  }
-  const auto surface = QuinticSurface::through(values, 1e-9);
-  ASSERT_TRUE(surface);
-  EXPECT_FALSE(surface->is_bilinear(0.1));
-  for (double s = 0; s <= 1; s += 0.125) {
-    for (double t = 0; t <= 1; t += 0.125) EXPECT_NEAR(surface->at(s, t), f(s, t), 1e-12);
-  }
-  values.back() += 1e-6;
-  EXPECT_FALSE(QuinticSurface::through(values, 1e-6));
 }
 
 }  // namespace

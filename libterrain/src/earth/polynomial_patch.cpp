@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "earth/smooth_offsets.hpp"
+#include "earth/polynomial_patch.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,10 +8,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <vector>
-
-#include "earth/quintic_surface.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -20,6 +19,7 @@ namespace {
 constexpr std::size_t kFewestOffsets = 256;
 
 using Exact = std::function<void(std::span<const Point2>, std::span<double>)>;
+using OffsetPatch = PolynomialPatch<5, 1>;
 
 struct Box {
   Point2 low{HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL};
@@ -81,12 +81,13 @@ class Adder {
   }
   bool add_by_polynomials(const Box& box, std::span<const std::uint32_t> numbers) {
     const Point2 size{box.high[0] - box.low[0], box.high[1] - box.low[1]};
-    std::array<Point2, QuinticSurface::kPlaces> at = QuinticSurface::places();
-    for (Point2& p : at) p = {box.low[0] + p[0] * size[0], box.low[1] + p[1] * size[1]};
-    std::array<double, QuinticSurface::kPlaces> offsets{};
+    const std::array<Point2, OffsetPatch::kPlaces> at = OffsetPatch::places(box.low, size);
+    std::array<double, OffsetPatch::kPlaces> offsets{};
     exact_(at, offsets);
-    const auto surface = QuinticSurface::through(offsets, tolerance_);
-    if (!surface) return false;
+    std::array<OffsetPatch::Values, OffsetPatch::kPlaces> values{};
+    for (std::size_t i = 0; i < offsets.size(); ++i) values[i] = {offsets[i]};
+    const std::optional<OffsetPatch> patch = OffsetPatch::through(values, tolerance_);
+    if (!patch) return false;
     // Along a single meridian or parallel the function has one variable.
     const double s = size[0] > 0 ? 1.0 / size[0] : 0.0, t = size[1] > 0 ? 1.0 / size[1] : 0.0;
     const auto add_all = [&](const auto& offset) {
@@ -95,10 +96,10 @@ class Adder {
       }
     };
     // Most grids are interpolated bilinearly.
-    if (surface->is_bilinear(tolerance_ / 8)) {
-      add_all([&](double u, double v) { return surface->bilinear_at(u, v); });
+    if (patch->is_bilinear(0, tolerance_ / 8)) {
+      add_all([&](double u, double v) { return patch->bilinear_at(0, u, v); });
     } else {
-      add_all([&](double u, double v) { return surface->at(u, v); });
+      add_all([&](double u, double v) { return patch->at(0, u, v); });
     }
     return true;
   }
