@@ -16,6 +16,7 @@
 #include <proj.h>
 
 #include "earth/crs/crs_definition.hpp"
+#include "earth/crs/projection_engine.hpp"
 #include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {

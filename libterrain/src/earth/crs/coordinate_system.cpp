@@ -14,7 +14,7 @@
 #include "earth/crs/crs_definition.hpp"
 #include "earth/crs/crs_geo_keys.hpp"
 #include "earth/crs/datum_change.hpp"
-#include "earth/crs/projection.hpp"
+#include "earth/crs/projection_engine.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"

@@ -5,48 +5,17 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <system_error>
-
-#include <GeographicLib/Math.hpp>
+#include <utility>
+#include <variant>
 
 #include "earth/crs/crs_reading.hpp"
-#include "earth/crs/proj_pipeline.hpp"
-#include "earth/crs/projection_names.hpp"
+#include "earth/crs/projection_engine.hpp"
 
 namespace terrace::terrain {
 namespace {
-
-/// A projection computed by PROJ.
-class ProjProjection final : public Projection {
- public:
-  ProjProjection(const std::string& pipeline, double degrees_per_unit, double metres_per_unit)
-      : pipeline_(pipeline), degrees_(degrees_per_unit), metres_(metres_per_unit) {}
-
-  void forward(std::span<Point2> places) const override {
-    if (degrees_ != 1) {
-      for (Point2& place : places) place = {place[0] / degrees_, place[1] / degrees_};
-    }
-    pipeline_.forward(places);
-    if (metres_ == 1) return;
-    for (Point2& place : places) place = {place[0] * metres_, place[1] * metres_};
-  }
-  void reverse(std::span<Point2> places) const override {
-    if (metres_ != 1) {
-      for (Point2& place : places) place = {place[0] / metres_, place[1] / metres_};
-    }
-    pipeline_.reverse(places);
-    for (Point2& place : places) {
-      place = {GeographicLib::Math::AngNormalize(place[0] * degrees_), place[1] * degrees_};
-    }
-  }
-
- private:
-  ProjPipeline pipeline_;
-  double degrees_, metres_;
-};
 
 std::string wkt_name(std::string_view text) {
   std::string result = "\"";
@@ -190,49 +159,6 @@ std::string wkt1_of(const CrsDefinition& definition) {
     if (!text.empty() && mean_the_same(text, wkt)) return text;
   }
   return {};
-}
-
-std::string proj_pipeline_of(const CrsDefinition& definition) {
-  PJ_CONTEXT* const context = proj_context();
-  proj_complaint();
-  const ProjObject crs = proj_crs_of_text(definition.wkt);
-  const ProjObject base = proj_crs_of_text(definition.base_wkt);
-  if (crs != nullptr && base != nullptr) {
-    const ProjOwned<PJ_OPERATION_FACTORY_CONTEXT> factory(
-        proj_create_operation_factory_context(context, nullptr));
-    const ProjOwned<PJ_OBJ_LIST> list(
-        proj_create_operations(context, base.get(), crs.get(), factory.get()));
-    const ProjObject first(list != nullptr ? proj_list_get(context, list.get(), 0) : nullptr);
-    const ProjObject normal(
-        first != nullptr ? proj_normalize_for_visualization(context, first.get()) : nullptr);
-    const char* const text = normal != nullptr
-                                 ? proj_as_proj_string(context, normal.get(), PJ_PROJ_5, nullptr)
-                                 : nullptr;
-    if (text != nullptr) {
-      check_proj_database();
-      return text;
-    }
-  }
-  check_proj_database();
-  const std::string why = proj_complaint();
-  throw CrsError("PROJ cannot compute the projection of the CRS " + definition.title() +
-                     (why.empty() ? "" : ": " + why),
-                 "give another with `crs` EPSG:n");
-}
-
-std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition) {
-  return std::make_shared<ProjProjection>(proj_pipeline_of(definition), definition.degrees_per_unit,
-                                          definition.metres_per_unit);
-}
-
-std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition) {
-  if (!definition.method) return proj_projection_of(definition);
-  try {
-    return make_projection(*definition.method, definition.parameters, definition.ellipsoid);
-  } catch (const std::invalid_argument& error) {
-    throw CrsError("the CRS " + definition.title() + " has no usable projection: " + error.what(),
-                   "give another with `crs` EPSG:n");
-  }
 }
 
 bool same_datum(const CrsDefinition& a, const CrsDefinition& b) {

@@ -104,7 +104,8 @@ struct CrsDefinition {
   /// database.
   std::optional<DatumShift> shift;
 
-  /// The projection, if GeographicLib supports it; PROJ computes the others from `wkt`.
+  /// The projection, if GeographicLib computes it (projection_engine.hpp); PROJ computes the others
+  /// from `wkt`.
   std::optional<ProjectionMethod> method;
   ProjectionParameters parameters;
 
@@ -158,12 +159,6 @@ bool mean_the_same(const std::string& wkt, const std::string& other);
 /// Reads the CRS that a source or a store records, in whatever form. Returns nullopt if there is no
 /// CRS, or a local or geocentric one. Throws: CrsError.
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
-
-/// Returns the projection of a projected system: from longitudes (from its prime meridian) and
-/// latitudes in degrees to metres. Throws: CrsError.
-std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition);
-/// The same, but always computed by PROJ.
-std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition);
 
 /// Whether both are the same apart from names: equal coordinates are equal places on the earth.
 bool same_places(const CrsDefinition& a, const CrsDefinition& b);

@@ -10,6 +10,7 @@
 
 #include <terrace/base/portable_math.hpp>
 
+#include "earth/crs/projection_engine.hpp"
 #include "earth/crs/projection_names.hpp"
 
 namespace terrace::terrain {
@@ -136,18 +137,10 @@ void read_projected(const PJ* crs, CrsDefinition& definition) {
   if (axes.size() < 2) throw CrsError("the CRS \"" + definition.name + "\" has no axes", kByCode);
   definition.metres_per_unit = metres_of(axes[0].unit);
   const ProjObject conversion(proj_crs_get_coordoperation(context, crs));
-  const auto known = conversion != nullptr ? known_projection(conversion.get()) : std::nullopt;
+  if (conversion == nullptr) return;
+  const auto known =
+      geographiclib_projection(conversion.get(), axes[0].direction, axes[1].direction);
   if (!known) return;
-  const auto points = [&axes](const char* a, const char* b) {
-    return axes[0].direction == a && axes[1].direction == b;
-  };
-  // Around a pole, all axes of a coordinate system point in the same direction.
-  const bool polar = known->method == ProjectionMethod::polar_stereographic_a ||
-                     known->method == ProjectionMethod::polar_stereographic_b;
-  if (!points("east", "north") && !points("north", "east") &&
-      !(polar && (points("north", "north") || points("south", "south")))) {
-    return;
-  }
   definition.method = known->method;
   definition.parameters = known->parameters;
 }

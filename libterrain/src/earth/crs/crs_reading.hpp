@@ -18,8 +18,4 @@ void read_vertical_crs(const PJ* crs, CrsDefinition& definition);
 /// ContradictoryCrs.
 void settle_code(CrsDefinition& definition);
 
-/// Returns the projection as a PROJ pipeline, from longitudes and latitudes of the geographic
-/// system, in its own unit and from its own meridian, to x and y. Throws: CrsError.
-std::string proj_pipeline_of(const CrsDefinition& definition);
-
 }  // namespace terrace::terrain

@@ -35,54 +35,13 @@ constexpr std::array<ParameterName, 20> kParameters{{
     {8833, Role::longitude, "Longitude of origin"},
 }};
 
-struct MethodName {
-  ProjectionMethod method;
-  int code;
-  const char* name;
-};
-constexpr std::array<MethodName, 9> kMethodNames{{
-    {ProjectionMethod::transverse_mercator, 9807, "Transverse Mercator"},
-    {ProjectionMethod::lambert_1sp, 9801, "Lambert Conic Conformal (1SP)"},
-    {ProjectionMethod::lambert_2sp, 9802, "Lambert Conic Conformal (2SP)"},
-    {ProjectionMethod::albers, 9822, "Albers Equal Area"},
-    {ProjectionMethod::polar_stereographic_a, 9810, "Polar Stereographic (variant A)"},
-    {ProjectionMethod::polar_stereographic_b, 9829, "Polar Stereographic (variant B)"},
-    {ProjectionMethod::web_mercator, 1024, "Popular Visualisation Pseudo Mercator"},
-    {ProjectionMethod::mercator_a, 9804, "Mercator (variant A)"},
-    {ProjectionMethod::mercator_b, 9805, "Mercator (variant B)"},
-}};
+}  // namespace
 
 bool is_called(int code, const char* name, const char* authority, const char* id,
                const char* called) {
   if (text_of(authority) == "EPSG" && id != nullptr) return std::atoi(id) == code;
   return called != nullptr && plain_name(called) == plain_name(name);
 }
-
-double ProjectionParameters::*member_of(Role role) {
-  using P = ProjectionParameters;
-  switch (role) {
-    case Role::latitude:
-      return &P::latitude;
-    case Role::longitude:
-      return &P::longitude;
-    case Role::scale:
-      return &P::scale;
-    case Role::false_easting:
-      return &P::false_easting;
-    case Role::false_northing:
-      return &P::false_northing;
-    case Role::parallel1:
-      return &P::parallel1;
-    case Role::parallel2:
-      return &P::parallel2;
-    case Role::azimuth:
-    case Role::skew:
-      break;
-  }
-  return nullptr;
-}
-
-}  // namespace
 
 const ParameterName* parameter_of_code(int code) {
   for (const ParameterName& row : kParameters) {
@@ -117,29 +76,6 @@ std::vector<ConversionParameter> parameters_of(const PJ* conversion) {
     found.push_back(parameter);
   }
   return found;
-}
-
-std::optional<KnownProjection> known_projection(const PJ* conversion) {
-  const char *name = nullptr, *authority = nullptr, *code = nullptr;
-  if (proj_coordoperation_get_method_info(proj_context(), conversion, &name, &authority, &code) ==
-      0) {
-    return std::nullopt;
-  }
-  for (const MethodName& row : kMethodNames) {
-    if (!is_called(row.code, row.name, authority, code, name)) continue;
-    KnownProjection known{.method = row.method, .parameters = {}};
-    for (const ConversionParameter& parameter : parameters_of(conversion)) {
-      double ProjectionParameters::*const member =
-          parameter.role ? member_of(*parameter.role) : nullptr;
-      if (member == nullptr) return std::nullopt;
-      known.parameters.*member = parameter.value;
-    }
-    // At a latitude of origin off the equator the definition is ambiguous about where the scale
-    // applies.
-    if (row.method == ProjectionMethod::mercator_a && known.parameters.latitude != 0) break;
-    return known;
-  }
-  return std::nullopt;
 }
 
 std::string plain_name(std::string_view name) {

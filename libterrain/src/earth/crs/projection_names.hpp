@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "earth/crs/proj_object.hpp"
-#include "earth/crs/projection.hpp"
 
 namespace terrace::terrain {
 
@@ -36,6 +35,11 @@ struct ParameterName {
 const ParameterName* parameter_of_code(int code);
 ParameterKind kind_of(ParameterRole role);
 
+/// Whether a method or parameter is that of the table: by its code if EPSG's is given, otherwise by
+/// its name.
+bool is_called(int code, const char* name, const char* authority, const char* id,
+               const char* called);
+
 /// A parameter of a conversion, in degrees, metres or as a factor. role: nullopt if the table has
 /// neither its code nor its name.
 struct ConversionParameter {
@@ -43,13 +47,6 @@ struct ConversionParameter {
   double value = 0;
 };
 std::vector<ConversionParameter> parameters_of(const PJ* conversion);
-
-/// The method of a conversion and its parameters, if GeographicLib supports it; nullopt otherwise.
-struct KnownProjection {
-  ProjectionMethod method;
-  ProjectionParameters parameters;
-};
-std::optional<KnownProjection> known_projection(const PJ* conversion);
 
 /// Lower case, letters and digits only: the form in which names are compared.
 std::string plain_name(std::string_view name);
