@@ -61,8 +61,8 @@ stream::Crs crs_of_point_file(const stream::Placement& own,
       known.vertical_unit = crs.vertical_unit;
       return known;
     }
-    const std::optional<stream::Crs> local = local_crs_of(crs);
-    if (local && !is_geocentric(*local) && metres) crs.wkt = with_height_unit(*local, *metres);
+    const std::optional<LocalCrs> local = local_crs_of(crs);
+    if (local && !local->is_geocentric && metres) crs.wkt = with_height_unit(local->crs, *metres);
   } catch (const CrsError&) {
     // The file repeats the record of the source.
   }

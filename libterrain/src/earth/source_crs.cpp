@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "earth/source_crs.hpp"
 
-#include "base/store_checks.hpp"
+#include <utility>
+#include <variant>
+
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
@@ -17,11 +19,13 @@ namespace {
 
 /// Returns nullopt for a local system, which it stores in `local`.
 std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std::string& contents,
-                                             std::optional<stream::Crs>& local) {
+                                             std::optional<LocalCrs>& local) {
   try {
-    return CoordinateSystem(definition_of_contents(contents));
-  } catch (const LocalCrs& error) {
-    local = error.crs();
+    AnyCrs system = crs_of_contents(contents);
+    if (auto* const definition = std::get_if<CrsDefinition>(&system)) {
+      return CoordinateSystem(*definition);
+    }
+    local = std::get<LocalCrs>(std::move(system));
     return std::nullopt;
   } catch (const CrsError& error) {
     fail(file, error.what(), "correct or remove it, or name the system: `crs` EPSG:n");
@@ -32,7 +36,7 @@ std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std:
 /// the earth. note: receives what the user should know about the files.
 std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& info,
                                                    std::string& name,
-                                                   std::optional<stream::Crs>& local,
+                                                   std::optional<LocalCrs>& local,
                                                    std::string& note) {
   std::optional<CoordinateSystem> system;
   for (const std::string& file : info.files) {
@@ -64,10 +68,14 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   found.crs = info.crs;
   found.crs.geo_keys.clear();
   const std::string file = info.files.empty() ? std::string() : info.files.front();
-  std::optional<CrsDefinition> definition;
+  std::optional<LocalCrs> local;
   try {
-    definition = definition_of(info.crs);
-    if (definition) found.system.emplace(*definition);
+    std::optional<AnyCrs> own = crs_of_record(info.crs);
+    if (own && std::holds_alternative<LocalCrs>(*own)) {
+      local = std::get<LocalCrs>(*std::move(own));
+    } else if (own) {
+      found.system.emplace(std::get<CrsDefinition>(*own));
+    }
   } catch (const ContradictoryCrs& error) {
     fail(file, error.what(), error.remedy());
   } catch (const CrsError& error) {
@@ -80,9 +88,7 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
     return found;
   }
   std::string sidecar;
-  std::optional<stream::Crs> local;
   if (!found.system) {
-    local = local_crs_of(info.crs);
     if (!local) found.system = system_of_sidecars(info, sidecar, local, found.note);
   } else if (!info.crs.geo_keys.empty()) {
     // A file with its own CRS needs no .prj file; if there is one, it must agree.
@@ -96,13 +102,14 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   }
   if (!found.system) {
     if (local) {
+      const stream::Crs& record = local->crs;
       found.crs.epsg = 0;
-      found.crs.name = local->name;
-      found.crs.wkt = local->wkt;
-      if (found.crs.horizontal_unit.empty()) found.crs.horizontal_unit = local->horizontal_unit;
-      if (found.crs.vertical_unit.empty()) found.crs.vertical_unit = local->vertical_unit;
-      if (is_geocentric(found.crs)) {
-        found.note = "the CRS \"" + local->name +
+      found.crs.name = record.name;
+      found.crs.wkt = record.wkt;
+      if (found.crs.horizontal_unit.empty()) found.crs.horizontal_unit = record.horizontal_unit;
+      if (found.crs.vertical_unit.empty()) found.crs.vertical_unit = record.vertical_unit;
+      if (local->is_geocentric) {
+        found.note = "the CRS \"" + record.name +
                      "\" is geocentric, with x, y and z from the centre of the earth: z is not a "
                      "height, and what needs a terrain will not work";
         return found;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <mutex>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include <GeographicLib/Math.hpp>
@@ -88,22 +89,36 @@ bool CoordinateSystem::counts_as_wgs84() const {
   return to_wgs84().possible() && to_wgs84().identity();
 }
 
+namespace {
+
+/// Calls a function of CRSs that the user wrote as `text`. Throws: UsageError.
+template <class Function>
+auto of_text(const std::string& text, const Function& function) {
+  try {
+    return function(crs_of_text(text));
+  } catch (const CrsError& error) {
+    throw UsageError("'" + text.substr(0, 80) + "': " + error.what() + "; " + error.remedy());
+  }
+}
+
+}  // namespace
+
 stream::Crs crs_named(const std::string& text) {
-  if (const auto local = local_crs_named(text)) return *local;
-  return CoordinateSystem::parse(text).crs();
+  return of_text(text, [](AnyCrs system) {
+    if (const auto* const local = std::get_if<LocalCrs>(&system)) return local->crs;
+    return CoordinateSystem(on_earth(std::move(system))).crs();
+  });
 }
 
 CoordinateSystem CoordinateSystem::parse(const std::string& text,
                                          const std::optional<DatumShift>& shift) {
-  try {
-    CrsDefinition definition = definition_of_text(text);
+  return of_text(text, [&shift](AnyCrs read) {
+    CrsDefinition definition = on_earth(std::move(read));
     CoordinateSystem system(definition);
     if (!shift || system.counts_as_wgs84()) return system;
     definition.shift = shift;
     return CoordinateSystem(definition);
-  } catch (const CrsError& error) {
-    throw UsageError("'" + text.substr(0, 80) + "': " + error.what() + "; " + error.remedy());
-  }
+  });
 }
 
 std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,

@@ -105,6 +105,18 @@ std::string CrsDefinition::title() const {
   return authority + ":" + code + (name.empty() ? "" : " (" + name + ")");
 }
 
+CrsDefinition on_earth(AnyCrs system) {
+  if (auto* const definition = std::get_if<CrsDefinition>(&system)) return std::move(*definition);
+  const LocalCrs& local = std::get<LocalCrs>(system);
+  const std::string name = "the CRS \"" + local.crs.name + '"';
+  if (local.is_geocentric) {
+    throw CrsError(name + " is geocentric, with x, y and z from the centre of the earth",
+                   "convert the points with cs2cs, or name the right CRS: `crs` EPSG:n");
+  }
+  throw CrsError(name + " is a local one, without a place on the earth",
+                 "name a CRS on the earth: EPSG:n");
+}
+
 std::string wkt_of(const CrsDefinition& definition) {
   const bool vertical = is_vertical(definition.height_wkt);
   std::string text =

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <variant>
 
 #include "earth/crs/projection.hpp"
 #include "terrace/stream/error.hpp"
@@ -37,40 +38,6 @@ class CrsDatabaseError : public stream::Error {
 class ContradictoryCrs : public CrsError {
  public:
   using CrsError::CrsError;
-};
-
-/// A text that is not the definition or name of a CRS.
-class UnreadableCrs : public CrsError {
- public:
-  using CrsError::CrsError;
-};
-
-/// A local (engineering) system, which has units but no place on the earth.
-class LocalCrs : public CrsError {
- public:
-  explicit LocalCrs(const stream::Crs& crs)
-      : LocalCrs(crs, "the CRS \"" + crs.name + "\" is a local one, without a place on the earth",
-                 "name a CRS on the earth: EPSG:n") {}
-  /// The record of this system in stores.
-  [[nodiscard]] const stream::Crs& crs() const { return crs_; }
-
- protected:
-  LocalCrs(stream::Crs crs, const std::string& cause, std::string remedy)
-      : CrsError(cause, std::move(remedy)), crs_(std::move(crs)) {}
-
- private:
-  stream::Crs crs_;
-};
-
-/// A geocentric system: x, y and z are measured from the centre of the earth, so z is not a height.
-/// Its points are stored like those of a local system.
-class GeocentricCrs : public LocalCrs {
- public:
-  explicit GeocentricCrs(const stream::Crs& crs)
-      : LocalCrs(crs,
-                 "the CRS \"" + crs.name +
-                     "\" is geocentric, with x, y and z from the centre of the earth",
-                 "convert the points with cs2cs, or name the right CRS: `crs` EPSG:n") {}
 };
 
 /// The name of a vertical system of which only the unit is known, as GDAL writes it.
@@ -121,24 +88,37 @@ struct CrsDefinition {
   [[nodiscard]] std::string title() const;
 };
 
-/// Reads what a user writes: anything that a file may contain (see definition_of_contents), or the
-/// name of a file. Throws: CrsError.
-CrsDefinition definition_of_text(const std::string& text);
+/// A local (engineering) system, which has units but no place on the earth, or a geocentric one:
+/// its x, y and z are measured from the centre of the earth, so z is not a height. The points of
+/// both are stored alike.
+struct LocalCrs {
+  stream::Crs crs;  ///< the record of this system in stores
+  bool is_geocentric = false;
+};
+/// A system of any kind.
+using AnyCrs = std::variant<CrsDefinition, LocalCrs>;
+/// Returns the definition of a system on the earth. Throws: CrsError for a local one.
+CrsDefinition on_earth(AnyCrs system);
+
+/// Reads what a user writes: anything that a file may contain (see crs_of_contents), or the name of
+/// a file. Throws: CrsError.
+AnyCrs crs_of_text(const std::string& text);
 /// Reads the contents of a file, which never refer to another file: WKT (version 1 by OGC, GDAL or
 /// ESRI, or version 2), PROJJSON, a PROJ string, a code such as "EPSG:32632+5773" or "ESRI:54030",
 /// a URN or URL of the OGC, or a name. Refuses text of more than 64 KiB, 512 parts or 32 levels.
 /// Throws: CrsError.
-CrsDefinition definition_of_contents(const std::string& text);
+AnyCrs crs_of_contents(const std::string& text);
+/// The same for a system that must be on the earth.
+inline CrsDefinition definition_of_contents(const std::string& text) {
+  return on_earth(crs_of_contents(text));
+}
 /// Returns the contents of such a file, without a byte order mark and surrounding white space. Of a
 /// file that is too large, returns only enough to show that.
 std::string contents_of_file(const std::string& name);
-/// Returns the local or geocentric system that a text describes; nullopt if it describes another or
-/// none.
-std::optional<stream::Crs> local_crs_named(const std::string& text);
-/// The same for the record of a source or a store.
-std::optional<stream::Crs> local_crs_of(const stream::Crs& crs);
-/// Returns the system of an EPSG code: geographic, projected or compound. Throws: CrsError.
-CrsDefinition definition_of_epsg(int code);
+/// Returns the system of an EPSG code: geographic, projected, compound or geocentric. Throws:
+/// CrsError.
+AnyCrs crs_of_epsg(int code);
+inline CrsDefinition definition_of_epsg(int code) { return on_earth(crs_of_epsg(code)); }
 /// Sets the vertical part to a vertical system's code. Throws: CrsError.
 void set_vertical_epsg(CrsDefinition& definition, int code);
 /// Makes the reference of heights unknown.
@@ -157,8 +137,12 @@ std::string wkt1_of(const CrsDefinition& definition);
 bool mean_the_same(const std::string& wkt, const std::string& other);
 
 /// Reads the CRS that a source or a store records, in whatever form. Returns nullopt if there is no
-/// CRS, or a local or geocentric one. Throws: CrsError.
+/// CRS. Throws: CrsError.
+std::optional<AnyCrs> crs_of_record(const stream::Crs& crs);
+/// The same; nullopt also for a local or geocentric system.
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
+/// The same; nullopt for a system on the earth.
+std::optional<LocalCrs> local_crs_of(const stream::Crs& crs);
 
 /// Whether both are the same apart from names: equal coordinates are equal places on the earth.
 bool same_places(const CrsDefinition& a, const CrsDefinition& b);

@@ -383,7 +383,7 @@ CrsDefinition definition_of_geo_keys(const stream::Crs& crs) {
                                              base.get(), conversion.get(), axes.get())),
         "its projection is impossible");
   }
-  CrsDefinition definition = read_crs(whole != nullptr ? whole.get() : base.get());
+  CrsDefinition definition = read_definition(whole != nullptr ? whole.get() : base.get());
   read_shift(keys, definition);
   settle_code(definition);
   return definition;

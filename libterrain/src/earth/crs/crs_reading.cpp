@@ -169,30 +169,26 @@ void read_shift(const PJ* bound, CrsDefinition& definition) {
   definition.shift = shift;
 }
 
-void read_horizontal(const PJ* crs, CrsDefinition& definition) {
+/// Returns a local or geocentric system, which it does not read into `definition`.
+std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition) {
   PJ_CONTEXT* const context = proj_context();
   definition.name = text_of(proj_get_name(crs));
   const PJ_TYPE type = proj_get_type(crs);
   if (type == PJ_TYPE_BOUND_CRS) {
     const ProjObject source(proj_get_source_crs(context, crs));
     if (source == nullptr) throw CrsError("the bound CRS has no source", kByCode);
-    read_horizontal(source.get(), definition);
-    return read_shift(crs, definition);
+    auto local = read_horizontal(source.get(), definition);
+    if (!local) read_shift(crs, definition);
+    return local;
   }
-  if (type == PJ_TYPE_ENGINEERING_CRS) {
-    stream::Crs local;
-    local.name = definition.name;
-    local.wkt = wkt_of(crs);
+  if (type == PJ_TYPE_ENGINEERING_CRS || type == PJ_TYPE_GEOCENTRIC_CRS) {
+    LocalCrs local{.crs = {}, .is_geocentric = type == PJ_TYPE_GEOCENTRIC_CRS};
+    local.crs.name = definition.name;
+    local.crs.wkt = wkt_of(crs);
     const std::vector<Axis> axes = axes_of(crs);
-    if (!axes.empty()) local.horizontal_unit = unit_name(axes[0].unit);
-    throw LocalCrs(local);
-  }
-  if (type == PJ_TYPE_GEOCENTRIC_CRS) {
-    stream::Crs local;
-    local.name = definition.name;
-    local.wkt = wkt_of(crs);
-    local.horizontal_unit = local.vertical_unit = unit_name(axes_of(crs).at(0).unit);
-    throw GeocentricCrs(local);
+    if (!axes.empty()) local.crs.horizontal_unit = unit_name(axes[0].unit);
+    if (local.is_geocentric) local.crs.vertical_unit = local.crs.horizontal_unit;
+    return local;
   }
   const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
   if (!geographic && type != PJ_TYPE_PROJECTED_CRS) {
@@ -220,6 +216,7 @@ void read_horizontal(const PJ* crs, CrsDefinition& definition) {
   }
   read_base(plane.get(), definition);
   if (!geographic) read_projected(plane.get(), definition);
+  return std::nullopt;
 }
 
 /// Whether both definitions give the same coordinates, to a tenth of a millimetre, for some places
@@ -263,7 +260,7 @@ void take(CrsDefinition&& known, CrsDefinition& definition) {
 void check_code(CrsDefinition& definition) {
   const ProjObject code = proj_crs_of_code(definition.authority, definition.code);
   if (code == nullptr) return;
-  CrsDefinition known = read_crs(code.get());
+  CrsDefinition known = read_definition(code.get());
   const auto differs = [](double a, double b) { return !(std::abs(a / b - 1) < 1e-9); };
   std::string what;
   if (known.geographic != definition.geographic) {
@@ -317,7 +314,7 @@ void read_vertical_crs(const PJ* crs, CrsDefinition& definition) {
   definition.height_wkt = ellipsoidal ? std::string() : wkt_of(crs);
 }
 
-CrsDefinition read_crs(const PJ* crs) {
+AnyCrs read_crs(const PJ* crs) {
   PJ_CONTEXT* const context = proj_context();
   CrsDefinition definition;
   if (proj_get_type(crs) != PJ_TYPE_COMPOUND_CRS) {
@@ -326,7 +323,7 @@ CrsDefinition read_crs(const PJ* crs) {
       throw CrsError("EPSG:" + code + " is a vertical CRS",
                      "write it after a horizontal one: EPSG:4326+" + code);
     }
-    read_horizontal(crs, definition);
+    if (auto local = read_horizontal(crs, definition)) return *std::move(local);
     return definition;
   }
   const ProjObject horizontal(proj_crs_get_sub_crs(context, crs, 0)),
@@ -335,15 +332,12 @@ CrsDefinition read_crs(const PJ* crs) {
     throw CrsError("the compound CRS \"" + text_of(proj_get_name(crs)) + "\" is incomplete",
                    kByCode);
   }
-  try {
-    read_horizontal(horizontal.get(), definition);
-  } catch (const GeocentricCrs&) {
-    throw;
-  } catch (const LocalCrs& error) {
-    stream::Crs local = error.crs();
+  if (auto local = read_horizontal(horizontal.get(), definition)) {
     const std::vector<Axis> axes = axes_of(vertical.get());
-    if (axes.size() == 1) local.vertical_unit = unit_name(metres_of(axes[0].unit));
-    throw LocalCrs(local);
+    if (!local->is_geocentric && axes.size() == 1) {
+      local->crs.vertical_unit = unit_name(metres_of(axes[0].unit));
+    }
+    return *std::move(local);
   }
   read_vertical_crs(vertical.get(), definition);
   return definition;
@@ -365,7 +359,7 @@ void settle_code(CrsDefinition& definition) {
   for (int i = 0; i < count && confidence[i] >= kSure; ++i) {
     const ProjObject candidate(proj_list_get(proj_context(), list.get(), i));
     if (proj_is_deprecated(candidate.get()) != 0) continue;
-    CrsDefinition known = read_crs(candidate.get());
+    CrsDefinition known = read_definition(candidate.get());
     if (known.heights != Heights::unknown || !same_places(known, definition)) continue;
     several = several || only.has_value();
     only = std::move(known);

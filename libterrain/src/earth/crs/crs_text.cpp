@@ -9,6 +9,8 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <variant>
 
 #include "earth/crs/crs_geo_keys.hpp"
 #include "earth/crs/crs_reading.hpp"
@@ -65,7 +67,7 @@ int leading_code(std::string_view& rest) {
 }
 
 /// Parses "EPSG:n" or "EPSG:n+m"; nullopt for other text.
-std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
+std::optional<AnyCrs> crs_of_codes(std::string_view text) {
   if (text.size() < 5 || plain_name(text.substr(0, 4)) != "epsg" || text[4] != ':') {
     return std::nullopt;
   }
@@ -78,9 +80,10 @@ std::optional<CrsDefinition> definition_of_codes(std::string_view text) {
     if (vertical == 0) return std::nullopt;
   }
   if (horizontal == 0 || !rest.empty()) return std::nullopt;
-  CrsDefinition definition = definition_of_epsg(horizontal);
-  if (vertical != 0) set_vertical_epsg(definition, vertical);
-  return definition;
+  AnyCrs system = crs_of_epsg(horizontal);
+  auto* const definition = std::get_if<CrsDefinition>(&system);
+  if (definition != nullptr && vertical != 0) set_vertical_epsg(*definition, vertical);
+  return system;
 }
 
 /// Parses "ESRI:54030", "OGC:CRS84", "urn:ogc:def:crs:EPSG::4326" or
@@ -277,7 +280,7 @@ void forget_heights(CrsDefinition& definition) {
   definition.metres_per_height = 0;
 }
 
-CrsDefinition definition_of_epsg(int code) {
+AnyCrs crs_of_epsg(int code) {
   const ProjObject crs = proj_crs_of_code("EPSG", std::to_string(alias_of(code)));
   if (crs == nullptr) {
     throw CrsError("the CRS EPSG:" + std::to_string(code) + " is not known",
@@ -294,45 +297,49 @@ std::string contents_of_file(const std::string& name) {
   return without_padding(text);
 }
 
-CrsDefinition definition_of_contents(const std::string& text) {
+namespace {
+
+constexpr char kCorrect[] = "correct the text, or name the system by its code: `crs` EPSG:n";
+
+/// Returns nullopt for a text that is not the definition or name of a CRS. Throws: CrsError.
+std::optional<AnyCrs> find_crs(const std::string& text) {
   std::string plain = without_padding(text);
   // Spellings of codes that PROJ does not support.
   constexpr std::string_view kInit = "+init=";
   if (plain.starts_with(kInit) && plain.find(' ') == plain.npos) plain.erase(0, kInit.size());
   if (plain == "WGS72") plain = "EPSG:4322";
-  const char* const remedy = "correct the text, or name the system by its code: `crs` EPSG:n";
-  if (plain.empty()) throw CrsError("the definition is empty", remedy);
+  if (plain.empty()) throw CrsError("the definition is empty", kCorrect);
   check_extent(plain);
   if (is_arcinfo(plain)) return definition_of_arcinfo(plain);
   proj_complaint();
-  ProjObject crs;
-  if (is_formal(plain)) {
-    crs = proj_crs_of_text(proj_text(plain));
-  } else {
-    if (const auto definition = definition_of_codes(plain)) return *definition;
-    crs = crs_of_authority(plain);
+  if (!is_formal(plain)) {
+    if (auto system = crs_of_codes(plain)) return system;
+    ProjObject crs = crs_of_authority(plain);
     if (crs == nullptr) crs = crs_of_name(plain);
-    if (crs != nullptr) return read_crs(crs.get());
+    if (crs == nullptr) return std::nullopt;
+    return read_crs(crs.get());
   }
-  if (crs == nullptr) {
-    const std::string why = proj_complaint();
-    throw UnreadableCrs("the definition cannot be read" + (why.empty() ? "" : ": " + why), remedy);
-  }
-  CrsDefinition definition = read_crs(crs.get());
-  settle_code(definition);
-  return definition;
+  const ProjObject crs = proj_crs_of_text(proj_text(plain));
+  if (crs == nullptr) return std::nullopt;
+  AnyCrs system = read_crs(crs.get());
+  if (auto* const definition = std::get_if<CrsDefinition>(&system)) settle_code(*definition);
+  return system;
 }
 
-CrsDefinition definition_of_text(const std::string& text) {
-  if (is_formal(text)) return definition_of_contents(text);
-  if (std::optional<CrsDefinition> definition = definition_of_codes(text)) return *definition;
-  if (std::ifstream(text)) return definition_of_contents(contents_of_file(text));
-  try {
-    if (!text.empty() && plain_name(text.substr(0, 5)) != "epsg") {
-      return definition_of_contents(text);
-    }
-  } catch (const UnreadableCrs&) {
-    // Reported below, together with all supported forms.
+}  // namespace
+
+AnyCrs crs_of_contents(const std::string& text) {
+  if (auto system = find_crs(text)) return *std::move(system);
+  const std::string why = proj_complaint();
+  throw CrsError("the definition cannot be read" + (why.empty() ? "" : ": " + why), kCorrect);
+}
+
+AnyCrs crs_of_text(const std::string& text) {
+  if (is_formal(text)) return crs_of_contents(text);
+  if (auto system = crs_of_codes(text)) return *std::move(system);
+  if (std::ifstream(text)) return crs_of_contents(contents_of_file(text));
+  if (!text.empty() && plain_name(text.substr(0, 5)) != "epsg") {
+    if (auto system = find_crs(text)) return *std::move(system);
   }
   throw CrsError(
       "is not a CRS",
@@ -340,21 +347,7 @@ CrsDefinition definition_of_text(const std::string& text) {
       "name a file with WKT or PROJJSON (.prj)");
 }
 
-std::optional<stream::Crs> local_crs_named(const std::string& text) {
-  try {
-    definition_of_text(text);
-  } catch (const LocalCrs& local) {
-    return local.crs();
-  } catch (const CrsError&) {
-    // The caller reports the error when it uses the text.
-  }
-  return std::nullopt;
-}
-
-namespace {
-
-/// As definition_of(), but throws LocalCrs for a local or geocentric system.
-std::optional<CrsDefinition> definition_or_local(const stream::Crs& crs) {
+std::optional<AnyCrs> crs_of_record(const stream::Crs& crs) {
   CrsDefinition definition;
   constexpr std::string_view kEsri = "ESRI PE String = ";
   const std::string wkt = !crs.wkt.empty()              ? crs.wkt
@@ -368,14 +361,18 @@ std::optional<CrsDefinition> definition_or_local(const stream::Crs& crs) {
                std::find(kUnits.begin(), kUnits.end(), key.key) == kUnits.end();
       });
   if (!wkt.empty()) {
-    definition = definition_of_contents(wkt);
+    AnyCrs system = crs_of_contents(wkt);
+    if (std::holds_alternative<LocalCrs>(system)) return system;
+    definition = on_earth(std::move(system));
     if (crs.epsg != 0 && definition.epsg() != 0 && alias_of(crs.epsg) != definition.epsg()) {
       throw ContradictoryCrs("its CRS is EPSG:" + std::to_string(crs.epsg) + " by code and EPSG:" +
                                  std::to_string(definition.epsg()) + " by WKT",
                              "say which is meant with `crs` EPSG:n");
     }
   } else if (crs.epsg != 0) {
-    definition = definition_of_epsg(crs.epsg);
+    AnyCrs system = crs_of_epsg(crs.epsg);
+    if (std::holds_alternative<LocalCrs>(system)) return system;
+    definition = on_earth(std::move(system));
     if (!crs.geo_keys.empty()) check_geo_keys(crs, definition);
   } else if (has_keys) {
     definition = definition_of_geo_keys(crs);
@@ -397,25 +394,16 @@ std::optional<CrsDefinition> definition_or_local(const stream::Crs& crs) {
   return definition;
 }
 
-}  // namespace
-
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs) {
-  try {
-    return definition_or_local(crs);
-  } catch (const LocalCrs&) {
-    return std::nullopt;
-  }
+  std::optional<AnyCrs> system = crs_of_record(crs);
+  if (!system || !std::holds_alternative<CrsDefinition>(*system)) return std::nullopt;
+  return std::get<CrsDefinition>(*std::move(system));
 }
 
-std::optional<stream::Crs> local_crs_of(const stream::Crs& crs) {
-  try {
-    static_cast<void>(definition_or_local(crs));
-  } catch (const LocalCrs& local) {
-    return local.crs();
-  } catch (const CrsError&) {
-    // A caller that needs the definition reports the error.
-  }
-  return std::nullopt;
+std::optional<LocalCrs> local_crs_of(const stream::Crs& crs) {
+  std::optional<AnyCrs> system = crs_of_record(crs);
+  if (!system || !std::holds_alternative<LocalCrs>(*system)) return std::nullopt;
+  return std::get<LocalCrs>(*std::move(system));
 }
 
 }  // namespace terrace::terrain
