@@ -45,27 +45,31 @@ inline constexpr OutputFormat kFolder[] = {{"folder", ""}};
 
 /// One row for each output of a verb or a function of the Python module.
 namespace outputs {
-using namespace output_formats;
 using enum OutputKind::Names;
-inline constexpr OutputKind kPointFile{"a file of points", std::span(kPoints).first(7)};
+inline constexpr OutputKind kPointFile{"a file of points",
+                                       std::span(output_formats::kPoints).first(7)};
 /// For stores that may hold lines.
-inline constexpr OutputKind kPointOrLineFile{"a file of points", kPoints};
-inline constexpr OutputKind kMeshFile{"a mesh", kMesh};
-inline constexpr OutputKind kTetrahedraFile{"a file of tetrahedra", kTetrahedra, listed, false};
-inline constexpr OutputKind kRasterFile{"a raster", kRaster, listed, false};
-inline constexpr OutputKind kPictureFile{"a picture", kPicture};
-inline constexpr OutputKind kContourFile{"a file of contour lines", kLines};
-inline constexpr OutputKind kProfileTable{"a profile", kTable};
-inline constexpr OutputKind kSampleTable{"a table of heights", kPlaces};
-inline constexpr OutputKind kPairsTable{"a table of pairs", kTable};
-inline constexpr OutputKind kDendrogramTable{"a dendrogram", kTable};
+inline constexpr OutputKind kPointOrLineFile{"a file of points", output_formats::kPoints};
+inline constexpr OutputKind kMeshFile{"a mesh", output_formats::kMesh};
+inline constexpr OutputKind kTetrahedraFile{"a file of tetrahedra", output_formats::kTetrahedra,
+                                            listed, false};
+inline constexpr OutputKind kRasterFile{"a raster", output_formats::kRaster, listed, false};
+inline constexpr OutputKind kPictureFile{"a picture", output_formats::kPicture};
+inline constexpr OutputKind kContourFile{"a file of contour lines", output_formats::kLines};
+inline constexpr OutputKind kProfileTable{"a profile", output_formats::kTable};
+inline constexpr OutputKind kSampleTable{"a table of heights", output_formats::kPlaces};
+inline constexpr OutputKind kPairsTable{"a table of pairs", output_formats::kTable};
+inline constexpr OutputKind kDendrogramTable{"a dendrogram", output_formats::kTable};
 /// Also an input of `sample`.
-inline constexpr OutputKind kPlaceTable{"a table of places", kPlaces, free};
-inline constexpr OutputKind kLabelFile{"a list of labels", kLabels, free};
-inline constexpr OutputKind kOverlayFile{"an overlay", kOverlay, free, false};
-inline constexpr OutputKind kStore{"a store, which is a folder,", kFolder, free, false};
-inline constexpr OutputKind kTileSet{"a tile set, which is a folder,", kFolder, free, false};
-inline constexpr OutputKind kSite{"a site, which is a folder,", kFolder, free, false};
+inline constexpr OutputKind kPlaceTable{"a table of places", output_formats::kPlaces, free};
+inline constexpr OutputKind kLabelFile{"a list of labels", output_formats::kLabels, free};
+inline constexpr OutputKind kOverlayFile{"an overlay", output_formats::kOverlay, free, false};
+inline constexpr OutputKind kStore{"a store, which is a folder,", output_formats::kFolder, free,
+                                   false};
+inline constexpr OutputKind kTileSet{"a tile set, which is a folder,", output_formats::kFolder,
+                                     free, false};
+inline constexpr OutputKind kSite{"a site, which is a folder,", output_formats::kFolder, free,
+                                  false};
 }  // namespace outputs
 
 /// Returns a list such as ".ply, .obj or .glb".
