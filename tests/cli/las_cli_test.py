@@ -221,6 +221,14 @@ class LasFormatTest(LasCase):
             for ending in '.csv', '.xyz', '.ply':
                 result = terrace('convert', copy, '-o', self.path('lost' + ending), '--force')
                 self.assertEqual(b'no place for a unit' in result.stderr, unit != 'metre', result.stderr)
+        # Nor does it if the file's own CRS is WKT.
+        feet = (f'COMPD_CS["c",{UTM_WKT},VERT_CS["h",VERT_DATUM["d",2005],'
+                'UNIT["US survey foot",0.304800609601219]]]')
+        own = self.put('own.las', las(6, random_records(6, 20), encoding=16, vlrs=[wkt(feet)]))
+        for crs in ((), ('--crs', 'EPSG:32632')):
+            shutil.rmtree(store, ignore_errors=True)
+            self.run_ok('build', own, *crs, '-o', store)
+            self.assertEqual(self.info(store)['crs']['vertical_unit'], 'US survey foot', crs)
         inches = self.put('inches.csv', b'x,y,z (in)\n1,2,3\n2,3,4\n')
         self.assertIn(b'heights are in inches', terrace('convert', inches, '-o', self.path('inches.las')).stderr)
         strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')

@@ -61,7 +61,7 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   SourceInfo& info = stream.info;
   info.format = "ept";
   info.files = {file};
-  info.crs = options.crs ? *options.crs : metadata.crs;
+  info.crs = options.crs ? with_own_height_unit(*options.crs, metadata.crs) : metadata.crs;
   octree.keep(options.selection.region, options.selection.resolution, steps_of(info));
   info.points = octree.points();
   info.octree = octree.info();

@@ -2,9 +2,11 @@
 #include "format/las/header.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include <fmt/core.h>
@@ -14,11 +16,13 @@
 #include "format/geotiff/tags.hpp"
 #include "format/las/fields.hpp"
 #include "io/bytes.hpp"
+#include "io/number.hpp"
 #include "io/peek.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/laz.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -184,6 +188,45 @@ bool names_something(const Crs& crs) {
   return crs.epsg != 0 || crs.vertical_epsg != 0 || !crs.geo_keys.empty() || !crs.name.empty();
 }
 
+/// Returns the unit of the vertical CRS in WKT 1 or 2, or of a third axis that points up; empty if
+/// there is none, or its unit is not known.
+std::string height_unit_of_wkt(std::string_view wkt) {
+  constexpr std::array<std::string_view, 5> kBegins{"VERT_CS[", "VERTCS[", "VERTCRS[",
+                                                    "VERTICALCRS[", "\",up,"};
+  std::size_t at = wkt.npos;
+  for (std::size_t i = 0; i < kBegins.size() && at == wkt.npos; ++i) at = wkt.find(kBegins[i]);
+  constexpr std::string_view kUnit = "UNIT[\"";
+  at = at == wkt.npos ? at : wkt.find(kUnit, at);
+  if (at == wkt.npos) return {};
+  const std::string_view rest = wkt.substr(at + kUnit.size());
+  const std::size_t quote = rest.find('"');
+  if (quote >= rest.size()) return {};
+  // Its length says more than its name, which ESRI and others spell in their own ways.
+  double metres = 0;
+  const std::size_t comma = rest.find(',', quote);
+  if (comma != rest.npos) {
+    std::string_view number = rest.substr(comma + 1);
+    number.remove_prefix(std::min(number.find_first_not_of(' '), number.size()));
+    parse_real(number.data(), number.data() + number.size(), metres);
+  }
+  constexpr std::array<std::pair<double, const char*>, 3> kLengths{
+      {{1, "metre"}, {0.3048, "foot"}, {1200.0 / 3937.0, "US survey foot"}}};
+  for (const auto& [length, name] : kLengths) {
+    if (std::abs(metres / length - 1) < 1e-9) return name;
+  }
+  std::string name = canonical_unit(rest.substr(0, quote));
+  return is_length_unit(name) ? name : std::string();
+}
+
+/// The CRS named by the records that were read.
+Crs recorded_crs(const LasHeader& header, std::vector<std::string>& comments) {
+  Crs by_wkt;
+  by_wkt.wkt = wkt_of_records(header, comments);
+  if (header.wkt && !by_wkt.wkt.empty()) return by_wkt;
+  Crs by_keys = crs_of_key_records(header, comments);
+  return names_something(by_keys) ? by_keys : by_wkt;
+}
+
 }  // namespace
 
 LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
@@ -302,22 +345,30 @@ std::optional<LasHeader> peek_las_header(std::string_view head) {
 }
 
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments) {
-  Crs by_wkt;
-  by_wkt.wkt = wkt_of_records(header, comments);
-  if (header.wkt && by_wkt.wkt.empty() && header.unread_evlrs) {
+  std::vector<std::string> ignored;
+  if (header.wkt && header.unread_evlrs && wkt_of_records(header, ignored).empty()) {
     throw Error(name,
                 "the record of its coordinate reference system (an EVLR) follows the points, so it "
                 "cannot be read from a pipe")
         .remedy("name the file, or the system: `crs` EPSG:n");
   }
-  if (header.wkt && !by_wkt.wkt.empty()) return by_wkt;
-  Crs by_keys = crs_of_key_records(header, comments);
-  return names_something(by_keys) ? by_keys : by_wkt;
+  return recorded_crs(header, comments);
 }
 
-std::string las_height_unit(const LasHeader& header) {
+Crs with_own_height_unit(Crs given, const Crs& own) {
+  if (given.vertical_epsg == 0 && given.vertical_unit.empty()) {
+    given.vertical_unit =
+        own.vertical_unit.empty() ? height_unit_of_wkt(own.wkt) : own.vertical_unit;
+  }
+  return given;
+}
+
+Crs las_crs_given(const LasHeader& header, const Crs& given) {
   std::vector<std::string> ignored;
-  return crs_of_key_records(header, ignored).vertical_unit;
+  Crs own = recorded_crs(header, ignored);
+  // GeoKeys may name a unit and nothing else.
+  if (own.wkt.empty()) own.vertical_unit = crs_of_key_records(header, ignored).vertical_unit;
+  return with_own_height_unit(given, own);
 }
 
 }  // namespace terrace::stream

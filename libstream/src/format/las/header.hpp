@@ -67,8 +67,10 @@ std::optional<LasHeader> peek_las_header(std::string_view head);
 /// pipe.
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments);
 
-/// The unit of heights in the GeoKeys, for files whose CRS is named by the caller; empty if none is
-/// recorded.
-std::string las_height_unit(const LasHeader& header);
+/// Returns a CRS that overrides a file's own one. A horizontal system says nothing of heights: it
+/// keeps the unit that `own` names, in WKT too.
+Crs with_own_height_unit(Crs given, const Crs& own);
+/// The same for a LAS file.
+Crs las_crs_given(const LasHeader& header, const Crs& given);
 
 }  // namespace terrace::stream

@@ -47,11 +47,7 @@ class LasOpener {
     info.format = header_.compressed ? "laz" : "las";
     info.files = {file_};
     if (options_.crs) {
-      info.crs = *options_.crs;
-      // A horizontal system says nothing of heights: their unit is that of the file.
-      if (info.crs.vertical_epsg == 0 && info.crs.vertical_unit.empty()) {
-        info.crs.vertical_unit = las_height_unit(header_);
-      }
+      info.crs = las_crs_given(header_, *options_.crs);
     } else {
       info.crs = las_crs(header_, stream_.input->name(), info.comments);
     }
