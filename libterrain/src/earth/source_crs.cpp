@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "earth/source_crs.hpp"
 
+#include <cmath>
 #include <utility>
 #include <variant>
 
@@ -61,9 +62,7 @@ std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& inf
   return system;
 }
 
-}  // namespace
-
-SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<DatumShift>& shift) {
+SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<DatumShift>& shift) {
   SourceCrs found;
   found.crs = info.crs;
   found.crs.geo_keys.clear();
@@ -139,6 +138,37 @@ SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<Datu
   found.crs = found.system->crs();
   if (!vertical_unit.empty()) found.crs.vertical_unit = vertical_unit;
   found.heights = found.system->heights();
+  return found;
+}
+
+/// Throws: stream::Error if the columns of x and y name another unit than that of the CRS.
+void check_unit_of_columns(const stream::SourceInfo& info, const SourceCrs& found) {
+  constexpr char kDegree[] = "degree";
+  const std::string& unit = info.coordinates[0].unit;
+  const std::string& of_crs = found.crs.horizontal_unit;
+  const auto metres = metres_in_unit(unit);
+  const auto known = found.system && !found.crs.geographic
+                         ? std::optional(found.system->metres_per_unit())
+                         : metres_in_unit(of_crs);
+  const bool degrees = unit == kDegree;
+  if ((!metres && !degrees) || (!known && !found.crs.geographic)) return;
+  // Few authors of tables distinguish feet from US survey feet.
+  const double tolerance = unit == "foot" ? 1e-5 : 1e-8;
+  if (found.crs.geographic ? degrees : metres && std::abs(*known / *metres - 1) <= tolerance) {
+    return;
+  }
+  const std::string crs = found.system ? found.system->title() : '"' + found.crs.name + '"';
+  fail(info.files.empty() ? std::string() : info.files.front(),
+       "x and y are in " + plural_unit(unit) + " by the names of their columns, but the CRS " +
+           crs + " is in " + (of_crs.empty() ? "another unit" : plural_unit(of_crs)),
+       "name the CRS of these numbers with `crs` EPSG:n, or rename the columns");
+}
+
+}  // namespace
+
+SourceCrs crs_of_source(const stream::SourceInfo& info, const std::optional<DatumShift>& shift) {
+  SourceCrs found = read_source_crs(info, shift);
+  check_unit_of_columns(info, found);
   return found;
 }
 

@@ -21,8 +21,8 @@ struct SourceCrs {
 /// are several, they must agree). An unknown CRS with a known unit is accepted with a note:
 /// distances can be measured then, places cannot be converted.
 /// shift: the value of --towgs84, for a datum other than WGS 84's.
-/// Throws: stream::Error for a CRS that contradicts itself or its .prj file, for an unknown one
-/// without a unit, and for a shift that does not apply.
+/// Throws: stream::Error for a CRS that contradicts itself, its .prj file or the unit that the
+/// columns of x and y name, for an unknown one without a unit, and for a shift that does not apply.
 SourceCrs crs_of_source(const stream::SourceInfo& info,
                         const std::optional<DatumShift>& shift = std::nullopt);
 
