@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "earth/crs/crs_definition.hpp"
+#include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -59,6 +60,68 @@ TEST(SourceCrs, AcceptsColumnsInTheUnitOfTheCrs) {
   stream::SourceInfo bare;
   bare.coordinates[0].unit = bare.coordinates[1].unit = bare.crs.horizontal_unit = "foot";
   EXPECT_NO_THROW(crs_of_source(bare));
+}
+
+constexpr char kUtm[] = R"(PROJCRS["own",BASEGEOGCRS["WGS 84",DATUM["World Geodetic System 1984",)"
+                        R"(ELLIPSOID["WGS 84",6378137,298.257223563]]],CONVERSION["c",)"
+                        R"(METHOD["Transverse Mercator",ID["EPSG",9807]],)"
+                        R"(PARAMETER["Longitude of natural origin",9],)"
+                        R"(PARAMETER["Scale factor at natural origin",0.9996],)"
+                        R"(PARAMETER["False easting",500000]],)";
+
+/// The unit of heights in a WKT reaches the record, and from there the ground.
+TEST(SourceCrs, KeepsTheUnitOfHeightsInWkt) {
+  const std::string flat =
+      std::string(kUtm) +
+      R"(CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]])";
+  const auto axes = [](const std::string& unit) {
+    return R"(CS[Cartesian,3],AXIS["x",east,LENGTHUNIT["metre",1]],)"
+           R"(AXIS["y",north,LENGTHUNIT["metre",1]],AXIS["z",up,LENGTHUNIT[)" +
+           unit + "]]]";
+  };
+  const auto compound = [&](const std::string& horizontal, const std::string& unit) {
+    return "COMPOUNDCRS[\"c\"," + horizontal +
+           R"(,VERTCRS["h",VDATUM["d"],CS[vertical,1],AXIS["H",up],LENGTHUNIT[)" + unit + "]]]";
+  };
+  struct Unit {
+    const char* wkt;
+    double metres;
+  };
+  for (const Unit& unit :
+       {Unit{R"("foot",0.3048)", 0.3048},
+        Unit{R"("US survey foot",0.304800609601219)", 1200.0 / 3937.0},
+        Unit{R"("Indian foot",0.304799510248147)", 0.304799510248147}, Unit{R"("metre",1)", 1}}) {
+    const std::string site = R"(ENGCRS["site",EDATUM["d"],)";
+    for (const std::string& wkt :
+         {compound(flat, unit.wkt), std::string(kUtm) + axes(unit.wkt), site + axes(unit.wkt),
+          compound(
+              site + R"(CS[Cartesian,2],AXIS["x",east],AXIS["y",north],LENGTHUNIT["metre",1]])",
+              unit.wkt)}) {
+      SCOPED_TRACE(wkt);
+      stream::SourceInfo info;
+      info.crs = crs_named(wkt);
+      const SourceCrs found = crs_of_source(info);
+      stream::Placement placement;
+      placement.crs = found.crs;
+      const Ground ground(placement);
+      EXPECT_NEAR(ground.metres_vertical(), unit.metres, 1e-12);
+      EXPECT_EQ(ground.unknown_height_unit(), "");
+    }
+  }
+}
+
+/// Some programs write heights above the ellipsoid as a vertical CRS of that name.
+TEST(SourceCrs, KeepsEllipsoidalHeightsOfVerticalCrs) {
+  stream::SourceInfo info;
+  info.crs = crs_named(
+      R"--(COMPOUNDCRS["c",GEOGCRS["WGS 84",DATUM["World Geodetic System 1984",)--"
+      R"--(ELLIPSOID["WGS 84",6378137,298.257223563]],CS[ellipsoidal,2],AXIS["lat",north],)--"
+      R"--(AXIS["lon",east],ANGLEUNIT["degree",0.0174532925199433]],)--"
+      R"--(VERTCRS["Ellipsoid height (ft)",VDATUM["Ellipsoid"],CS[vertical,1],AXIS["h",up],)--"
+      R"--(LENGTHUNIT["foot",0.3048]]])--");
+  const SourceCrs found = crs_of_source(info);
+  EXPECT_EQ(found.heights, Heights::ellipsoidal);
+  EXPECT_EQ(found.crs.vertical_unit, "foot");
 }
 
 }  // namespace

@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
+#include <system_error>
 #include <utility>
 
 #include <GeographicLib/Constants.hpp>
 #include <terrace/base/portable_math.hpp>
 
+#include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
 #include "terrace/stream/unit_words.hpp"
 
@@ -70,7 +73,19 @@ std::optional<double> metres_in_unit(std::string_view unit) {
   for (const UnitName& known : kUnits) {
     if (name == known.name) return known.metres;
   }
+  double metres = 0;
+  const char* const end = unit.data() + unit.size();
+  const auto [rest, error] = std::from_chars(unit.data(), end, metres);
+  if (error == std::errc{} && std::string_view(rest, end) == " m" && metres > 0 &&
+      std::isfinite(metres)) {
+    return metres;
+  }
   return std::nullopt;
+}
+
+std::string recorded_unit(double metres) {
+  const std::string name = unit_name(metres);
+  return name.empty() ? number_text(metres) + " m" : name;
 }
 
 std::string unit_name(double metres) {
@@ -81,6 +96,7 @@ std::string unit_name(double metres) {
 }
 
 std::string plural_unit(const std::string& unit) {
+  if (unit.ends_with(" m")) return "units of " + unit;
   if (unit.ends_with("foot")) return unit.substr(0, unit.size() - 4) + "feet";
   if (unit.ends_with("inch")) return unit + "es";
   return unit.ends_with('s') || unit.ends_with("feet") ? unit : unit + "s";
@@ -122,7 +138,7 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
   const std::string& own = placement_.coordinates[2].unit;
   // A file may name the unit only in its WKT.
   const double of_heights = crs.vertical_unit.empty() && known ? known->metres_per_height : 0;
-  const std::string of_crs = of_heights != 0 ? unit_name(of_heights) : crs.vertical_unit;
+  const std::string of_crs = of_heights != 0 ? recorded_unit(of_heights) : crs.vertical_unit;
   const std::string& word = own.empty() ? of_crs : own;
   const bool unknown = !word.empty() && !metres_in_unit(word);
   std::string taken = "metres";

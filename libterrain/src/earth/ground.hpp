@@ -27,8 +27,8 @@ struct MetresPerDegree {
 /// sin and cos.
 MetresPerDegree metres_per_degree(double latitude);
 
-/// Returns metres per unit of length, for any name that stream::canonical_unit() knows; nullopt for
-/// an unknown unit.
+/// Returns metres per unit of length, for any name that stream::canonical_unit() knows and for the
+/// form of recorded_unit(); nullopt for an unknown unit.
 std::optional<double> metres_in_unit(std::string_view unit);
 
 /// Local maps to the ground for a source or a store.

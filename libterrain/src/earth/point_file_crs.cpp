@@ -17,7 +17,7 @@ std::string unit_of_heights(const stream::Placement& own, bool converted) {
   if (!own.crs.vertical_unit.empty()) return own.crs.vertical_unit;
   if (converted) return Ground(own).height_unit();
   const std::optional<CrsDefinition> known = definition_of(own.crs);
-  return known && known->metres_per_height != 0 ? unit_name(known->metres_per_height)
+  return known && known->metres_per_height != 0 ? recorded_unit(known->metres_per_height)
                                                 : std::string();
 }
 
@@ -62,7 +62,11 @@ stream::Crs crs_of_point_file(const stream::Placement& own,
       return known;
     }
     const std::optional<LocalCrs> local = local_crs_of(crs);
-    if (local && !local->is_geocentric && metres) crs.wkt = with_height_unit(local->crs, *metres);
+    // The WKT of a system with a third axis already has the unit.
+    const bool said = local && metres_in_unit(local->crs.vertical_unit) == metres;
+    if (local && !local->is_geocentric && metres && !said) {
+      crs.wkt = with_height_unit(local->crs, *metres);
+    }
   } catch (const CrsError&) {
     // The file repeats the record of the source.
   }

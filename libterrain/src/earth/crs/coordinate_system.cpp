@@ -106,7 +106,13 @@ auto of_text(const std::string& text, const Function& function) {
 stream::Crs crs_named(const std::string& text) {
   return of_text(text, [](AnyCrs system) {
     if (const auto* const local = std::get_if<LocalCrs>(&system)) return local->crs;
-    return CoordinateSystem(on_earth(std::move(system))).crs();
+    CrsDefinition definition = on_earth(std::move(system));
+    // A vertical CRS of heights above the ellipsoid is not kept as WKT, but the record needs it.
+    if (definition.heights == Heights::ellipsoidal && definition.height_wkt.empty() &&
+        definition.vertical_epsg == 0) {
+      write_height_unit(definition, definition.metres_per_height);
+    }
+    return CoordinateSystem(definition).crs();
   });
 }
 
@@ -206,11 +212,7 @@ stream::Crs CoordinateSystem::crs() const {
   crs.geographic = is_geographic();
   crs.horizontal_unit =
       is_geographic() ? angle_name(own.degrees_per_unit) : unit_name(own.metres_per_unit);
-  if (own.metres_per_height != 0) {
-    crs.vertical_unit = unit_name(own.metres_per_height);
-    // Records the length of a unit without a name, so that the unit is not missing.
-    if (crs.vertical_unit.empty()) crs.vertical_unit = number_text(own.metres_per_height) + " m";
-  }
+  if (own.metres_per_height != 0) crs.vertical_unit = recorded_unit(own.metres_per_height);
   return crs;
 }
 

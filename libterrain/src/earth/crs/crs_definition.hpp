@@ -46,6 +46,9 @@ inline constexpr char kUnknownHeights[] = "unknown";
 /// Returns the name of a unit that metres_in_unit() knows, such as "metre", "foot" or "US survey
 /// foot"; empty for other units.
 std::string unit_name(double metres);
+/// Returns the same, or a number like "0.3047995 m" for other units, so that no unit is missing in
+/// a record.
+std::string recorded_unit(double metres);
 /// Returns the plural: "feet", "US survey feet", "metres".
 std::string plural_unit(const std::string& unit);
 

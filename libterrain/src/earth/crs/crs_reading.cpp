@@ -187,7 +187,11 @@ std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition
     local.crs.wkt = wkt_of(crs);
     const std::vector<Axis> axes = axes_of(crs);
     if (!axes.empty()) local.crs.horizontal_unit = unit_name(axes[0].unit);
-    if (local.is_geocentric) local.crs.vertical_unit = local.crs.horizontal_unit;
+    if (local.is_geocentric) {
+      local.crs.vertical_unit = local.crs.horizontal_unit;
+    } else if (axes.size() == 3) {
+      local.crs.vertical_unit = recorded_unit(metres_of(axes[2].unit));
+    }
     return local;
   }
   const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
@@ -335,7 +339,7 @@ AnyCrs read_crs(const PJ* crs) {
   if (auto local = read_horizontal(horizontal.get(), definition)) {
     const std::vector<Axis> axes = axes_of(vertical.get());
     if (!local->is_geocentric && axes.size() == 1) {
-      local->crs.vertical_unit = unit_name(metres_of(axes[0].unit));
+      local->crs.vertical_unit = recorded_unit(metres_of(axes[0].unit));
     }
     return *std::move(local);
   }
