@@ -25,11 +25,9 @@ void for_ranges(std::uint32_t count, unsigned threads, const Work& work) {
     work(0, count);
     return;
   }
-  base::parallel_blocks(
-      count, kRange, threads, [] { return 0; },
-      [&](std::size_t from, std::size_t to, int) {
-        work(static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to));
-      });
+  base::parallel_blocks(count, kRange, threads, [&](std::size_t from, std::size_t to) {
+    work(static_cast<std::uint32_t>(from), static_cast<std::uint32_t>(to));
+  });
 }
 
 struct CurveEntry {

@@ -45,14 +45,12 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
     return spatial::make_side(result.number[other],
                               kTurns[turn[other]].to[spatial::index_of(mate)]);
   };
-  base::parallel_blocks(
-      slots, kSphereBlock, threads, [] { return 0; },
-      [&](std::size_t begin, std::size_t end, int) {
-        for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
-          if (turn[t] == 0) continue;
-          result.tetrahedra[result.number[t]] = turned(tetrahedra[t], kTurns[turn[t]], new_side);
-        }
-      });
+  base::parallel_blocks(slots, kSphereBlock, threads, [&](std::size_t begin, std::size_t end) {
+    for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
+      if (turn[t] == 0) continue;
+      result.tetrahedra[result.number[t]] = turned(tetrahedra[t], kTurns[turn[t]], new_side);
+    }
+  });
   return result;
 }
 
@@ -61,15 +59,14 @@ Spheres::Spheres(std::span<const spatial::Tetrahedron> tetrahedra, std::vector<P
     : tetrahedra_(tetrahedra), places_(std::move(places)) {
   sphere_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
   finite_.resize(static_cast<std::uint32_t>(tetrahedra.size()));
-  base::parallel_blocks(
-      tetrahedra.size(), kSphereBlock, threads, [] { return 0; },
-      [&](std::size_t begin, std::size_t end, int) {
-        if (check_stop) check_stop();
-        for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
-          finite_[t] = spatial::is_finite(tetrahedra[t].corner);
-          if (finite(t)) sphere_[t] = sphere_of(tetrahedra[t]);
-        }
-      });
+  base::parallel_blocks(tetrahedra.size(), kSphereBlock, threads,
+                        [&](std::size_t begin, std::size_t end) {
+                          if (check_stop) check_stop();
+                          for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
+                            finite_[t] = spatial::is_finite(tetrahedra[t].corner);
+                            if (finite(t)) sphere_[t] = sphere_of(tetrahedra[t]);
+                          }
+                        });
 }
 
 Spheres::Sphere Spheres::sphere_of(const spatial::Tetrahedron& t) const {
