@@ -74,8 +74,8 @@ auto Patches<kAxes>::box_of(const Triangle& triangle) -> Box {
   const auto& [a, b, c] = triangle.corners;
   Box box;
   for (std::size_t k = 0; k < kAxes; ++k) {
-    box.low[k] = std::min(std::min(a[k], b[k]), c[k]);
-    box.high[k] = std::max(std::max(a[k], b[k]), c[k]);
+    box.min[k] = std::min(std::min(a[k], b[k]), c[k]);
+    box.max[k] = std::max(std::max(a[k], b[k]), c[k]);
   }
   return box;
 }
@@ -85,26 +85,24 @@ template <std::size_t kAxes>
 void Patches<kAxes>::sort() {
   constexpr unsigned kBits = 30 / kAxes;
   Box all;
-  all.low.fill(kInfinity);
-  all.high.fill(-kInfinity);
   const auto middle = [](const Triangle& t, std::size_t k) {
     return t.corners[0][k] + t.corners[1][k] + t.corners[2][k];
   };
   for (const Triangle& t : triangles_) {
     for (std::size_t k = 0; k < kAxes; ++k) {
-      all.low[k] = std::min(all.low[k], middle(t, k));
-      all.high[k] = std::max(all.high[k], middle(t, k));
+      all.min[k] = std::min(all.min[k], middle(t, k));
+      all.max[k] = std::max(all.max[k], middle(t, k));
     }
   }
   double side = 0.0;
-  for (std::size_t k = 0; k < kAxes; ++k) side = std::max(side, all.high[k] - all.low[k]);
+  for (std::size_t k = 0; k < kAxes; ++k) side = std::max(side, all.max[k] - all.min[k]);
   const double scale = side > 0.0 ? ((1u << kBits) - 1) / side : 0.0;
   keys_.clear();
   for (const Triangle& t : triangles_) {
     std::uint64_t key = t.part;
     std::array<std::uint32_t, kAxes> cell;
     for (std::size_t k = 0; k < kAxes; ++k) {
-      cell[k] = static_cast<std::uint32_t>((middle(t, k) - all.low[k]) * scale);
+      cell[k] = static_cast<std::uint32_t>((middle(t, k) - all.min[k]) * scale);
     }
     for (unsigned bit = kBits; bit-- > 0;) {
       for (std::size_t k = 0; k < kAxes; ++k) key = 2 * key + (cell[k] >> bit & 1);
@@ -147,13 +145,11 @@ void Patches<kAxes>::add_tree(std::uint32_t first, std::uint32_t last) {
       for (std::size_t k = 0; k < kAxes; ++k) {
         node.low[k].fill(kInfinity);
         node.high[k].fill(-kInfinity);
-        whole.low[k] = kInfinity;
-        whole.high[k] = -kInfinity;
         for (std::size_t j = i; j < std::min(i + kWidth, boxes_.size()); ++j) {
-          node.low[k][j - i] = boxes_[j].low[k];
-          node.high[k][j - i] = boxes_[j].high[k];
-          whole.low[k] = std::min(whole.low[k], boxes_[j].low[k]);
-          whole.high[k] = std::max(whole.high[k], boxes_[j].high[k]);
+          node.low[k][j - i] = boxes_[j].min[k];
+          node.high[k][j - i] = boxes_[j].max[k];
+          whole.min[k] = std::min(whole.min[k], boxes_[j].min[k]);
+          whole.max[k] = std::max(whole.max[k], boxes_[j].max[k]);
         }
       }
       boxes_[count++] = whole;

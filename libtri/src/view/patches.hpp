@@ -8,6 +8,8 @@
 #include <optional>
 #include <vector>
 
+#include <terrace/base/box.hpp>
+
 #include "terrace/tri/multiresolution.hpp"
 
 namespace terrace::tri {
@@ -49,9 +51,7 @@ class Patches {
     std::array<Point3, 3> corners;
     std::uint32_t part, number;
   };
-  struct Box {
-    std::array<double, kAxes> low, high;
-  };
+  using Box = base::Box<kAxes>;
   /// Boxes of nodes or triangles that are close together, stored axis by axis.
   struct Node {
     std::array<std::array<double, kWidth>, kAxes> low, high;  ///< low > high: no child

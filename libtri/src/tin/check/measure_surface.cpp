@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/box.hpp>
 #include <terrace/base/portable_math.hpp>
 
 #include "delaunay2/double_kernel.hpp"
@@ -22,18 +23,9 @@ class Raster {
  public:
   Raster(std::span<const Point3> vertices, std::span<const Corners> triangles)
       : vertices_(vertices), triangles_(triangles) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      low_[k] = HUGE_VAL;
-      high_[k] = -HUGE_VAL;
-    }
-    for (const Corners& corners : triangles) {
-      for (const std::uint32_t v : corners) {
-        for (std::size_t k = 0; k < 2; ++k) {
-          low_[k] = std::min(low_[k], vertices[v][k]);
-          high_[k] = std::max(high_[k], vertices[v][k]);
-        }
-      }
-    }
+    for (const Corners& corners : triangles)
+      for (const std::uint32_t v : corners)
+        box_.include(base::Point2{vertices[v][0], vertices[v][1]});
     const double per_axis = std::sqrt(static_cast<double>(triangles.size()));
     side_ = static_cast<std::size_t>(std::clamp(per_axis, 1.0, 4096.0));
     start_.assign(side_ * side_ + 1, 0);
@@ -50,7 +42,7 @@ class Raster {
 
   /// A triangle that contains the place, or nullptr.
   [[nodiscard]] const Corners* find(double x, double y) const {
-    if (!(x >= low_[0] && x <= high_[0] && y >= low_[1] && y <= high_[1])) return nullptr;
+    if (!box_.contains({x, y})) return nullptr;
     const std::size_t cell = cell_of(y, 1) * side_ + cell_of(x, 0);
     for (std::size_t e = start_[cell]; e < start_[cell + 1]; ++e) {
       const Corners& corners = triangles_[entries_[e]];
@@ -69,7 +61,7 @@ class Raster {
  private:
   /// Monotone, so that a place between two others is in a cell between theirs.
   [[nodiscard]] std::size_t cell_of(double c, std::size_t axis) const {
-    const double part = (c - low_[axis]) / (high_[axis] - low_[axis]);
+    const double part = (c - box_.min[axis]) / (box_.max[axis] - box_.min[axis]);
     const double cell = part * static_cast<double>(side_);
     return cell > 0 ? std::min(static_cast<std::size_t>(cell), side_ - 1) : 0;
   }
@@ -95,8 +87,8 @@ class Raster {
   [[nodiscard]] std::array<std::size_t, 2> columns_in(const Corners& corners,
                                                       std::size_t row) const {
     // Uses a band slightly wider than the row.
-    const double height = (high_[1] - low_[1]) / static_cast<double>(side_);
-    const double bottom = low_[1] + (static_cast<double>(row) - 0.01) * height;
+    const double height = (box_.max[1] - box_.min[1]) / static_cast<double>(side_);
+    const double bottom = box_.min[1] + (static_cast<double>(row) - 0.01) * height;
     const double top = bottom + 1.02 * height;
     double left = HUGE_VAL;
     double right = -HUGE_VAL;
@@ -116,14 +108,13 @@ class Raster {
       if (a[1] == b[1]) right = std::max(right, b[0]), left = std::min(left, b[0]);
     }
     if (left > right) return {1, 0};
-    const double margin = 1e-9 * (high_[0] - low_[0]);
+    const double margin = 1e-9 * (box_.max[0] - box_.min[0]);
     return {cell_of(left - margin, 0), cell_of(right + margin, 0)};
   }
 
   std::span<const Point3> vertices_;
   std::span<const Corners> triangles_;
-  std::array<double, 2> low_;
-  std::array<double, 2> high_;
+  base::Box2 box_;
   std::size_t side_;
   std::vector<std::size_t> start_;
   std::vector<std::uint32_t> entries_;
