@@ -15,7 +15,7 @@
 #include "error_queue.hpp"
 #include "ground.hpp"
 #include "mesh.hpp"
-#include "scan_results.hpp"
+#include "scan.hpp"
 #include "star.hpp"
 #include "terrace/tri/grid_tin.hpp"
 

@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 
-// Vectors of 64 bytes. This file, scan_masks.hpp and the scans (*/scan_impl.hpp) are compiled once
-// for each instruction set. They must not share anything between objects, as otherwise the linker
-// might keep only the version for newer processors: everything is in anonymous namespaces, and no
-// function of another header is called.
+// Vectors of 64 bytes. This file, scan_masks.hpp and the scans that scan_impl.hpp includes are
+// compiled once for each instruction set. They must not share anything between objects, as
+// otherwise the linker might keep only the version for newer processors: everything is in anonymous
+// namespaces, and no function of another header is called.
 
 namespace terrace::tri::tin {
 namespace {

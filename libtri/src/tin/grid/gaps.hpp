@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "scan.hpp"
 #include "tin/ground.hpp"
 #include "tin/mesh.hpp"
+#include "tin/scan.hpp"
 
 /// Handles missing data in a window. The whole window is triangulated, including samples without
 /// data, until no triangle is mixed; then triangles that have a corner without data are dropped. A

@@ -9,12 +9,10 @@
 #include <terrace/base/simd.hpp>
 
 #include "gaps.hpp"
-#include "scan.hpp"
 #include "terrace/tri/grid_tin.hpp"
 #include "tin/ground.hpp"
 #include "tin/mesh.hpp"
 #include "tin/scan.hpp"
-#include "tin/scan_results.hpp"
 
 namespace terrace::tri::tin {
 

@@ -4,7 +4,7 @@
 
 #include "removal.hpp"
 #include "tin/lattice.hpp"
-#include "tin/scan_results.hpp"
+#include "tin/scan.hpp"
 
 namespace terrace::tri::tin::points {
 namespace {

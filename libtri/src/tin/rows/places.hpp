@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "scan.hpp"
 #include "terrace/tri/point_tin.hpp"
+#include "tin/scan.hpp"
 
 namespace terrace::tri::tin::rows {
 

@@ -59,7 +59,7 @@ void PlacedSamples::restore() {
 }
 
 bool PlacedSamples::within(const Vertex& a, const Vertex& b, const Vertex& c) const {
-  return scan_.within(samples_, corner(a), corner(b), corner(c), bound_);
+  return scan_.within(samples_, corner(a), corner(b), corner(c), bound_) != 0;
 }
 
 bool PlacedSamples::fits(const Vertex& a, const Vertex& b, const Vertex& c,

@@ -14,7 +14,6 @@
 #include "tin/ground.hpp"
 #include "tin/mesh.hpp"
 #include "tin/scan.hpp"
-#include "tin/scan_results.hpp"
 
 namespace terrace::tri::tin::rows {
 

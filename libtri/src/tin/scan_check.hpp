@@ -3,7 +3,7 @@
 
 // The rules in scan_lanes.hpp apply here.
 #include "scan.hpp"
-#include "tin/scan_lanes.hpp"
+#include "scan_lanes.hpp"
 
 namespace terrace::tri::tin {
 namespace {
