@@ -9,7 +9,7 @@
 
 #include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
-#include "tin/grid/make.hpp"
+#include "tin/by_path.hpp"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <terrace/base/simd.hpp>
 
 #include "grid_tin_oracle.hpp"
-#include "tin/grid/make.hpp"
+#include "tin/by_path.hpp"
 
 namespace {
 

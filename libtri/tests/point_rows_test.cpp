@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tin/rows/point_rows.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -17,6 +15,7 @@
 #include "delaunay2/double_kernel.hpp"
 #include "point_tin_oracle.hpp"
 #include "terrace/tri/point_tin.hpp"
+#include "tin/by_path.hpp"
 #include "tin/rows/places.hpp"
 
 namespace terrace::tri {

@@ -15,36 +15,39 @@
 
 namespace terrace::tri::tin {
 
+/// One tile for all samples.
+struct OneTile {
+  static std::size_t count() { return 1; }
+  static std::uint32_t of(std::uint32_t) { return 0; }
+};
+
 /// Returns approximately the greatest error first: 4 buckets per power of two, last in, first out.
 /// The meshes are as good as with the exact order, and it is several times as fast.
+///
+/// Sorts each bucket by tiles when its turn comes, so that triangles close to each other in the
+/// plane are also close in time and memory. `tiles.of(place)` is a number below `tiles.count()`.
+template <class Tiles = OneTile>
 class ErrorBuckets {
  public:
   /// Errors below `least` share its bucket.
-  explicit ErrorBuckets(float least) : base_(octave_quarter(least)) {
+  explicit ErrorBuckets(float least, Tiles tiles = {})
+      : tiles_(tiles), base_(octave_quarter(least)) {
     buckets_.resize(octave_quarter(kHighest) - base_ + 1);
   }
 
-  void push(float error, std::uint32_t triangle) {
-    const std::size_t bucket = bucket_of(error);
-    buckets_[bucket].push_back(triangle);
+  void push(const Triangle& triangle, std::uint32_t number) {
+    const std::size_t bucket = bucket_of(triangle.error);
+    buckets_[bucket].push_back(number);
     top_ = std::max(top_, bucket + 1);
   }
 
   /// The next triangle, or kNone if the queue is empty.
   std::uint32_t pop(const Triangles& triangles) {
-    return pop(triangles, 1, [](const Triangle&) { return 0; });
-  }
-
-  /// The same, but sorts each bucket by tiles when its turn comes, so that triangles close to each
-  /// other in the plane are also close in time and memory. `tile_of(triangle)` is a number below
-  /// `tiles`.
-  template <class TileOf>
-  std::uint32_t pop(const Triangles& triangles, std::size_t tiles, const TileOf& tile_of) {
     for (; top_ > 0; --top_) {
       auto& bucket = buckets_[top_ - 1];
       if (top_ < sorted_from_) {
         sorted_from_ = top_;
-        if (tiles > 1 && bucket.size() > kWorthSorting) sort(triangles, tiles, tile_of, bucket);
+        if (tiles_.count() > 1 && bucket.size() > kWorthSorting) sort(triangles, bucket);
       }
       while (!bucket.empty()) {
         const std::uint32_t t = bucket.back();
@@ -74,13 +77,11 @@ class ErrorBuckets {
       if (next != kNone) __builtin_prefetch(&triangles[next]);
   }
 
-  template <class TileOf>
-  void sort(const Triangles& triangles, std::size_t tiles, const TileOf& tile_of,
-            std::vector<std::uint32_t>& bucket) {
-    starts_.assign(tiles + 1, 0);
+  void sort(const Triangles& triangles, std::vector<std::uint32_t>& bucket) {
+    starts_.assign(tiles_.count() + 1, 0);
     tile_.clear();
     for (const std::uint32_t t : bucket) {
-      const auto tile = static_cast<std::uint32_t>(tile_of(triangles[t]));
+      const std::uint32_t tile = tiles_.of(triangles[t].place);
       tile_.push_back(tile);
       ++starts_[tile + 1];
     }
@@ -91,6 +92,7 @@ class ErrorBuckets {
   }
 
   static constexpr std::size_t kWorthSorting = 256;
+  Tiles tiles_;
   std::size_t base_;
   std::size_t top_ = 0;                                     ///< buckets from this one on are empty
   std::size_t sorted_from_ = static_cast<std::size_t>(-1);  ///< top_ of the last bucket sorted
@@ -101,15 +103,12 @@ class ErrorBuckets {
 /// Returns exactly the greatest error first; of equal errors the smallest number first.
 class ErrorHeap {
  public:
-  explicit ErrorHeap(float) {}
-
-  void push(float error, std::uint32_t triangle) {
-    heap_.emplace_back(error, ~triangle);
+  void push(const Triangle& triangle, std::uint32_t number) {
+    heap_.emplace_back(triangle.error, ~number);
     std::push_heap(heap_.begin(), heap_.end());
   }
 
-  template <class TileOf>
-  std::uint32_t pop(const Triangles& triangles, std::size_t, const TileOf&) {
+  std::uint32_t pop(const Triangles& triangles) {
     while (!heap_.empty()) {
       const auto [error, inverted] = heap_.front();
       std::pop_heap(heap_.begin(), heap_.end());
@@ -121,6 +120,45 @@ class ErrorHeap {
 
  private:
   std::vector<std::pair<float, std::uint32_t>> heap_;
+};
+
+/// Handles samples in parts of `together` numbers, one part after the other. If the numbers of a
+/// part are close to each other in the plane, it and its triangles stay in the cache; the result is
+/// as good as if all parts were handled together.
+class ErrorParts {
+ public:
+  ErrorParts(float least, std::size_t samples, std::size_t together)
+      : queue_(least),
+        together_(std::max<std::size_t>(together, 1)),
+        later_(samples / together_ + 1) {}
+
+  void push(const Triangle& triangle, std::uint32_t number) {
+    const std::size_t part = triangle.place / together_;
+    if (part > part_) {
+      later_[part].push_back(number);
+    } else {
+      queue_.push(triangle, number);
+    }
+  }
+
+  std::uint32_t pop(const Triangles& triangles) {
+    for (;;) {
+      const std::uint32_t t = queue_.pop(triangles);
+      if (t != kNone) return t;
+      while (part_ < later_.size() && later_[part_].empty()) ++part_;
+      if (part_ == later_.size()) return kNone;
+      for (const std::uint32_t waiting : later_[part_])
+        if (triangles[waiting].error > 0) queue_.push(triangles[waiting], waiting);
+      later_[part_] = {};
+    }
+  }
+
+ private:
+  ErrorBuckets<> queue_;
+  std::size_t together_;
+  std::size_t part_ = 0;  ///< the current part
+  /// The triangles of later parts; some of them may have changed since.
+  std::vector<std::vector<std::uint32_t>> later_;
 };
 
 }  // namespace terrace::tri::tin

@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-/// Triangles linked to their neighbours, without coordinates. Shared by all TINs.
+/// Triangles linked to their neighbours. Shared by all TINs.
 
 namespace terrace::tri::tin {
 
@@ -25,6 +25,41 @@ struct Triangle {
 };
 
 using Triangles = std::vector<Triangle>;
+
+/// Triangles with the coordinates of their corners. `Vertices` is an array of vertices.
+template <class Vertices>
+struct Mesh {
+  Vertices vertices;
+  Triangles triangles;
+
+  const auto& vertex(const Triangle& triangle, unsigned i) const {
+    return vertices[triangle.corner[i]];
+  }
+};
+
+/// The place of a point in a mesh.
+struct Spot {
+  std::uint32_t triangle = kNone;  ///< contains the point; kNone: outside
+  unsigned zeros = 0;              ///< number of its sides whose lines contain the point
+  unsigned side = 0;               ///< one of these
+  bool border = false;             ///< the point is on the mesh's border, between two vertices
+};
+
+/// The side that a walk tries first in each triangle. In a Delaunay triangulation a walk ends
+/// whatever side that is.
+struct LowestSide {
+  explicit LowestSide(std::uint32_t) {}
+  static unsigned next() { return 0; }
+};
+/// Varies, so that a walk cannot be endless in a mesh that is not Delaunay.
+struct RandomSide {
+  explicit RandomSide(std::uint32_t start) : random(start * 2654435761u + 1) {}
+  unsigned next() {
+    random = random * 1664525u + 1013904223u;
+    return (random >> 16) % 3;
+  }
+  std::uint32_t random;
+};
 
 /// An error as stored in Triangle::error: rounded up, positive, finite.
 inline float rounded_up(double error) {

@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "options.hpp"
 #include "terrace/tri/grid_tin.hpp"
-#include "tin/check/window.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "lattice.hpp"
+#include "options.hpp"
 
 namespace terrace::tri {
 namespace {

@@ -11,8 +11,9 @@
 #include <terrace/base/portable_math.hpp>
 #include <terrace/base/simd.hpp>
 
-#include "tin/grid/make.hpp"
-#include "window.hpp"
+#include "tin/by_path.hpp"
+#include "tin/options.hpp"
+#include "tin/scan.hpp"
 
 namespace terrace::tri {
 namespace {

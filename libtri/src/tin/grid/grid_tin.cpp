@@ -10,10 +10,10 @@
 
 #include <terrace/base/simd.hpp>
 
-#include "make.hpp"
 #include "samples.hpp"
-#include "tin/check/window.hpp"
-#include "tin/lattice_surface.hpp"
+#include "tin/by_path.hpp"
+#include "tin/lattice.hpp"
+#include "tin/options.hpp"
 
 namespace terrace::tri::tin {
 namespace {
@@ -113,9 +113,9 @@ std::vector<GridCorner<T>> frame_of(RasterSamples<T>& samples, const GridSides& 
 
 /// Makes triangles counter-clockwise on the ground.
 template <class T>
-GridTin result_of(const LatticeSurface<RasterSamples<T>>& surface, const GridTinOptions& options) {
+GridTin result_of(const Refinement<RasterSamples<T>>& refinement, const GridTinOptions& options) {
   GridTin tin;
-  surface.publish(tin);
+  refinement.publish(tin);
   if ((options.column_step < 0) != (options.row_step < 0))
     for (auto& triangle : tin.triangles) std::swap(triangle[1], triangle[2]);
   return tin;
@@ -127,9 +127,9 @@ GridTin make(const GridWindow<T>& window, const GridSides& sides, const GridTinO
   RasterSamples<Real> samples(window, options, true, set);
   samples.judge_coarsely_first();
   std::vector<GridCorner<Real>> frame = frame_of(samples, sides);
-  LatticeSurface surface(std::move(samples), std::move(frame));
-  surface.make(options.quality, 0);
-  return result_of(surface, options);
+  Refinement refinement = start_in_rectangle(std::move(samples), std::move(frame));
+  refine_to_bound(refinement, options.quality, 0);
+  return result_of(refinement, options);
 }
 
 }  // namespace
@@ -176,9 +176,11 @@ GridTin grid_tin_of_points(const GridWindow<T>& window, std::size_t max_points,
   if (window.columns > 1 && window.rows > 1 && range.data > 0) {
     tin::RasterSamples<double> samples(window, options, false, base::best_simd_path());
     auto frame = tin::frame_of(samples, {});
-    tin::LatticeSurface<tin::RasterSamples<double>> surface(std::move(samples), std::move(frame));
-    surface.refine<tin::ErrorHeap>(max_points);
-    result = tin::result_of(surface, options);
+    tin::Refinement refinement = tin::start_in_rectangle(std::move(samples), std::move(frame));
+    tin::ErrorHeap queue;
+    refinement.judge_all(queue);
+    refinement.refine(queue, {.vertices = max_points});
+    result = tin::result_of(refinement, options);
   }
   tin::measure(window, options.measure, range.data, result);
   return result;

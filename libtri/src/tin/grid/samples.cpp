@@ -7,8 +7,6 @@
 
 #include <terrace/base/simd.hpp>
 
-#include "tin/lattice_surface.hpp"
-
 namespace terrace::tri::tin {
 namespace {
 
@@ -81,11 +79,13 @@ template <class T>
 template <class Height>
 RasterSamples<T>::RasterSamples(const GridWindow<Height>& window, const GridTinOptions& options,
                                 bool sides_fixed, base::SimdPath set)
-    : columns_(static_cast<std::int32_t>(window.columns)),
+    : LatticeSamples<RasterSamples<T>, GridCorner<T>>(Ground(
+          options.column_step, options.row_step, std::max(window.columns, window.rows), kTangent)),
+      columns_(static_cast<std::int32_t>(window.columns)),
       rows_(static_cast<std::int32_t>(window.rows)),
+      sides_fixed_(sides_fixed),
       bound_(options.max_error),
       scan_bound_(rounded_down<T>(options.max_error)),
-      ground_(options.column_step, options.row_step, std::max(columns_, rows_), kTangent),
       scan_(scans(set).grid<T>()) {
   const std::size_t stride = round_up(window.columns + kScanPadRight, 16);
   heights_.resize((window.rows + kScanPadBelow) * stride);
@@ -146,8 +146,10 @@ WorstSample<T> RasterSamples<T>::worst_to_insert(const Vertex& a, const Vertex& 
 }
 
 template <class T>
-void RasterSamples<T>::judge(Triangle& triangle, const Vertex& a, const Vertex& b,
-                             const Vertex& c) const {
+void RasterSamples<T>::judge(RasterMesh& mesh, std::uint32_t t) const {
+  Triangle& triangle = mesh.triangles[t];
+  const Vertex &a = mesh.vertex(triangle, 0), &b = mesh.vertex(triangle, 1),
+               &c = mesh.vertex(triangle, 2);
   if (!gaps_ || have_data(a, b, c)) {
     const WorstSample<T> found = worst_to_insert(a, b, c);
     if (found.error == 0) {
@@ -164,7 +166,7 @@ void RasterSamples<T>::judge(Triangle& triangle, const Vertex& a, const Vertex& 
     triangle.error = 0;
     return;
   }
-  triangle.place = gaps_->cure(samples_, ground_, a, b, c);
+  triangle.place = gaps_->cure(samples_, this->ground(), a, b, c);
   triangle.error = triangle.place == kNone ? 0 : std::numeric_limits<float>::infinity();
 }
 
@@ -208,7 +210,7 @@ bool RasterSamples<T>::fits(const Vertex& a, const Vertex& b, const Vertex& c,
 /// A sample at which the vertex has weight w allows the vertex to rise by (error - bound) / w to
 /// (error + bound) / w.
 template <class T>
-void RasterSamples<T>::narrow(const Vertex& v, const Vertex& b, const Vertex& c,
+void RasterSamples<T>::narrow(std::uint32_t, const Vertex& v, const Vertex& b, const Vertex& c,
                               Interval& rises) const {
   if (!have_data(v, b, c)) return;
   const auto area = static_cast<double>(turn(v, b, c));

@@ -5,9 +5,13 @@
 #include <cstdint>
 #include <vector>
 
-#include "mesh.hpp"
+#include "hole.hpp"
+#include "samples.hpp"
+#include "tin/refinement.hpp"
 
 namespace terrace::tri::tin::points {
+
+using PointRefinement = Refinement<PointSamples>;
 
 struct Measured {
   TinErrors errors;         ///< covered: samples listed and vertices; uncovered: samples outside
@@ -20,10 +24,17 @@ struct Measured {
 /// Rebuilds all lists from the samples 0, step, 2 * step, ... that are not vertices, each in the
 /// triangle that contains it (exact), and measures them. `place` and `error` of a triangle become
 /// those of its worst sample that is beyond the bound and not stuck; `error` is 0 if there is none.
-Measured list_samples(Mesh& mesh, std::uint32_t step, double bound);
+Measured list_samples(PointRefinement& refinement, std::uint32_t step);
 
 /// Gives the same result for all samples from lists that are complete, several times as fast: each
 /// sample is checked exactly against the triangle that lists it.
-Measured measure_lists(Mesh& mesh, double bound);
+Measured measure_lists(PointRefinement& refinement);
+
+/// Passes once over the samples 0, step, 2 * step, ... in their order. Each sample that is beyond
+/// the bound when its turn comes becomes a vertex, if it can. This is several times as fast as
+/// refine() per vertex, as no lists are kept, and makes more vertices; removal leaves about as
+/// many. Later vertices may move the surface away from samples that were passed. The lists must be
+/// rebuilt afterwards.
+void sweep(PointRefinement& refinement, std::uint32_t step);
 
 }  // namespace terrace::tri::tin::points

@@ -6,7 +6,7 @@
 
 #include "delaunay2/double_kernel.hpp"
 #include "pool.hpp"
-#include "samples.hpp"
+#include "tin/mesh.hpp"
 
 namespace terrace::tri::tin::points {
 
@@ -39,65 +39,34 @@ struct Vertex {
   double x;
   double y;
   double z;
-  std::uint32_t sample;  ///< index in Samples::all; kNone: of the frame
+  std::uint32_t sample;  ///< its index; kNone: of the frame
 };
 
-/// The end of a walk.
-struct Spot {
-  std::uint32_t triangle = kNone;  ///< contains the place; kNone: outside
-  unsigned zeros = 0;              ///< number of its edges whose lines contain the place
-  unsigned edge = 0;               ///< one of these
-};
+inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
+inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;
+inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;
 
-struct Mesh {
-  Pool<Sample>* samples = nullptr;
-  Pool<Vertex> vertices;
-  Triangles triangles;        ///< `place`: the sample to insert next
-  Pool<std::uint32_t> heads;  ///< heads of the triangles' lists of samples, kNone if empty
-  bool whole = false;         ///< true if WholeKernel can handle the vertices
-
-  [[nodiscard]] Place2 place(std::uint32_t v) const { return {vertices[v].x, vertices[v].y}; }
-  [[nodiscard]] int orientation(const Place2& a, const Place2& b, const Place2& c) const {
-    return whole ? WholeKernel::orientation(a, b, c) : Kernel::orientation(a, b, c);
-  }
-  [[nodiscard]] int in_circle(const Place2& a, const Place2& b, const Place2& c,
-                              const Place2& p) const {
-    return whole ? WholeKernel::in_circle(a, b, c, p) : Kernel::in_circle(a, b, c, p);
-  }
-  /// Walks from a triangle to the one that contains p, exactly. The region is convex, so p is
-  /// outside if it is beyond a border edge.
-  [[nodiscard]] Spot locate(const Place2& p, std::uint32_t start) const {
-    std::uint32_t at = start;
-    std::uint32_t from = kNone;
-    // The edge that is tried first varies, so that a walk cannot be endless in a mesh that is not
-    // Delaunay.
-    std::uint32_t random = start * 2654435761u + 1;
-    for (;;) {
-      const Triangle& t = triangles[at];
-      Spot spot{at, 0, 0};
-      bool moved = false;
-      random = random * 1664525u + 1013904223u;
-      unsigned i = (random >> 16) % 3;
-      for (unsigned k = 0; k < 3; ++k, i = after(i)) {
-        if (t.next[i] == from && from != kNone) continue;
-        const int side =
-            Kernel::orientation(place(t.corner[after(i)]), place(t.corner[before(i)]), p);
-        if (side > 0) continue;
-        if (side == 0) {
-          ++spot.zeros;
-          spot.edge = i;
-          continue;
-        }
-        if (t.next[i] == kNone) return {};
-        from = at;
-        at = t.next[i];
-        moved = true;
-        break;
-      }
-      if (!moved) return spot;
-    }
-  }
+/// A sample as a member of its triangle's list. It takes half a cache line, so following the list
+/// also loads the values to measure.
+struct Sample {
+  double x;
+  double y;
+  double z;
+  std::uint32_t next;  ///< next in the list, kNone at its end; or why it is not listed
+  /// The caller's number, with kStuck set if it cannot become a vertex.
+  std::uint32_t id;
 };
+inline constexpr std::uint32_t kStuck = 0x80000000u;
+inline bool stuck(const Sample& sample) { return (sample.id & kStuck) != 0; }
+inline std::uint32_t number(const Sample& sample) { return sample.id & ~kStuck; }
+
+using PointMesh = Mesh<Pool<Vertex>>;
+
+/// The position of a vertex or sample.
+template <class At>
+Place2 place(const At& at) {
+  return {at.x, at.y};
+}
 
 /// The plane of a triangle relative to one of its vertices. `sound`: true if doubles can resolve
 /// its slope.
@@ -146,9 +115,8 @@ inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, doubl
   if (wc == sum) return c.z;
   return a.z + (wb * (b.z - a.z) + wc * (c.z - a.z)) / sum;
 }
-inline double height_in(const Mesh& mesh, const Triangle& t, double x, double y) {
-  return height_in(mesh.vertices[t.corner[0]], mesh.vertices[t.corner[1]],
-                   mesh.vertices[t.corner[2]], x, y);
+inline double height_in(const PointMesh& mesh, const Triangle& t, double x, double y) {
+  return height_in(mesh.vertex(t, 0), mesh.vertex(t, 1), mesh.vertex(t, 2), x, y);
 }
 
 }  // namespace terrace::tri::tin::points

@@ -7,18 +7,16 @@
 #include <stdexcept>
 #include <string>
 
-#include "greedy.hpp"
 #include "lists.hpp"
-#include "removal.hpp"
 #include "samples.hpp"
 #include "start.hpp"
 #include "terrace/tri/least_error.hpp"
-#include "tin/lattice.hpp"
-#include "tin/rows/point_rows.hpp"
+#include "tin/error_queue.hpp"
+#include "tin/options.hpp"
 
 namespace terrace::tri {
 
-void tin::points::check_options(const PointTinOptions& options, std::span<const Point3> frame) {
+void tin::check_point_options(const PointTinOptions& options, std::span<const Point3> frame) {
   if (!(options.max_error >= 0) || !std::isfinite(options.max_error))
     throw std::invalid_argument("point_tin: max_error must be at least 0");
   if (!(options.min_angle_degrees >= 0 && options.min_angle_degrees <= 30))
@@ -45,62 +43,54 @@ constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 /// Makes the mesh, for one bound after another.
 class Maker {
  public:
-  Maker(Samples& samples, std::span<const Point3> frame, const PointTinOptions& options)
+  Maker(SampleList& samples, std::span<const Point3> frame, const PointTinOptions& options)
       : samples_(samples.all), frame_(frame), options_(options) {}
 
   /// Returns false if there is no surface.
   bool make(double bound, std::size_t max_vertices, TinQuality quality) {
-    mesh_ = {};
-    mesh_.samples = &samples_;
-    mesh_.whole =
-        options_.lattice && std::all_of(frame_.begin(), frame_.end(), [](const Point3& p) {
-          return p[0] <= kMostWhole && p[1] <= kMostWhole;
-        });
+    refinement_.reset();
     for (Sample& sample : span_of(samples_)) {
       sample.next = kUnlisted;
       sample.id = number(sample);
     }
-    if (frame_.empty()) {
-      start_with_hull(mesh_);
-    } else {
-      start_with_frame(mesh_, frame_);
-    }
-    if (mesh_.triangles.empty()) return false;
-    const std::size_t fixed = mesh_.vertices.size();
+    tin::points::PointMesh mesh =
+        frame_.empty() ? start_with_hull(samples_) : start_with_frame(frame_);
+    if (mesh.triangles.empty()) return false;
+    const std::size_t fixed = mesh.vertices.size();
     // Reserves so much that reallocation, which briefly takes twice the memory, is rare. Unused
     // capacity costs only address space.
-    mesh_.vertices.reserve(fixed + samples_.size());
-    mesh_.triangles.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
-    mesh_.heads.reserve(mesh_.triangles.size() + 2 * std::size_t{samples_.size()});
-    Greedy greedy(mesh_, bound, !frame_.empty(), options_.lattice);
-    const bool sweeps = quality != TinQuality::kGreedy;
-    insert(greedy, bound, max_vertices, sweeps);
+    mesh.vertices.reserve(fixed + samples_.size());
+    mesh.triangles.reserve(mesh.triangles.size() + 2 * std::size_t{samples_.size()});
+    const bool whole =
+        options_.lattice && std::all_of(frame_.begin(), frame_.end(), [](const Point3& p) {
+          return p[0] <= kMostWhole && p[1] <= kMostWhole;
+        });
+    PointSamples samples(samples_, bound, options_, !frame_.empty(), whole, mesh.triangles);
+    PointRefinement& refinement = refinement_.emplace(std::move(samples), std::move(mesh));
+    insert(refinement, max_vertices, quality != TinQuality::kGreedy);
     removed_ = 0;
     if (quality == TinQuality::kGreedy) {
-      mend(greedy, bound, max_vertices);
-      inserted_ = mesh_.vertices.size() - fixed;
+      mend(refinement, max_vertices);
+      inserted_ = refinement.mesh().vertices.size() - fixed;
       return true;
     }
-    inserted_ = mesh_.vertices.size() - fixed;
-    greedy.stop_delaunay();
-    const auto remove = [&] {
-      removed_ += remove_vertices(mesh_, fixed, bound, options_.min_angle_degrees);
-    };
-    remove();
+    inserted_ = refinement.mesh().vertices.size() - fixed;
+    refinement.stop_delaunay();
+    removed_ += refinement.remove();
     if (quality == TinQuality::kFitted) {
       // The moved vertices have errors at their own samples.
       for (Sample& sample : span_of(samples_))
         if (sample.next == kIsVertex) sample.next = kUnlisted;
-      list_samples(mesh_, 1, bound);
-      fit_heights(mesh_, fixed, bound, options_.lattice);
-      remove();
+      list_samples(refinement, 1);
+      refinement.fit();
+      removed_ += refinement.remove();
     }
-    mend(greedy, bound, max_vertices);
+    mend(refinement, max_vertices);
     return true;
   }
 
   [[nodiscard]] const Measured& measured() const { return measured_; }
-  [[nodiscard]] std::size_t vertices() const { return mesh_.vertices.size() - removed_; }
+  [[nodiscard]] std::size_t vertices() { return refinement_->mesh().vertices.size() - removed_; }
 
   /// The difference between the lowest and the highest of the samples and the frame.
   [[nodiscard]] double height_range() const {
@@ -118,33 +108,20 @@ class Maker {
     result.inserted = inserted_;
     result.removed = removed_;
     // Frees the memory of the samples before allocating the result.
-    for (Vertex& vertex : span_of(mesh_.vertices))
+    for (Vertex& vertex : span_of(refinement_->mesh().vertices))
       vertex.sample = vertex.sample == kNone ? kNoSample : number(samples_[vertex.sample]);
     samples_.release();
-    mesh_.heads.release();
-    std::vector<std::uint32_t> number_of =
-        tin::triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
-    result.vertices.reserve(vertices());
+    refinement_->samples().heads().release();
     result.sample.reserve(vertices());
-    for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
-      if (number_of[v] == kNone) continue;
-      number_of[v] = static_cast<std::uint32_t>(result.vertices.size());
-      const Vertex& vertex = mesh_.vertices[v];
-      result.vertices.push_back({vertex.x, vertex.y, vertex.z});
-      result.sample.push_back(vertex.sample);
-    }
-    result.triangles.reserve(2 * vertices());
-    for (const tin::Triangle& t : mesh_.triangles)
-      if (t.live())
-        result.triangles.push_back(
-            {number_of[t.corner[0]], number_of[t.corner[1]], number_of[t.corner[2]]});
+    refinement_->publish(result);
+    refinement_.reset();
   }
 
  private:
   /// Inserts vertices. While triangles are large, a few of their samples choose the vertices as
   /// well as all would, and need not be redistributed each time. sweeps: true if vertices are
   /// removed later and therefore need not be chosen well.
-  void insert(Greedy& greedy, double bound, std::size_t max_vertices, bool sweeps) {
+  void insert(PointRefinement& refinement, std::size_t max_vertices, bool sweeps) {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 3;
     // Few enough samples for them and their triangles to stay in the cache.
@@ -152,28 +129,36 @@ class Maker {
     for (const std::uint32_t step : kSteps) {
       const std::size_t listed = samples_.size() / step;
       if (step > 1 && listed < 1024) continue;
-      if (sweeps) greedy.sweep(step);
+      if (sweeps) sweep(refinement, step);
       if (sweeps && step > 1) continue;
       const bool last = step == 1 && max_vertices == kUnlimited;
-      greedy.start(list_samples(mesh_, step, bound).waiting, last ? kTogether : samples_.size());
-      greedy.run(max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited);
+      refine(refinement, list_samples(refinement, step).waiting, last ? kTogether : samples_.size(),
+             {max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited});
     }
   }
 
   /// Measures, and inserts the very rare samples that rounding hid from the lists.
-  void mend(Greedy& greedy, double bound, std::size_t max_vertices) {
-    measured_ = measure_lists(mesh_, bound);
-    while (measured_.to_mend > 0 && mesh_.vertices.size() < max_vertices) {
-      greedy.start(measured_.waiting, samples_.size());
-      greedy.run(max_vertices, kUnlimited);
-      measured_ = measure_lists(mesh_, bound);
+  void mend(PointRefinement& refinement, std::size_t max_vertices) {
+    measured_ = measure_lists(refinement);
+    while (measured_.to_mend > 0 && refinement.mesh().vertices.size() < max_vertices) {
+      refine(refinement, measured_.waiting, samples_.size(), {.vertices = max_vertices});
+      measured_ = measure_lists(refinement);
     }
+  }
+
+  /// Starts with the triangles that have an error. `together`: see ErrorParts.
+  void refine(PointRefinement& refinement, const std::vector<std::uint32_t>& waiting,
+              std::size_t together, const tin::RefinementLimits& limits) {
+    constexpr float kLeastError = 1e-30F;
+    tin::ErrorParts queue(kLeastError, samples_.size(), together);
+    for (const std::uint32_t t : waiting) queue.push(refinement.mesh().triangles[t], t);
+    refinement.refine(queue, limits);
   }
 
   Pool<Sample>& samples_;
   std::span<const Point3> frame_;
   const PointTinOptions& options_;
-  Mesh mesh_;
+  std::optional<PointRefinement> refinement_;
   Measured measured_;
   std::size_t inserted_ = 0;
   std::size_t removed_ = 0;
@@ -209,8 +194,8 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
 
 PointTin point_tin(std::span<const double> x, std::span<const double> y, std::span<const double> z,
                    std::span<const Point3> frame, const PointTinOptions& options) {
-  check_options(options, frame);
-  Samples samples = take_samples(x, y, z, options.duplicates);
+  tin::check_point_options(options, frame);
+  SampleList samples = take_samples(x, y, z, options.duplicates);
   PointTin result;
   result.duplicates = samples.duplicates;
   result.duplicate_range = samples.duplicate_range;

@@ -2,143 +2,127 @@
 #include "samples.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
-#include "curve_sort.hpp"
+#include "tin/ground.hpp"
+#include "tin/options.hpp"
 
 namespace terrace::tri::tin::points {
-namespace {
 
-/// Spreads the bits to every other position.
-std::uint32_t spread(std::uint32_t bits) {
-  bits = (bits | bits << 8) & 0x00FF00FFu;
-  bits = (bits | bits << 4) & 0x0F0F0F0Fu;
-  bits = (bits | bits << 2) & 0x33333333u;
-  return (bits | bits << 1) & 0x55555555u;
+PointSamples::PointSamples(Pool<Sample>& all, double bound, const PointTinOptions& options,
+                           bool border_fixed, bool whole, const Triangles& triangles)
+    : all_(all),
+      bound_(bound),
+      tangent_(tangent_of(options.min_angle_degrees)),
+      lattice_(options.lattice),
+      border_fixed_(border_fixed),
+      whole_(whole) {
+  heads_.reserve(triangles.size() + 2 * std::size_t{all.size()});
+  add_lists(triangles);
 }
 
-/// A raster of 2^16 x 2^16 cells over some samples, along the Z curve.
-class Cells {
- public:
-  Cells(const double* x, const double* y, std::span<const std::uint32_t> order)
-      : x_(x), y_(y), low_{x[order[0]], y[order[0]]} {
-    std::array<double, 2> high = low_;
-    for (const std::uint32_t i : order) {
-      low_ = {std::min(low_[0], x[i]), std::min(low_[1], y[i])};
-      high = {std::max(high[0], x[i]), std::max(high[1], y[i])};
-    }
-    extent_ = std::max(high[0] - low_[0], high[1] - low_[1]);
-  }
-  [[nodiscard]] bool single() const { return !(extent_ > 0); }
-  [[nodiscard]] std::uint32_t key(std::uint32_t i) const {
-    return spread(cell(x_[i], low_[0])) | spread(cell(y_[i], low_[1])) << 1;
-  }
-
- private:
-  [[nodiscard]] std::uint32_t cell(double c, double low) const {
-    const double part = (c - low) / extent_ * 65536;
-    return part < 65535 ? static_cast<std::uint32_t>(part) : 65535;
-  }
-
-  const double* x_;
-  const double* y_;
-  std::array<double, 2> low_;
-  double extent_ = 0;
-};
-
-double merged_height(std::span<const Sample> group, PointDuplicates duplicates) {
-  double height = group[0].z;
-  if (duplicates == PointDuplicates::kMin || duplicates == PointDuplicates::kMax) {
-    for (const Sample& sample : group)
-      height = duplicates == PointDuplicates::kMin ? std::min(height, sample.z)
-                                                   : std::max(height, sample.z);
-  } else if (duplicates == PointDuplicates::kMean) {
-    // Adds differences from the first height, so that equal heights are preserved exactly.
-    double sum = 0;
-    for (const Sample& sample : group) sum += sample.z - group[0].z;
-    height += sum / static_cast<double>(group.size());
-  }
-  return height;
+void PointSamples::add_lists(const Triangles& triangles) {
+  while (heads_.size() < triangles.size()) heads_.push_back(kNone);
 }
 
-void check(std::span<const double> values, const char* name) {
-  for (std::size_t i = 0; i < values.size(); ++i)
-    if (!(std::abs(values[i]) < kLargest))
-      throw std::invalid_argument(std::string("point_tin: ") + name + " of sample " +
-                                  std::to_string(i) + " is not finite or too large");
+void PointSamples::set_error(Triangle& triangle, std::uint32_t worst, double error) const {
+  triangle.place = worst;
+  triangle.error = error > bound_ ? rounded_up(error) : 0;
 }
 
-}  // namespace
+void PointSamples::judge(PointMesh& mesh, std::uint32_t t) const {
+  Triangle& triangle = mesh.triangles[t];
+  double largest = 0;
+  std::uint32_t worst = kNone;
+  for (std::uint32_t i = heads_[t]; i != kNone; i = all_[i].next) {
+    const Sample& sample = all_[i];
+    if (stuck(sample)) continue;
+    const double error = std::abs(height_in(mesh, triangle, sample.x, sample.y) - sample.z);
+    if (error > largest) {
+      largest = error;
+      worst = i;
+    }
+  }
+  set_error(triangle, worst, largest);
+}
 
-Samples take_samples(std::span<const double> x, std::span<const double> y,
-                     std::span<const double> z, PointDuplicates duplicates) {
-  if (x.size() != y.size() || x.size() != z.size())
-    throw std::invalid_argument("point_tin: x, y and z must have equal lengths");
-  if (x.size() > std::size_t{1} << 29) throw std::length_error("point_tin: more than 2^29 samples");
-  check(x, "x");
-  check(y, "y");
-  check(z, "z");
-  Samples samples;
-  const auto count = static_cast<std::uint32_t>(x.size());
-  if (count == 0) return samples;
-  Pool<std::uint32_t> numbers;
-  numbers.resize(count);
-  const std::span<std::uint32_t> order = span_of(numbers);
-  std::iota(order.begin(), order.end(), 0u);
-  // Samples at one position become adjacent, the smaller number first.
-  sort_along_curve<32>(
-      order, [&](std::span<const std::uint32_t> part) { return Cells(x.data(), y.data(), part); },
-      1,
-      [&](std::span<std::uint32_t> run) {
-        std::sort(run.begin(), run.end(), [&](std::uint32_t a, std::uint32_t b) {
-          if (x[a] != x[b]) return x[a] < x[b];
-          if (y[a] != y[b]) return y[a] < y[b];
-          return a < b;
-        });
-      });
-  Pool<Sample>& all = samples.all;
-  all.resize(count);
-  for (std::uint32_t k = 0; k < count; ++k) {
-    const std::uint32_t i = order[k];
-    all[k] = {x[i], y[i], z[i], kUnlisted, i};
+void PointSamples::split(PointMesh& mesh, std::span<const std::uint32_t> created,
+                         std::uint32_t place, std::uint32_t t, const Spot& spot) {
+  // Rounding may have assigned the sample to another list.
+  if (!lattice_ && spot.triangle != t) move(place, t, spot.triangle);
+  const auto corner = [&](std::uint32_t number, unsigned i) -> const Vertex& {
+    return mesh.vertex(mesh.triangles[number], i);
+  };
+  fan_.start(corner(created.front(), 0), spot.border);
+  for (const std::uint32_t number : created) fan_.add_ray(corner(number, 1));
+  if (spot.border) fan_.add_ray(corner(created.back(), 2));
+  fan_.finish();
+  const std::size_t removed = created.size() - (spot.border ? 1 : 2);
+  for (const std::uint32_t number : created.first(removed))
+    fan_.deal(all_.data(), heads_[number], lattice_ ? kNone : place);
+  fan_.close();
+  add_lists(mesh.triangles);
+  for (std::size_t i = 0; i < created.size(); ++i) {
+    const Fan::Sector& sector = fan_.sectors()[i];
+    heads_[created[i]] = sector.head;
+    set_error(mesh.triangles[created[i]], sector.worst, sector.error);
   }
-  numbers.release();
-  std::uint32_t kept = 0;
-  for (std::uint32_t begin = 0; begin < count;) {
-    Sample first = all[begin];
-    std::uint32_t end = begin + 1;
-    while (end < count && all[end].x == first.x && all[end].y == first.y) ++end;
-    if (end - begin > 1 && duplicates == PointDuplicates::kError)
-      throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
-                                  " is at the position of sample " + std::to_string(first.id));
-    if (end - begin == 1) {
-      all[kept++] = first;
-      begin = end;
-      continue;
-    }
-    const std::span<Sample> group = span_of(all).subspan(begin, end - begin);
-    const auto [low, high] = std::minmax_element(
-        group.begin(), group.end(), [](const Sample& a, const Sample& b) { return a.z < b.z; });
-    const Sample lowest = *low, highest = *high;
-    samples.duplicates += group.size() - 1;
-    samples.duplicate_range = std::max(samples.duplicate_range, highest.z - lowest.z);
-    if (duplicates == PointDuplicates::kAll) {
-      // Once one of them is a vertex, the other cannot become one, because its position is taken.
-      all[kept++] = lowest;
-      if (highest.z > lowest.z) all[kept++] = highest;
-    } else {
-      first.z = merged_height(group, duplicates);
-      all[kept++] = first;
-    }
-    begin = end;
+  if (!lattice_) all_[place].next = kIsVertex;
+}
+
+void PointSamples::move(std::uint32_t index, std::uint32_t from, std::uint32_t to) {
+  std::uint32_t* link = &heads_[from];
+  while (*link != index) link = &all_[*link].next;
+  *link = all_[index].next;
+  all_[index].next = heads_[to];
+  heads_[to] = index;
+}
+
+Vertex PointSamples::take(std::uint32_t place) const {
+  const Sample& sample = all_[place];
+  if (!lattice_) return {sample.x, sample.y, sample.z, place};
+  return {to_whole(sample.x), to_whole(sample.y), tin::on_lattice(*lattice_, sample.z), place};
+}
+
+void PointSamples::narrow(std::uint32_t t, const Vertex& v, const Vertex& b, const Vertex& c,
+                          Interval& rises) const {
+  // Samples where the vertex has a smaller weight are ignored.
+  constexpr double kLeast = 1e-9;
+  for (std::uint32_t i = heads_[t]; i != kNone; i = all_[i].next) {
+    const Sample& sample = all_[i];
+    const auto part = [&](const Vertex& p, const Vertex& q) {
+      const double area = (p.x - sample.x) * (q.y - sample.y) - (p.y - sample.y) * (q.x - sample.x);
+      return area > 0 ? area : 0;
+    };
+    const double at_v = part(b, c);
+    const double at_b = part(c, v);
+    const double at_c = part(v, b);
+    const double sum = at_v + at_b + at_c;
+    if (!(at_v > kLeast * sum)) continue;
+    // Heights are relative to the vertex's current one.
+    const double others = (at_b * (b.z - v.z) + at_c * (c.z - v.z)) / sum;
+    const double wanted = sample.z - v.z - others;
+    rises.low = std::max(rises.low, (wanted - bound_) * sum / at_v);
+    rises.high = std::min(rises.high, (wanted + bound_) * sum / at_v);
   }
-  all.resize(kept);
-  return samples;
+}
+
+bool PointSamples::raise(Vertex& v, const Interval& rises) const {
+  // If no height satisfies all samples the vertex stays, because a compromise would break the
+  // bound.
+  if (!(rises.low < rises.high && rises.high - rises.low < HUGE_VAL)) return false;
+  v.z += rises.low / 2 + rises.high / 2;
+  if (lattice_) v.z = tin::on_lattice(*lattice_, v.z);
+  return true;
+}
+
+bool PointSamples::within(const PointMesh& mesh, std::uint32_t t, const Vertex&, const Vertex&,
+                          const Vertex&) const {
+  const Triangle& triangle = mesh.triangles[t];
+  for (std::uint32_t i = heads_[t]; i != kNone; i = all_[i].next)
+    if (!(std::abs(height_in(mesh, triangle, all_[i].x, all_[i].y) - all_[i].z) <= bound_))
+      return false;
+  return true;
 }
 
 }  // namespace terrace::tri::tin::points

@@ -2,20 +2,84 @@
 #include "start.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "curve_sort.hpp"
 #include "terrace/tri/delaunay2.hpp"
+#include "tin/options.hpp"
 
 namespace terrace::tri::tin::points {
 namespace {
 
+/// Spreads the bits to every other position.
+std::uint32_t spread(std::uint32_t bits) {
+  bits = (bits | bits << 8) & 0x00FF00FFu;
+  bits = (bits | bits << 4) & 0x0F0F0F0Fu;
+  bits = (bits | bits << 2) & 0x33333333u;
+  return (bits | bits << 1) & 0x55555555u;
+}
+
+/// A raster of 2^16 x 2^16 cells over some samples, along the Z curve.
+class Cells {
+ public:
+  Cells(const double* x, const double* y, std::span<const std::uint32_t> order)
+      : x_(x), y_(y), low_{x[order[0]], y[order[0]]} {
+    std::array<double, 2> high = low_;
+    for (const std::uint32_t i : order) {
+      low_ = {std::min(low_[0], x[i]), std::min(low_[1], y[i])};
+      high = {std::max(high[0], x[i]), std::max(high[1], y[i])};
+    }
+    extent_ = std::max(high[0] - low_[0], high[1] - low_[1]);
+  }
+  [[nodiscard]] bool single() const { return !(extent_ > 0); }
+  [[nodiscard]] std::uint32_t key(std::uint32_t i) const {
+    return spread(cell(x_[i], low_[0])) | spread(cell(y_[i], low_[1])) << 1;
+  }
+
+ private:
+  [[nodiscard]] std::uint32_t cell(double c, double low) const {
+    const double part = (c - low) / extent_ * 65536;
+    return part < 65535 ? static_cast<std::uint32_t>(part) : 65535;
+  }
+
+  const double* x_;
+  const double* y_;
+  std::array<double, 2> low_;
+  double extent_ = 0;
+};
+
+double merged_height(std::span<const Sample> group, PointDuplicates duplicates) {
+  double height = group[0].z;
+  if (duplicates == PointDuplicates::kMin || duplicates == PointDuplicates::kMax) {
+    for (const Sample& sample : group)
+      height = duplicates == PointDuplicates::kMin ? std::min(height, sample.z)
+                                                   : std::max(height, sample.z);
+  } else if (duplicates == PointDuplicates::kMean) {
+    // Adds differences from the first height, so that equal heights are preserved exactly.
+    double sum = 0;
+    for (const Sample& sample : group) sum += sample.z - group[0].z;
+    height += sum / static_cast<double>(group.size());
+  }
+  return height;
+}
+
+void check(std::span<const double> values, const char* name) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!(std::abs(values[i]) < kLargest))
+      throw std::invalid_argument(std::string("point_tin: ") + name + " of sample " +
+                                  std::to_string(i) + " is not finite or too large");
+}
+
 /// Triangulates the vertices present.
-void triangulate(Mesh& mesh) {
+void triangulate(PointMesh& mesh) {
   std::vector<Place2> points;
-  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) points.push_back(mesh.place(v));
+  for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v)
+    points.push_back(place(mesh.vertices[v]));
   Delaunay2<double> delaunay;
   const std::vector<VertexId> ids = delaunay.build(points);
   std::vector<std::uint32_t> vertex_of(delaunay.vertex_slots(), kNone);
@@ -32,7 +96,6 @@ void triangulate(Mesh& mesh) {
       made.next[i] = neighbours[i] == kNoTriangle ? kNone : triangle_of[slot(neighbours[i])];
     }
     mesh.triangles.push_back(made);
-    mesh.heads.push_back(kNone);
   }
 }
 
@@ -63,8 +126,75 @@ std::vector<std::uint32_t> hull_of(const std::vector<std::uint32_t>& sorted, Pla
 
 }  // namespace
 
-void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
+SampleList take_samples(std::span<const double> x, std::span<const double> y,
+                        std::span<const double> z, PointDuplicates duplicates) {
+  if (x.size() != y.size() || x.size() != z.size())
+    throw std::invalid_argument("point_tin: x, y and z must have equal lengths");
+  if (x.size() > std::size_t{1} << 29) throw std::length_error("point_tin: more than 2^29 samples");
+  check(x, "x");
+  check(y, "y");
+  check(z, "z");
+  SampleList samples;
+  const auto count = static_cast<std::uint32_t>(x.size());
+  if (count == 0) return samples;
+  Pool<std::uint32_t> numbers;
+  numbers.resize(count);
+  const std::span<std::uint32_t> order = span_of(numbers);
+  std::iota(order.begin(), order.end(), 0u);
+  // Samples at one position become adjacent, the smaller number first.
+  sort_along_curve<32>(
+      order, [&](std::span<const std::uint32_t> part) { return Cells(x.data(), y.data(), part); },
+      1,
+      [&](std::span<std::uint32_t> run) {
+        std::sort(run.begin(), run.end(), [&](std::uint32_t a, std::uint32_t b) {
+          if (x[a] != x[b]) return x[a] < x[b];
+          if (y[a] != y[b]) return y[a] < y[b];
+          return a < b;
+        });
+      });
+  Pool<Sample>& all = samples.all;
+  all.resize(count);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    const std::uint32_t i = order[k];
+    all[k] = {x[i], y[i], z[i], kUnlisted, i};
+  }
+  numbers.release();
+  std::uint32_t kept = 0;
+  for (std::uint32_t begin = 0; begin < count;) {
+    Sample first = all[begin];
+    std::uint32_t end = begin + 1;
+    while (end < count && all[end].x == first.x && all[end].y == first.y) ++end;
+    if (end - begin > 1 && duplicates == PointDuplicates::kError)
+      throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
+                                  " is at the position of sample " + std::to_string(first.id));
+    if (end - begin == 1) {
+      all[kept++] = first;
+      begin = end;
+      continue;
+    }
+    const std::span<Sample> group = span_of(all).subspan(begin, end - begin);
+    const auto [low, high] = std::minmax_element(
+        group.begin(), group.end(), [](const Sample& a, const Sample& b) { return a.z < b.z; });
+    const Sample lowest = *low, highest = *high;
+    samples.duplicates += group.size() - 1;
+    samples.duplicate_range = std::max(samples.duplicate_range, highest.z - lowest.z);
+    if (duplicates == PointDuplicates::kAll) {
+      // Once one of them is a vertex, the other cannot become one, because its position is taken.
+      all[kept++] = lowest;
+      if (highest.z > lowest.z) all[kept++] = highest;
+    } else {
+      first.z = merged_height(group, duplicates);
+      all[kept++] = first;
+    }
+    begin = end;
+  }
+  all.resize(kept);
+  return samples;
+}
+
+PointMesh start_with_frame(std::span<const Point3> frame) {
   if (frame.size() < 3) throw std::invalid_argument("point_tin: a frame needs at least 3 vertices");
+  PointMesh mesh;
   for (std::size_t i = 0; i < frame.size(); ++i) {
     for (const double c : frame[i])
       if (!(std::abs(c) < kLargest)) refuse_frame(i, "is not finite or too large");
@@ -76,9 +206,9 @@ void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
   std::size_t turns = 0;
   bool bends = false;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Place2 before = mesh.place(i == 0 ? count - 1 : i - 1);
-    const Place2 here = mesh.place(i);
-    const Place2 after = mesh.place(i + 1 == count ? 0 : i + 1);
+    const Place2 before = place(mesh.vertices[i == 0 ? count - 1 : i - 1]);
+    const Place2 here = place(mesh.vertices[i]);
+    const Place2 after = place(mesh.vertices[i + 1 == count ? 0 : i + 1]);
     if (here == after) refuse_frame(i, "coincides with the next");
     const int side = Kernel::orientation(before, here, after);
     const bool turns_back =
@@ -91,15 +221,16 @@ void start_with_frame(Mesh& mesh, std::span<const Point3> frame) {
   if (!bends || turns != 2)
     throw std::invalid_argument("point_tin: the frame goes around more than once");
   triangulate(mesh);
+  return mesh;
 }
 
-void start_with_hull(Mesh& mesh) {
-  Pool<Sample>& samples = *mesh.samples;
+PointMesh start_with_hull(Pool<Sample>& samples) {
+  PointMesh mesh;
   const std::uint32_t count = samples.size();
-  if (count < 3) return;
-  const auto place = [&](std::uint32_t i) { return Place2{samples[i].x, samples[i].y}; };
+  if (count < 3) return mesh;
+  const auto at = [&](std::uint32_t i) { return place(samples[i]); };
   const auto less = [&](std::uint32_t a, std::uint32_t b) {
-    return lexicographically_less(place(a), place(b));
+    return lexicographically_less(at(a), at(b));
   };
   // The extremes in 16 directions form a polygon; points strictly inside it are not corners.
   constexpr std::array<Place2, 8> kDirections{
@@ -123,7 +254,7 @@ void start_with_hull(Mesh& mesh) {
   std::vector<std::uint32_t> candidates(extreme.begin(), extreme.end());
   std::sort(candidates.begin(), candidates.end(), less);
   candidates.erase(std::unique(candidates.begin(), candidates.end()), candidates.end());
-  const std::vector<std::uint32_t> inner = hull_of(candidates, place);
+  const std::vector<std::uint32_t> inner = hull_of(candidates, at);
   candidates.clear();
   // Most points are recognised at once as between four of the extremes, one in each quadrant around
   // them.
@@ -139,18 +270,18 @@ void start_with_hull(Mesh& mesh) {
       continue;
     bool inside = inner.size() >= 3;
     for (std::size_t k = 0; k < inner.size() && inside; ++k)
-      inside =
-          Kernel::orientation(place(inner[k]), place(inner[(k + 1) % inner.size()]), place(i)) > 0;
+      inside = Kernel::orientation(at(inner[k]), at(inner[(k + 1) % inner.size()]), at(i)) > 0;
     if (!inside) candidates.push_back(i);
   }
   std::sort(candidates.begin(), candidates.end(), less);
-  const std::vector<std::uint32_t> hull = hull_of(candidates, place);
-  if (hull.size() < 3) return;
+  const std::vector<std::uint32_t> hull = hull_of(candidates, at);
+  if (hull.size() < 3) return mesh;
   for (const std::uint32_t i : hull) {
     mesh.vertices.push_back({samples[i].x, samples[i].y, samples[i].z, i});
     samples[i].next = kIsVertex;
   }
   triangulate(mesh);
+  return mesh;
 }
 
 }  // namespace terrace::tri::tin::points

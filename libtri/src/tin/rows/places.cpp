@@ -8,7 +8,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "tin/point/samples.hpp"
+#include <terrace/base/box.hpp>
+
+#include "tin/options.hpp"
 
 namespace terrace::tri::tin::rows {
 namespace {
@@ -20,22 +22,11 @@ constexpr double kRegular = 1e-3;
 /// Maximum distance of samples from a lattice, in spacings; larger ones would make scans slow.
 constexpr double kFarthestOff = 4.0;
 
-struct Region {
-  std::array<double, 2> low, high;
-
-  explicit Region(std::span<const Point3> frame)
-      : low{frame[0][0], frame[0][1]}, high{frame[0][0], frame[0][1]} {
-    for (const Point3& p : frame) {
-      for (std::size_t k = 0; k < 2; ++k) {
-        low[k] = std::min(low[k], p[k]);
-        high[k] = std::max(high[k], p[k]);
-      }
-    }
-  }
-  [[nodiscard]] bool contains(double x, double y) const {
-    return x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1];
-  }
-};
+base::Box2 region_of(std::span<const Point3> frame) {
+  base::Box2 region;
+  for (const Point3& p : frame) region.include(base::Point2{p[0], p[1]});
+  return region;
+}
 
 /// True if the places ascend at approximately equal spacing.
 bool regular(std::span<const double> places) {
@@ -80,7 +71,7 @@ std::vector<double> padded_rows(std::span<const double> from, std::size_t column
 
 /// Copies the heights of samples inside the frame. `place_of(row, column)` returns x and y.
 template <class PlaceOf>
-void copy_heights(std::span<const double> from, std::size_t columns, const Region& region,
+void copy_heights(std::span<const double> from, std::size_t columns, const base::Box2& region,
                   const PlaceOf& place_of, PaddedSamples& out) {
   const std::size_t stride = out.layout.stride;
   out.z = padded_rows(from, columns, stride);
@@ -88,13 +79,12 @@ void copy_heights(std::span<const double> from, std::size_t columns, const Regio
     double* const to = out.z.data() + row * stride;
     for (std::size_t column = 0; column < columns; ++column) {
       if (std::isnan(to[column])) continue;
-      if (!(std::abs(to[column]) < points::kLargest))
+      if (!(std::abs(to[column]) < kLargest))
         throw std::invalid_argument("point_tin: z of sample " +
                                     std::to_string(row * columns + column) +
                                     " is not finite or too large");
       ++out.known;
-      const auto [x, y] = place_of(row, column);
-      if (!region.contains(x, y)) to[column] = kMissing;
+      if (!region.contains(place_of(row, column))) to[column] = kMissing;
     }
   }
 }
@@ -166,15 +156,12 @@ double off_lattice(const SampleGrid& samples, const RowSamples& layout) {
 
 bool is_rectangle(std::span<const Point3> frame) {
   if (frame.size() < 4) return false;
-  std::array<double, 2> low{kFarthest, kFarthest}, high{0.0, 0.0};
   for (const Point3& p : frame) {
-    if (!(std::abs(p[2]) < points::kLargest)) return false;
-    for (std::size_t k = 0; k < 2; ++k) {
+    if (!(std::abs(p[2]) < kLargest)) return false;
+    for (std::size_t k = 0; k < 2; ++k)
       if (!(p[k] >= 0.0 && p[k] < kFarthest && p[k] == std::floor(p[k]))) return false;
-      low[k] = std::min(low[k], p[k]);
-      high[k] = std::max(high[k], p[k]);
-    }
   }
+  const auto [low, high] = region_of(frame);
   const double width = high[0] - low[0], height = high[1] - low[1];
   if (!(width > 0.0 && height > 0.0)) return false;
   // Distances along the sides, from the south-west corner.
@@ -221,7 +208,7 @@ std::optional<PaddedSamples> padded_samples(const SampleRows& samples,
   layout.row_0 = -samples.y[0] * layout.row_y;
   layout.off = kRegular;
   copy_heights(
-      samples.z, columns, Region(frame),
+      samples.z, columns, region_of(frame),
       [&](std::size_t row, std::size_t column) {
         return std::array<double, 2>{samples.x[column], samples.y[row]};
       },
@@ -246,7 +233,7 @@ std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
   layout.off = off_lattice(samples, layout) + 1e-6;
   if (!(layout.off <= kFarthestOff)) return std::nullopt;
   copy_heights(
-      samples.z, columns, Region(frame),
+      samples.z, columns, region_of(frame),
       [&](std::size_t row, std::size_t column) {
         const std::size_t i = row * columns + column;
         return std::array<double, 2>{samples.x[i], samples.y[i]};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "star.hpp"
+#include "hole.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -17,9 +17,11 @@ constexpr double kNever = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-void StarSamples::gather(const Mesh& mesh, const Star& star, const Vertex& centre,
-                         std::uint32_t extra) {
-  const Pool<Sample>& samples = *mesh.samples;
+bool PointHole::gather(const PointMesh& mesh, const Star& star, std::uint32_t v) {
+  mesh_ = &mesh;
+  star_ = &star;
+  const Pool<Sample>& samples = all_.all();
+  const Vertex& centre = mesh.vertices[v];
   ring_.clear();
   x_.clear();
   y_.clear();
@@ -36,25 +38,38 @@ void StarSamples::gather(const Mesh& mesh, const Star& star, const Vertex& centr
   for (std::size_t k = 0; k < star.size(); ++k) {
     const Vertex& corner = mesh.vertices[star.ring(k)];
     ring_.push_back({corner.x - centre.x, corner.y - centre.y, corner.z - centre.z, kNone});
-    for (std::uint32_t i = mesh.heads[star.triangle(k)]; i != kNone; i = samples[i].next) add(i);
+    for (std::uint32_t i = all_.heads()[star.triangle(k)]; i != kNone; i = samples[i].next) add(i);
   }
-  if (extra != kNone) add(extra);
+  // A sample that has become a vertex is in no list.
+  if (centre.sample != kNone && samples[centre.sample].next == kIsVertex) add(centre.sample);
   beyond_ = index_.size();
   own_ = std::min(own_, beyond_);
   known_.fill(0);
   words_ = (index_.size() + 63) / 64;
   if (sides_.size() < 2 * words_ * kMaxRing * kMaxRing)
     sides_.resize(2 * words_ * kMaxRing * kMaxRing);
+  return !out_of_reach(own_);
 }
 
-double StarSamples::cross_at(std::size_t i, std::size_t j, std::size_t sample) const {
+bool PointHole::fill_otherwise(PolygonFill& fill) {
+  return !out_of_reach(beyond_) &&
+         fill_least_worst(
+             ring_.size(), all_.bound(),
+             [&](std::size_t i, std::size_t m, std::size_t j, double limit) {
+               return left(i, m, j) && wide(i, m, j) ? worst(i, m, j, limit) : kNever;
+             },
+             fill);
+}
+
+double PointHole::cross_at(std::size_t i, std::size_t j, std::size_t sample) const {
   const Vertex& a = ring_[i];
   const Vertex& b = ring_[j];
   return (b.x - a.x) * (y_[sample] - a.y) - (b.y - a.y) * (x_[sample] - a.x);
 }
 
-bool StarSamples::out_of_reach(std::size_t sample, double bound) const {
+bool PointHole::out_of_reach(std::size_t sample) const {
   if (sample == index_.size()) return false;
+  const double bound = all_.bound();
   const std::size_t size = ring_.size();
   // A triangle does not extend above or below its corners.
   const auto [low, high] = std::minmax_element(
@@ -89,7 +104,7 @@ bool StarSamples::out_of_reach(std::size_t sample, double bound) const {
   return true;
 }
 
-StarSamples::Sides StarSamples::sides(std::size_t i, std::size_t j) {
+PointHole::Sides PointHole::sides(std::size_t i, std::size_t j) {
   std::uint64_t* const left = sides_.data() + 2 * words_ * (i * kMaxRing + j);
   std::uint64_t* const right = left + words_;
   if ((known_[i] >> j & 1U) != 0) return {left, right};
@@ -127,12 +142,12 @@ StarSamples::Sides StarSamples::sides(std::size_t i, std::size_t j) {
   return {left, right};
 }
 
-double StarSamples::error_at(const Plane& plane, const Vertex& a, std::size_t sample) const {
+double PointHole::error_at(const Plane& plane, const Vertex& a, std::size_t sample) const {
   const double height = a.z + (plane.gx * (x_[sample] - a.x) + plane.gy * (y_[sample] - a.y));
   return std::abs(height - z_[sample]);
 }
 
-double StarSamples::worst(std::size_t i, std::size_t m, std::size_t j, double limit) {
+double PointHole::worst(std::size_t i, std::size_t m, std::size_t j, double limit) {
   const Vertex& a = ring_[i];
   const Plane plane = plane_of(a, ring_[m], ring_[j]);
   if (!plane.sound) return kNever;
@@ -156,7 +171,7 @@ double StarSamples::worst(std::size_t i, std::size_t m, std::size_t j, double li
   return largest;
 }
 
-bool StarSamples::wide(std::size_t i, std::size_t m, std::size_t j, double tangent) const {
+bool PointHole::wide(std::size_t i, std::size_t m, std::size_t j) const {
   const std::array<std::size_t, 3> corner{i, m, j};
   for (std::size_t k = 0; k < 3; ++k) {
     const Vertex& p = ring_[corner[k]];
@@ -164,29 +179,30 @@ bool StarSamples::wide(std::size_t i, std::size_t m, std::size_t j, double tange
     const Vertex& b = ring_[corner[(k + 2) % 3]];
     const double cross = (a.x - p.x) * (b.y - p.y) - (a.y - p.y) * (b.x - p.x);
     const double dot = (a.x - p.x) * (b.x - p.x) + (a.y - p.y) * (b.y - p.y);
-    if (cross < tangent * dot) return false;
+    if (cross < all_.tangent() * dot) return false;
   }
   return true;
 }
 
-void StarSamples::list(Mesh& mesh, const Star& star, const PolygonFill& fill) {
+void PointHole::replaced(const PointMesh&, const Star& star, const PolygonFill& fill) {
   const std::size_t count = index_.size();
   rest_.assign(words_, ~std::uint64_t{0});
   if (count % 64 != 0) rest_.back() >>= 64 - count % 64;
-  for (std::size_t k = 0; k < star.size(); ++k) mesh.heads[star.triangle(k)] = kNone;
+  Pool<Sample>& samples = all_.all();
+  for (std::size_t k = 0; k < star.size(); ++k) all_.heads()[star.triangle(k)] = kNone;
   // Slots are reused in the order in which triangles are visited.
   std::size_t k = 0;
   star.all_of(fill, [&](std::size_t i, std::size_t m, std::size_t j) {
     const std::uint64_t* const first = sides(i, m).left;
     const std::uint64_t* const second = sides(m, j).left;
     const std::uint64_t* const chord = sides(i, j).right;
-    std::uint32_t& head = mesh.heads[star.triangle(k++)];
+    std::uint32_t& head = all_.heads()[star.triangle(k++)];
     for (std::size_t w = 0; w < rest_.size(); ++w) {
       const std::uint64_t inside = rest_[w] & first[w] & second[w] & chord[w];
       rest_[w] &= ~inside;
       for (std::uint64_t bits = inside; bits != 0; bits &= bits - 1) {
         const std::uint32_t s = index_[w * 64 + static_cast<std::size_t>(std::countr_zero(bits))];
-        (*mesh.samples)[s].next = head;
+        samples[s].next = head;
         head = s;
       }
     }
@@ -194,12 +210,11 @@ void StarSamples::list(Mesh& mesh, const Star& star, const PolygonFill& fill) {
   });
   for (std::size_t w = 0; w < rest_.size(); ++w)
     for (std::uint64_t bits = rest_[w]; bits != 0; bits &= bits - 1)
-      list_rest(mesh, star, fill, w * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+      list_rest(star, fill, w * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
 // Samples that rounding places in no triangle go to the triangle that they are least outside of.
-void StarSamples::list_rest(Mesh& mesh, const Star& star, const PolygonFill& fill,
-                            std::size_t sample) const {
+void PointHole::list_rest(const Star& star, const PolygonFill& fill, std::size_t sample) {
   double best = -kNever;
   std::uint32_t slot = star.triangle(0);
   std::size_t k = 0;
@@ -213,8 +228,8 @@ void StarSamples::list_rest(Mesh& mesh, const Star& star, const PolygonFill& fil
     ++k;
     return true;
   });
-  (*mesh.samples)[index_[sample]].next = mesh.heads[slot];
-  mesh.heads[slot] = index_[sample];
+  all_.all()[index_[sample]].next = all_.heads()[slot];
+  all_.heads()[slot] = index_[sample];
 }
 
 }  // namespace terrace::tri::tin::points

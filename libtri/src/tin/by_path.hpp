@@ -1,22 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <span>
+
 #include <terrace/base/simd.hpp>
 
 #include "terrace/tri/grid_tin.hpp"
-#include "tin/scan.hpp"
+#include "terrace/tri/point_tin.hpp"
+
+/// Public functions with a given instruction set, for tests that compare them.
 
 namespace terrace::tri::tin {
 
-/// grid_tin() with a given instruction set. For tests.
+/// grid_tin(). T: float or double.
 template <class T>
 GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
                       const GridTinOptions& options, base::SimdPath set);
 
-/// check_grid_tin() with a given instruction set. For tests.
+/// check_grid_tin(). T: float or double.
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,
                                double tolerance, base::SimdPath set);
 
+namespace rows {
+
+/// point_tin() for SampleRows or SampleGrid.
+template <class Samples>
+PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
+                  const PointTinOptions& options, base::SimdPath set);
+
+}  // namespace rows
 }  // namespace terrace::tri::tin
