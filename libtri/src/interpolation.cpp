@@ -11,7 +11,7 @@
 #include <terrace/base/portable_math.hpp>
 
 #include "delaunay2/access.hpp"
-#include "delaunay2/hilbert.hpp"
+#include "hilbert.hpp"
 #include "interpolation/check_heights.hpp"
 #include "interpolation/sampler.hpp"
 
@@ -41,7 +41,7 @@ void answer_all(const Mesh& mesh, std::span<const Point2> queries, std::vector<R
   if (mesh.vertex_count == 0) return;
   for (std::size_t done = 0; done < queries.size(); done += kSorted) {
     const auto part = queries.subspan(done, std::min(kSorted, queries.size() - done));
-    const auto order = planar::hilbert_order<double>(part);
+    const auto order = hilbert_order<Point2>(part);
     base::parallel_blocks(
         part.size(), kBlock, threads, [&] { return std::make_unique<Sampler>(mesh); },
         [&](std::size_t begin, std::size_t end, std::unique_ptr<Sampler>& sampler) {

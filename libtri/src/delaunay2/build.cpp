@@ -26,7 +26,7 @@ template <class Kernel>
 std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
                                       std::span<const typename Kernel::Point> points,
                                       std::uint32_t begin) {
-  Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
+  Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points);
   const auto count = static_cast<std::uint32_t>(points.size());
   mesh.point.reserve(begin + count);
   mesh.incident.reserve(begin + count);

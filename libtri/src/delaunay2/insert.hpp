@@ -67,7 +67,7 @@ void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> p
   if constexpr (std::is_integral_v<typename Kernel::Coord>) {
     if (find_lattice(mesh, points, hint)) return insert_on_lattice(mesh, points, hint, done);
   }
-  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
+  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points);
   const auto insert = [&](std::uint32_t i) {
     const Inserted inserted = insert_point(mesh, points[i], hint);
     hint = inserted.vertex;

@@ -27,7 +27,7 @@ template <class Kernel>
 std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
                                       std::span<const typename Kernel::Point> points,
                                       std::uint32_t begin, unsigned threads) {
-  Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points, threads);
+  Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points, threads);
   const auto count = static_cast<std::uint32_t>(points.size());
   mesh.vertex.reserve(begin + count);
   mesh.vertex.resize(begin + count);

@@ -38,7 +38,7 @@ void leave_flat(Mesh<Kernel>& mesh, std::uint32_t apex) {
   std::vector<typename Kernel::Point> points;
   points.reserve(waiting.size());
   for (const std::uint32_t v : waiting) points.push_back(mesh.vertex[v].point);
-  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
+  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points);
   std::uint32_t hint = apex;
   visit_coarse_first(order.size(), [&](std::uint32_t k) {
     const std::uint32_t v = waiting[order[k]];

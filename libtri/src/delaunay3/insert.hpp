@@ -47,7 +47,7 @@ void visit_coarse_first(std::uint32_t count, Visit visit) {
 template <class Kernel, class Done>
 void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points,
                    std::uint32_t hint, Done done) {
-  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
+  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points);
   visit_coarse_first(order.size(), [&](std::uint32_t k) {
     const Inserted inserted = insert_point(mesh, points[order[k]], hint);
     hint = inserted.vertex;

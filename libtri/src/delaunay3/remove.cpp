@@ -148,7 +148,7 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
   std::vector<typename Kernel::Point> points;
   points.reserve(vertices.size());
   for (const std::uint32_t v : vertices) points.push_back(mesh.vertex[v].point);
-  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Coord>(points);
+  const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points);
   std::vector<std::uint32_t> part;
   for (std::uint32_t begin = 0; begin < order.size();) {
     part.clear();
