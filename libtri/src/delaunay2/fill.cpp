@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fill.hpp"
-
 #include <cmath>
 
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
+#include "remove.hpp"
 
 namespace terrace::tri::planar {
 namespace {

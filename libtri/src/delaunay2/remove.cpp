@@ -5,7 +5,6 @@
 
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
-#include "fill.hpp"
 #include "flat.hpp"
 #include "int_kernel.hpp"
 

@@ -11,7 +11,6 @@
 
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
-#include "fill.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
 #include "remove.hpp"

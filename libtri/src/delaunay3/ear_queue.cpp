@@ -10,8 +10,6 @@
 // vertices. Such a tetrahedron belongs to the result whenever it is made, so the result is exact,
 // ties included. An ear that fails will always fail and is dropped. If no ear is left before the
 // hole is full (possible with ties and at the hull), the rest is wrapped.
-#include "ear_queue.hpp"
-
 #include <algorithm>
 #include <limits>
 
@@ -20,6 +18,7 @@
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
 #include "predicates.hpp"
+#include "remove.hpp"
 
 namespace terrace::tri::spatial {
 namespace {

@@ -7,7 +7,6 @@
 
 #include "delaunay3/wrap/wrap.hpp"
 #include "double_kernel.hpp"
-#include "ear_queue.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
