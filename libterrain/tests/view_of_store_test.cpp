@@ -350,7 +350,8 @@ TEST_F(ViewOfStore, WindowsHaveAllTrianglesOfItsPoints) {
       for (const tri::TriangleId t : whole.all_triangles()) {
         triangles.insert(corners(whole, heights, t));
       }
-      PointWindow window(pair.view, level, 0);
+      PointCloud cloud(pair.view, level);
+      PointWindow window(cloud);
       std::set<Triangle> found;
       constexpr int kSide = 3;
       const stream::Box3& all = pair.view.bounds();

@@ -14,12 +14,16 @@
 #include <string>
 #include <vector>
 
+#include <gtest/gtest.h>
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
+#include <terrace/tri/interpolation.hpp>
 
 #include "random.hpp"
+#include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
+#include "surface/surface_corner.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -105,8 +109,8 @@ inline Points points_of(const std::string& kind) {
   return points;
 }
 
-inline std::filesystem::path cloud_store(const std::filesystem::path& folder,
-                                         const Points& points) {
+inline std::filesystem::path cloud_store(const std::filesystem::path& folder, const Points& points,
+                                         std::uint64_t block_points = 100) {
   std::filesystem::create_directories(folder);
   std::ofstream out(folder / "cloud.xyz");
   out.precision(17);
@@ -115,7 +119,7 @@ inline std::filesystem::path cloud_store(const std::filesystem::path& folder,
   terrain::BuildRequest request;
   request.inputs = {(folder / "cloud.xyz").string()};
   request.store = folder / "cloud.store";
-  request.block_points = 100;
+  request.block_points = block_points;
   request.facility_cost = 1.0;
   terrain::build_store(request);
   return request.store;
@@ -153,6 +157,28 @@ inline std::filesystem::path raster_store(const std::filesystem::path& folder) {
   return request.store;
 }
 
+/// True if no line separates them; computed in long double.
+inline bool meets(const Triangle& t, const terrain::StoredBox& box) {
+  using Number = long double;
+  const std::array<Point2, 4> corner{Point2{box.min[0], box.min[1]}, Point2{box.max[0], box.min[1]},
+                                     Point2{box.max[0], box.max[1]},
+                                     Point2{box.min[0], box.max[1]}};
+  for (std::size_t k = 0; k < 2; ++k) {
+    if (std::max({t[0][k], t[1][k], t[2][k]}) < box.min[k]) return false;
+    if (std::min({t[0][k], t[1][k], t[2][k]}) > box.max[k]) return false;
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Point2 &a = t[i], &b = t[(i + 1) % 3];
+    if (std::all_of(corner.begin(), corner.end(), [&](const Point2& p) {
+          return (Number{b[0]} - a[0]) * (Number{p[1]} - a[1]) <
+                 (Number{b[1]} - a[1]) * (Number{p[0]} - a[0]);
+        })) {
+      return false;
+    }
+  }
+  return true;
+}
+
 /// All points of a level and above in one triangulation.
 struct Whole {
   tri::Delaunay2<double> triangulation;
@@ -176,6 +202,51 @@ struct Whole {
     }
   }
 
+  [[nodiscard]] terrain::SurfaceCorner corner(tri::VertexId v) const {
+    return {triangulation.point(v), heights[tri::slot(v)]};
+  }
+  [[nodiscard]] terrain::SurfaceTriangle corners(tri::TriangleId t) const {
+    const auto v = triangulation.vertices(t);
+    return {corner(v[0]), corner(v[1]), corner(v[2])};
+  }
+  /// The linear surface, see terrain::PointSurface::linear().
+  [[nodiscard]] terrain::SurfacePoint at(const Point2& place,
+                                         const terrain::TooLong& too_long = {}) const {
+    const auto on_segment = [&](tri::VertexId v, tri::VertexId w,
+                                std::vector<terrain::SurfaceTriangle> sides) {
+      const terrain::SurfaceCorner a = corner(v), b = corner(w);
+      if (too_long && too_long(a.place, b.place)) return terrain::SurfacePoint{};
+      return terrain::where_triangles_meet(place, terrain::on_edge(a, b, place), sides, too_long);
+    };
+    const tri::Location found = triangulation.locate(place);
+    if (found.place == tri::Place::kVertex) {
+      std::vector<terrain::SurfaceTriangle> round;
+      for (const tri::TriangleId t : triangulation.all_triangles()) {
+        const auto v = triangulation.vertices(t);
+        if (std::find(v.begin(), v.end(), found.vertex) != v.end()) round.push_back(corners(t));
+      }
+      return terrain::where_triangles_meet(place, corner(found.vertex).height, round, too_long);
+    }
+    if (found.place == tri::Place::kEdge) {
+      const auto v = triangulation.vertices(found.triangle);
+      std::vector<terrain::SurfaceTriangle> sides{corners(found.triangle)};
+      const tri::TriangleId other = triangulation.neighbours(found.triangle)[found.edge];
+      if (other != tri::kNoTriangle) sides.push_back(corners(other));
+      return on_segment(v[(found.edge + 1) % 3], v[(found.edge + 2) % 3], sides);
+    }
+    if (found.place == tri::Place::kInside) {
+      const terrain::SurfaceTriangle t = corners(found.triangle);
+      return terrain::is_surface(t, too_long) ? terrain::on_plane(t, place)
+                                              : terrain::SurfacePoint{};
+    }
+    if (triangulation.triangle_count() > 0) return {};
+    // All points are collinear.
+    std::vector<tri::VertexWeight> weights;
+    tri::weights_at(triangulation, place, tri::Interpolation::kLinear, weights);
+    return weights.size() == 2 ? on_segment(weights[0].vertex, weights[1].vertex, {})
+                               : terrain::SurfacePoint{};
+  }
+
   static void add_triangle(const tri::Delaunay2<double>& of, const std::vector<double>& heights,
                            tri::TriangleId t, std::map<Triangle, std::array<double, 3>>& to) {
     const auto v = of.vertices(t);
@@ -189,5 +260,26 @@ struct Whole {
     to[corners] = {height[corners[0]], height[corners[1]], height[corners[2]]};
   }
 };
+
+/// Checks that the certain triangles of a window are those of the whole, and that all that meet the
+/// box are among them.
+inline void check_window(const Whole& whole, const terrain::PointWindow& window,
+                         const terrain::StoredBox& box) {
+  std::map<Triangle, std::array<double, 3>> certain;
+  for (const tri::TriangleId t : window.triangulation().all_triangles()) {
+    if (!window.is_certain(t)) continue;
+    Whole::add_triangle(window.triangulation(), window.heights(), t, certain);
+  }
+  for (const auto& [corners, heights] : certain) {
+    const auto found = whole.triangles.find(corners);
+    ASSERT_TRUE(found != whole.triangles.end());
+    ASSERT_EQ(heights, found->second);
+  }
+  for (const auto& [corners, heights] : whole.triangles) {
+    if (meets(corners, box)) {
+      ASSERT_TRUE(certain.contains(corners));
+    }
+  }
+}
 
 }  // namespace terrace::tests

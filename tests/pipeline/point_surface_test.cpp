@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,9 +24,8 @@ namespace terrace {
 namespace {
 
 using terrain::Point2;
-using terrain::PointHull;
+using terrain::PointCloud;
 using terrain::PointSurface;
-using terrain::PointWindow;
 using terrain::StoredBox;
 using terrain::SurfacePoint;
 using tests::cloud_store;
@@ -35,6 +33,7 @@ using tests::Points;
 using tests::points_of;
 using tests::Random;
 using tests::same_bits;
+using tests::Whole;
 
 /// Positions around the store, on its points and near the midpoints of its edges.
 std::vector<Point2> places_of(const tri::Delaunay2<double>& whole, const stream::Box3& box) {
@@ -65,11 +64,8 @@ TEST_P(SurfaceOfClouds, MatchesTheTriangulationWhateverIsLoaded) {
       stream::Store::open(cloud_store(folder.path(), points_of(GetParam())));
   for (unsigned level = 0; level <= store.top(); ++level) {
     SCOPED_TRACE("level " + std::to_string(level));
-    const PointHull hull(store, level);
-    if (hull.is_flat()) continue;
-    PointWindow whole(store, level, 0);
-    whole.load(terrain::flat(store.bounds()));
-    const auto& triangulation = whole.triangulation();
+    const Whole whole(store, level);
+    const auto& triangulation = whole.triangulation;
     const std::vector<Point2> places = places_of(triangulation, store.bounds());
     const StoredBox all = terrain::flat(store.bounds());
     StoredBox part = all;
@@ -77,14 +73,13 @@ TEST_P(SurfaceOfClouds, MatchesTheTriangulationWhateverIsLoaded) {
       part.min[k] += 0.3 * (all.max[k] - all.min[k]);
       part.max[k] -= 0.3 * (all.max[k] - all.min[k]);
     }
-    PointSurface loaded(store, level, hull), some(store, level, hull), none(store, level, hull);
+    PointCloud cloud(store, level), with_border(store, level);
+    PointSurface loaded(cloud), some(cloud), none(cloud), bordered(with_border);
     ASSERT_TRUE(loaded.load(all, 1U << 20, true));
     ASSERT_TRUE(some.load(part, 1U << 20, true));
     // With the border of the voids known.
-    const auto voids = std::make_shared<terrain::PointVoids>(store, level);
-    PointWindow scratch(store, level, 0);
-    ASSERT_TRUE(voids->find(scratch));
-    PointSurface bordered(store, level, hull, {}, voids);
+    terrain::PointWindow scratch(with_border);
+    ASSERT_EQ(with_border.voids.find(scratch), triangulation.triangle_count() > 0);
     for (std::size_t i = 0; i < places.size(); ++i) {
       SCOPED_TRACE("place " + std::to_string(i));
       const SurfacePoint expected = whole.at(places[i]);
@@ -114,7 +109,8 @@ TEST_P(SurfaceOfClouds, MatchesTheTriangulationWhateverIsLoaded) {
 INSTANTIATE_TEST_SUITE_P(PointSurface, SurfaceOfClouds,
                          testing::Values("random", "lattice", "duplicates", "voids", "clusters",
                                          "turned", "winding", "straight borders", "circle",
-                                         "parabola", "far", "huge", "tiny", "nearly a line"),
+                                         "parabola", "far", "huge", "tiny", "line", "nearly a line",
+                                         "one", "two", "one place"),
                          [](const auto& one) {
                            std::string name = one.param;
                            std::replace(name.begin(), name.end(), ' ', '_');
@@ -126,11 +122,9 @@ INSTANTIATE_TEST_SUITE_P(PointSurface, SurfaceOfClouds,
 TEST(PointSurface, SearchesInBendsOfASwathVisitFewPoints) {
   const tests::TemporaryFolder folder;
   const stream::Store store = stream::Store::open(cloud_store(folder.path(), points_of("winding")));
-  const PointHull hull(store, 0);
-  const auto voids = std::make_shared<terrain::PointVoids>(store, 0);
-  PointSurface surface(store, 0, hull, {}, voids);
-  PointWindow whole(store, 0, 0);
-  whole.load(terrain::flat(store.bounds()));
+  PointCloud cloud(store, 0);
+  PointSurface surface(cloud);
+  const Whole whole(store, 0);
   const stream::Box3& box = store.bounds();
   constexpr int kSide = 100;
   std::uint64_t places = 0;
@@ -142,10 +136,10 @@ TEST(PointSurface, SearchesInBendsOfASwathVisitFewPoints) {
     if (!std::isnan(height)) ++places;
   }
   RecordProperty("places", std::to_string(places));
-  RecordProperty("looks", std::to_string(voids->looks()));
-  EXPECT_TRUE(voids->known());
+  RecordProperty("looks", std::to_string(cloud.voids.looks()));
+  EXPECT_TRUE(cloud.voids.known());
   // Up to 16 visits per point, then only the points near each position.
-  EXPECT_LT(voids->looks(), 17 * store.points() + 400 * places);
+  EXPECT_LT(cloud.voids.looks(), 17 * store.points() + 400 * places);
 }
 
 TEST(PointSurface, RejectsMorePointsThanFitAndCrowds) {
@@ -157,8 +151,8 @@ TEST(PointSurface, RejectsMorePointsThanFitAndCrowds) {
     points.push_back({0.5 + 1e-6 * random.unit(), 0.5 + 1e-6 * random.unit(), 1});
   }
   const stream::Store store = stream::Store::open(cloud_store(folder.path(), points));
-  const PointHull hull(store, 0);
-  PointSurface surface(store, 0, hull);
+  PointCloud cloud(store, 0);
+  PointSurface surface(cloud);
   const StoredBox all = terrain::flat(store.bounds());
   EXPECT_FALSE(surface.load(all, 5999, true));
   EXPECT_FALSE(surface.load(all, 6000, false));

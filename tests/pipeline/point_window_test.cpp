@@ -6,17 +6,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <limits>
-#include <map>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store.hpp>
-#include <terrace/tri/delaunay2.hpp>
-#include <terrace/tri/interpolation.hpp>
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
@@ -26,39 +21,16 @@ namespace terrace {
 namespace {
 
 using terrain::Point2;
-using terrain::PointVoids;
+using terrain::PointCloud;
 using terrain::PointWindow;
 using terrain::StoredBox;
-using terrain::SurfacePoint;
+using tests::check_window;
 using tests::cloud_store;
 using tests::Points;
 using tests::points_of;
 using tests::Random;
 using tests::raster_store;
-using tests::same_bits;
-using tests::Triangle;
 using tests::Whole;
-/// True if no line separates them; computed in long double.
-bool meets(const Triangle& t, const StoredBox& box) {
-  using Number = long double;
-  const std::array<Point2, 4> corner{Point2{box.min[0], box.min[1]}, Point2{box.max[0], box.min[1]},
-                                     Point2{box.max[0], box.max[1]},
-                                     Point2{box.min[0], box.max[1]}};
-  for (std::size_t k = 0; k < 2; ++k) {
-    if (std::max({t[0][k], t[1][k], t[2][k]}) < box.min[k]) return false;
-    if (std::min({t[0][k], t[1][k], t[2][k]}) > box.max[k]) return false;
-  }
-  for (std::size_t i = 0; i < 3; ++i) {
-    const Point2 &a = t[i], &b = t[(i + 1) % 3];
-    if (std::all_of(corner.begin(), corner.end(), [&](const Point2& p) {
-          return (Number{b[0]} - a[0]) * (Number{p[1]} - a[1]) <
-                 (Number{b[1]} - a[1]) * (Number{p[0]} - a[0]);
-        })) {
-      return false;
-    }
-  }
-  return true;
-}
 
 StoredBox random_box(const stream::Box3& bounds, Random& random, std::uint64_t i) {
   StoredBox box;
@@ -76,64 +48,17 @@ StoredBox random_box(const stream::Box3& bounds, Random& random, std::uint64_t i
 void check_windows(const stream::Store& store, unsigned level, int boxes,
                    bool knows_border = false) {
   const Whole whole(store, level);
-  const auto voids = std::make_shared<PointVoids>(store, level);
-  PointWindow window(store, level, 0, voids), other(store, level, 0);
+  PointCloud cloud(store, level);
+  PointWindow window(cloud);
   if (knows_border) {
-    ASSERT_EQ(voids->find(other), whole.triangulation.triangle_count() > 0);
+    ASSERT_EQ(cloud.voids.find(window), whole.triangulation.triangle_count() > 0);
   }
   Random random(level + 3);
   for (int i = 0; i < boxes; ++i) {
     SCOPED_TRACE("level " + std::to_string(level) + ", box " + std::to_string(i));
     const StoredBox box = random_box(store.bounds(), random, static_cast<std::uint64_t>(i));
     window.load(box);
-    std::map<Triangle, std::array<double, 3>> certain;
-    for (const tri::TriangleId t : window.triangulation().all_triangles()) {
-      if (!window.is_certain(t)) continue;
-      Whole::add_triangle(window.triangulation(), window.heights(), t, certain);
-    }
-    for (const auto& [corners, heights] : certain) {
-      const auto found = whole.triangles.find(corners);
-      ASSERT_TRUE(found != whole.triangles.end());
-      ASSERT_EQ(heights, found->second);
-    }
-    for (const auto& [corners, heights] : whole.triangles) {
-      if (meets(corners, box)) {
-        ASSERT_TRUE(certain.contains(corners));
-      }
-    }
-    // Positions in the box, some on points and some between them; the same from another window.
-    std::vector<Point2> places;
-    for (int k = 0; k < 60; ++k) {
-      Point2 p;
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        p[axis] = box.min[axis] + random.unit() * (box.max[axis] - box.min[axis]);
-        if (k % 3 == 1) p[axis] = std::round(p[axis] * 2) / 2;
-        p[axis] = std::clamp(p[axis], box.min[axis], box.max[axis]);
-      }
-      places.push_back(p);
-    }
-    for (const tri::VertexId v : window.triangulation().all_vertices()) {
-      const Point2 p = window.triangulation().point(v);
-      if (places.size() < 90 && box.contains({p[0], p[1], 0})) places.push_back(p);
-    }
-    StoredBox larger = box;
-    for (std::size_t k = 0; k < 2; ++k) {
-      larger.min[k] -= random.unit() * (1e-300 + store.bounds().max[k] - store.bounds().min[k]);
-    }
-    other.load(larger);
-    const std::vector<double> expected =
-        tri::heights_at(whole.triangulation, whole.heights, places, tri::Interpolation::kLinear, 1);
-    for (std::size_t k = 0; k < places.size(); ++k) {
-      SCOPED_TRACE("place " + std::to_string(k));
-      const SurfacePoint found = window.at(places[k]), again = other.at(places[k]);
-      ASSERT_EQ(std::isnan(found.height), std::isnan(expected[k]));
-      if (!std::isnan(expected[k])) {
-        ASSERT_NEAR(found.height, expected[k], 1e-7);
-      }
-      ASSERT_TRUE(same_bits(found.height, again.height));
-      ASSERT_TRUE(same_bits(found.per_column, again.per_column));
-      ASSERT_TRUE(same_bits(found.per_row, again.per_row));
-    }
+    check_window(whole, window, box);
   }
 }
 
@@ -178,7 +103,8 @@ TEST(PointWindow, ReadsFewPointsBeyondTheWindow) {
     SCOPED_TRACE(kind);
     const stream::Store store =
         stream::Store::open(cloud_store(folder.path() / kind, points_of(kind)));
-    PointWindow window(store, 0, 0);
+    PointCloud cloud(store, 0);
+    PointWindow window(cloud);
     Random random(4);
     std::size_t read = 0;
     for (int i = 0; i < 200; ++i) {
@@ -204,17 +130,17 @@ TEST(PointWindow, WindowsAlongAWindingSwathVisitFewBoxes) {
   const stream::Store store = stream::Store::open(cloud_store(folder.path(), points_of("winding")));
   const terrain::WindowTree tree(store, 0, 200);
   ASSERT_GT(tree.size(), 50U);
-  const auto voids = std::make_shared<PointVoids>(store, 0);
-  PointWindow window(store, 0, 0, voids);
+  PointCloud cloud(store, 0);
+  PointWindow window(cloud);
   std::size_t triangulated = 0;
   for (std::size_t i = 0; i < tree.size(); ++i) {
     window.load(tree.box(i));
     triangulated += window.triangulation().vertex_count();
   }
-  RecordProperty("looks", std::to_string(voids->looks()));
+  RecordProperty("looks", std::to_string(cloud.voids.looks()));
   RecordProperty("triangulated", std::to_string(triangulated));
-  EXPECT_TRUE(voids->known());
-  EXPECT_LT(voids->looks(), 17 * store.points());
+  EXPECT_TRUE(cloud.voids.known());
+  EXPECT_LT(cloud.voids.looks(), 17 * store.points());
   EXPECT_LT(triangulated, 4 * store.points());
 }
 
@@ -224,7 +150,8 @@ TEST(PointWindow, ReportsTheMemoryItNeeds) {
   Points points;
   for (int i = 0; i < 60000; ++i) points.push_back({random.unit(), random.unit(), 0});
   const stream::Store store = stream::Store::open(cloud_store(folder.path(), points));
-  PointWindow window(store, 0, std::uint64_t{14} << 20);
+  PointCloud cloud(store, 0);
+  PointWindow window(cloud, std::uint64_t{14} << 20);
   window.load({{0.4, 0.4}, {0.5, 0.5}});
   EXPECT_GT(window.triangulation().triangle_count(), 500U);
   try {

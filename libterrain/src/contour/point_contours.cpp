@@ -112,8 +112,8 @@ class PointContours {
                         [&](const WindowTree::Part& part) {
                           if (first_at_work(part) < part.end) loads.push_back(&part);
                         });
+    PointCloud cloud(parts_.store, request_.level);
     std::vector<std::unique_ptr<PointWindow>> windows(threads);
-    const auto voids = std::make_shared<PointVoids>(parts_.store, request_.level);
     ContourTriangles lines(request_.interval, parts_.emit, parts_.limit);
     std::vector<Triangle> strange;
     base::in_order(
@@ -121,8 +121,7 @@ class PointContours {
         [&](unsigned thread, std::size_t i) {
           std::unique_ptr<PointWindow>& window = windows[thread];
           if (window == nullptr) {
-            window = std::make_unique<PointWindow>(parts_.store, request_.level, memory / threads,
-                                                   voids);
+            window = std::make_unique<PointWindow>(cloud, memory / threads);
           }
           Crossed result;
           add_crossed(*window, *loads[i], result);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -12,18 +14,25 @@
 
 namespace terrace::terrain {
 
-std::unique_ptr<HeightSampler> make_sampler(const stream::Store& given,
+std::shared_ptr<SampledCloud> sampled_cloud(const stream::Store& store,
                                             const SamplerOptions& options, const Context& context) {
-  need_terrain(given, "the height of a place");
-  const stream::Store store = given.with_stop(context.stop);
+  need_terrain(store, "the height of a place");
   need_level(store, options.level);
-  if (!store.schema().grid || options.level > 0) return make_point_sampler(store, options, context);
+  if (store.schema().grid && options.level == 0) return nullptr;
+  return std::make_shared<SampledCloud>(store.with_stop(context.stop), options.level);
+}
+
+std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
+                                            const SamplerOptions& options, const Context& context) {
+  if (std::shared_ptr<SampledCloud> cloud = sampled_cloud(store, options, context)) {
+    return make_point_sampler(std::move(cloud), options, context);
+  }
   if (options.max_edge) {
     throw UsageError(
         "`max_edge` is for irregular points and coarser levels: rasters mark missing data "
         "explicitly");
   }
-  return make_lattice_sampler(store, options, context);
+  return make_lattice_sampler(store.with_stop(context.stop), options, context);
 }
 
 std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<const Point2> places,

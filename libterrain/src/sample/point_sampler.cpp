@@ -9,23 +9,17 @@
 #include <vector>
 
 #include <terrace/stream/error.hpp>
-#include <terrace/tri/interpolation.hpp>
 
 #include "base/available_memory.hpp"
 #include "base/parallel.hpp"
 #include "base/units.hpp"
 #include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
-#include "surface/point_hull.hpp"
 #include "surface/point_surface.hpp"
-#include "surface/point_window.hpp"
-#include "surface/window_tree.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-/// Points per window of the tree. As many windows as pay off are loaded together.
-constexpr std::size_t kWindowPoints = 16384;
 /// With more than this, threads would wait for the last one.
 constexpr double kMostPointsAtOnce = 1U << 21;
 constexpr double kPartsPerThread = 4;
@@ -85,51 +79,19 @@ double points_met_by_a_place(const stream::Store& store, unsigned level) {
   return static_cast<double>(info.points) * sum / static_cast<double>(count) / whole;
 }
 
-/// Samples the surface of collinear points, or of a single point, by triangulating them all.
-void sample_line(const stream::Store& store, const SamplerOptions& options, const TooLong& too_long,
-                 std::uint64_t memory_bytes, std::span<const Point2> places,
-                 std::span<SurfacePoint> out) {
-  PointWindow window(store, options.level, memory_bytes);
-  window.set_limit(too_long);
-  window.load(flat(store.bounds()));
-  const auto& points = window.triangulation();
-  if (points.vertex_count() == 0) return;
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    store.check_stop();
-    const Point2& place = places[i];
-    if (!std::isfinite(place[0]) || !std::isfinite(place[1])) continue;
-    const SurfacePoint linear = window.at(place);
-    if (options.method == tri::Interpolation::kLinear) {
-      out[i] = linear;
-    } else if (too_long && std::isnan(linear.height)) {
-      continue;
-    } else if (options.method == tri::Interpolation::kNearest) {
-      out[i] = window.at(points.point(points.nearest(place)));
-    } else {
-      out[i].height =
-          tri::heights_at(points, window.heights(), std::span(&place, 1), options.method, 1)[0];
-    }
-  }
-}
-
 /// The working data of one thread.
 struct CloudWorker {
   PointSurface surface;
   std::vector<std::uint64_t> along{};  ///< positions on a curve, with numbers of places
   std::optional<StoredBox> loaded{};
 
-  CloudWorker(const stream::Store& store, unsigned level, const PointHull& hull,
-              const TooLong& too_long, const std::shared_ptr<PointVoids>& voids,
-              std::uint64_t memory_bytes)
-      : surface(store, level, hull, too_long, voids, memory_bytes) {}
+  CloudWorker(PointCloud& cloud, const TooLong& too_long, std::uint64_t memory_bytes)
+      : surface(cloud, too_long, memory_bytes) {}
 
   /// Loads the points in a box and `margin` around it, unless loaded. Returns false if they do not
   /// fit.
-  bool load(StoredBox box, double margin, std::size_t most_points, bool may_crowd) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      box.min[k] -= margin;
-      box.max[k] += margin;
-    }
+  bool load(const StoredBox& inner, double margin, std::size_t most_points, bool may_crowd) {
+    const StoredBox box = inner.widened(margin);
     if (loaded && loaded->min == box.min && loaded->max == box.max) return true;
     loaded.reset();
     if (!surface.load(box, most_points, may_crowd)) return false;
@@ -140,14 +102,15 @@ struct CloudWorker {
 
 class PointSampler final : public HeightSampler {
  public:
-  PointSampler(const stream::Store& store, const SamplerOptions& options, const Context& context)
-      : store_(store),
+  PointSampler(std::shared_ptr<SampledCloud> sampled, const SamplerOptions& options,
+               const Context& context)
+      : sampled_(std::move(sampled)),
+        cloud_(sampled_->cloud),
+        tree_(sampled_->windows),
         options_(options),
         stop_(context.stop),
-        memory_(working_memory(context) / 2),
-        hull_(store, options.level),
-        voids_(std::make_shared<PointVoids>(store_, options.level)),
-        tree_(store, options.level, kWindowPoints) {
+        memory_(working_memory(context) / 2) {
+    const stream::Store& store = cloud_.store;
     const auto threads =
         std::clamp<std::uint64_t>(memory_ / kThreadBytes, 1, std::max(1U, context.threads));
     workers_.resize(threads);
@@ -165,9 +128,7 @@ class PointSampler final : public HeightSampler {
 
   void sample(std::span<const Point2> places, std::span<SurfacePoint> out) override {
     std::fill(out.begin(), out.end(), SurfacePoint{});
-    if (hull_.is_flat()) {
-      return sample_line(store_, options_, too_long_, memory_, places, out);
-    }
+    if (cloud_.hull.corners().empty()) return;
     sort_by_window(places);
     if (takes_whole_ && !whole_ && is_dense(tree_.part(0), order_.size())) take_whole();
     std::vector<const WindowTree::Part*> parts;
@@ -183,8 +144,7 @@ class PointSampler final : public HeightSampler {
         [&](std::size_t i, unsigned thread) {
           std::unique_ptr<CloudWorker>& worker = workers_[thread];
           if (worker == nullptr) {
-            worker = std::make_unique<CloudWorker>(store_, options_.level, hull_, too_long_, voids_,
-                                                   memory_ / workers_.size());
+            worker = std::make_unique<CloudWorker>(cloud_, too_long_, memory_ / workers_.size());
           }
           if (whole_) {
             worker->surface.share(*whole_);
@@ -203,7 +163,7 @@ class PointSampler final : public HeightSampler {
     if (options_.method == tri::Interpolation::kNearest) {
       return std::isfinite(p[0]) && std::isfinite(p[1]);
     }
-    const stream::Box3& all = store_.bounds();
+    const stream::Box3& all = cloud_.store.bounds();
     return p[0] >= all.min[0] && p[0] <= all.max[0] && p[1] >= all.min[1] && p[1] <= all.max[1];
   }
 
@@ -245,7 +205,8 @@ class PointSampler final : public HeightSampler {
   /// circles in voids extend beyond windows.
   void take_whole() {
     auto cells = std::make_unique<PointCells>();
-    takes_whole_ = cells->load_all(store_, options_.level, static_cast<unsigned>(workers_.size()));
+    takes_whole_ =
+        cells->load_all(cloud_.store, cloud_.level, static_cast<unsigned>(workers_.size()));
     if (takes_whole_) whole_ = std::move(cells);
   }
 
@@ -280,7 +241,7 @@ class PointSampler final : public HeightSampler {
         static_cast<double>(kReadBytes) + part.points * static_cast<double>(kBytesPerExpected);
     const std::uint64_t needed =
         2 * std::max(memory_ + (std::uint64_t{1} << 20), static_cast<std::uint64_t>(bytes));
-    throw stream::Error({.file = store_.path().string(),
+    throw stream::Error({.file = cloud_.store.path().string(),
                          .cause = "more than " + counted(room_, "point") +
                                   " are close together, too many for `memory_bytes`",
                          .remedy = "give " + std::to_string((needed >> 20) + 1) +
@@ -295,7 +256,7 @@ class PointSampler final : public HeightSampler {
     }
     std::sort(worker.along.begin(), worker.along.end());
     for (const std::uint64_t one : worker.along) {
-      store_.check_stop();
+      cloud_.store.check_stop();
       const auto i = static_cast<std::uint32_t>(one);
       out[i] = answer(worker.surface, places[i]);
     }
@@ -315,12 +276,9 @@ class PointSampler final : public HeightSampler {
     std::sort(numbers.begin(), numbers.end(),
               [&](std::uint32_t a, std::uint32_t b) { return part(a) < part(b); });
     for (std::size_t begin = 0, end = 0; begin < numbers.size(); begin = end) {
-      StoredBox around{places[numbers[begin]], places[numbers[begin]]};
+      StoredBox around = StoredBox::empty();
       for (; end < numbers.size() && part(numbers[end]) == part(numbers[begin]); ++end) {
-        for (std::size_t k = 0; k < 2; ++k) {
-          around.min[k] = std::min(around.min[k], places[numbers[end]][k]);
-          around.max[k] = std::max(around.max[k], places[numbers[end]][k]);
-        }
+        around.include({places[numbers[end]], places[numbers[end]]});
       }
       if (!worker.load(around, margin, room_, true) && !worker.load(around, 0, room_, true)) {
         throw_no_room(window);
@@ -343,13 +301,12 @@ class PointSampler final : public HeightSampler {
     return surface.linear(place);
   }
 
-  stream::Store store_;
+  std::shared_ptr<SampledCloud> sampled_;
+  PointCloud& cloud_;
+  const WindowTree& tree_;
   SamplerOptions options_;
   std::stop_token stop_;
   std::uint64_t memory_;
-  PointHull hull_;
-  std::shared_ptr<PointVoids> voids_;
-  WindowTree tree_;
   TooLong too_long_;
   std::vector<std::unique_ptr<CloudWorker>> workers_;
   std::size_t room_ = 0;         ///< the most points that a worker can hold
@@ -363,10 +320,10 @@ class PointSampler final : public HeightSampler {
 
 }  // namespace
 
-std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
+std::unique_ptr<HeightSampler> make_point_sampler(std::shared_ptr<SampledCloud> cloud,
                                                   const SamplerOptions& options,
                                                   const Context& context) {
-  return std::make_unique<PointSampler>(store, options, context);
+  return std::make_unique<PointSampler>(std::move(cloud), options, context);
 }
 
 }  // namespace terrace::terrain

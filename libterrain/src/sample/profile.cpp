@@ -19,6 +19,7 @@
 #include "earth/ground.hpp"
 #include "earth/line_distance.hpp"
 #include "sample/lattice_crossings.hpp"
+#include "sample/samplers.hpp"
 #include "sample/surface_crossings.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/error.hpp"
@@ -43,11 +44,13 @@ class ProfileRun {
         context_(context),
         take_(take),
         ground_(store),
-        distance_(LineDistance::of(store)),
-        sampler_(make_sampler(store, request.sampler, context)) {
+        distance_(LineDistance::of(store)) {
     for (const Point2& place : request.line) line_.push_back(ground_.turned(place));
-    if (!request.step && (!store.schema().grid || request.sampler.level > 0)) {
-      crossings_.emplace(store, request.sampler, working_memory(context));
+    const std::shared_ptr<SampledCloud> cloud = sampled_cloud(store, request.sampler, context);
+    sampler_ = cloud != nullptr ? make_point_sampler(cloud, request.sampler, context)
+                                : make_sampler(store, request.sampler, context);
+    if (!request.step && cloud != nullptr) {
+      crossings_.emplace(cloud, request.sampler, working_memory(context));
     }
   }
 

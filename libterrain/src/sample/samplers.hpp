@@ -1,8 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 
+#include <terrace/stream/store.hpp>
+
+#include "surface/point_cloud.hpp"
+#include "surface/window_tree.hpp"
 #include "terrace/terrain/heights.hpp"
 
 /// The samplers that make_sampler() chooses from.
@@ -13,8 +18,26 @@ namespace terrace::terrain {
 std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
                                                     const SamplerOptions& options,
                                                     const Context& context);
-/// Samples points, or a raster at a coarser level.
-std::unique_ptr<HeightSampler> make_point_sampler(const stream::Store& store,
+/// A cloud that is sampled in windows. A sampler and SurfaceCrossings may share one.
+struct SampledCloud {
+  /// As many windows as pay off are loaded together.
+  static constexpr std::size_t kWindowPoints = 16384;
+
+  /// Throws: as PointCloud.
+  SampledCloud(const stream::Store& sampled, unsigned level)
+      : store(sampled), cloud(store, level), windows(store, level, kWindowPoints) {}
+
+  stream::Store store;
+  PointCloud cloud;
+  WindowTree windows;
+};
+
+/// Returns the points of a store, or of a coarser level of a raster; null for level 0 of a raster.
+/// Throws: as make_sampler().
+std::shared_ptr<SampledCloud> sampled_cloud(const stream::Store& store,
+                                            const SamplerOptions& options, const Context& context);
+/// Samples points, or a raster at a coarser level. Uses the level of the cloud.
+std::unique_ptr<HeightSampler> make_point_sampler(std::shared_ptr<SampledCloud> cloud,
                                                   const SamplerOptions& options,
                                                   const Context& context);
 

@@ -13,7 +13,6 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kCrossingWindowPoints = 16384;
 /// A line is followed in pieces of this share of a window's size, because boxes around slanting
 /// pieces cover more than the pieces.
 constexpr double kCrossingPiece = 0.5;
@@ -42,23 +41,21 @@ std::array<double, 2> part_within(const StoredBox& box, const Point2& from, cons
 
 }  // namespace
 
-SurfaceCrossings::SurfaceCrossings(const stream::Store& store, const SamplerOptions& options,
-                                   std::uint64_t memory_bytes)
-    : store_(store),
-      tree_(store, options.level, kCrossingWindowPoints),
-      window_(store, options.level, memory_bytes / 2) {
-  if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
+SurfaceCrossings::SurfaceCrossings(std::shared_ptr<SampledCloud> sampled,
+                                   const SamplerOptions& options, std::uint64_t memory_bytes)
+    : sampled_(std::move(sampled)), window_(sampled_->cloud, memory_bytes / 2) {
+  if (options.max_edge) too_long_ = longer_than(sampled_->store, *options.max_edge);
 }
 
 void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
                                   const std::function<void(const Crossing&)>& visit) {
-  const StoredBox all{{store_.bounds().min[0], store_.bounds().min[1]},
-                      {store_.bounds().max[0], store_.bounds().max[1]}};
+  const StoredBox all = flat(sampled_->store.bounds());
   if (from == to) return;
   const auto [first, last] = part_within(all, from, to);
   double latest = -1;
   for (double begin = first; begin <= last;) {
-    const StoredBox& box = tree_.box(tree_.window_of(point_between(from, to, begin)));
+    const WindowTree& tree = sampled_->windows;
+    const StoredBox& box = tree.box(tree.window_of(point_between(from, to, begin)));
     double end = 1;
     for (std::size_t k = 0; k < 2; ++k) {
       const double size = box.max[k] - box.min[k], way = std::abs(to[k] - from[k]);
@@ -82,12 +79,7 @@ void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begi
   // Includes crossings that rounding may move into this piece.
   const Point2 a = point_between(from, to, std::max(0.0, begin - 1e-9));
   const Point2 b = point_between(from, to, std::min(1.0, end + 1e-9));
-  StoredBox box;
-  for (std::size_t k = 0; k < 2; ++k) {
-    box.min[k] = std::min(a[k], b[k]);
-    box.max[k] = std::max(a[k], b[k]);
-  }
-  window_.load(box);
+  window_.load(StoredBox::around(a, b));
   found_.clear();
   const auto& triangulation = window_.triangulation();
   const double dx = to[0] - from[0], dy = to[1] - from[1], square = dx * dx + dy * dy;

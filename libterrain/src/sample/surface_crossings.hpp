@@ -2,12 +2,11 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <vector>
 
-#include <terrace/stream/store.hpp>
-
+#include "sample/samplers.hpp"
 #include "surface/point_window.hpp"
-#include "surface/window_tree.hpp"
 #include "terrace/terrain/heights.hpp"
 
 namespace terrace::terrain {
@@ -22,8 +21,8 @@ class SurfaceCrossings {
     double height{};  ///< of the linear surface; NaN on edges longer than SamplerOptions::max_edge
   };
 
-  /// Uses the level and max_edge of the options. The store must outlive this object.
-  SurfaceCrossings(const stream::Store& store, const SamplerOptions& options,
+  /// Uses the max_edge of the options.
+  SurfaceCrossings(std::shared_ptr<SampledCloud> sampled, const SamplerOptions& options,
                    std::uint64_t memory_bytes);
 
   /// Calls visit for each crossing between stored places `from` and `to`, in order, once per
@@ -36,8 +35,7 @@ class SurfaceCrossings {
  private:
   void collect(const Point2& from, const Point2& to, double begin, double end, bool is_last);
 
-  const stream::Store& store_;
-  WindowTree tree_;
+  std::shared_ptr<SampledCloud> sampled_;
   TooLong too_long_;
   PointWindow window_;
   std::vector<Crossing> found_;

@@ -10,7 +10,7 @@
 
 #include "surface/store_window.hpp"
 
-/// Where a point would change a Delaunay triangulation: closed circumcircles and half-planes.
+/// Where a point would change a Delaunay triangulation: closed circumcircles.
 /// Rounding only enlarges them, and tests are written so that NaN meets everything.
 
 namespace terrace::terrain {
@@ -20,13 +20,6 @@ struct HalfPlane {
   std::array<double, 2> a{}, b{};
 
   [[nodiscard]] bool meets(const StoredBox& box) const { return !(leftness(box) > 0); }
-  /// Whether hardly any of the box is in the half-plane. Boxes of stores are slightly larger than
-  /// their contents.
-  [[nodiscard]] bool grazes(const StoredBox& box) const {
-    const double across = std::abs(b[0] - a[0]) * (box.max[1] - box.min[1]) +
-                          std::abs(b[1] - a[1]) * (box.max[0] - box.min[0]);
-    return leftness(box) > -across / 64;
-  }
   /// How far left of the line the rightmost corner of the box is; positive only if it is certainly
   /// left. Proportional to the distance, for comparisons.
   [[nodiscard]] double leftness(const StoredBox& box) const {
@@ -54,8 +47,8 @@ struct CircleCover {
   double radius = 0;
 
   /// The corners must be counter-clockwise.
-  static CircleCover of_triangle(const std::array<double, 2>& a, const std::array<double, 2>& b,
-                                 const std::array<double, 2>& c) {
+  static CircleCover of_triangle(const std::array<std::array<double, 2>, 3>& corners) {
+    const auto& [a, b, c] = corners;
     constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
     const double ux = b[0] - a[0], uy = b[1] - a[1], vx = c[0] - a[0], vy = c[1] - a[1];
     const double first = ux * vy, second = uy * vx;
@@ -80,13 +73,6 @@ struct CircleCover {
       if (error <= 0.01 * size) return cover;
     }
     return of_needle(a, b, c);
-  }
-
-  static CircleCover of_plane(const std::array<double, 2>& a, const std::array<double, 2>& b) {
-    CircleCover cover;
-    cover.has_plane = true;
-    cover.plane = {a, b};
-    return cover;
   }
 
   [[nodiscard]] bool meets(const StoredBox& box) const {
@@ -150,8 +136,9 @@ struct CircleCover {
       std::swap(a, c);  // to (c, a, b)
       std::swap(b, c);
     }
-    CircleCover cover = of_plane(a, b);
-    cover.has_disk = true;
+    CircleCover cover;
+    cover.has_plane = cover.has_disk = true;
+    cover.plane = {a, b};
     cover.near = a;
     cover.centre = {0.5 * (b[0] - a[0]), 0.5 * (b[1] - a[1])};
     cover.radius = 0.9 * size;

@@ -39,7 +39,7 @@ class PointStar {
     return spokes_[i + 1 < size() ? i + 1 : 0].end;
   }
   [[nodiscard]] CircleCover circle(std::size_t triangle) const {
-    return CircleCover::of_triangle(centre_, neighbour(triangle), next_neighbour(triangle));
+    return CircleCover::of_triangle({centre_, neighbour(triangle), next_neighbour(triangle)});
   }
   /// A number that a triangle keeps until it is replaced; initially 0.
   [[nodiscard]] unsigned mark(std::size_t triangle) const { return spokes_[triangle].mark; }

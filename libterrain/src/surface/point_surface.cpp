@@ -24,10 +24,6 @@ constexpr std::size_t kManyCells = 128;
 /// Memory for decoded clusters, for circles that reach beyond the loaded points.
 constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
 
-CircleCover circle_of(const std::array<Point2, 3>& t) {
-  return CircleCover::of_triangle(t[0], t[1], t[2]);
-}
-
 double square_of(double dx, double dy) { return dx * dx + dy * dy; }
 
 /// Returns a lower bound of the squared distance to any point in the box.
@@ -58,35 +54,24 @@ CircleCover disk(const Point2& place, double square) {
 
 /// Returns a box around all covers.
 StoredBox bounds_of(std::span<const CircleCover> covers) {
-  StoredBox all = covers[0].bounds();
-  for (const CircleCover& cover : covers.subspan(1)) {
-    const StoredBox box = cover.bounds();
-    for (std::size_t k = 0; k < 2; ++k) {
-      all.min[k] = std::min(all.min[k], box.min[k]);
-      all.max[k] = std::max(all.max[k], box.max[k]);
-    }
-  }
+  StoredBox all = StoredBox::empty();
+  for (const CircleCover& cover : covers) all.include(cover.bounds());
   return all;
 }
 
 }  // namespace
 
-PointSurface::PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
-                           TooLong too_long, std::shared_ptr<PointVoids> voids,
-                           std::uint64_t memory_bytes)
-    : store_(store),
-      level_(level),
-      hull_(hull),
+PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t memory_bytes)
+    : cloud_(cloud),
       too_long_(std::move(too_long)),
-      voids_(std::move(voids)),
       memory_bytes_(memory_bytes),
-      query_(store, kSurfaceCacheBytes) {
+      query_(cloud.store, kSurfaceCacheBytes) {
   own_.clear();
 }
 
 bool PointSurface::load(const StoredBox& box, std::size_t most_points, bool may_crowd) {
   cells_ = &own_;
-  return own_.load(query_, level_, box, most_points, may_crowd);
+  return own_.load(query_, cloud_.level, box, most_points, may_crowd);
 }
 
 int PointSurface::side_of(const Point2& a, const Point2& b, const Target& target) {
@@ -104,15 +89,15 @@ bool PointSurface::has(const Corners& t, const Target& target) {
 
 std::optional<PointSurface::Target> PointSurface::target_of(const Point2& place,
                                                             PointHull::Side& side) const {
-  const PointHull::Found found = hull_.find(place);
+  const PointHull::Found found = cloud_.hull.find(place);
   side = found.side;
   switch (side) {
     case PointHull::Side::kOutside:
       break;
     case PointHull::Side::kBorder:
-      return Target{place, hull_.corners()[found.next]};
+      return Target{place, cloud_.hull.corners()[found.next]};
     case PointHull::Side::kInside:
-      return Target{place, hull_.corners()[0]};
+      return Target{place, cloud_.hull.corners()[0]};
   }
   return std::nullopt;
 }
@@ -122,7 +107,7 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
                            const Visit& visit) {
   std::uint64_t looks = 0;
   query_.best_first(
-      level_,
+      cloud_.level,
       [&](const stream::Box3& whole) {
         ++looks;
         const StoredBox box = flat(whole);
@@ -140,31 +125,30 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
         }
         return greatest_square(bounds_of(covers), from);
       });
-  if (voids_ != nullptr) wants_border_ = voids_->count_looks(looks);
+  wants_border_ = cloud_.voids.count_looks(looks);
 }
 
 bool PointSurface::knows_border() {
-  if (voids_ == nullptr) return false;
-  if (wants_border_ && !voids_->known()) {
-    PointWindow window(store_, level_, memory_bytes_, voids_);
-    voids_->find(window);
+  if (wants_border_ && !cloud_.voids.known()) {
+    PointWindow window(cloud_, memory_bytes_);
+    cloud_.voids.find(window);
     wants_border_ = false;
   }
-  return voids_->known();
+  return cloud_.voids.known();
 }
 
 void PointSurface::find_triangle(const Target& target) {
   if (triangle_ && has(*triangle_, target)) return;
   triangle_.reset();  // in case reading fails
   // The hull is a fan of triangles around its first corner.
-  const std::span<const Point2> hull = hull_.corners();
+  const std::span<const Point2> hull = cloud_.hull.corners();
   std::size_t before = 1, after = hull.size() - 1;
   while (after - before > 1) {
     const std::size_t middle = before + (after - before) / 2;
     (side_of(hull[0], hull[middle], target) > 0 ? before : after) = middle;
   }
   Corners t{hull[0], hull[before], hull[after]};
-  CircleCover cover = circle_of(t);
+  CircleCover cover = CircleCover::of_triangle(t);
   bool changed = false;
   const auto offer = [&](const Point2& p) {
     if (!cover.meets(StoredBox{p, p})) return;
@@ -176,7 +160,7 @@ void PointSurface::find_triangle(const Target& target) {
     for (std::size_t i = 0; i < 3; ++i) {
       if (!(side[(i + 1) % 3] > 0 && side[(i + 2) % 3] < 0)) continue;
       t[i] = p;
-      cover = circle_of(t);
+      cover = CircleCover::of_triangle(t);
       changed = true;
       break;
     }
@@ -190,11 +174,11 @@ void PointSurface::find_triangle(const Target& target) {
     if (reach >= kFarthest || cells_->is_near(cover.bounds(), reach)) break;
   }
   if (!cells_->knows(cover.bounds()) && knows_border()) {
-    const double reach = voids_->reach({target.place, target.place});
+    const double reach = cloud_.voids.reach({target.place, target.place});
     const CircleCover near = disk(target.place, reach * reach);
     do {
       changed = false;
-      voids_->for_each_around(target.place, offer);
+      cloud_.voids.for_each_around(target.place, offer);
       cells_->in(near, target.place, offer);
       if (!cells_->knows(near.bounds())) read_in({&near, 1}, target.place, offer);
     } while (changed);
@@ -223,7 +207,7 @@ void PointSurface::narrow_first(const Point2& centre) {
     if (!(tri::orientation(centre, neighbour, p) > 0)) return;
     if (!tri::inside_circle(centre, neighbour, next, p)) return;
     next = p;
-    cover = CircleCover::of_triangle(centre, neighbour, next);
+    cover = CircleCover::of_triangle({centre, neighbour, next});
   });
   star_.offer(next);
   for (std::size_t i = 0; i < star_.triangles(); ++i) {
@@ -268,7 +252,7 @@ void PointSurface::find_star(const Point2& centre) {
     if (covers_.empty() || wanted.count() <= 2 * seen.count()) break;
   }
   if (!star_.is_closed()) {
-    for (const Point2& corner : hull_.corners()) offer(corner);
+    for (const Point2& corner : cloud_.hull.corners()) offer(corner);
   }
   while (true) {
     for (find_open(); !covers_.empty(); find_open()) {
@@ -295,10 +279,10 @@ void PointSurface::find_star(const Point2& centre) {
     }
     if (covers_.empty()) return;
     if (knows_border()) {
-      const double reach = voids_->reach({centre, centre});
+      const double reach = cloud_.voids.reach({centre, centre});
       const CircleCover near = disk(centre, reach * reach);
       limit = kFarAway;
-      voids_->for_each_around(centre, offer);
+      cloud_.voids.for_each_around(centre, offer);
       cells_->in(near, centre, offer);
       if (!cells_->knows(near.bounds())) read_in({&near, 1}, centre, offer);
       return;
@@ -310,11 +294,11 @@ void PointSurface::find_star(const Point2& centre) {
 
 double PointSurface::height(const Point2& point) {
   if (cells_->knows(point)) return cells_->height(point);
-  const stream::Channel& channel = store_.schema().coordinates[2];
+  const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   const StoredBox box{point, point};
   std::optional<double> found;
   query_.descend(
-      level_,
+      cloud_.level,
       [&](unsigned, const stream::StoreQuery::Branch& branch) {
         return !found && box.meets(branch.box);
       },
@@ -334,6 +318,7 @@ SurfaceTriangle PointSurface::with_heights(const Corners& corners) {
 }
 
 SurfacePoint PointSurface::at_point(const Point2& point) {
+  if (cloud_.hull.is_flat()) return {height(point)};
   find_star(point);
   const SurfaceCorner centre{point, height(point)};
   const auto corner = [&](const Point2& p) { return SurfaceCorner{p, height(p)}; };
@@ -347,7 +332,36 @@ SurfacePoint PointSurface::at_point(const Point2& point) {
   return where_triangles_meet(point, centre.height, meeting_, too_long_);
 }
 
+void PointSurface::find_on_line(const Point2& place) {
+  points_.clear();
+  // Along the line, points are in lexicographic order.
+  Point2 before = cloud_.hull.corners().front(), after = cloud_.hull.corners().back();
+  if (place < before || after < place || tri::orientation(before, after, place) != 0) return;
+  const auto cover_now = [&] {
+    const auto square_to = [&](const Point2& p) {
+      return square_of(p[0] - place[0], p[1] - place[1]);
+    };
+    return disk(place, std::max(square_to(before), square_to(after)));
+  };
+  CircleCover cover = cover_now();
+  const auto offer = [&](const Point2& p) {
+    if (before < p && p <= place) before = p;
+    if (place <= p && p < after) after = p;
+    cover = cover_now();
+  };
+  cells_->in(cover, place, offer);
+  if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, place, offer);
+  points_.push_back(before);
+  if (after != before) points_.push_back(after);
+}
+
 SurfacePoint PointSurface::linear(const Point2& place) {
+  if (cloud_.hull.is_flat()) {
+    find_on_line(place);
+    if (points_.size() == 1) return {height(place)};
+    if (points_.empty() || (too_long_ && too_long_(points_[0], points_[1]))) return {};
+    return {on_edge({points_[0], height(points_[0])}, {points_[1], height(points_[1])}, place)};
+  }
   PointHull::Side where{};
   const std::optional<Target> target = target_of(place, where);
   if (!target) return {};
@@ -361,7 +375,7 @@ SurfacePoint PointSurface::linear(const Point2& place) {
     if (too_long_ && too_long_(a.place, b.place)) return {};
     meeting_.assign(1, triangle);
     // The triangle on the other side, unless the edge is on the hull.
-    for (const Point2& beyond : hull_.corners()) {
+    for (const Point2& beyond : cloud_.hull.corners()) {
       if (tri::orientation(a.place, b.place, beyond) >= 0) continue;
       find_triangle({place, beyond});
       meeting_.push_back(with_heights(*triangle_));
@@ -390,6 +404,10 @@ SurfacePoint PointSurface::natural_among(std::vector<Point2>& points, const Poin
 }
 
 SurfacePoint PointSurface::natural(const Point2& place) {
+  if (cloud_.hull.is_flat()) {
+    if (std::isnan(linear(place).height)) return {};
+    return natural_among(points_, place);
+  }
   PointHull::Side where{};
   const std::optional<Target> target = target_of(place, where);
   if (!target || (too_long_ && std::isnan(linear(place).height))) return {};
@@ -432,7 +450,7 @@ Point2 PointSurface::nearest(const Point2& place) {
     cells_->visit_cells(cells_->near(place, reach), offer);
     if (found && cells_->is_near(disk(place, bound).bounds(), reach)) break;
     if (found || reach < kFarthest) continue;
-    for (const Point2& corner : hull_.corners()) offer(corner);
+    for (const Point2& corner : cloud_.hull.corners()) offer(corner);
   }
   const CircleCover cover = disk(place, bound);
   cells_->in(cover, place, offer);

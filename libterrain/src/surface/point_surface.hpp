@@ -4,27 +4,24 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
-#include <terrace/tri/delaunay2.hpp>
 
 #include "surface/circle_cover.hpp"
 #include "surface/point_cells.hpp"
-#include "surface/point_hull.hpp"
+#include "surface/point_cloud.hpp"
 #include "surface/point_star.hpp"
-#include "surface/point_voids.hpp"
 #include "surface/surface_corner.hpp"
 #include "terrace/terrain/heights.hpp"
 
 namespace terrace::terrain {
 
-/// The surface between the points of a level and above at single places. Gives the result of the
-/// Delaunay triangulation of all points without constructing it.
+/// The surface between the points of a cloud at single places. Gives the result of the Delaunay
+/// triangulation of all points without constructing it. PointWindow constructs it, for work on all
+/// triangles of a box.
 ///
 /// The triangle that contains a place is the solution of a linear programme: of all planes through
 /// three lifted points around the place, the lowest. The simplex method finds it: starting from any
@@ -39,15 +36,16 @@ namespace terrace::terrain {
 /// because a place is usually in the triangle of the previous one or close to it. About 1 us per
 /// place in a loaded box, half a millisecond elsewhere.
 ///
-/// One object per thread; any number of them share a Store and a hull, which must outlive them. All
+/// If all points are collinear, or there is only one, the surface is the segment between the
+/// outermost points; it has heights but no gradients.
+///
+/// One object per thread; any number of them share a PointCloud, which must outlive them. All
 /// functions throw stream::Error on a damaged store and stream::Stopped.
 class PointSurface {
  public:
-  /// Requires a hull of the same level that is not flat. voids: shared by the surfaces of this
-  /// store and level, or null. memory_bytes: limit for finding their border; 0: no limit.
-  PointSurface(const stream::Store& store, unsigned level, const PointHull& hull,
-               TooLong too_long = {}, std::shared_ptr<PointVoids> voids = nullptr,
-               std::uint64_t memory_bytes = 0);
+  /// Requires a cloud with points. memory_bytes: limit for finding the border of the voids; 0: no
+  /// limit.
+  explicit PointSurface(PointCloud& cloud, TooLong too_long = {}, std::uint64_t memory_bytes = 0);
   PointSurface(const PointSurface&) = delete;
   PointSurface& operator=(const PointSurface&) = delete;
 
@@ -91,6 +89,9 @@ class PointSurface {
   void narrow_first(const Point2& centre);
   /// Whether the border of the voids is known; finds it if that pays off.
   bool knows_border();
+  /// Sets points_ to the point at a place among collinear points, or else to its two neighbours.
+  /// Clears points_ outside the segment.
+  void find_on_line(const Point2& place);
   /// Calls visit(point) at least for all points in the covers that are not in memory.
   template <class Visit>
   void read_in(std::span<const CircleCover> covers, const Point2& from, const Visit& visit);
@@ -99,11 +100,8 @@ class PointSurface {
   SurfacePoint at_point(const Point2& point);
   SurfacePoint natural_among(std::vector<Point2>& points, const Point2& place);
 
-  const stream::Store& store_;
-  unsigned level_;
-  const PointHull& hull_;
+  PointCloud& cloud_;
   TooLong too_long_;
-  std::shared_ptr<PointVoids> voids_;
   std::uint64_t memory_bytes_;
   bool wants_border_ = false;
   stream::StoreQuery query_;

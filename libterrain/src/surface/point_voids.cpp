@@ -137,7 +137,7 @@ void PointVoids::for_each_around(const Point2& place,
     open.pop_back();
     const std::array<Point2, 3> corner{border_.point(v[0]), border_.point(v[1]),
                                        border_.point(v[2])};
-    if (!CircleCover::of_triangle(corner[0], corner[1], corner[2]).meets(box)) continue;
+    if (!CircleCover::of_triangle(corner).meets(box)) continue;
     for (std::size_t i = 0; i < 3; ++i) {
       visit(corner[i]);
       if (next[i] != tri::kNoTriangle && reached.insert(tri::slot(next[i])).second) {

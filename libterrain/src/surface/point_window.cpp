@@ -33,14 +33,21 @@ constexpr std::uint64_t kShareKept = 16;
 
 }  // namespace
 
-PointWindow::PointWindow(const stream::Store& store, unsigned level, std::uint64_t memory_bytes,
-                         std::shared_ptr<PointVoids> voids)
-    : store_(store),
+PointWindow::PointWindow(PointCloud& cloud, std::uint64_t memory_bytes)
+    : cloud_(cloud),
       memory_bytes_(memory_bytes),
-      scale_(store.schema().coordinates[2].scale),
-      offset_(store.schema().coordinates[2].offset),
-      voids_(voids != nullptr ? std::move(voids) : std::make_shared<PointVoids>(store, level)),
-      frontier_(store, level) {}
+      scale_(cloud.store.schema().coordinates[2].scale),
+      offset_(cloud.store.schema().coordinates[2].offset),
+      frontier_(cloud.store, cloud.level) {}
+
+SurfaceCorner PointWindow::corner(tri::VertexId vertex) const {
+  return {triangulation_.point(vertex), height(vertex)};
+}
+
+SurfaceTriangle PointWindow::corners_with_heights(tri::TriangleId t) const {
+  const auto v = triangulation_.vertices(t);
+  return {corner(v[0]), corner(v[1]), corner(v[2])};
+}
 
 std::array<Point2, 3> PointWindow::corners(tri::TriangleId triangle) const {
   const auto v = triangulation_.vertices(triangle);
@@ -60,10 +67,10 @@ void PointWindow::check_memory(std::size_t more) const {
   const std::uint64_t inserted = triangulation_.vertex_count() + places_.size() + more;
   const std::uint64_t needed = around * kBytesRead + inserted * kBytesPerPoint + kBytesBefore +
                                frontier_.memory_bytes() + outer_.capacity() * sizeof(Outer) +
-                               groups_.capacity() * sizeof(Group) + outer_tree_.memory_bytes() +
+                               groups_.memory_bytes() + outer_tree_.memory_bytes() +
                                open_tree_.memory_bytes();
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
-  throw NoRoom({.file = store_.path().string(),
+  throw NoRoom({.file = cloud_.store.path().string(),
                 .cause = "a window of at least " + counted(around + inserted, "point") + " needs " +
                          std::to_string((needed >> 20) + 1) + "M of memory, " +
                          std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
@@ -74,8 +81,7 @@ void PointWindow::take(const stream::StoreQuery::Node& node) {
   check_memory(node.positions.size());
   const auto cluster = static_cast<std::uint32_t>(read_.size());
   read_.push_back(node.id);
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  Outer outer{{{kAll, kAll}, {-kAll, -kAll}}, pending_.size()};
+  Outer outer{.box = StoredBox::empty(), .begin = pending_.size()};
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     const stream::Point3& p = node.positions[i];
     const Origin origin{cluster, static_cast<std::uint32_t>(i)};
@@ -86,10 +92,7 @@ void PointWindow::take(const stream::StoreQuery::Node& node) {
       continue;
     }
     pending_.push_back({{p[0], p[1]}, height, origin});
-    for (std::size_t k = 0; k < 2; ++k) {
-      outer.box.min[k] = std::min(outer.box.min[k], p[k]);
-      outer.box.max[k] = std::max(outer.box.max[k], p[k]);
-    }
+    outer.box.include({pending_.back().place, pending_.back().place});
   }
   outer.count = pending_.size() - outer.begin;
   left_ += outer.count;
@@ -115,23 +118,6 @@ void PointWindow::grow_inner(const StoredBox& box) {
   frontier_.read_meeting(inner_, [this](const stream::StoreQuery::Node& node) { take(node); });
 }
 
-void PointWindow::take_nearest(std::size_t count) {
-  by_distance_.clear();
-  for (std::size_t i = 0; i < pending_.size(); ++i) {
-    const Pending& p = pending_[i];
-    if (p.origin.cluster == kNowhere) continue;
-    double distance = 0;
-    for (std::size_t k = 0; k < 2; ++k) {
-      distance = std::max({distance, inner_.min[k] - p.place[k], p.place[k] - inner_.max[k]});
-    }
-    by_distance_.emplace_back(distance, i);
-  }
-  count = std::min(count, by_distance_.size());
-  std::nth_element(by_distance_.begin(), by_distance_.begin() + static_cast<std::ptrdiff_t>(count),
-                   by_distance_.end());
-  for (std::size_t k = 0; k < count; ++k) take(pending_[by_distance_[k].second]);
-}
-
 bool PointWindow::keeps_taken() const {
   return taken_.capacity() * (sizeof(Triangulation::Point) + sizeof(Taken)) <=
          memory_bytes_ / kShareKept;
@@ -143,7 +129,7 @@ void PointWindow::insert_taken() {
   std::vector<tri::VertexId> built;
   const bool is_first = triangulation_.vertex_count() == 0;
   if (is_first) {
-    triangulation_.set_check_stop([this] { store_.check_stop(); });
+    triangulation_.set_check_stop([this] { cloud_.store.check_stop(); });
     built = triangulation_.build(places_);
     if (keeps_taken()) {
       places_.clear();
@@ -155,7 +141,7 @@ void PointWindow::insert_taken() {
     triangulation_.insert(places_, inserted_);
     places_.clear();
   }
-  heights_.resize(triangulation_.vertex_slots(), std::numeric_limits<double>::quiet_NaN());
+  heights_.resize(triangulation_.vertex_slots(), kUnknownHeight);
   origins_.resize(triangulation_.vertex_slots());
   for (std::size_t i = 0; i < taken_.size(); ++i) {
     const std::uint32_t at = tri::slot(is_first ? built[i] : inserted_[i].vertex);
@@ -185,8 +171,6 @@ void PointWindow::clear() {
   groups_.clear();
   read_in_trees_ = 0;
   suspects_.clear();
-  suspect_triangles_ = 0;
-  hull_.clear();
 }
 
 double PointWindow::margin() const {
@@ -205,42 +189,42 @@ void PointWindow::begin(const StoredBox& box) {
 }
 
 void PointWindow::load(const StoredBox& box) {
-  if (!box.meets(flat(store_.bounds()))) {
+  if (!box.meets(flat(cloud_.store.bounds()))) {
     clear();
     box_ = inner_ = box;
-    return make_hints();
+    return;
   }
   const auto load = [&] {
     begin(box);
-    if (voids_->known()) return load_with_border();
+    if (cloud_.voids.known()) return load_with_border();
     // Triangles across the border need a few more points, which are cheaper in bulk.
     grow_inner(box.widened(margin()));
-    if (places_.size() < kFirstPoints) take_nearest(kFirstPoints - places_.size());
     insert_taken();
     is_whole_ = left_ == 0 && frontier_.open().empty();
-    if (!is_whole_) settle();
+    if (!is_whole_ && !cloud_.hull.is_flat()) settle();
   };
   load();
   if (takes_too_long_) {
-    voids_->find(*this);
+    cloud_.voids.find(*this);
     load();
   }
-  make_hints();
+}
+
+void PointWindow::take_distant(const SurfaceCorner& corner) {
+  if (inner_.contains({corner.place[0], corner.place[1], 0})) return;
+  places_.push_back(corner.place);
+  taken_.push_back({corner.height, {}});
 }
 
 void PointWindow::load_with_border() {
-  grow_inner(box_.widened(voids_->reach(box_)));
+  grow_inner(box_.widened(cloud_.voids.reach(box_)));
   insert_taken();
-  voids_->for_each(box_, [this](const SurfaceCorner& corner) {
-    if (inner_.contains({corner.place[0], corner.place[1], 0})) return;
-    places_.push_back(corner.place);
-    taken_.push_back({corner.height, {}});
-  });
+  cloud_.voids.for_each(box_, [this](const SurfaceCorner& corner) { take_distant(corner); });
   insert_taken();
-  states_.assign(triangulation_.triangle_slots(), kUnknown);
+  states_.assign(triangulation_.triangle_slots(), State::kUnknown);
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
     if (inner_.holds(circle(t).bounds()) || triangle_meets(corners(t), box_)) {
-      states_[tri::slot(t)] = kCertain;
+      states_[tri::slot(t)] = State::kCertain;
     }
   }
 }

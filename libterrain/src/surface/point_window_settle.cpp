@@ -24,7 +24,7 @@ constexpr unsigned kMostTimesWidened = 3;
 /// The number of clusters read together for a suspect doubles after this many rounds, at most this
 /// often.
 constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
-/// Up to this many suspects, each point is searched separately.
+/// With fewer suspects, a wider border does not pay off.
 constexpr std::size_t kFewSuspects = 12;
 /// Looks are added to the count of all windows in batches of this size.
 constexpr std::uint64_t kLooksAtOnce = 1024;
@@ -45,21 +45,16 @@ bool triangle_meets(const std::array<Point2, 3>& corner, const StoredBox& box) {
   return true;
 }
 
-CircleCover PointWindow::circle(tri::TriangleId triangle) const {
-  const std::array<Point2, 3> corner = corners(triangle);
-  return CircleCover::of_triangle(corner[0], corner[1], corner[2]);
-}
-
 void PointWindow::examine(tri::TriangleId triangle) {
-  std::uint8_t& state = states_[tri::slot(triangle)];
+  State& state = states_[tri::slot(triangle)];
   const CircleCover cover = circle(triangle);
   if (inner_.holds(cover.bounds())) {
-    state = kCertain;
+    state = State::kCertain;
   } else if (triangle_meets(corners(triangle), box_)) {
-    state = kSuspect;
+    state = State::kSuspect;
     suspects_.push_back({cover, triangle});
   } else {
-    state = kUnknown;
+    state = State::kUnknown;
   }
 }
 
@@ -67,19 +62,25 @@ void PointWindow::settle() {
   clusters_at_once_ = 1;
   triangulation_.start_journal();
   examine_all();
-  for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) store_.check_stop();
+  for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) cloud_.store.check_stop();
+  // With its corners, the hull is that of the whole, so only circles can lack points. The corners
+  // get their heights when their clusters are read.
+  for (const Point2& corner : cloud_.hull.corners()) take_distant({corner, kUnknownHeight});
+  insert_taken();
+  examine_changes();
   for (unsigned round = 1; add_missing(); ++round) {
     // Where clusters have no missing points, more of them are read together.
     clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMostDoublings);
-    store_.check_stop();
+    cloud_.store.check_stop();
     insert_taken();
     examine_changes();
   }
   triangulation_.stop_journal();
 }
 
-void PointWindow::find_hull() {
-  if (triangulation_.triangle_count() == 0) return;
+std::vector<tri::TriangleId> PointWindow::triangles_at_hull() const {
+  std::vector<tri::TriangleId> found;
+  if (triangulation_.triangle_count() == 0) return found;
   tri::VertexId least = tri::kNoVertex;
   Point2 place{};
   for (const tri::VertexId v : triangulation_.all_vertices()) {
@@ -103,70 +104,43 @@ void PointWindow::find_hull() {
       }
       t = next;
     }
-    hull_.push_back(t);
+    found.push_back(t);
   } while (about != least);
+  return found;
 }
 
 void PointWindow::examine_all() {
-  // While inner_ contains all vertices, a circle that leaves it contains places outside the hull.
+  // As inner_ contains all vertices, a circle that leaves it contains places outside the hull.
   // The triangles whose circles contain such a place are connected across edges to each other and
   // to the hull, like those that an insertion there would remove. So the others need no test.
-  states_.assign(triangulation_.triangle_slots(), kCertain);
-  find_hull();
-  std::vector<tri::TriangleId> reached = hull_;
-  if (triangulation_.vertex_count() <= kFirstPoints) {
-    const auto all = triangulation_.all_triangles();
-    reached.assign(all.begin(), all.end());
-  }
+  states_.assign(triangulation_.triangle_slots(), State::kCertain);
+  std::vector<tri::TriangleId> reached = triangles_at_hull();
   while (!reached.empty()) {
     const tri::TriangleId t = reached.back();
     reached.pop_back();
-    if (state(t) != kCertain) continue;
+    if (states_[tri::slot(t)] != State::kCertain) continue;
     examine(t);
-    if (state(t) == kCertain) continue;
+    if (states_[tri::slot(t)] == State::kCertain) continue;
     for (const tri::TriangleId next : triangulation_.neighbours(t)) {
-      if (next != tri::kNoTriangle && state(next) == kCertain) reached.push_back(next);
+      if (next != tri::kNoTriangle && states_[tri::slot(next)] == State::kCertain)
+        reached.push_back(next);
     }
   }
-  suspect_triangles_ = suspects_.size();
-  find_suspect_hull();
 }
 
 void PointWindow::examine_changes() {
   triangulation_.take_changes(changes_);
-  states_.resize(triangulation_.triangle_slots(), kUnknown);
-  for (const tri::TriangleId t : changes_.removed_triangles) states_[tri::slot(t)] = kUnknown;
-  suspects_.resize(suspect_triangles_);
-  std::erase_if(suspects_,
-                [&](const Suspect& suspect) { return state(suspect.triangle) != kSuspect; });
-  for (const tri::TriangleId t : changes_.added_triangles) {
-    const auto next = triangulation_.neighbours(t);
-    if (std::find(next.begin(), next.end(), tri::kNoTriangle) != next.end()) hull_.push_back(t);
-    examine(t);
-  }
-  suspect_triangles_ = suspects_.size();
-  find_suspect_hull();
+  states_.resize(triangulation_.triangle_slots(), State::kUnknown);
+  for (const tri::TriangleId t : changes_.removed_triangles)
+    states_[tri::slot(t)] = State::kUnknown;
+  drop_settled();
+  for (const tri::TriangleId t : changes_.added_triangles) examine(t);
 }
 
-void PointWindow::find_suspect_hull() {
-  std::sort(hull_.begin(), hull_.end());
-  hull_.erase(std::unique(hull_.begin(), hull_.end()), hull_.end());
-  std::erase_if(hull_, [&](tri::TriangleId t) {
-    if (!triangulation_.alive(t)) return true;
-    const auto next = triangulation_.neighbours(t);
-    return std::find(next.begin(), next.end(), tri::kNoTriangle) == next.end();
+void PointWindow::drop_settled() {
+  std::erase_if(suspects_, [&](const Suspect& suspect) {
+    return states_[tri::slot(suspect.triangle)] != State::kSuspect;
   });
-  for (const tri::TriangleId t : hull_) {
-    const auto next = triangulation_.neighbours(t);
-    const std::array<Point2, 3> corner = corners(t);
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (next[i] != tri::kNoTriangle || (states_[tri::slot(t)] & kHullEdge << i) != 0) continue;
-      const CircleCover cover = CircleCover::of_plane(corner[(i + 1) % 3], corner[(i + 2) % 3]);
-      if (cover.meets(box_)) {
-        suspects_.push_back({cover, t, static_cast<std::uint8_t>(i)});
-      }
-    }
-  }
 }
 
 bool PointWindow::widen() {
@@ -191,91 +165,50 @@ bool PointWindow::widen() {
   grow_inner(inner_.widened(more));
   insert_taken();
   examine_changes();
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < suspects_.size(); ++i) {
-    const Suspect& suspect = suspects_[i];
-    if (i < suspect_triangles_ && inner_.holds(suspect.cover.bounds())) {
-      std::uint8_t& state = states_[tri::slot(suspect.triangle)];
-      state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
-    } else {
-      suspects_[kept++] = suspect;
-    }
+  for (const Suspect& suspect : suspects_) {
+    if (!inner_.holds(suspect.cover.bounds())) continue;
+    states_[tri::slot(suspect.triangle)] = State::kCertain;
   }
-  suspect_triangles_ -= suspects_.size() - kept;
-  suspects_.resize(kept);
+  drop_settled();
   return true;
 }
 
 bool PointWindow::add_missing() {
-  if (triangulation_.triangle_count() == 0) {
-    // With fewer than three points, or collinear points, any other point may form a triangle.
-    while (true) {
-      take_nearest(std::max<std::size_t>(64, triangulation_.vertex_count()));
-      if (!places_.empty()) return true;
-      constexpr std::size_t kAtOnce = 64;
-      chosen_.clear();
-      for (std::uint32_t k = 0; k < frontier_.open().size() && k < kAtOnce; ++k) {
-        chosen_.push_back(k);
-      }
-      if (!read_missing()) return false;
-      if (!places_.empty()) return true;
-    }
-  }
   make_trees();
   chosen_.clear();
   for (const Suspect& suspect : suspects_) {
     const bool is_missing = find_missing(suspect);
-    if (looks_ >= kLooksAtOnce) takes_too_long_ = voids_->count_looks(std::exchange(looks_, 0));
-    if (takes_too_long_) return false;
-    if (is_missing) continue;
-    std::uint8_t& state = states_[tri::slot(suspect.triangle)];
-    if (suspect.edge == Suspect::kNone) {
-      state = static_cast<std::uint8_t>((state & ~kTriangleState) | kCertain);
-    } else {
-      state = static_cast<std::uint8_t>(state | kHullEdge << suspect.edge);
+    if (looks_ >= kLooksAtOnce) {
+      takes_too_long_ = cloud_.voids.count_looks(std::exchange(looks_, 0));
     }
+    if (takes_too_long_) return false;
+    if (!is_missing) states_[tri::slot(suspect.triangle)] = State::kCertain;
   }
   // Clusters are only read now; their points are found in the next round.
   const bool has_read = read_missing();
   return has_read || !places_.empty();
 }
 
-void PointWindow::add_groups(std::size_t begin, std::size_t count) {
-  constexpr double kAll = std::numeric_limits<double>::infinity();
-  StoredBox box{{kAll, kAll}, {-kAll, -kAll}};
-  const std::span<Pending> points(pending_.data() + begin, count);
-  for (const Pending& p : points) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      box.min[k] = std::min(box.min[k], p.place[k]);
-      box.max[k] = std::max(box.max[k], p.place[k]);
-    }
-  }
-  const std::size_t at = groups_.size();
-  groups_.push_back({box, begin, count, at + 1});
-  if (count <= kPointsPerGroup) return;
-  groups_[at].count = 0;
-  const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
-  const std::size_t half = count / 2;
-  std::nth_element(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(half), points.end(),
-                   [axis](const Pending& a, const Pending& b) {
-                     return std::pair(a.place[axis], a.origin.index) <
-                            std::pair(b.place[axis], b.origin.index);
-                   });
-  add_groups(begin, half);
-  add_groups(begin + half, count - half);
-  groups_[at].next = groups_.size();
-}
-
 void PointWindow::part(Outer& outer) {
-  if (outer.is_parted) return;
-  outer.is_parted = true;
-  outer.first_group = groups_.size();
-  const auto begin = pending_.begin() + static_cast<std::ptrdiff_t>(outer.begin);
-  const auto end = begin + static_cast<std::ptrdiff_t>(outer.count);
-  const auto taken =
-      std::partition(begin, end, [](const Pending& p) { return p.origin.cluster != kNowhere; });
-  if (taken != begin) add_groups(outer.begin, static_cast<std::size_t>(taken - begin));
-  outer.end_group = groups_.size();
+  if (outer.groups.is_built) return;
+  const auto at = [&](std::size_t i) { return pending_.begin() + static_cast<std::ptrdiff_t>(i); };
+  const auto taken = std::partition(at(outer.begin), at(outer.begin + outer.count),
+                                    [](const Pending& p) { return p.origin.cluster != kNowhere; });
+  outer.groups = groups_.add(
+      static_cast<std::uint32_t>(outer.begin), static_cast<std::uint32_t>(taken - pending_.begin()),
+      kPointsPerGroup, [&](std::uint32_t i) { return StoredBox::around(pending_[i].place); },
+      [&](std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
+        StoredBox box = StoredBox::empty();
+        for (std::uint32_t i = begin; i < end; ++i) {
+          box.include({pending_[i].place, pending_[i].place});
+        }
+        const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
+        std::nth_element(at(begin), at(middle), at(end),
+                         [axis](const Pending& a, const Pending& b) {
+                           return std::pair(a.place[axis], a.origin.index) <
+                                  std::pair(b.place[axis], b.origin.index);
+                         });
+      });
 }
 
 void PointWindow::make_trees() {
@@ -297,19 +230,9 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   const CircleCover& cover = suspect.cover;
   const std::array<Point2, 3> corner = corners(suspect.triangle);
   const StoredBox bounds = cover.bounds();
-  const Point2 &from = corner[(suspect.edge + 1) % 3], &to = corner[(suspect.edge + 2) % 3];
   const auto meets_cover = [&](const StoredBox& box) {
     ++looks_;
-    if (!bounds.meets(box) || !cover.meets(box)) return false;
-    if (suspect.edge == Suspect::kNone) return true;
-    // On the line of a hull edge, only points between its ends are missing; a straight border has
-    // many points on its line.
-    const Point2 outermost{to[1] > from[1] ? box.max[0] : box.min[0],
-                           to[0] > from[0] ? box.min[1] : box.max[1]};
-    if (tri::orientation(from, to, outermost) < 0) return true;
-    return StoredBox{{std::min(from[0], to[0]), std::min(from[1], to[1])},
-                     {std::max(from[0], to[0]), std::max(from[1], to[1])}}
-        .meets(box);
+    return bounds.meets(box) && cover.meets(box);
   };
   // Take the innermost of the points that were read: it leaves the smallest remainder.
   std::size_t point = pending_.size();
@@ -332,13 +255,7 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   outer_tree_.visit(may_hold, [&](std::uint32_t number) {
     Outer& outer = outer_[number];
     part(outer);
-    for (std::size_t g = outer.first_group; g < outer.end_group;) {
-      const Group& group = groups_[g];
-      const bool looks = may_hold(group.box);
-      g = looks ? g + 1 : group.next;
-      if (!looks) continue;
-      for (std::size_t k = 0; k < group.count; ++k) look_at_point(group.begin + k);
-    }
+    groups_.visit(outer.groups, may_hold, look_at_point);
   });
   if (point < pending_.size()) {
     take(pending_[point]);
@@ -348,24 +265,18 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   // cover.
   const auto open = frontier_.open();
   unsigned level = 0;
-  by_distance_.clear();
+  by_depth_.clear();
   open_tree_.visit(meets_cover, [&](std::uint32_t k) {
     if (open[k].level < level) return;
-    if (open[k].level > level) by_distance_.clear();
+    if (open[k].level > level) by_depth_.clear();
     level = open[k].level;
-    by_distance_.emplace_back(cover.depth(open[k].box), k);
+    by_depth_.emplace_back(cover.depth(open[k].box), k);
   });
-  if (by_distance_.empty()) return false;
-  std::size_t count = std::min(clusters_at_once_, by_distance_.size());
-  const auto behind = by_distance_.begin() + static_cast<std::ptrdiff_t>(count);
-  std::nth_element(by_distance_.begin(), behind - 1, by_distance_.end());
-  const StoredBox& best = open[std::min_element(by_distance_.begin(), behind)->second].box;
-  // Hardly any points are beyond an edge of the hull, but on a straight border many are on its
-  // line. They do not make the half-plane smaller, so all such clusters must be read.
-  if (cover.has_plane && !cover.has_disk && cover.plane.grazes(best)) count = by_distance_.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    chosen_.push_back(static_cast<std::uint32_t>(by_distance_[i].second));
-  }
+  if (by_depth_.empty()) return false;
+  const std::size_t count = std::min(clusters_at_once_, by_depth_.size());
+  std::nth_element(by_depth_.begin(), by_depth_.begin() + static_cast<std::ptrdiff_t>(count - 1),
+                   by_depth_.end());
+  for (std::size_t i = 0; i < count; ++i) chosen_.push_back(by_depth_[i].second);
   return true;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -30,6 +31,24 @@ struct LatticeWindow {
 struct StoredBox {
   std::array<double, 2> min{}, max{};
 
+  /// Returns the box of no place, which grows by include().
+  static StoredBox empty() {
+    constexpr double kFar = std::numeric_limits<double>::infinity();
+    return {{kFar, kFar}, {-kFar, -kFar}};
+  }
+  /// Returns the smallest box with some places.
+  template <class... Places>
+  static StoredBox around(const Places&... places) {
+    StoredBox box = empty();
+    (box.include({places, places}), ...);
+    return box;
+  }
+  void include(const StoredBox& other) {
+    for (std::size_t k = 0; k < 2; ++k) {
+      min[k] = std::min(min[k], other.min[k]);
+      max[k] = std::max(max[k], other.max[k]);
+    }
+  }
   [[nodiscard]] bool meets(const StoredBox& other) const {
     return min[0] <= other.max[0] && max[0] >= other.min[0] && min[1] <= other.max[1] &&
            max[1] >= other.min[1];

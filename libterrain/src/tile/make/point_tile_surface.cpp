@@ -16,23 +16,14 @@ namespace {
 
 /// The most samples to take at once.
 constexpr double kMostSamples = 1U << 18;
+/// Margin to load around a part, in mean distances of points.
+constexpr double kMargin = 8;
 /// In degrees: a box this narrow is practically one place, so dividing it does not help.
 constexpr double kNarrowest = 1e-9;
-/// The most points to triangulate at once if places need them.
+/// The most points to load at once if places need them.
 constexpr double kMostTogether = 1U << 15;
 /// The number of boxes to remember as crowded or not.
 constexpr std::size_t kMostRemembered = 1U << 14;
-
-StoredBox box_around(std::span<const Point2> stored, std::span<const std::uint32_t> part) {
-  StoredBox box{stored[part.front()], stored[part.front()]};
-  for (const std::uint32_t i : part) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      box.min[axis] = std::min(box.min[axis], stored[i][axis]);
-      box.max[axis] = std::max(box.max[axis], stored[i][axis]);
-    }
-  }
-  return box;
-}
 
 }  // namespace
 
@@ -41,31 +32,20 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
                        unsigned threads)
     : TiledStore(tiled, std::move(system), std::move(heights)),
       window_bytes(bytes),
-      hull(store, 0),
-      voids(std::make_shared<PointVoids>(store, 0)) {
+      points(std::make_unique<PointCloud>(store, 0)) {
   spacing = cloud_spacing(tiled, places);
   rim = rim_of_outline();
   constexpr std::uint64_t kMost = std::uint64_t{1} << 31;
   if (tiled.points() >= std::min(whole_bytes / CloudSamples::kBytesPerPoint, kMost)) return;
   samples = std::make_unique<CloudSamples>(store, places, vertical, threads);
-  if (!samples->crowd()) return;
-  const std::uint64_t left = whole_bytes - tiled.points() * CloudSamples::kBytesPerPoint;
-  auto all = std::make_unique<PointWindow>(store, 0, left, voids);
-  try {
-    all->load(places.stored_bounds());
-  } catch (const PointWindow::NoRoom&) {
-    return;
-  }
-  whole = std::move(all);
 }
 
 PointTileSurface::PointTileSurface(const TiledCloud& cloud)
     : cloud_(cloud),
       reader_(cloud.store, std::uint64_t{8} << 20),
-      window_(cloud.store, 0, cloud.window_bytes, cloud.voids) {
-  if (!cloud.samples || cloud.samples->crowd() || cloud.hull.is_flat()) return;
-  surface_.emplace(cloud.store, 0, cloud.hull, TooLong{}, cloud.voids, cloud.window_bytes);
-  surface_->share(cloud.samples->cells());
+      surface_(*cloud.points, TooLong{}, cloud.window_bytes),
+      has_all_(cloud.samples && !cloud.samples->crowd()) {
+  if (has_all_) surface_.share(cloud.samples->cells());
 }
 
 const std::vector<StoredBox>& PointTileSurface::windows(const GeographicBox& box) {
@@ -200,7 +180,8 @@ bool PointTileSurface::holds(const StoredBox& box) const {
 void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
                                     std::span<double> out) {
   if (part.empty()) return;
-  const StoredBox box = box_around(stored, part);
+  StoredBox box = StoredBox::empty();
+  for (const std::uint32_t i : part) box.include({stored[i], stored[i]});
   if (!holds(box)) {
     const auto within = [&](const StoredBox& all) {
       return all.contains({box.min[0], box.min[1], 0.0}) &&
@@ -227,11 +208,21 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
       part_heights(stored, part.subspan(first), out);
       return;
     }
-    held_.reset();  // so that nothing is held if reading fails
-    window_.load(*wanted);
-    held_ = wanted;
+    load(*wanted);
   }
-  for (const std::uint32_t i : part) out[i] = window_.at(stored[i]).height;
+  for (const std::uint32_t i : part) out[i] = surface_.linear(stored[i]).height;
+}
+
+/// Loads the points of a box and as far around it as most circles extend.
+void PointTileSurface::load(const StoredBox& box) {
+  held_.reset();  // so that nothing is held if reading fails
+  const StoredBox all = cloud_.places.stored_bounds();
+  const double area = (all.max[0] - all.min[0]) * (all.max[1] - all.min[1]);
+  const double margin = kMargin * std::sqrt(area / static_cast<double>(cloud_.store.points()));
+  const std::size_t most = cloud_.window_bytes / PointCells::kBytesPerPoint;
+  // Without points in memory, each place reads its own.
+  if (!surface_.load(box.widened(margin), most, true)) surface_.load(box, most, true);
+  held_ = box;
 }
 
 void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span<double> out) {
@@ -242,22 +233,8 @@ void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span
       within.push_back(i);
     }
   }
-  if (surface_) {
-    for (const std::uint32_t i : within) out[i] = surface_->linear(stored[i]).height;
-    return;
-  }
-  if (cloud_.whole) {
-    // Places come along sides, each usually a few triangles from the previous one.
-    tri::VertexId near = tri::kNoVertex;
-    Point2 before{};
-    for (const std::uint32_t i : within) {
-      if (!cloud_.whole->are_close(before, stored[i])) near = tri::kNoVertex;
-      out[i] = cloud_.whole->at(stored[i], near).height;
-      before = stored[i];
-    }
-    return;
-  }
-  part_heights(stored, within, out);
+  if (!has_all_) return part_heights(stored, within, out);
+  for (const std::uint32_t i : within) out[i] = surface_.linear(stored[i]).height;
 }
 
 void PointTileSurface::heights(std::span<const double> longitude, std::span<const double> latitude,
@@ -270,7 +247,8 @@ void PointTileSurface::heights(std::span<const double> longitude, std::span<cons
   for (std::size_t i = 0; i < places.size(); ++i) {
     // The meridian of 180 degrees has two numbers, and tiles on both sides.
     if (places[i][0] == 180.0) places[i][0] = -180.0;
-    if (std::isnan(out[i]) && !cloud_.flat_fill && cloud_.hull.distance(stored[i]) <= cloud_.rim) {
+    if (std::isnan(out[i]) && !cloud_.flat_fill &&
+        cloud_.points->hull.distance(stored[i]) <= cloud_.rim) {
       out[i] = cloud_.fill.height(stored[i][0], stored[i][1]);
     }
   }

@@ -12,9 +12,8 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/geoid_heights.hpp"
-#include "surface/point_hull.hpp"
+#include "surface/point_cloud.hpp"
 #include "surface/point_surface.hpp"
-#include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "tile/make/cloud_samples.hpp"
@@ -25,16 +24,12 @@ namespace terrace::terrain {
 
 /// The data that all threads share when tiling a store of irregular points.
 struct TiledCloud : TiledStore {
-  /// Memory limit of a thread for the triangles of a part.
+  /// Memory limit of a thread for the points of a part.
   std::uint64_t window_bytes = 0;
-  PointHull hull;
   double rim = 0;  ///< from rim_of_outline()
   /// All samples if they fit in memory; otherwise each thread reads those of a part at a time.
   std::unique_ptr<const CloudSamples> samples{};
-  /// The whole triangulation, for crowded samples, if it fits as well.
-  std::unique_ptr<const PointWindow> whole{};
-  /// Shared by the windows of all threads.
-  std::shared_ptr<PointVoids> voids{};
+  std::unique_ptr<PointCloud> points;
 
   /// Reads a level of the store and a few clusters, or the whole store if it fits in whole_bytes.
   /// Throws: stream::Error if no place of it has a longitude and latitude.
@@ -73,6 +68,7 @@ class PointTileSurface final : public TileSurface {
   void surface_heights(std::span<const Point2> stored, std::span<double> out);
   void part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
                     std::span<double> out);
+  void load(const StoredBox& box);
   bool holds(const StoredBox& box) const;
   bool counts_as_crowded(const GeographicBox& box);
   /// Approximate number of points in the window, see stream::StoreQuery::estimate().
@@ -84,10 +80,9 @@ class PointTileSurface final : public TileSurface {
 
   const TiledCloud& cloud_;
   StoreWindow reader_;
-  /// Used if all samples are in memory and neither crowded nor collinear.
-  std::optional<PointSurface> surface_;
-  PointWindow window_;                        ///< of a part
-  std::optional<StoredBox> held_, expected_;  ///< the box in the window, and the one it should hold
+  PointSurface surface_;
+  bool has_all_ = false;                      ///< whether all points are in memory
+  std::optional<StoredBox> held_, expected_;  ///< the loaded box, and the one to load
   std::optional<GeographicBox> asked_;
   std::vector<StoredBox> windows_;
   WindowPoints points_;
