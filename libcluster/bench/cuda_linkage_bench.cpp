@@ -48,7 +48,7 @@ bool equal_heights(const Dendrogram& a, const Dendrogram& b) {
   return true;
 }
 
-void linkage(benchmark::State& state, Kind kind) {
+void compare(benchmark::State& state, Kind kind) {
   std::mt19937_64 random(20);
   const std::vector<Point3> points = inputs::cube(static_cast<std::size_t>(state.range(0)), random);
   auto start = std::chrono::steady_clock::now();
@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
   for (const auto& [name, kind] : {std::pair{"complete/float", Kind::complete_float},
                                    {"complete/double", Kind::complete_double},
                                    {"single", Kind::single}}) {
-    auto* const registered = benchmark::RegisterBenchmark(name, linkage, kind)
+    auto* const registered = benchmark::RegisterBenchmark(name, compare, kind)
                                  ->UseRealTime()
                                  ->Unit(benchmark::kMillisecond);
     registered->Arg(kLeast);
