@@ -68,8 +68,7 @@ cluster::FacilityStrategy strategy_named(const std::string& name) {
                                   {"facilities", FacilityStrategy::facilities},
                                   {"interchange", FacilityStrategy::interchange},
                                   {"jain-vazirani", FacilityStrategy::jain_vazirani},
-                                  {"greedy-stars", FacilityStrategy::greedy_stars},
-                                  {"lp-rounding", FacilityStrategy::lp_rounding}});
+                                  {"greedy-stars", FacilityStrategy::greedy_stars}});
 }
 
 }  // namespace terrace::python

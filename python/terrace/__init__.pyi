@@ -63,7 +63,7 @@ class Raster:
     def __array__(self, dtype: Any = ...) -> npt.NDArray[Any]: ...
 
 _Search = Literal['fast', 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree', 'facilities', 'interchange',
-                  'jain-vazirani', 'greedy-stars', 'lp-rounding']
+                  'jain-vazirani', 'greedy-stars']
 _Smoothing = Literal['laplacian', 'taubin', 'bilateral']
 _Cluster = Union[tuple[int, int], npt.NDArray[Any]]
 
@@ -396,7 +396,7 @@ def cluster(points: _Array, facility_cost: float = ..., *, count: int | None = .
             restarts: int | None = ..., steps: int | None = ..., start: Clusters | None = ..., assign_nearest: bool = ...,
             ordered: bool = ..., threads: int | None = ...) -> Clusters: ...
 def facility_location(connection: _Array, opening: _Array | None = ..., *, count: int | None = ...,
-                      method: Literal['interchange', 'jain-vazirani', 'greedy-stars', 'lp-rounding'] = ...,
+                      method: Literal['interchange', 'jain-vazirani', 'greedy-stars'] = ...,
                       effort: _Effort = ..., seed: int = ..., bound_steps: int = ..., restarts: int | None = ...,
                       seconds: float = ..., threads: int | None = ...) -> Clusters: ...
 

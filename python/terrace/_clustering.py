@@ -217,8 +217,7 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
         returned.
     method: 'fast', the default for points, which supports neither outliers nor channels; the local searches of the
         thesis 'automatic', 'full-scan', 'quadtree', 'octree', 'kd-tree' and 'facilities'; on the matrix of distances
-        (8 n^2 bytes) 'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' if the module was built with
-        GLPK.
+        (8 n^2 bytes) 'interchange', 'jain-vazirani' and 'greedy-stars'.
     effort: 'fast', 'default', 'fine' or 'full'.
     metric: 'euclidean', 'squared', 'minkowski:P' or 'elliptical:FILE'.
     channels: shape (n, c): attributes that count as additional axes of distances and of the diagonal, in the unit of
@@ -311,7 +310,7 @@ def facility_location(connection, opening=None, *, count=None, method='interchan
     connection: shape (facilities, clients), not negative. A matrix of distances clusters entities of any kind.
     opening: the cost of each facility, or one cost for all of them.
     count: opens exactly this many facilities, at no cost (k-median).
-    method: 'interchange', 'jain-vazirani', 'greedy-stars', and 'lp-rounding' if the module was built with GLPK.
+    method: 'interchange', 'jain-vazirani' or 'greedy-stars'.
     bound_steps: the steps of a search for lower_bound; 0 for no search.
     restarts: the number of independent searches; overrides effort.
     seconds: no search is perturbed after this time.

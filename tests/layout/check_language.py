@@ -14,7 +14,7 @@ import re
 import sys
 import tokenize
 
-ROOMS = ['libbase', 'libstream', 'libcluster', 'libmatching', 'libtri', 'libterrain', 'python', 'tools', 'viewer', 'tests', 'cmake', 'docs', '.ci/run', 'dev',
+ROOMS = ['libbase', 'libstream', 'libcluster', 'libmatching', 'libtri', 'libterrain', 'python', 'tools', 'viewer', 'research', 'tests', 'cmake', 'docs', '.ci/run', 'dev',
          'meson.build', 'meson_options.txt', 'README.md', 'ARCHITECTURE.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md']
 
 # What to avoid and what to write instead. Verbs and nouns that have correct uses are narrowed by what follows.

@@ -17,6 +17,8 @@ LIBRARIES = ['base', 'stream', 'cluster', 'matching', 'tri', 'terrain']
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 # The rooms that use the libraries and that no library knows.
 PROGRAMS = ['python', 'tools', 'viewer']
+# The thesis's algorithms and experiments that are not part of the product. It may use all libraries and their private headers.
+RESEARCH = 'research'
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
@@ -36,17 +38,19 @@ LICENCES = {
     'python': 'Apache-2.0',
     'tools': 'GPL-3.0-or-later',
     'viewer': 'GPL-3.0-or-later',
+    'research': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
 
 # What may be included where: a pattern of the name, and the folders and files that may name it. Public headers
 # are stricter still, see check_public_header().
-TESTS = ['tests', 'libbase/tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests']
+TESTS = ['tests', 'libbase/tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests',
+         RESEARCH]
 BENCHES = ['tests/bench', 'libbase/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
            'libterrain/bench']
 # Where CGAL is: what computes on integers must compile without it.
 IN_CGAL = ['libtri/src/delaunay2/double_kernel.cpp', 'libtri/src/delaunay2/elliptical_kernel.cpp', 'libtri/src/delaunay3',
-           'libtri/src/interpolation', 'libtri/src/shape', 'libtri/tests', 'libtri/bench', 'tools/src/scan', 'tests/bench']
+           'libtri/src/interpolation', 'libtri/src/shape', 'libtri/tests', 'libtri/bench', 'tools/src/scan', 'tests/bench', RESEARCH]
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
 RESTRICTED = [
     (r'CGAL/|gmp(xx)?\.h|mpfr\.h', IN_CGAL),
@@ -58,6 +62,7 @@ RESTRICTED = [
     (r'lemon/', ['libmatching/src', 'libmatching/tests', 'libmatching/bench']),
     (r'cuda_runtime|cuda\.h|cuda_(device|rounds)',
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
+    (r'glpk\.h', [RESEARCH]),
     (r'CLI/', ['tools']),
     (r'fmt/', ['libstream/src', 'tools/src']),
     (r'pybind11/|Python\.h', ['python']),
@@ -290,6 +295,30 @@ def check_rooms(root):
                 yield f'{room}/{name}: is missing'
 
 
+def check_research(root):
+    """Nothing uses research/, nothing of it is installed, and its lists of sources are complete."""
+    own = [path for path in files_below(root, RESEARCH) if path.endswith(SOURCE_ENDINGS)]
+    headers = {os.path.relpath(path, RESEARCH) for path in own if path.endswith('.hpp')}
+    for room in LICENCES:
+        for path in files_below(root, room) if room != RESEARCH else []:
+            name = os.path.basename(path)
+            if name == 'meson.build' and re.search(r'\bresearch', read(root, path)):
+                yield f'{path}: names research, which only the workspace\'s meson.build may'
+            if not path.endswith(('.cpp', '.hpp', '.h', '.cu')):
+                continue
+            for number, line in enumerate(read(root, path).split('\n'), 1):
+                included = INCLUDE.match(line)
+                if 'terrace::research' in line or (included and re.sub(r'^(\.\./)*research/', '', included.group(2)) in headers):
+                    yield f'{path}:{number}: uses research, which nothing may'
+    for path in files_below(root, RESEARCH):
+        if os.path.basename(path) == 'meson.build' and re.search(r'\binstall(_\w+)?\s*[:(]', read(root, path)):
+            yield f'{path}: installs something of research'
+    for path in own:
+        listed = os.path.join(os.path.dirname(path), 'meson.build')
+        if path.endswith('.cpp') and f"'{os.path.basename(path)}'" not in read(root, listed):
+            yield f'{path}: is not in {listed}'
+
+
 def check_versions(root):
     """The projects of the libraries name the version that the file VERSION has; others read that file."""
     version = read(root, 'VERSION').strip()
@@ -300,7 +329,7 @@ def check_versions(root):
 
 
 def check_folders(root):
-    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['python/src', 'tools/src', 'viewer/core']:
+    for folder in [f'lib{library}/src' for library in LIBRARIES] + ['python/src', 'tools/src', 'viewer/core', RESEARCH]:
         sources = collections.Counter(os.path.dirname(path) for path in files_below(root, folder)
                                       if path.endswith(('.cpp', '.hpp', '.h', '.cu')))
         for place, count in sorted(sources.items()):
@@ -325,6 +354,7 @@ def breaches(root):
     yield from check_command(root)
     yield from check_texts(root)
     yield from check_meson(root)
+    yield from check_research(root)
     yield from check_versions(root)
     yield from check_folders(root)
 

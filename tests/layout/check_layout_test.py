@@ -42,6 +42,9 @@ def make_tree(root):
     write(root, 'VERSION', '1.2.3\n')
     write(root, 'CITATION.cff', 'cff-version: 1.2.0\nversion: 1.2.3\n')
     write(root, 'tests/run.sh', f'#!/bin/sh\n# {gpl}')
+    write(root, 'research/meson.build', f"# {gpl}executable('a', 'a.cpp')\n")
+    write(root, 'research/ears.hpp', f'// {gpl}')
+    write(root, 'research/a.cpp', f'// {gpl}#include <glpk.h>\n#include <terrace/tri/a.hpp>\n#include "ears.hpp"\n')
 
 
 def head(path):
@@ -137,6 +140,13 @@ class CheckLayout(unittest.TestCase):
             ('libtri/bench/b_bench.cpp', head('libtri'), 'is not in the list'),
             ('libtri/meson.build', head('libtri').replace('//', '#') + "dependency('terrace-stream')\n", 'depends on'),
             ('libcluster/meson.build', apache.replace('//', '#') + "dependency('gmp')\n", 'depends on'),
+            ('libcluster/src/b.cpp', apache + '#include <glpk.h>\n', 'which only'),
+            ('libtri/src/b.cpp', head('libtri') + '#include "ears.hpp"\n', 'uses research'),
+            ('tools/src/b.cpp', gpl + '#include "../../research/ears.hpp"\n', 'uses research'),
+            ('tests/b.cpp', gpl + 'using namespace terrace::research;\n', 'uses research'),
+            ('tests/meson.build', gpl.replace('//', '#') + 'a = research_dep\n', 'names research'),
+            ('research/b.cpp', gpl, 'is not in research/meson.build'),
+            ('research/b/meson.build', gpl.replace('//', '#') + "executable('b', install : true)\n", 'installs'),
         ]
         for path, text, expected in cases:
             with self.subTest(path=path, expected=expected):

@@ -36,8 +36,6 @@ FacilitySolution solve_matrix(const FacilityMatrix& problem, const FacilityOptio
       return jain_vazirani(problem, report, options.check_stop);
     case FacilityStrategy::greedy_stars:
       return greedy_stars(problem, report, options.check_stop);
-    case FacilityStrategy::lp_rounding:
-      return lp_rounding(problem, report);
     default:
       return interchange(problem, options);
   }
@@ -129,11 +127,9 @@ const char* name_of(FacilityStrategy strategy) {
     case FacilityStrategy::jain_vazirani:
       return "Jain-Vazirani";
     case FacilityStrategy::greedy_stars:
-      return "greedy stars";
-    case FacilityStrategy::lp_rounding:
       break;
   }
-  return "LP rounding";
+  return "greedy stars";
 }
 
 FacilitySolution solve(const FacilityPoints& problem, const FacilityOptions& options,

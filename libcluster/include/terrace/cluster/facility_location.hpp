@@ -159,25 +159,11 @@ enum class FacilityStrategy : std::uint8_t {
   /// Source: M. Mahdian et al., A greedy facility location algorithm analyzed using dual fitting,
   /// APPROX 2001.
   greedy_stars,
-  /// Rounds the linear relaxation (programs 4.12 to 4.16 with fractions allowed). In the order of
-  /// their duals, each client whose fractional facilities are all still free opens the cheapest of
-  /// them and blocks the rest. On metric costs the solution costs at most 4 times the relaxation,
-  /// which is its lower bound. For small problems: constraints x <= y are added as they are
-  /// violated, and 50 by 50 takes hundredths of a second, 100 by 100 tenths. Not thread-safe. Needs
-  /// GLPK, see has_lp_rounding(). Sources: D. Shmoys, É. Tardos, K. Aardal, Approximation
-  /// algorithms for facility location problems, STOC 1997; F. Chudak, D. Shmoys, Improved
-  /// approximation algorithms for the uncapacitated facility location problem, SIAM J. Computing
-  /// 2003 (clusters by duals).
-  lp_rounding,
 };
 
 /// Returns "automatic", "full scan", "quadtree", "octree", "kd-tree", "facilities", "fast",
-/// "interchange", "Jain-Vazirani", "greedy stars" or "LP rounding".
+/// "interchange", "Jain-Vazirani" or "greedy stars".
 [[nodiscard]] const char* name_of(FacilityStrategy strategy);
-
-/// Returns whether the library was built with GLPK (-Dterrace_glpk=enabled). GLPK's licence,
-/// GPL-3.0-or-later, then applies to the library too.
-[[nodiscard]] bool has_lp_rounding();
 
 /// Called on the caller's thread at intervals with the number of steps done and their total.
 /// Returning false ends the work with the best result so far.
@@ -196,7 +182,7 @@ struct FacilityOptions {
   double seconds = std::numeric_limits<double>::infinity();
   std::uint64_t seed = 1;
   /// Number of threads, including the caller's; 0: one per core. Does not change the result.
-  /// Growth, LP rounding and `fast` use one thread.
+  /// Growth and `fast` use one thread.
   unsigned threads = 1;
   /// Number of candidates that a local search evaluates at once, on the same solution (7.3.3). The
   /// one with the greatest positive gain is opened, those without gain count as tried, and the
@@ -212,7 +198,6 @@ struct FacilityOptions {
   std::uint64_t memory_limit = 0;
   /// Reports the progress of a local search in candidates.
   FacilityProgress progress = {};
-  /// Called by every strategy except LP rounding.
   base::StopCheck check_stop = {};
 };
 
@@ -238,15 +223,11 @@ struct SearchStatistics {
 struct FacilityReport {
   FacilityStrategy strategy = FacilityStrategy::automatic;  ///< the one that was used
   SearchStatistics search;
-  /// Duals per client. For growth, the time at which the client was connected. For LP rounding, its
-  /// payment in the relaxation.
+  /// Duals per client: for growth, the time at which the client was connected.
   std::vector<double> duals;
   /// The lower bound is that of the duals divided by this number, the least divisor (to 1e-9) for
   /// which no facility is paid more than it costs. 1 except for greedy_stars.
   double divisor = 1.0;
-  /// LP rounding: the fraction to which each facility is open in the relaxation.
-  std::vector<double> fractions;
-  double relaxation = 0.0;
 };
 
 /// Solves the problem by the strategy of the options. Fills in `report` if given; its
@@ -260,7 +241,6 @@ struct FacilityReport {
 /// - for a caller's distance that is negative or NaN, with facility and client;
 /// - if the matrix of points or entities exceeds the limit or memory cannot be allocated, with the
 ///   bytes needed.
-/// std::runtime_error if LP rounding is not built in (the message names the option) or GLPK fails.
 /// Cost: a local search takes at most O(n) per candidate, O(n * facilities) for the start, and
 /// about 150 bytes per point.
 [[nodiscard]] FacilitySolution solve(const FacilityPoints& problem,

@@ -18,8 +18,6 @@ namespace terrace::cluster {
                                              const base::StopCheck& check_stop);
 [[nodiscard]] FacilitySolution greedy_stars(const FacilityMatrix& problem, FacilityReport& report,
                                             const base::StopCheck& check_stop);
-/// Throws: std::runtime_error if the library was built without GLPK or GLPK fails.
-[[nodiscard]] FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& report);
 
 /// All costs of a problem of points or entities, so that strategies on a matrix can solve it.
 struct CostMatrix {

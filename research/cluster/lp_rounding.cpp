@@ -1,4 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "lp_rounding.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -6,15 +8,15 @@
 #include <stdexcept>
 #include <string>
 
-#include "facility/bounds/matrix_dual.hpp"
-#include "facility/matrix/cost_rows.hpp"
-#include "facility/matrix/strategies.hpp"
-
-#ifdef TERRACE_CLUSTER_GLPK
-
 #include <glpk.h>
 
-namespace terrace::cluster {
+#include "facility/bounds/matrix_dual.hpp"
+#include "facility/matrix/cost_rows.hpp"
+
+namespace terrace::research {
+
+using cluster::FacilityMatrix;
+
 namespace {
 
 // Fractions below this count as zero.
@@ -140,9 +142,8 @@ std::vector<std::uint32_t> rounded(const Relaxation& relaxation, const FacilityM
 
 }  // namespace
 
-bool has_lp_rounding() { return true; }
-
-FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& report) {
+LpRounding lp_rounding(const FacilityMatrix& problem) {
+  cluster::check(problem);
   if (problem.facilities > 10000000 / problem.clients) {
     throw std::invalid_argument("a linear program of " + std::to_string(problem.facilities) +
                                 " facilities times " + std::to_string(problem.clients) +
@@ -150,32 +151,17 @@ FacilitySolution lp_rounding(const FacilityMatrix& problem, FacilityReport& repo
   }
   Relaxation relaxation(problem);
   relaxation.solve();
-  report.relaxation = relaxation.value();
+  LpRounding result;
+  result.relaxation = relaxation.value();
   for (int j = 0; j < static_cast<int>(problem.facilities); ++j) {
-    report.fractions.push_back(relaxation.fraction(j));
+    result.fractions.push_back(relaxation.fraction(j));
   }
   for (int i = 0; i < static_cast<int>(problem.clients); ++i) {
-    report.duals.push_back(relaxation.dual(i));
+    result.duals.push_back(relaxation.dual(i));
   }
-  FacilitySolution solution = solution_of(problem, rounded(relaxation, problem, report.duals));
-  solution.lower_bound = dual_value(problem, report.duals);
-  return solution;
+  result.solution = cluster::solution_of(problem, rounded(relaxation, problem, result.duals));
+  result.solution.lower_bound = cluster::dual_value(problem, result.duals);
+  return result;
 }
 
-}  // namespace terrace::cluster
-
-#else
-
-namespace terrace::cluster {
-
-bool has_lp_rounding() { return false; }
-
-FacilitySolution lp_rounding(const FacilityMatrix&, FacilityReport&) {
-  throw std::runtime_error(
-      "this build of libcluster has no linear programming: configure with "
-      "-Dterrace_glpk=enabled (GLPK, whose licence is GPL-3.0-or-later)");
-}
-
-}  // namespace terrace::cluster
-
-#endif
+}  // namespace terrace::research

@@ -1,43 +1,30 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "lp_rounding.hpp"
+
 #include <cmath>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
 
 #include "matrix_laws.hpp"
-#include "terrace/cluster/facility_location.hpp"
 
-namespace terrace::cluster {
+namespace terrace::research {
+
+using namespace cluster;
+
 namespace {
-
-const FacilityOptions kRounding{.strategy = FacilityStrategy::lp_rounding};
 
 double bound_by(const FacilityMatrix& matrix, FacilityStrategy strategy) {
   return solve(matrix, {.strategy = strategy}).lower_bound;
 }
 
-TEST(LpRounding, ReportsThatItIsNotBuilt) {
-  const std::vector<double> one{1.0};
-  if (has_lp_rounding()) {
-    EXPECT_NO_THROW(static_cast<void>(solve(FacilityMatrix{1, 1, one, one}, kRounding)));
-    return;
-  }
-  try {
-    static_cast<void>(solve(FacilityMatrix{1, 1, one, one}, kRounding));
-    FAIL() << "it worked";
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("-Dterrace_glpk=enabled"), std::string::npos);
-  }
-}
-
 TEST(LpRounding, CostIsWithinTheProvenFactor) {
-  if (!has_lp_rounding()) GTEST_SKIP() << "GLPK is not built in (-Dterrace_glpk=enabled)";
   for (std::uint64_t seed = 1; seed <= 120; ++seed) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 10, 20);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    FacilityReport result;
-    const FacilitySolution solution = solve(matrix, kRounding, &result);
+    const LpRounding result = lp_rounding(matrix);
+    const FacilitySolution& solution = result.solution;
     laws::expect_solution(matrix, solution);
     const double best = laws::optimum(matrix);
     EXPECT_LE(solution.lower_bound, best);
@@ -52,16 +39,13 @@ TEST(LpRounding, CostIsWithinTheProvenFactor) {
 }
 
 TEST(LpRounding, NoBoundIsAboveTheRelaxation) {
-  if (!has_lp_rounding()) GTEST_SKIP() << "GLPK is not built in (-Dterrace_glpk=enabled)";
   double share = 0.0;
   unsigned count = 0;
   for (std::uint64_t seed = 1; seed <= 48; ++seed) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 30, 40);
     SCOPED_TRACE(testing::Message() << "seed " << seed << ", " << problem.kind);
     const FacilityMatrix matrix = problem.matrix();
-    FacilityReport report;
-    (void)solve(matrix, kRounding, &report);
-    const double limit = report.relaxation;
+    const double limit = lp_rounding(matrix).relaxation;
     const double most = limit * (1.0 + 1e-9);
     const double bound = lower_bound(matrix).lower_bound;
     EXPECT_LE(bound, most);
@@ -76,7 +60,6 @@ TEST(LpRounding, NoBoundIsAboveTheRelaxation) {
 }
 
 TEST(LpRounding, SolvesFiftyByFifty) {
-  if (!has_lp_rounding()) GTEST_SKIP() << "GLPK is not built in (-Dterrace_glpk=enabled)";
   std::mt19937_64 random(50);
   const std::vector<Point3> points = inputs::cube(50, random);
   std::vector<double> opening(50, 0.4), connection;
@@ -86,17 +69,16 @@ TEST(LpRounding, SolvesFiftyByFifty) {
     }
   }
   const FacilityMatrix matrix{50, 50, opening, connection};
-  FacilityReport result;
-  const FacilitySolution solution = solve(matrix, kRounding, &result);
+  const LpRounding result = lp_rounding(matrix);
+  const FacilitySolution& solution = result.solution;
   laws::expect_solution(matrix, solution);
   EXPECT_LE(solution.gap(), 3.0);
   EXPECT_NEAR(lower_bound(matrix).lower_bound, result.relaxation, 0.01 * result.relaxation);
 }
 
 TEST(LpRounding, RejectsInvalidProblems) {
-  EXPECT_THROW(static_cast<void>(solve(FacilityMatrix{0, 1, {}, {}}, kRounding)),
-               std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(lp_rounding(FacilityMatrix{0, 1, {}, {}})), std::invalid_argument);
 }
 
 }  // namespace
-}  // namespace terrace::cluster
+}  // namespace terrace::research
