@@ -26,7 +26,6 @@
 #include <malloc.h>
 #endif
 
-#include "delaunay3/access.hpp"
 #include "terrace/tri/delaunay3.hpp"
 
 namespace {
@@ -308,7 +307,7 @@ void bulk_by_threads(benchmark::State& state) {
   });
 }
 
-enum Action { kInsert, kRemoveSets, kRemoveOneByOne, kRemoveByEars };
+enum Action { kInsert, kRemoveSets, kRemoveOneByOne };
 
 template <class Engine, Action kAction>
 void clusters(benchmark::State& state) {
@@ -317,14 +316,12 @@ void clusters(benchmark::State& state) {
   Engine engine(input_points(input));
   engine.build();
   engine.find(all);
-  if constexpr (kAction == kRemoveByEars)
-    terrace::tri::Delaunay3Access::mesh(engine.triangulation).hole.by_ears = true;
   const auto insert = [&] {
     for (auto& members : engine.clusters) engine.insert(members);
   };
   const auto remove = [&] {
     for (auto& members : engine.clusters) {
-      if constexpr (kAction == kRemoveOneByOne || kAction == kRemoveByEars) {
+      if constexpr (kAction == kRemoveOneByOne) {
         engine.remove_one_by_one(members);
       } else {
         engine.remove_set(members);
@@ -367,7 +364,6 @@ BENCHMARK(clusters<OursInt, kInsert>)->Apply(inputs);
 BENCHMARK(clusters<OursDouble, kInsert>)->Apply(inputs);
 BENCHMARK(clusters<Cgal, kRemoveOneByOne>)->Apply(inputs);
 BENCHMARK(clusters<OursInt, kRemoveOneByOne>)->Apply(inputs);
-BENCHMARK(clusters<OursInt, kRemoveByEars>)->Apply(inputs);
 BENCHMARK(clusters<OursDouble, kRemoveOneByOne>)->Apply(inputs);
 BENCHMARK(clusters<Cgal, kRemoveSets>)->Apply(inputs);
 BENCHMARK(clusters<OursInt, kRemoveSets>)->Apply(inputs);

@@ -138,9 +138,6 @@ struct Hole {
   std::vector<Facet> facets;
   std::vector<std::uint32_t> slots;  ///< slots of the tetrahedra taken out
 
-  /// True to fill the hole of one vertex by ear_queue.cpp, a second method for comparison.
-  bool by_ears = false;
-
   // For wrap.hpp: open facets as a stack (some already closed again), and facets by corners.
   std::vector<std::uint32_t> pending;
   std::vector<FacetEntry> table;

@@ -5,7 +5,6 @@
 // edges or vertices are filled one after the other.
 #include "remove.hpp"
 
-#include "delaunay3/wrap/wrap.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
@@ -21,8 +20,8 @@ constexpr std::size_t kMaxSet = 512;
 template <class Kernel>
 class Removal {
  public:
-  Removal(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices)
-      : mesh_(mesh), hole_(mesh.hole), vertices_(vertices) {}
+  Removal(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices, FillHole<Kernel> fill)
+      : mesh_(mesh), hole_(mesh.hole), vertices_(vertices), fill_(fill) {}
 
   void run() {
     starts_.clear();
@@ -42,11 +41,7 @@ class Removal {
         return;
       }
       for (const std::uint32_t t : hole_.slots) mesh_.mark[t] = kUnknown;
-      if (hole_.by_ears && vertices_.size() == 1) {
-        fill_by_ears(mesh_, mesh_.vertex[vertices_[0]].point);
-      } else {
-        wrap_hole(mesh_);
-      }
+      fill_(mesh_);
     }
     for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
     mesh_.last_vertex = hole_.vertex[1];
@@ -128,20 +123,22 @@ class Removal {
   Mesh<Kernel>& mesh_;
   Hole<typename Kernel::Point>& hole_;
   std::span<const std::uint32_t> vertices_;
+  FillHole<Kernel> fill_;
   std::vector<std::uint32_t> starts_;
 };
 
 }  // namespace
 
 template <class Kernel>
-void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
+void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices,
+                FillHole<Kernel> fill) {
   if (vertices.empty()) return;
   if (mesh.flat) {
     remove_flat(mesh, vertices);
     return;
   }
   if (vertices.size() <= kMaxSet) {
-    Removal<Kernel>(mesh, vertices).run();
+    Removal<Kernel>(mesh, vertices, fill).run();
     return;
   }
   std::vector<typename Kernel::Point> points;
@@ -153,15 +150,17 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
     part.clear();
     for (; begin < order.size() && part.size() < kMaxSet; ++begin)
       part.push_back(vertices[order[begin]]);
-    remove_set<Kernel>(mesh, part);
+    remove_set<Kernel>(mesh, part, fill);
   }
 }
 
 #ifdef TERRACE_TRI_CORE
-template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
+template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>, FillHole<IntKernel>);
 #else
-template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
-template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);
+template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>,
+                         FillHole<DoubleKernel>);
+template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>,
+                         FillHole<EllipticalKernel>);
 #endif
 
 }  // namespace terrace::tri::spatial

@@ -3,16 +3,18 @@
 
 #include <span>
 
-#include "mesh.hpp"
+#include "delaunay3/mesh.hpp"
+#include "delaunay3/wrap/wrap.hpp"
 
 namespace terrace::tri::spatial {
 
+/// Fills mesh.hole, like wrap_hole().
+template <class Kernel>
+using FillHole = void (*)(Mesh<Kernel>& mesh);
+
 /// Removes one or many different vertices, see remove.cpp.
 template <class Kernel>
-void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
-
-/// Fills mesh.hole, which one vertex at `removed` has left, by cutting ears, see ear_queue.cpp.
-template <class Kernel>
-void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed);
+void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices,
+                FillHole<Kernel> fill = wrap_hole<Kernel>);
 
 }  // namespace terrace::tri::spatial

@@ -1,4 +1,4 @@
-// SPDX-License-Identifier: Apache-2.0
+// SPDX-License-Identifier: GPL-3.0-or-later
 // Fills the hole of one vertex by cutting ears, after J. Skala, thesis, section 8.2, and O.
 // Devillers, "On deletion in Delaunay triangulations", doi:10.1142/S0218195902000815. An ear is the
 // tetrahedron of two neighbouring facets. Ears wait in a priority queue. The first is the one whose
@@ -10,17 +10,24 @@
 // vertices. Such a tetrahedron belongs to the result whenever it is made, so the result is exact,
 // ties included. An ear that fails will always fail and is dropped. If no ear is left before the
 // hole is full (possible with ties and at the hull), the rest is wrapped.
+#include "ear_queue.hpp"
+
 #include <algorithm>
+#include <cassert>
 #include <limits>
 
+#include "delaunay3/access.hpp"
+#include "delaunay3/double_kernel.hpp"
+#include "delaunay3/int_kernel.hpp"
+#include "delaunay3/predicates.hpp"
+#include "delaunay3/remove.hpp"
 #include "delaunay3/wrap/wrap.hpp"
-#include "double_kernel.hpp"
-#include "elliptical_kernel.hpp"
-#include "int_kernel.hpp"
-#include "predicates.hpp"
-#include "remove.hpp"
 
-namespace terrace::tri::spatial {
+namespace terrace::research {
+
+using namespace tri;
+using namespace tri::spatial;
+
 namespace {
 
 template <class Kernel>
@@ -143,20 +150,36 @@ class EarQueue {
   std::vector<Edge> edges_;
 };
 
-}  // namespace
+/// Returns the vertex whose removal left mesh.hole.
+template <class Kernel>
+const typename Kernel::Point& removed_point(const Mesh<Kernel>& mesh) {
+  for (const std::uint32_t v : mesh.tetrahedron[mesh.hole.slots.front()].corner) {
+    if (v != kGhost && mesh.vertex[v].incident == kRemoving) return mesh.vertex[v].point;
+  }
+  assert(false);
+  return mesh.hole.point.front();
+}
 
 template <class Kernel>
-void fill_by_ears(Mesh<Kernel>& mesh, const typename Kernel::Point& removed) {
+void fill_by_ears(Mesh<Kernel>& mesh) {
+  const typename Kernel::Point removed = removed_point(mesh);
   HoleFilling<Kernel> filling(mesh);
   EarQueue<Kernel>(mesh, filling, removed).run();
   wrap_rest(mesh, filling);
 }
 
-#ifdef TERRACE_TRI_CORE
-template void fill_by_ears(Mesh<IntKernel>&, const IntKernel::Point&);
-#else
-template void fill_by_ears(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
-template void fill_by_ears(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&);
-#endif
+}  // namespace
 
-}  // namespace terrace::tri::spatial
+template <class Coord>
+void remove_by_ears(Delaunay3<Coord>& triangulation, VertexId vertex) {
+  const std::uint32_t one = slot(vertex);
+  [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
+  auto& mesh = Delaunay3Access::mesh(triangulation);
+  using Kernel = typename std::remove_reference_t<decltype(mesh)>::Kernel;
+  remove_set<Kernel>(mesh, std::span(&one, 1), fill_by_ears<Kernel>);
+}
+
+template void remove_by_ears(Delaunay3<std::int32_t>&, VertexId);
+template void remove_by_ears(Delaunay3<double>&, VertexId);
+
+}  // namespace terrace::research
