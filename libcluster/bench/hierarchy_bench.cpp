@@ -14,7 +14,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/inputs.hpp"
-#include "hierarchy/hierarchy_engine.hpp"
+#include "hierarchy/engine.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
 namespace terrace::cluster {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hierarchy/hierarchy_engine.hpp"
-
 #include <algorithm>
 #include <atomic>
 #include <limits>
@@ -14,6 +12,7 @@
 
 #include <gtest/gtest.h>
 
+#include "hierarchy/engine.hpp"
 #include "hierarchy_laws.hpp"
 #include "inputs.hpp"
 #include "recording_sink.hpp"

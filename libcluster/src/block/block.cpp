@@ -8,10 +8,10 @@
 
 #include <terrace/base/simd.hpp>
 
-#include "block/block_state.hpp"
 #include "block/engine.hpp"
 #include "block/exact_finish.hpp"
 #include "block/linear_block.hpp"
+#include "block/state.hpp"
 #include "facility/points/make_search.hpp"
 #include "scaling.hpp"
 

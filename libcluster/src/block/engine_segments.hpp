@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "block/block_state.hpp"
+#include "block/state.hpp"
 
 namespace terrace::cluster {
 

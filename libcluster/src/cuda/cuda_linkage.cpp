@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <stdexcept>
 
-#include "linkage/linkage_points.hpp"
+#include "linkage/points.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 #ifdef TERRACE_CLUSTER_CUDA

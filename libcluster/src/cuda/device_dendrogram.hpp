@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "cuda/device_primitives.hpp"
-#include "linkage/linkage_points.hpp"
-#include "linkage/linkage_tree.hpp"
+#include "linkage/points.hpp"
+#include "linkage/tree.hpp"
 #include "terrace/cluster/dendrogram.hpp"
 
 namespace terrace::cluster::device {

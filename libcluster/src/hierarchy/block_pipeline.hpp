@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "hierarchy/hierarchy_block.hpp"
+#include "hierarchy/block.hpp"
 
 /// Processes blocks on several threads and commits them in order. Private to the hierarchy.
 

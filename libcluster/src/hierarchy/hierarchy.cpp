@@ -4,7 +4,7 @@
 #include <memory>
 #include <utility>
 
-#include "hierarchy/hierarchy_engine.hpp"
+#include "hierarchy/engine.hpp"
 
 namespace terrace::cluster {
 

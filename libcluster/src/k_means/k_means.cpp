@@ -12,9 +12,9 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/base/thread_team.hpp>
 
-#include "k_means/k_means_filter.hpp"
-#include "k_means/k_means_seeds.hpp"
-#include "k_means/k_means_tree.hpp"
+#include "k_means/filter.hpp"
+#include "k_means/seeds.hpp"
+#include "k_means/tree.hpp"
 #include "scaling.hpp"
 #include "terrace/cluster/metric.hpp"
 

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "linkage/cluster_slots.hpp"
-#include "linkage/linkage_kernels.hpp"
-#include "linkage/linkage_points.hpp"
+#include "linkage/kernels.hpp"
+#include "linkage/points.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 /// Clusters of points, each represented by one place instead of a matrix of distances. Private to

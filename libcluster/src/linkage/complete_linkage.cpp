@@ -9,8 +9,8 @@
 #include <terrace/base/stop_check.hpp>
 
 #include "linkage/complete_rounds.hpp"
-#include "linkage/linkage_points.hpp"
-#include "linkage/linkage_tree.hpp"
+#include "linkage/points.hpp"
+#include "linkage/tree.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {

@@ -7,7 +7,7 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "linkage/linkage_kernels.hpp"
+#include "linkage/kernels.hpp"
 #include "terrace/cluster/band_matrix.hpp"
 #include "terrace/cluster/dendrogram.hpp"
 #include "terrace/cluster/linkage.hpp"

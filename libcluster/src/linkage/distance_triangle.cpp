@@ -8,7 +8,7 @@
 #include <terrace/base/parallel.hpp>
 #include <terrace/base/stop_check.hpp>
 
-#include "linkage/linkage_kernels.hpp"
+#include "linkage/kernels.hpp"
 #include "terrace/cluster/band_matrix.hpp"
 
 namespace terrace::cluster {

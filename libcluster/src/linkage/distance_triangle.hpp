@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "linkage/cluster_slots.hpp"
-#include "linkage/linkage_points.hpp"
+#include "linkage/points.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 /// Clusters of any items, with the distances of all pairs. Private to linkage.

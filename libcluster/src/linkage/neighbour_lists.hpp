@@ -6,7 +6,7 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "linkage/linkage_tree.hpp"
+#include "linkage/tree.hpp"
 
 /// Private to single linkage.
 

@@ -7,9 +7,9 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/base/union_find.hpp>
 
-#include "linkage/linkage_points.hpp"
-#include "linkage/linkage_tree.hpp"
+#include "linkage/points.hpp"
 #include "linkage/spanning_tree.hpp"
+#include "linkage/tree.hpp"
 #include "terrace/cluster/linkage.hpp"
 
 namespace terrace::cluster {

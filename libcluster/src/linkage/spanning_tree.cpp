@@ -8,7 +8,7 @@
 #include <terrace/base/parallel.hpp>
 #include <terrace/base/stop_check.hpp>
 
-#include "linkage/linkage_points.hpp"
+#include "linkage/points.hpp"
 
 namespace terrace::cluster {
 namespace {

@@ -11,8 +11,8 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/base/union_find.hpp>
 
-#include "linkage/linkage_tree.hpp"
 #include "linkage/neighbour_lists.hpp"
+#include "linkage/tree.hpp"
 
 /// Private to single linkage.
 

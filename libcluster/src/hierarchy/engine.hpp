@@ -9,8 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "hierarchy/block.hpp"
 #include "hierarchy/block_pipeline.hpp"
-#include "hierarchy/hierarchy_block.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
 /// The implementation of HierarchyBuilder, in which tests can replace the clustering. Private.

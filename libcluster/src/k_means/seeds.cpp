@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "k_means/k_means_seeds.hpp"
+#include "k_means/seeds.hpp"
 
 #include <algorithm>
 #include <bit>

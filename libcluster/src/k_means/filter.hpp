@@ -9,7 +9,7 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/base/thread_team.hpp>
 
-#include "k_means/k_means_tree.hpp"
+#include "k_means/tree.hpp"
 
 namespace terrace::cluster {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "linkage/linkage_kernels.hpp"
+#include "linkage/kernels.hpp"
 
 /// Included once for each instruction set, with TERRACE_VECTOR_BYTES as the size of its registers.
 /// Everything is local to the object (see tests/check_symbols.sh), so functions of the standard

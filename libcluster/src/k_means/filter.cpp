@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "k_means/k_means_filter.hpp"
+#include "k_means/filter.hpp"
 
 #include <algorithm>
 #include <array>

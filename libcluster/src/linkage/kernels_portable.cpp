@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #define TERRACE_VECTOR_BYTES 16
-#include "linkage/linkage_kernels_impl.hpp"
+#include "linkage/kernels_impl.hpp"
 
 namespace terrace::cluster {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "k_means/k_means_tree.hpp"
+#include "k_means/tree.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "linkage/linkage_kernels.hpp"
+#include "linkage/kernels.hpp"
 
 #include <stdexcept>
 

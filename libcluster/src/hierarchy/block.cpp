@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hierarchy/hierarchy_block.hpp"
+#include "hierarchy/block.hpp"
 
 #include <algorithm>
 #include <cassert>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "block/block_state.hpp"
+#include "block/state.hpp"
 
 #include <algorithm>
 #include <cstring>

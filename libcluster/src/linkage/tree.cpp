@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "linkage/linkage_tree.hpp"
+#include "linkage/tree.hpp"
 
 #include <terrace/base/parallel.hpp>
 #include <terrace/base/stop_check.hpp>

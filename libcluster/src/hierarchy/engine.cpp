@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hierarchy/hierarchy_engine.hpp"
+#include "hierarchy/engine.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "k_means/k_means_tree.hpp"
+#include "k_means/tree.hpp"
 
 namespace terrace::cluster {
 

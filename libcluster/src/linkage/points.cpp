@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "linkage/linkage_points.hpp"
+#include "linkage/points.hpp"
 
 #include <algorithm>
 #include <cmath>
