@@ -19,7 +19,7 @@
 
 namespace terrace::matching::peers {
 
-using Boxes = std::span<const Box<3>>;
+using Boxes = std::span<const base::Box3>;
 
 /// Divides until every part is a single primitive. `Split` reorders a range of primitives and
 /// returns its middle.
@@ -57,25 +57,23 @@ std::vector<TreeChildren> divide(std::size_t n, Split&& split) {
   return rows;
 }
 
-inline double centre(const Box<3>& box, std::size_t d) { return 0.5 * (box.lo[d] + box.hi[d]); }
+inline double centre(const base::Box3& box, std::size_t d) {
+  return 0.5 * (box.min[d] + box.max[d]);
+}
 
-inline Box<3> box_of_centres(Boxes boxes, std::span<const std::uint32_t> range) {
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  Box<3> all{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
+inline base::Box3 box_of_centres(Boxes boxes, std::span<const std::uint32_t> range) {
+  base::Box3 all;
   for (const std::uint32_t i : range) {
-    for (std::size_t d = 0; d < 3; ++d) {
-      all.lo[d] = std::min(all.lo[d], centre(boxes[i], d));
-      all.hi[d] = std::max(all.hi[d], centre(boxes[i], d));
-    }
+    all.include({centre(boxes[i], 0), centre(boxes[i], 1), centre(boxes[i], 2)});
   }
   return all;
 }
 
 inline std::size_t halve(Boxes boxes, std::span<std::uint32_t> range) {
-  const Box<3> all = box_of_centres(boxes, range);
+  const base::Box3 all = box_of_centres(boxes, range);
   std::size_t axis = 0;
   for (std::size_t d = 1; d < 3; ++d) {
-    if (all.hi[d] - all.lo[d] > all.hi[axis] - all.lo[axis]) axis = d;
+    if (all.max[d] - all.min[d] > all.max[axis] - all.min[axis]) axis = d;
   }
   const std::size_t middle = range.size() / 2;
   std::nth_element(range.begin(), range.begin() + static_cast<std::ptrdiff_t>(middle), range.end(),
@@ -91,21 +89,17 @@ inline std::vector<TreeChildren> median_split(Boxes boxes) {
   return divide(boxes.size(), [&](std::span<std::uint32_t> range) { return halve(boxes, range); });
 }
 
-inline double half_area(const Box<3>& box) {
-  const double x = box.hi[0] - box.lo[0], y = box.hi[1] - box.lo[1], z = box.hi[2] - box.lo[2];
+inline double half_area(const base::Box3& box) {
+  const double x = box.max[0] - box.min[0], y = box.max[1] - box.min[1],
+               z = box.max[2] - box.min[2];
   return x * y + y * z + z * x;
 }
 
 struct Bin {
-  Box<3> box{};
+  base::Box3 box{};
   std::size_t count = 0;
 
-  void add(const Box<3>& other) {
-    for (std::size_t d = 0; d < 3; ++d) {
-      box.lo[d] = count == 0 ? other.lo[d] : std::min(box.lo[d], other.lo[d]);
-      box.hi[d] = count == 0 ? other.hi[d] : std::max(box.hi[d], other.hi[d]);
-    }
-  }
+  void add(const base::Box3& other) { box.include(other); }
 };
 
 /// Splits where the sum of area times primitives is least over kBins bins along each axis (I. Wald,
@@ -113,15 +107,16 @@ struct Bin {
 inline std::vector<TreeChildren> binned_sah(Boxes boxes) {
   constexpr std::size_t kBins = 16;
   return divide(boxes.size(), [&](std::span<std::uint32_t> range) {
-    const Box<3> all = box_of_centres(boxes, range);
+    const base::Box3 all = box_of_centres(boxes, range);
     const auto bin_of = [&](std::uint32_t i, std::size_t axis) {
-      const double share = (centre(boxes[i], axis) - all.lo[axis]) / (all.hi[axis] - all.lo[axis]);
+      const double share =
+          (centre(boxes[i], axis) - all.min[axis]) / (all.max[axis] - all.min[axis]);
       return std::min(kBins - 1, static_cast<std::size_t>(share * static_cast<double>(kBins)));
     };
     double least = std::numeric_limits<double>::infinity();
     std::size_t best_axis = 3, best_bin = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!(all.hi[axis] > all.lo[axis])) continue;
+      if (!(all.max[axis] > all.min[axis])) continue;
       std::array<Bin, kBins> bins;
       for (const std::uint32_t i : range) {
         Bin& bin = bins[bin_of(i, axis)];

@@ -8,7 +8,6 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "blossom/proof.hpp"
 #include "blossom/solver.hpp"
 
 namespace terrace::matching {

@@ -10,7 +10,6 @@
 
 #include "blossom/box_tree.hpp"
 #include "blossom/pricing.hpp"
-#include "blossom/proof.hpp"
 #include "blossom/solver.hpp"
 
 namespace terrace::matching {

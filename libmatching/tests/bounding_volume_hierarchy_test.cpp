@@ -19,19 +19,19 @@ namespace {
 using oracles::uniform;
 
 template <std::size_t D>
-std::vector<Box<D>> random_boxes(std::size_t n, double size, std::mt19937_64& random) {
-  std::vector<Box<D>> boxes(n);
-  for (Box<D>& box : boxes) {
+std::vector<base::Box<D>> random_boxes(std::size_t n, double size, std::mt19937_64& random) {
+  std::vector<base::Box<D>> boxes(n);
+  for (base::Box<D>& box : boxes) {
     for (std::size_t d = 0; d < D; ++d) {
-      box.lo[d] = 10.0 * uniform(random) - 3.0;
-      box.hi[d] = box.lo[d] + size * uniform(random);
+      box.min[d] = 10.0 * uniform(random) - 3.0;
+      box.max[d] = box.min[d] + size * uniform(random);
     }
   }
   return boxes;
 }
 
 template <std::size_t D>
-void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<Box<D>>& boxes,
+void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<base::Box<D>>& boxes,
                   std::uint32_t leaf_size) {
   const auto nodes = tree.nodes();
   const auto order = tree.order();
@@ -59,8 +59,8 @@ void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<Box<
       ASSERT_LT(node.link, nodes.size());
       for (const std::size_t child : {at + 1, std::size_t{node.link}}) {
         for (std::size_t d = 0; d < D; ++d) {
-          EXPECT_LE(node.lo[d], nodes[child].lo[d]);
-          EXPECT_GE(node.hi[d], nodes[child].hi[d]);
+          EXPECT_LE(node.min[d], nodes[child].min[d]);
+          EXPECT_GE(node.max[d], nodes[child].max[d]);
         }
       }
       open.push_back({node.link, depth + 1});
@@ -75,10 +75,10 @@ void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<Box<
       const auto& frame = tree.frame();
       for (std::size_t d = 0; d < D; ++d) {
         const long double centre = frame.centre[d], scale = frame.scale;
-        EXPECT_LE(static_cast<long double>(node.lo[d]),
-                  scale * static_cast<long double>(boxes[order[slot]].lo[d]) - centre);
-        EXPECT_GE(static_cast<long double>(node.hi[d]),
-                  scale * static_cast<long double>(boxes[order[slot]].hi[d]) - centre);
+        EXPECT_LE(static_cast<long double>(node.min[d]),
+                  scale * static_cast<long double>(boxes[order[slot]].min[d]) - centre);
+        EXPECT_GE(static_cast<long double>(node.max[d]),
+                  scale * static_cast<long double>(boxes[order[slot]].max[d]) - centre);
       }
     }
   }
@@ -88,11 +88,11 @@ void expect_sound(const BoundingVolumeHierarchy<D>& tree, const std::vector<Box<
 }
 
 template <std::size_t D>
-double area(const Box<D>& box) {
-  if constexpr (D == 2) return 2.0 * (box.hi[0] - box.lo[0] + box.hi[1] - box.lo[1]);
+double area(const base::Box<D>& box) {
+  if constexpr (D == 2) return 2.0 * (box.max[0] - box.min[0] + box.max[1] - box.min[1]);
   double sum = 0.0;
   for (std::size_t d = 0; d < D; ++d) {
-    sum += 2.0 * (box.hi[d] - box.lo[d]) * (box.hi[(d + 1) % D] - box.lo[(d + 1) % D]);
+    sum += 2.0 * (box.max[d] - box.min[d]) * (box.max[(d + 1) % D] - box.min[(d + 1) % D]);
   }
   return sum;
 }
@@ -101,23 +101,23 @@ double area(const Box<D>& box) {
 /// size.
 template <std::size_t D>
 std::vector<double> all_costs(const std::vector<TreeChildren>& rows,
-                              const std::vector<Box<D>>& boxes, std::uint32_t v,
+                              const std::vector<base::Box<D>>& boxes, std::uint32_t v,
                               std::uint32_t leaf_size, const SurfaceAreaCosts& costs,
-                              Box<D>& around, std::uint32_t& size) {
+                              base::Box<D>& around, std::uint32_t& size) {
   if (v < boxes.size()) {
     around = boxes[v];
     size = 1;
     return {costs.intersection * area(around)};
   }
-  Box<D> other;
+  base::Box<D> other;
   std::uint32_t other_size = 0;
   const auto [a, b] = rows[v - boxes.size()];
   const auto first = all_costs(rows, boxes, a, leaf_size, costs, around, size);
   const auto second = all_costs(rows, boxes, b, leaf_size, costs, other, other_size);
   size += other_size;
   for (std::size_t d = 0; d < D; ++d) {
-    around.lo[d] = std::min(around.lo[d], other.lo[d]);
-    around.hi[d] = std::max(around.hi[d], other.hi[d]);
+    around.min[d] = std::min(around.min[d], other.min[d]);
+    around.max[d] = std::max(around.max[d], other.max[d]);
   }
   std::vector<double> all;
   if (size <= leaf_size) all.push_back(costs.intersection * area(around) * size);
@@ -140,7 +140,7 @@ void test_random(std::uint64_t seed) {
   const BoundingVolumeHierarchy<D> tree(rows, boxes, options);
   expect_sound(tree, boxes, options.leaf_size);
   if (n == 0 || n > 9) return;
-  Box<D> around;
+  base::Box<D> around;
   std::uint32_t size = 0;
   const auto all = all_costs(rows, boxes, static_cast<std::uint32_t>(n + rows.size() - 1),
                              options.leaf_size, options.costs, around, size);
@@ -158,7 +158,7 @@ TEST(BoundingVolumeHierarchy, IsValidAndOfLeastCostForItsTree) {
 }
 
 TEST(BoundingVolumeHierarchy, ComputesTheSurfaceAreaCost) {
-  std::vector<Box<3>> cubes;
+  std::vector<base::Box3> cubes;
   for (int k = 0; k < 4; ++k) {
     const auto x = static_cast<double>(k);
     cubes.push_back({{x, 0.0, 0.0}, {x + 1.0, 1.0, 1.0}});
@@ -178,7 +178,7 @@ TEST(BoundingVolumeHierarchy, ComputesTheSurfaceAreaCost) {
   EXPECT_EQ(flat.nodes().size(), 1u);
   EXPECT_NEAR(flat.surface_area_cost(), 4.0, 1e-5);
   // If all areas are 0, every node counts in full.
-  const std::vector<Box<3>> equal(4, Box<3>{{1, 2, 3}, {1, 2, 3}});
+  const std::vector<base::Box3> equal(4, base::Box3{{1, 2, 3}, {1, 2, 3}});
   options.leaf_size = 1;
   EXPECT_EQ(BoundingVolumeHierarchy<3>(rows, equal, options).surface_area_cost(), 7.0);
 }
@@ -195,10 +195,10 @@ TEST(BoundingVolumeHierarchy, HandlesDeepTreesAndAnyScale) {
   for (const double unit : {1e300, 1e-300, 1e30, 1e-30, 1e-320}) {
     SCOPED_TRACE(testing::Message() << "unit " << unit);
     auto boxes = random_boxes<3>(100, 0.1, random);
-    for (Box<3>& box : boxes) {
+    for (base::Box3& box : boxes) {
       for (std::size_t d = 0; d < 3; ++d) {
-        box.lo[d] *= unit;
-        box.hi[d] *= unit;
+        box.min[d] *= unit;
+        box.max[d] *= unit;
       }
     }
     const BoundingVolumeHierarchy<3> scaled(oracles::random_tree(100, random), boxes);
@@ -207,8 +207,8 @@ TEST(BoundingVolumeHierarchy, HandlesDeepTreesAndAnyScale) {
   }
   // Georeferenced boxes are small compared to their coordinates.
   auto far = random_boxes<3>(100, 0.001, random);
-  for (Box<3>& box : far) {
-    for (auto* corner : {&box.lo, &box.hi}) {
+  for (base::Box3& box : far) {
+    for (auto* corner : {&box.min, &box.max}) {
       (*corner)[0] += 500000.0;
       (*corner)[1] += 4600000.0;
     }
@@ -217,7 +217,7 @@ TEST(BoundingVolumeHierarchy, HandlesDeepTreesAndAnyScale) {
   expect_sound(map, far, 1);
   for (const auto& node : map.nodes()) {
     if (node.count == 1) {
-      EXPECT_LT(node.hi[1] - node.lo[1], 0.0011f);
+      EXPECT_LT(node.max[1] - node.min[1], 0.0011f);
     }
   }
 }
@@ -229,10 +229,10 @@ void test_rotation(std::uint64_t seed) {
   const std::size_t n = seed <= 6 ? seed - 1 : 50 + random() % 300;
   auto boxes = random_boxes<D>(n, 0.1, random);
   const double unit = seed % 4 == 0 ? 1e300 : seed % 4 == 1 ? 1e-300 : 1.0;
-  for (Box<D>& box : boxes) {
+  for (base::Box<D>& box : boxes) {
     for (std::size_t d = 0; d < D; ++d) {
-      box.lo[d] *= unit;
-      box.hi[d] *= unit;
+      box.min[d] *= unit;
+      box.max[d] *= unit;
     }
   }
   const auto rows = seed % 3 == 0 ? oracles::chain(n) : oracles::random_tree(n, random);
@@ -267,7 +267,7 @@ TEST(BoundingVolumeHierarchy, RotationsLowerTheCost) {
     test_rotation<2>(seed);
     test_rotation<3>(seed);
   }
-  const std::vector<Box<3>> boxes(3);
+  const std::vector<base::Box3> boxes(3, base::Box3{{0, 0, 0}, {0, 0, 0}});
   const std::vector<TreeChildren> bad{{0, 1}, {2, 4}};
   EXPECT_THROW((void)rotate_tree<3>(bad, boxes), std::invalid_argument);
 }
@@ -283,7 +283,7 @@ void expect_refused(Make&& make, const std::string& what) {
 }
 
 TEST(BoundingVolumeHierarchy, RefusesBadInput) {
-  std::vector<Box<2>> boxes(3);
+  std::vector<base::Box2> boxes(3, base::Box2{{0, 0}, {0, 0}});
   std::vector<TreeChildren> rows{{0, 1}, {2, 3}};
   HierarchyOptions options;
   const auto make = [&] { return BoundingVolumeHierarchy<2>(rows, boxes, options); };
@@ -299,13 +299,13 @@ TEST(BoundingVolumeHierarchy, RefusesBadInput) {
   rows = {{0, 1}};
   expect_refused(make, "1 rows for 3 primitives");
   rows = {{0, 1}, {2, 3}};
-  boxes[2].hi[1] = std::numeric_limits<double>::infinity();
+  boxes[2].max[1] = std::numeric_limits<double>::infinity();
   expect_refused(make, "primitive 2");
-  boxes[2].hi[1] = std::numeric_limits<double>::quiet_NaN();
+  boxes[2].max[1] = std::numeric_limits<double>::quiet_NaN();
   expect_refused(make, "primitive 2");
-  boxes[2].hi[1] = -1.0;
+  boxes[2].max[1] = -1.0;
   expect_refused(make, "primitive 2");
-  boxes[2].hi[1] = 0.0;
+  boxes[2].max[1] = 0.0;
   options.leaf_size = 0;
   expect_refused(make, "leaf_size");
   options.leaf_size = 1;
@@ -313,7 +313,7 @@ TEST(BoundingVolumeHierarchy, RefusesBadInput) {
   expect_refused(make, "costs");
   expect_refused(
       [] {
-        return BoundingVolumeHierarchy<2>({}, std::vector<Box<2>>{})
+        return BoundingVolumeHierarchy<2>({}, std::vector<base::Box2>{})
             .surface_area_cost({std::numeric_limits<double>::quiet_NaN(), 1.0});
       },
       "costs");

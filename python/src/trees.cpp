@@ -91,10 +91,10 @@ py::array rotated(const Array<double>& rows, const Array<double>& lower, const A
                           std::to_string(high.size()) + " upper corners");
   }
   return to_array(released([&] {
-    std::vector<matching::Box<N>> boxes;
+    std::vector<base::Box<N>> boxes;
     for (std::size_t i = 0; i < low.size(); ++i) boxes.push_back({low[i], high[i]});
     std::vector<std::array<std::uint32_t, 2>> result;
-    const std::span<const matching::Box<N>> all(boxes);
+    const std::span<const base::Box<N>> all(boxes);
     for (const auto& [a, b] : matching::rotate_tree<N>(children, all, passes)) {
       result.push_back({a, b});
     }

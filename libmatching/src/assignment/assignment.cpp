@@ -1,19 +1,221 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/matching/assignment.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <terrace/base/stop_check.hpp>
 
-#include "assignment/dense_solver.hpp"
 #include "assignment/input_check.hpp"
+#include "assignment/scan_kernels.hpp"
 
 namespace terrace::matching {
 namespace {
+
+/// Shortest augmenting paths on a matrix whose rows come from `Rows`: rows(i) returns a pointer to
+/// the costs of row i, which is valid until the next call.
+///
+/// Labels of columns start at 0 and only fall, and only for columns that have a row. When all
+/// columns have a row and rows remain, labels are shifted so that the labels of rows are at most 0.
+/// From then on a path may also end at a row, which then gives up its column.
+template <class Cost, class Rows>
+class DenseSolver {
+ public:
+  using Number = LabelOf<Cost>;
+
+  /// check_stop: must outlive this object.
+  DenseSolver(std::size_t rows, std::size_t columns, Rows& source,
+              const base::StopCheck& check_stop)
+      : rows_(rows),
+        columns_(columns),
+        source_(source),
+        ticks_(check_stop),
+        kernels_(scan_kernels<Cost>()),
+        row_of_(columns, kUnassigned),
+        distance_(columns),
+        previous_(columns),
+        block_least_((columns + kScanBlock - 1) / kScanBlock) {
+    result_.column.assign(rows, kUnassigned);
+    result_.row_dual.assign(rows, 0);
+    result_.column_dual.assign(columns, 0);
+  }
+
+  BasicAssignment<Number> solve() {
+    const std::size_t first = std::min(rows_, columns_);
+    if (columns_ != 0) {
+      for (const std::uint32_t row : reduce_rows(first)) augment(row);
+      if (rows_ > columns_) {
+        shift_labels(first);
+        retiring_ = true;
+        for (std::size_t i = first; i < rows_; ++i) augment(static_cast<std::uint32_t>(i));
+      }
+    }
+    for (std::size_t i = 0; i < rows_; ++i) {
+      const std::uint32_t j = result_.column[i];
+      if (j != kUnassigned) result_.cost += static_cast<Number>(source_(i)[j]);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  struct Settled {
+    std::uint32_t column;
+    Number distance, label;
+  };
+
+  /// Returns the first column of `costs` with this value of cost - label, preferably one without a
+  /// row.
+  std::uint32_t column_at(const Cost* costs, Number value, bool look_for_free,
+                          std::uint32_t except) const {
+    std::uint32_t found = kUnassigned;
+    for (std::size_t j = 0; j < columns_; ++j) {
+      if (static_cast<Number>(costs[j]) - result_.column_dual[j] != value || j == except) continue;
+      if (!look_for_free || row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
+      if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
+    }
+    return found;
+  }
+
+  /// Augmenting row reduction: a row takes its best column, and the column's label falls until the
+  /// second best is as good. A row that loses its column searches again. With real costs the steps
+  /// get ever smaller, so their number is bounded. Returns the rows that remain.
+  std::vector<std::uint32_t> reduce_rows(std::size_t count) {
+    std::vector<std::uint32_t> left;
+    std::size_t steps = kReductionSteps * count;
+    for (std::size_t i = 0; i < count; ++i) {
+      std::uint32_t row = static_cast<std::uint32_t>(i);
+      while (row != kUnassigned) {
+        ticks_(columns_);
+        const Cost* costs = source_(row);
+        Number least, second;
+        kernels_.least_two(costs, result_.column_dual.data(), columns_, &least, &second);
+        result_.row_dual[row] = least;
+        std::uint32_t column = column_at(costs, least, least == second, kUnassigned);
+        const std::uint32_t owner = row_of_[column];
+        const bool free = owner == kUnassigned;
+        if (!free && (steps == 0 || !(least < second))) {
+          left.push_back(row);
+          break;
+        }
+        if (steps != 0) --steps;
+        if (columns_ > 1 && least < second) {
+          const Number label = result_.column_dual[column] - (second - least);
+          // Rounding can absorb the difference. Further steps would then make no progress.
+          if (!free && !(label < result_.column_dual[column])) {
+            left.push_back(row);
+            break;
+          }
+          result_.column_dual[column] = label;
+          result_.row_dual[row] = static_cast<Number>(costs[column]) - label;
+        }
+        row_of_[column] = row;
+        result_.column[row] = column;
+        if (!free) result_.column[owner] = kUnassigned;
+        row = owner;
+      }
+    }
+    return left;
+  }
+
+  void shift_labels(std::size_t count) {
+    Number highest = result_.row_dual[0];
+    for (std::size_t i = 1; i < count; ++i) highest = std::max(highest, result_.row_dual[i]);
+    for (std::size_t i = 0; i < count; ++i) result_.row_dual[i] -= highest;
+    for (Number& label : result_.column_dual) label += highest;
+  }
+
+  std::uint32_t nearest_column(Number least) const {
+    std::uint32_t found = kUnassigned;
+    for (std::size_t b = 0; b < block_least_.size(); ++b) {
+      if (block_least_[b] != least) continue;
+      const std::size_t end = std::min(columns_, (b + 1) * kScanBlock);
+      for (std::size_t j = b * kScanBlock; j < end; ++j) {
+        if (distance_[j] != least) continue;
+        // Among equally near columns a free one ends the search at once.
+        if (row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
+        if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
+      }
+    }
+    return found;
+  }
+
+  void augment(std::uint32_t start) {
+    std::fill(distance_.begin(), distance_.end(), kFar<Number>);
+    settled_.clear();
+    auto& labels = result_.column_dual;
+    std::uint32_t row = start, sink = kUnassigned, leaver = kUnassigned;
+    Number reached = 0, leave_at = kFar<Number>;
+    if (retiring_) {
+      leaver = start;
+      leave_at = -result_.row_dual[start];
+    }
+    for (;;) {
+      ticks_(columns_);
+      const Number base = reached - result_.row_dual[row];
+      const Number least = kernels_.relax(source_(row), labels.data(), columns_, base, row,
+                                          distance_.data(), previous_.data(), block_least_.data());
+      if (retiring_ && base < leave_at) {
+        leave_at = base;
+        leaver = row;
+      }
+      if (retiring_ && leave_at <= least) {
+        reached = leave_at;
+        break;
+      }
+      reached = least;
+      const std::uint32_t j = nearest_column(least);
+      if (row_of_[j] == kUnassigned) {
+        sink = j;
+        break;
+      }
+      settled_.push_back({j, least, labels[j]});
+      labels[j] = kSettled<Number>;
+      distance_[j] = kFar<Number>;
+      row = row_of_[j];
+    }
+    // Labels of the tree's rows rise and labels of its columns fall, which makes the path's edges
+    // tight.
+    result_.row_dual[start] += reached;
+    for (const Settled& s : settled_) {
+      const Number fall = reached - s.distance;
+      result_.row_dual[row_of_[s.column]] += fall;
+      labels[s.column] = s.label - fall;
+    }
+    std::uint32_t j = sink;
+    if (sink == kUnassigned) {
+      j = std::exchange(result_.column[leaver], kUnassigned);
+      result_.row_dual[leaver] = 0;
+      if (leaver == start) return;
+    }
+    for (;;) {
+      const auto i = static_cast<std::uint32_t>(previous_[j]);
+      row_of_[j] = i;
+      std::swap(result_.column[i], j);
+      if (i == start) break;
+    }
+  }
+
+  static constexpr std::size_t kReductionSteps = 4;
+
+  std::size_t rows_, columns_;
+  Rows& source_;
+  base::StopTicks ticks_;
+  const ScanKernels<Cost>& kernels_;
+  bool retiring_ = false;
+  BasicAssignment<Number> result_;
+  std::vector<std::uint32_t> row_of_;
+  std::vector<Number> distance_;
+  std::vector<std::int64_t> previous_;
+  std::vector<Number> block_least_;
+  std::vector<Settled> settled_;
+};
 
 template <class Cost>
 BasicAssignment<LabelOf<Cost>> assign_matrix(std::span<const Cost> costs, std::size_t rows,

@@ -54,7 +54,7 @@ void Solver::shrink(std::uint32_t u, std::uint32_t v) {
 
 void Solver::form(std::uint32_t blossom, std::uint32_t apex) {
   Node& b = nodes_[blossom];
-  b.label = Label::kPlus;
+  b.label = Label::plus;
   b.dual = -delta_;
   b.parent = kNone;
   b.base = nodes_[apex].base;
@@ -68,9 +68,9 @@ void Solver::form(std::uint32_t blossom, std::uint32_t apex) {
   std::uint32_t last = kNone, place = 0;
   for (const Part& part : parts(blossom)) {
     Node& x = nodes_[part.node];
-    const bool rises = x.label == Label::kMinus;
+    const bool rises = x.label == Label::minus;
     if (part.node >= n_) x.dual += rises ? -delta_ : delta_;
-    x.label = Label::kFree;
+    x.label = Label::free;
     x.parent = blossom;
     x.place = place++;
     b.size += x.size;
@@ -80,7 +80,7 @@ void Solver::form(std::uint32_t blossom, std::uint32_t apex) {
         vertex.set = b.set;
         if (rises) {
           vertex.potential -= 2 * delta_;
-          vertex.label = Label::kPlus;
+          vertex.label = Label::plus;
           queue_.push_back(v);
         }
         if (v == x.last) break;
@@ -101,7 +101,7 @@ void Solver::form(std::uint32_t blossom, std::uint32_t apex) {
 
 void Solver::stay_minus(std::uint32_t node, std::uint32_t from, std::uint32_t to) {
   Node& x = nodes_[node];
-  x.label = Label::kMinus;
+  x.label = Label::minus;
   x.dual += delta_;
   x.enter_from = from;
   x.enter_to = to;
@@ -113,7 +113,7 @@ void Solver::leave_minus(std::uint32_t node) {
   const Node& x = nodes_[node];
   for (std::uint32_t v = x.first;; v = vertices_[v].next) {
     vertices_[v].potential -= delta_;
-    vertices_[v].label = Label::kFree;
+    vertices_[v].label = Label::free;
     if (v == x.last) break;
   }
 }

@@ -49,7 +49,7 @@ void Solver::release_parts(std::uint32_t blossom) {
       if (v == x.last) break;
     }
   }
-  b.label = Label::kFree;
+  b.label = Label::free;
   b.first = b.last = kNone;
   b.dual = 0;
   spare_.push_back(blossom);

@@ -33,17 +33,17 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
     if (event.b == kGrow) {
       const Vertex& v = vertices_[event.a];
       // Skip events that a better edge, or another way into the tree, has made obsolete.
-      if (v.label != Label::kFree || v.key - v.potential != event.time) continue;
+      if (v.label != Label::free || v.key - v.potential != event.time) continue;
       delta_ = event.time;
       if (nodes_[top(event.a)].mate == kNone) {
         augment(v.key_from, event.a);
         end_tree();
-        return Outcome::kAugmented;
+        return Outcome::augmented;
       }
       grow(event.a);
     } else if (event.b == kExpand) {
       const Node& x = nodes_[event.a];
-      if (x.parent != kNone || x.label != Label::kMinus || x.dual != event.time) continue;
+      if (x.parent != kNone || x.label != Label::minus || x.dual != event.time) continue;
       delta_ = event.time;
       expand(event.a);
     } else if (vertices_[event.a].set != vertices_[event.b].set) {
@@ -55,11 +55,11 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
   if (left_out_) {
     delta_ = limit;
     end_tree();
-    return Outcome::kStopped;
+    return Outcome::stopped;
   }
   collect_witness();
   end_tree();
-  return Outcome::kImpossible;
+  return Outcome::impossible;
 }
 
 void Solver::push(std::int64_t time, std::uint32_t a, std::uint32_t b) {
@@ -78,12 +78,12 @@ void Solver::push(std::int64_t time, std::uint32_t a, std::uint32_t b) {
 
 void Solver::label_plus(std::uint32_t node) {
   Node& x = nodes_[node];
-  x.label = Label::kPlus;
+  x.label = Label::plus;
   x.dual -= delta_;
   labelled_.push_back(node);
   for (std::uint32_t v = x.first;; v = vertices_[v].next) {
     vertices_[v].potential -= delta_;
-    vertices_[v].label = Label::kPlus;
+    vertices_[v].label = Label::plus;
     queue_.push_back(v);
     if (v == x.last) break;
   }
@@ -93,7 +93,7 @@ void Solver::label_minus(std::uint32_t node, std::uint32_t from, std::uint32_t t
   const Node& x = nodes_[node];
   for (std::uint32_t v = x.first;; v = vertices_[v].next) {
     vertices_[v].potential += delta_;
-    vertices_[v].label = Label::kMinus;
+    vertices_[v].label = Label::minus;
     if (v == x.last) break;
   }
   stay_minus(node, from, to);
@@ -113,7 +113,7 @@ void Solver::scan(std::uint32_t vertex) {
     const Arc& arc = arcs_[k];
     Vertex& w = vertices_[arc.to];
     const std::int64_t key = arc.cost - u.potential;
-    if (w.label == Label::kPlus) {
+    if (w.label == Label::plus) {
       // Both potentials rise. The difference is even, because tree edges are tight and costs are
       // even.
       if (w.set != u.set) push((key - w.potential) / 2, vertex, arc.to);
@@ -123,7 +123,7 @@ void Solver::scan(std::uint32_t vertex) {
     if (w.key == kNever) keyed_.push_back(arc.to);
     w.key = key;
     w.key_from = vertex;
-    if (w.label == Label::kFree) offer(arc.to);
+    if (w.label == Label::free) offer(arc.to);
   }
 }
 
@@ -161,13 +161,13 @@ void Solver::augment(std::uint32_t from, std::uint32_t to) {
 void Solver::end_tree() {
   for (const std::uint32_t node : labelled_) {
     Node& x = nodes_[node];
-    if (x.parent != kNone || x.label == Label::kFree) continue;
-    const std::int64_t change = x.label == Label::kPlus ? delta_ : -delta_;
-    x.label = Label::kFree;
+    if (x.parent != kNone || x.label == Label::free) continue;
+    const std::int64_t change = x.label == Label::plus ? delta_ : -delta_;
+    x.label = Label::free;
     x.dual = node < n_ ? 0 : x.dual + change;
     for (std::uint32_t v = x.first;; v = vertices_[v].next) {
       Vertex& vertex = vertices_[v];
-      vertex.label = Label::kFree;
+      vertex.label = Label::free;
       vertex.potential += change;
       if (vertex.potential > kLimit || vertex.potential < -kLimit) {
         throw std::overflow_error("matching: the duals overflow 64 bits; use smaller weights");
@@ -186,7 +186,7 @@ void Solver::end_tree() {
 void Solver::collect_witness() {
   witness_.clear();
   for (const std::uint32_t node : labelled_) {
-    if (nodes_[node].parent == kNone && nodes_[node].label == Label::kMinus) {
+    if (nodes_[node].parent == kNone && nodes_[node].label == Label::minus) {
       witness_.push_back(node);
     }
   }

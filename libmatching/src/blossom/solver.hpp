@@ -4,9 +4,12 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <terrace/base/stop_check.hpp>
+
+#include "terrace/matching/matching.hpp"
 
 namespace terrace::matching::blossom {
 
@@ -65,7 +68,7 @@ class Solver {
   std::size_t edge_count() const { return edges_.size(); }
 
  private:
-  enum class Label : std::uint8_t { kFree, kPlus, kMinus };
+  enum class Label : std::uint8_t { free, plus, minus };
 
   struct Vertex {
     std::int64_t potential = 0;
@@ -73,7 +76,7 @@ class Solver {
     std::uint32_t key_from = kNone;  // the plus end of that edge
     std::uint32_t set = kNone;       // sets_[set] is the top node
     std::uint32_t next = kNone;      // within the list of the top node
-    Label label = Label::kFree;
+    Label label = Label::free;
   };
 
   struct Node {
@@ -86,7 +89,7 @@ class Solver {
     std::uint32_t enter_from = kNone,
                   enter_to = kNone;  // of a minus node: the edge from its parent
     std::uint32_t stamp = 0;
-    Label label = Label::kFree;
+    Label label = Label::free;
   };
 
   /// A part of a blossom and the edge to the next part around the cycle.
@@ -108,7 +111,7 @@ class Solver {
   void start_duals();
   std::int64_t first_limit() const;
 
-  enum class Outcome : std::uint8_t { kAugmented, kStopped, kImpossible };
+  enum class Outcome : std::uint8_t { augmented, stopped, impossible };
   Outcome search(std::uint32_t root, std::int64_t limit);
   void push(std::int64_t time, std::uint32_t a, std::uint32_t b);
   void label_plus(std::uint32_t node);
@@ -166,5 +169,12 @@ class Solver {
   std::uint32_t stamp_ = 0;
   std::vector<std::uint32_t> witness_;
 };
+
+/// Converts the solver's result to the public type: partners and duals, with blossoms numbered from
+/// 0. Leaves cost and exponent to the caller.
+Matching proof_of(Solver& solver);
+
+/// Returns the error message for a vertex that solve() could not match.
+std::string unmatchable(const Solver& solver, std::uint32_t vertex);
 
 }  // namespace terrace::matching::blossom

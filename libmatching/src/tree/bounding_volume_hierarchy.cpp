@@ -7,7 +7,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "tree/box_area.hpp"
 #include "tree/check_tree.hpp"
 
 namespace terrace::matching {
@@ -34,12 +33,12 @@ float rounded_up(double x) { return -rounded_down(-x); }
 /// A box in floats. The union of two such boxes is exact.
 template <std::size_t D>
 struct FloatBox {
-  std::array<float, D> lo, hi;
+  std::array<float, D> min, max;
 
   void add(const FloatBox& other) {
     for (std::size_t d = 0; d < D; ++d) {
-      lo[d] = std::min(lo[d], other.lo[d]);
-      hi[d] = std::max(hi[d], other.hi[d]);
+      min[d] = std::min(min[d], other.min[d]);
+      max[d] = std::max(max[d], other.max[d]);
     }
   }
 };
@@ -52,25 +51,20 @@ void check_costs(const SurfaceAreaCosts& costs) {
 }
 
 template <std::size_t D>
-HierarchyFrame<D> frame_of(std::span<const Box<D>> boxes) {
+HierarchyFrame<D> frame_of(std::span<const base::Box<D>> boxes) {
   HierarchyFrame<D> frame;
   if (boxes.empty()) return frame;
-  Box<D> all = boxes[0];
+  base::Box<D> all;
   double largest = 0.0;
-  for (const Box<D>& box : boxes) {
-    for (std::size_t d = 0; d < D; ++d) {
-      all.lo[d] = std::min(all.lo[d], box.lo[d]);
-      all.hi[d] = std::max(all.hi[d], box.hi[d]);
-    }
-  }
+  for (const base::Box<D>& box : boxes) all.include(box);
   for (std::size_t d = 0; d < D; ++d) {
-    largest = std::max({largest, std::abs(all.lo[d]), std::abs(all.hi[d])});
+    largest = std::max({largest, std::abs(all.min[d]), std::abs(all.max[d])});
   }
   if (largest > 0x1p60 || (largest < 0x1p-60 && largest > 0.0)) {
     frame.scale = std::ldexp(1.0, std::clamp(-std::ilogb(largest) - 1, -1000, 1000));
   }
   for (std::size_t d = 0; d < D; ++d) {
-    const double lo = all.lo[d] * frame.scale, hi = all.hi[d] * frame.scale;
+    const double lo = all.min[d] * frame.scale, hi = all.max[d] * frame.scale;
     frame.centre[d] = 0.5 * lo + 0.5 * hi;
     frame.reach = std::max({frame.reach, frame.centre[d] - lo, hi - frame.centre[d]});
   }
@@ -81,7 +75,7 @@ HierarchyFrame<D> frame_of(std::span<const Box<D>> boxes) {
 template <std::size_t D>
 class Plan {
  public:
-  Plan(std::span<const TreeChildren> rows, std::span<const Box<D>> boxes,
+  Plan(std::span<const TreeChildren> rows, std::span<const base::Box<D>> boxes,
        const HierarchyOptions& options, const HierarchyFrame<D>& frame)
       : rows_(rows), count_(static_cast<std::uint32_t>(boxes.size())), size_(rows.size()) {
     boxes_.resize(boxes.size() + rows.size());
@@ -89,8 +83,8 @@ class Plan {
     const SurfaceAreaCosts& costs = options.costs;
     for (std::size_t k = 0; k < boxes.size(); ++k) {
       for (std::size_t d = 0; d < D; ++d) {
-        boxes_[k].lo[d] = rounded_down(boxes[k].lo[d] * frame.scale - frame.centre[d]);
-        boxes_[k].hi[d] = rounded_up(boxes[k].hi[d] * frame.scale - frame.centre[d]);
+        boxes_[k].min[d] = rounded_down(boxes[k].min[d] * frame.scale - frame.centre[d]);
+        boxes_[k].max[d] = rounded_up(boxes[k].max[d] * frame.scale - frame.centre[d]);
       }
       cost[k] = costs.intersection * area_of(boxes_[k]);
     }
@@ -151,7 +145,7 @@ class Plan {
 
 template <std::size_t D>
 BoundingVolumeHierarchy<D>::BoundingVolumeHierarchy(std::span<const TreeChildren> rows,
-                                                    std::span<const Box<D>> boxes,
+                                                    std::span<const base::Box<D>> boxes,
                                                     const HierarchyOptions& options) {
   check_costs(options.costs);
   if (options.leaf_size == 0) refuse_volumes("leaf_size is 0; a leaf holds at least one primitive");
@@ -176,12 +170,12 @@ BoundingVolumeHierarchy<D>::BoundingVolumeHierarchy(std::span<const TreeChildren
     const FloatBox<D>& box = plan.box(at.node);
     if (plan.leaf(at.node)) {
       nodes_.push_back(
-          {box.lo, box.hi, static_cast<std::uint32_t>(order_.size()), plan.size(at.node)});
+          {box.min, box.max, static_cast<std::uint32_t>(order_.size()), plan.size(at.node)});
       plan.gather(at.node, order_);
       depth_ = std::max(depth_, at.depth);
       continue;
     }
-    nodes_.push_back({box.lo, box.hi, 0, 0});
+    nodes_.push_back({box.min, box.max, 0, 0});
     const auto [first, second] = plan.children(at.node);
     open.push_back({second, place, at.depth + 1});
     open.push_back({first, kFirstChild, at.depth + 1});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -8,11 +9,12 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
 
-/// Checks of the trees and boxes that callers pass in.
+/// Checks of the trees and boxes that callers pass in, and the area of a box.
 
 namespace terrace::matching::tree {
 
@@ -21,16 +23,16 @@ namespace terrace::matching::tree {
 }
 
 template <std::size_t D>
-void check_boxes(std::span<const Box<D>> boxes) {
+void check_boxes(std::span<const base::Box<D>> boxes) {
   for (std::size_t k = 0; k < boxes.size(); ++k) {
     for (std::size_t d = 0; d < D; ++d) {
-      if (std::isfinite(boxes[k].lo[d]) && std::isfinite(boxes[k].hi[d]) &&
-          boxes[k].lo[d] <= boxes[k].hi[d]) {
+      if (std::isfinite(boxes[k].min[d]) && std::isfinite(boxes[k].max[d]) &&
+          boxes[k].min[d] <= boxes[k].max[d]) {
         continue;
       }
       refuse_tree(
           "primitive " + std::to_string(k) +
-          " has a coordinate that is not finite or a box whose lo exceeds its hi; leave it out");
+          " has a coordinate that is not finite or a box whose min exceeds its max; leave it out");
     }
   }
 }
@@ -54,6 +56,20 @@ inline void check_rows(std::span<const TreeChildren> rows, std::size_t n) {
       }
       taken[child] = true;
     }
+  }
+}
+
+/// Returns the surface area of a box, or its perimeter in the plane.
+template <class AnyBox>
+double area_of(const AnyBox& box) {
+  std::array<double, std::tuple_size_v<decltype(box.min)>> side;
+  for (std::size_t d = 0; d < side.size(); ++d) {
+    side[d] = static_cast<double>(box.max[d]) - static_cast<double>(box.min[d]);
+  }
+  if constexpr (side.size() == 2) {
+    return 2.0 * (side[0] + side[1]);
+  } else {
+    return 2.0 * (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]);
   }
 }
 

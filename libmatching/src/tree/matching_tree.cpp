@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "label_groups.hpp"
-#include "tree/match_level.hpp"
+#include "terrace/matching/large_matching.hpp"
 
 namespace terrace::matching {
 namespace {
@@ -215,7 +215,10 @@ class Builder {
     std::vector<Point> positions(nodes.size());
     for (std::size_t i = 0; i < nodes.size(); ++i) positions[i] = nodes[i].position;
     if (!options_.matcher) {
-      return tree::match_level<D>(std::span<const Point>(positions), threads, options_.check_stop);
+      LargeMatchingOptions options;
+      options.threads = threads;
+      options.check_stop = options_.check_stop;
+      return std::move(match_large(std::span<const Point>(positions), options).mate);
     }
     std::vector<std::uint32_t> mate = options_.matcher(positions);
     if (mate.size() != nodes.size()) {

@@ -11,9 +11,34 @@
 #include <vector>
 
 #include "terrace/matching/point_hierarchy.hpp"
-#include "tree/near_walk.hpp"
+#include "tree/walk.hpp"
 
 namespace terrace::matching::tree {
+
+/// Factor for comparisons with a box's bound. It keeps rounding from pruning wrongly: the squared
+/// distances of a box and of a primitive inside it are both accurate to about 2^-50.
+inline constexpr double kSlack = 1.0 - 0x1p-47;
+
+template <class AnyBox, std::size_t D>
+double squared_distance(const AnyBox& box, const std::array<double, D>& p) {
+  double sum = 0.0;
+  for (std::size_t d = 0; d < D; ++d) {
+    const double below = static_cast<double>(box.min[d]) - p[d];
+    const double above = p[d] - static_cast<double>(box.max[d]);
+    const double out = std::max(std::max(below, above), 0.0);
+    sum += out * out;
+  }
+  return sum;
+}
+
+/// Calls leaf(node) for each leaf whose squared distance is at most bound(), nearer leaves first.
+template <std::size_t D, class Bound, class Leaf>
+void walk_near(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
+               Bound&& bound, Leaf&& leaf) {
+  walk(
+      tree, [&](const HierarchyNode<D>& node) { return squared_distance(node, framed); },
+      [&](double distance) { return distance * kSlack <= bound(); }, leaf);
+}
 
 /// A squared distance in the hierarchy's scale and the index of its primitive. Ties go to the lower
 /// index.
@@ -27,14 +52,13 @@ std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
   Candidate best{std::numeric_limits<double>::infinity(), kNobody};
   const std::uint32_t* order = tree.order().data();
   walk_near(
-      tree, framed,
+      tree, framed, [&] { return best.first; },
       [&](const HierarchyNode<D>& leaf) {
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
           const double d = squared(slot);
           if (d <= best.first) best = std::min(best, Candidate{d, order[slot]});
         }
-      },
-      [&] { return best.first; });
+      });
   if (best.second == kNobody) return std::nullopt;
   return Neighbour{best.second, std::sqrt(best.first) / tree.frame().scale};
 }
@@ -53,7 +77,7 @@ void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double
   const std::uint32_t* order = tree.order().data();
   double bound = std::numeric_limits<double>::infinity();
   walk_near(
-      tree, framed,
+      tree, framed, [&] { return bound; },
       [&](const HierarchyNode<D>& leaf) {
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
           const Neighbour candidate{order[slot], squared(slot)};
@@ -68,8 +92,7 @@ void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double
           std::push_heap(found.begin(), found.end(), nearer);
           if (found.size() == k) bound = found.front().distance;
         }
-      },
-      [&] { return bound; });
+      });
   std::sort_heap(found.begin(), found.end(), nearer);
   for (Neighbour& neighbour : found) {
     neighbour.distance = std::sqrt(neighbour.distance) / tree.frame().scale;

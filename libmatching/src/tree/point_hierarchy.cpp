@@ -11,8 +11,8 @@ namespace terrace::matching {
 namespace {
 
 template <std::size_t D>
-std::vector<Box<D>> boxes_of(std::span<const std::array<double, D>> points) {
-  std::vector<Box<D>> boxes;
+std::vector<base::Box<D>> boxes_of(std::span<const std::array<double, D>> points) {
+  std::vector<base::Box<D>> boxes;
   boxes.reserve(points.size());
   for (const auto& p : points) boxes.push_back({p, p});
   return boxes;

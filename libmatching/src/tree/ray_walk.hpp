@@ -10,10 +10,9 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "terrace/matching/point_hierarchy.hpp"
-#include "tree/near_walk.hpp"
+#include "tree/walk.hpp"
 
 namespace terrace::matching::tree {
 
@@ -68,8 +67,8 @@ class FramedRay {
   [[nodiscard]] Range within(const AnyBox& box, double last) const {
     Range range{t_min, last};
     for (std::size_t d = 0; d < 3; ++d) {
-      const double lo = (static_cast<double>(box.lo[d]) - for_lo_[d]) * inverse_[d];
-      const double hi = (static_cast<double>(box.hi[d]) - for_hi_[d]) * inverse_[d];
+      const double lo = (static_cast<double>(box.min[d]) - for_lo_[d]) * inverse_[d];
+      const double hi = (static_cast<double>(box.max[d]) - for_hi_[d]) * inverse_[d];
       const double enter = backward_[d] ? hi : lo;
       const double leave = backward_[d] ? lo : hi;
       range.enter = enter > range.enter ? enter : range.enter;
@@ -82,11 +81,11 @@ class FramedRay {
   /// if there is none. So an earlier hit never makes the walk skip a node around this one, and all
   /// trees give the same answer. The change is a few roundings, except for triangles seen nearly
   /// edge-on. The box's coordinates are in the units of the primitives.
-  [[nodiscard]] std::optional<double> moved_into(Box<3> box, const HierarchyFrame<3>& frame,
+  [[nodiscard]] std::optional<double> moved_into(base::Box3 box, const HierarchyFrame<3>& frame,
                                                  double t) const {
     for (std::size_t d = 0; d < 3; ++d) {
-      box.lo[d] -= frame.centre[d];
-      box.hi[d] -= frame.centre[d];
+      box.min[d] -= frame.centre[d];
+      box.max[d] -= frame.centre[d];
     }
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
     const Range range = within(box, kInfinity);
@@ -111,41 +110,17 @@ class FramedRay {
 /// nearer leaves first. leaf() lowers best.t, which is in the ray's own t.
 template <class Leaf>
 RayHit walk_ray(const BoundingVolumeHierarchy<3>& tree, const FramedRay& ray, Leaf&& leaf) {
+  constexpr double kMissed = std::numeric_limits<double>::infinity();
   RayHit best{kNobody, ray.t_max};
-  const auto nodes = tree.nodes();
-  if (nodes.empty()) return best;
-  struct Entry {
-    double enter;
-    std::uint32_t node;
-  };
-  WalkStack<Entry> open(tree.depth());
-  const auto root = ray.within(nodes[0], best.t);
-  if (root.empty()) return best;
-  Entry at{root.enter, 0};
-  while (true) {
-    const auto& node = nodes[at.node];
-    if (node.count != 0) {
-      leaf(node, best);
-    } else {
-      const auto first = ray.within(nodes[at.node + 1], best.t);
-      const auto second = ray.within(nodes[node.link], best.t);
-      Entry near{first.enter, at.node + 1}, far{second.enter, node.link};
-      bool has_near = !first.empty(), has_far = !second.empty();
-      if (has_far && (!has_near || far.enter < near.enter)) {
-        std::swap(near, far);
-        std::swap(has_near, has_far);
-      }
-      if (has_near) {
-        if (has_far) open.push(far);
-        at = near;
-        continue;
-      }
-    }
-    do {
-      if (open.empty()) return best;
-      at = open.pop();
-    } while (at.enter > best.t);
-  }
+  walk(
+      tree,
+      [&](const HierarchyNode<3>& node) {
+        const auto range = ray.within(node, best.t);
+        return range.empty() ? kMissed : range.enter;
+      },
+      [&](double enter) { return enter < kMissed && enter <= best.t; },
+      [&](const HierarchyNode<3>& node) { leaf(node, best); });
+  return best;
 }
 
 }  // namespace terrace::matching::tree

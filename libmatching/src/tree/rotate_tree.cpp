@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
-#include "tree/box_area.hpp"
 #include "tree/check_tree.hpp"
 
 namespace terrace::matching {
@@ -14,23 +13,23 @@ namespace {
 template <std::size_t D>
 class Rotation {
  public:
-  Rotation(std::span<const TreeChildren> rows, std::span<const Box<D>> boxes)
+  Rotation(std::span<const TreeChildren> rows, std::span<const base::Box<D>> boxes)
       : count_(static_cast<std::uint32_t>(boxes.size())),
         children_(rows.begin(), rows.end()),
         boxes_(boxes.begin(), boxes.end()) {
     // Scale by a power of two, so that areas neither overflow nor underflow.
     double largest = 0.0;
-    for (const Box<D>& box : boxes_) {
+    for (const base::Box<D>& box : boxes_) {
       for (std::size_t d = 0; d < D; ++d) {
-        largest = std::max({largest, std::abs(box.lo[d]), std::abs(box.hi[d])});
+        largest = std::max({largest, std::abs(box.min[d]), std::abs(box.max[d])});
       }
     }
     if (largest > 0.0) {
       const int exponent = -std::ilogb(largest) - 1;
-      for (Box<D>& box : boxes_) {
+      for (base::Box<D>& box : boxes_) {
         for (std::size_t d = 0; d < D; ++d) {
-          box.lo[d] = std::ldexp(box.lo[d], exponent);
-          box.hi[d] = std::ldexp(box.hi[d], exponent);
+          box.min[d] = std::ldexp(box.min[d], exponent);
+          box.max[d] = std::ldexp(box.max[d], exponent);
         }
       }
     }
@@ -64,11 +63,11 @@ class Rotation {
   }
 
  private:
-  [[nodiscard]] Box<D> together(std::uint32_t a, std::uint32_t b) const {
-    Box<D> box = boxes_[a];
+  [[nodiscard]] base::Box<D> together(std::uint32_t a, std::uint32_t b) const {
+    base::Box<D> box = boxes_[a];
     for (std::size_t d = 0; d < D; ++d) {
-      box.lo[d] = std::min(box.lo[d], boxes_[b].lo[d]);
-      box.hi[d] = std::max(box.hi[d], boxes_[b].hi[d]);
+      box.min[d] = std::min(box.min[d], boxes_[b].min[d]);
+      box.max[d] = std::max(box.max[d], boxes_[b].max[d]);
     }
     return box;
   }
@@ -151,7 +150,7 @@ class Rotation {
 
   std::uint32_t count_;
   std::vector<TreeChildren> children_;
-  std::vector<Box<D>> boxes_;
+  std::vector<base::Box<D>> boxes_;
   std::vector<std::uint32_t> order_;  // inner nodes, children before parents
   double cost_ = 0.0;                 // sum of the inner nodes' areas
 };
@@ -160,7 +159,7 @@ class Rotation {
 
 template <std::size_t D>
 std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,
-                                      std::span<const Box<D>> boxes, unsigned passes) {
+                                      std::span<const base::Box<D>> boxes, unsigned passes) {
   tree::check_rows(rows, boxes.size());
   tree::check_boxes(boxes);
   Rotation<D> rotation(rows, boxes);
@@ -170,8 +169,8 @@ std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,
 }
 
 template std::vector<TreeChildren> rotate_tree<2>(std::span<const TreeChildren>,
-                                                  std::span<const Box<2>>, unsigned);
+                                                  std::span<const base::Box2>, unsigned);
 template std::vector<TreeChildren> rotate_tree<3>(std::span<const TreeChildren>,
-                                                  std::span<const Box<3>>, unsigned);
+                                                  std::span<const base::Box3>, unsigned);
 
 }  // namespace terrace::matching

@@ -261,7 +261,7 @@ class MatchCommand final : public Command {
     if (triangles && !tree_) throw UsageError("--entities triangles is for --tree");
     PointTable table = read_point_table(input_, input_format_, common.memory_or(0), common,
                                         *stream::entities_named(entities_));
-    std::vector<matching::Box<3>> boxes;
+    std::vector<base::Box3> boxes;
     if (triangles) boxes = to_centroids(table);
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
     if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
@@ -270,7 +270,7 @@ class MatchCommand final : public Command {
     request.labels = labels;
     request.held_bytes = kProgramMemory + table.payload.size() +
                          table.size() * 2 * sizeof(stream::Point3) +
-                         boxes.size() * sizeof(matching::Box<3>);
+                         boxes.size() * sizeof(base::Box3);
     positions_.resize(table.size());
     std::transform(table.positions.begin(), table.positions.end(), positions_.begin(), ground);
 
@@ -348,10 +348,10 @@ class MatchCommand final : public Command {
 
   /// Returns the boxes of a table's triangles. Replaces its positions (first corners) with
   /// centroids.
-  [[nodiscard]] std::vector<matching::Box<3>> to_centroids(PointTable& table) const {
+  [[nodiscard]] std::vector<base::Box3> to_centroids(PointTable& table) const {
     const CornerReader read(table.info, stream::Entities::triangles, input_);
     const std::size_t record = table.info.payload_size();
-    std::vector<matching::Box<3>> boxes(table.size());
+    std::vector<base::Box3> boxes(table.size());
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       check_interrupt();
       std::array<stream::Point3, 3> corners{table.positions[i]};
@@ -359,8 +359,8 @@ class MatchCommand final : public Command {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto [low, high] =
             std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
-        boxes[i].lo[axis] = low;
-        boxes[i].hi[axis] = high;
+        boxes[i].min[axis] = low;
+        boxes[i].max[axis] = high;
         table.positions[i][axis] =
             corners[0][axis] / 3 + corners[1][axis] / 3 + corners[2][axis] / 3;
       }
@@ -370,7 +370,7 @@ class MatchCommand final : public Command {
 
   /// Returns the rows of a tree. `boxes` are those of the entities, in the file's coordinates;
   /// without any, rows have no boxes.
-  static std::string rows_of(const TreeOutcome& outcome, std::vector<matching::Box<3>> boxes = {}) {
+  static std::string rows_of(const TreeOutcome& outcome, std::vector<base::Box3> boxes = {}) {
     const bool boxed = !boxes.empty();
     std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
     for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
@@ -378,14 +378,14 @@ class MatchCommand final : public Command {
       text += fmt::format("{},{},{},{},{}", row.a, row.b, number_text(row.distance), row.size,
                           row.level);
       if (boxed) {
-        matching::Box<3> box = boxes[row.a];
+        base::Box3 box = boxes[row.a];
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          box.lo[axis] = std::min(box.lo[axis], boxes[row.b].lo[axis]);
-          box.hi[axis] = std::max(box.hi[axis], boxes[row.b].hi[axis]);
+          box.min[axis] = std::min(box.min[axis], boxes[row.b].min[axis]);
+          box.max[axis] = std::max(box.max[axis], boxes[row.b].max[axis]);
         }
         boxes.push_back(box);
-        for (const double value : box.lo) text += ',' + number_text(value);
-        for (const double value : box.hi) text += ',' + number_text(value);
+        for (const double value : box.min) text += ',' + number_text(value);
+        for (const double value : box.max) text += ',' + number_text(value);
       }
       text += '\n';
     }

@@ -7,15 +7,12 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/box.hpp>
+
 /// Bounding volume hierarchies from binary trees: one box per node, stored in one array in
 /// depth-first order. For queries see point_hierarchy.hpp and triangle_hierarchy.hpp.
 
 namespace terrace::matching {
-
-template <std::size_t D>
-struct Box {
-  std::array<double, D> lo, hi;
-};
 
 /// A row of a binary tree, numbered as in matching_tree.hpp: nodes 0 .. n-1 are the primitives, and
 /// row r makes node n + r from two earlier nodes.
@@ -51,7 +48,7 @@ struct HierarchyOptions {
 /// Takes 32 bytes in space and 24 in the plane.
 template <std::size_t D>
 struct HierarchyNode {
-  std::array<float, D> lo, hi;  ///< in the frame of the hierarchy, rounded outward
+  std::array<float, D> min, max;  ///< in the frame of the hierarchy, rounded outward
   /// first slot of a leaf; otherwise the second child (the first is the next node)
   std::uint32_t link;
   std::uint32_t count;  ///< primitives of a leaf; 0 for an inner node
@@ -80,10 +77,10 @@ class BoundingVolumeHierarchy {
   /// rows: a tree of any shape, with one row fewer than there are boxes.
   /// Throws: std::invalid_argument for a wrong number of rows, a row that names a node that does
   /// not exist yet or already has a parent (the message names the row), a box that is not finite or
-  /// whose lo exceeds its hi (the message gives its index), a leaf size of 0, and costs that are
+  /// whose min exceeds its max (the message gives its index), a leaf size of 0, and costs that are
   /// negative or not finite.
   /// Cost: O(n) time; 80 bytes per box while building.
-  BoundingVolumeHierarchy(std::span<const TreeChildren> rows, std::span<const Box<D>> boxes,
+  BoundingVolumeHierarchy(std::span<const TreeChildren> rows, std::span<const base::Box<D>> boxes,
                           const HierarchyOptions& options = {});
 
   [[nodiscard]] std::span<const Node> nodes() const { return nodes_; }  ///< the root first
@@ -119,7 +116,7 @@ class BoundingVolumeHierarchy {
 /// Source: A. Kensler, "Tree rotations for improving bounding volume hierarchies", 2008.
 template <std::size_t D>
 [[nodiscard]] std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,
-                                                    std::span<const Box<D>> boxes,
+                                                    std::span<const base::Box<D>> boxes,
                                                     unsigned passes = 16);
 
 extern template class BoundingVolumeHierarchy<2>;

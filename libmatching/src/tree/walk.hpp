@@ -40,22 +40,6 @@ class WalkStack {
   std::size_t size_ = 0;
 };
 
-/// Factor for comparisons with a box's bound. It keeps rounding from pruning wrongly: the squared
-/// distances of a box and of a primitive inside it are both accurate to about 2^-50.
-inline constexpr double kSlack = 1.0 - 0x1p-47;
-
-template <class AnyBox, std::size_t D>
-double squared_distance(const AnyBox& box, const std::array<double, D>& p) {
-  double sum = 0.0;
-  for (std::size_t d = 0; d < D; ++d) {
-    const double below = static_cast<double>(box.lo[d]) - p[d];
-    const double above = p[d] - static_cast<double>(box.hi[d]);
-    const double out = std::max(std::max(below, above), 0.0);
-    sum += out * out;
-  }
-  return sum;
-}
-
 /// A point in the units of the primitives and in the units of the boxes.
 template <std::size_t D>
 struct FramedPlace {
@@ -77,26 +61,28 @@ struct FramedPlace {
   }
 };
 
-/// Calls leaf(node) for each leaf whose squared distance is at most bound(), nearer leaves first.
-template <std::size_t D, class Leaf, class Bound>
-void walk_near(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
-               Leaf&& leaf, Bound&& bound) {
+/// Walks down a hierarchy, the child with the lower key first. key(node) is a number that is not
+/// greater for a node than for what is inside it, infinity if there is nothing. reaches(key) is
+/// whether nodes of that key still matter; once false it stays false. Calls leaf(node) for each
+/// leaf that matters.
+template <std::size_t D, class Key, class Reaches, class Leaf>
+void walk(const BoundingVolumeHierarchy<D>& tree, Key&& key, Reaches&& reaches, Leaf&& leaf) {
   const auto nodes = tree.nodes();
   if (nodes.empty()) return;
   struct Entry {
-    double distance;
+    double key;
     std::uint32_t node;
   };
   WalkStack<Entry> open(tree.depth());
-  Entry at{0.0, 0};
+  Entry at{key(nodes[0]), 0};
   while (true) {
-    if (at.distance * kSlack <= bound()) {
+    if (reaches(at.key)) {
       const auto& node = nodes[at.node];
       if (node.count == 0) {
-        Entry near{squared_distance(nodes[at.node + 1], framed), at.node + 1};
-        Entry far{squared_distance(nodes[node.link], framed), node.link};
-        if (far.distance < near.distance) std::swap(near, far);
-        if (far.distance * kSlack <= bound()) open.push(far);
+        Entry near{key(nodes[at.node + 1]), at.node + 1};
+        Entry far{key(nodes[node.link]), node.link};
+        if (far.key < near.key) std::swap(near, far);
+        if (reaches(far.key)) open.push(far);
         at = near;
         continue;
       }
