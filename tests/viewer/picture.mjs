@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // picture.mjs PACKAGES STORE LINK OUT [WIDTHxHEIGHT [dark]]: takes a picture of a store in the
 // viewer with headless Chromium once everything has loaded. TERRACE names the command, CHROMIUM the
-// browser. The picture in README:
-//   tests/clients/clients_test.sh build "$PWD/tests/viewer/picture.mjs" alps.store
-//     '#s=alps&q=2&v=20500,-44500,1000,15,40,20000&c=height' docs/viewer.jpg 1200x640
+// browser. docs/tools/pictures.py takes the manual's pictures of the viewer with it.
 import {mkdtempSync, rmSync} from 'node:fs';
 import {spawnSync} from 'node:child_process';
 import {tmpdir} from 'node:os';
