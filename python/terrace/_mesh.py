@@ -68,7 +68,7 @@ class Mesh:
         """Writes a mesh file in the format of its extension: .ply, .obj or .glb, or .svg for a picture from above.
 
         .ply, .obj and .glb files appear only when complete. glTF knows only metres, so .glb files of a store in
-        degrees or feet are converted to metres (see "Meshes in metres" in tools/README.md), and ``asset.extras`` in
+        degrees or feet are converted to metres (see "Meshes in metres" in the manual), and ``asset.extras`` in
         the file describes how to convert back. A mesh made of arrays, or whose ``vertices`` have been set, is written
         unconverted. A note of the conversion goes to ``logging.getLogger('terrace')``.
 

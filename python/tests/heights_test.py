@@ -4,15 +4,13 @@
 import logging
 import math
 import os
-import re
-import shutil
 import tempfile
 import unittest
 
 import numpy as np
 
 import terrace
-from python_case import ALPS, TRANSFORM, StoreCase, cell_centres
+from python_case import TRANSFORM, StoreCase, cell_centres
 
 try:
     from scipy.interpolate import LinearNDInterpolator, RegularGridInterpolator
@@ -242,24 +240,6 @@ class Lines(StoreCase):
             self.assertEqual(len(store.points(region=star)), len(getattr(inside, 'geoms', () if inside.is_empty else (inside,))))
 
         check()
-
-
-class RealTerrain(unittest.TestCase):
-    def test_example_in_the_readme(self):
-        with open(os.path.join(os.path.dirname(__file__), '..', 'README.md'), encoding='utf-8') as file:
-            code = re.search(r'```python\n(.*?)```', file.read(), re.DOTALL)[1]
-        with tempfile.TemporaryDirectory() as folder:
-            shutil.copy(ALPS, folder)
-            before = os.getcwd()
-            os.chdir(folder)
-            try:
-                names = {}
-                exec(code, names)
-            finally:
-                os.chdir(before)
-        self.assertFalse(np.isnan(names['heights']).any())
-        self.assertLessEqual(names['mesh'].max_error, 50)
-        self.assertGreater(len(names['lines']['features']), 3)
 
 
 if __name__ == '__main__':

@@ -4,7 +4,7 @@
 # - no installed text file names the source or the build folder, or a library by its absolute path;
 # - every public header compiles with only its own library's pkg-config flags;
 # - consumer.cpp, which uses all libraries, links by pkg-config and runs;
-# - the CMake lines of each library's README build and run use_LIBRARY.cpp.
+# - the CMake lines of the guide for C++, with each library in turn, build and run use_LIBRARY.cpp.
 # The same CMake projects are then built with shared libraries (see below).
 # Usage: install_test.sh BUILD SOURCE PREFIX LIBDIR STATIC-OR-SHARED COMPILER...
 set -eu
@@ -47,9 +47,9 @@ mkdir "$folder/work"
 LD_LIBRARY_PATH="$installed/$libdir" "$folder/consumer" "$folder/work"
 
 command -v cmake >/dev/null || fail 'cmake is missing'
-# with_cmake NAME PREFIX: each ```cmake block of each README builds a separate program of one
-# project. The project is configured without other installations of terrace, which would hide
-# errors.
+# with_cmake NAME PREFIX: for each library, the lines of each ```cmake block of the guide that find
+# and link it build a separate program of one project. The project is configured without other
+# installations of terrace, which would hide errors.
 with_cmake() {
   project=$folder/project-$1
   mkdir "$project"
@@ -58,15 +58,17 @@ cmake_minimum_required(VERSION 3.16)
 project(stranger CXX)
 CMAKE
   for library in $libraries; do
-    awk -v stem="$project/${library}_" '/^```cmake$/ { n += 1; file = stem n ".cmake"; next } /^```$/ { file = "" } file { print > file }' \
-      "$source/lib$library/README.md"
-    [ -f "$project/${library}_2.cmake" ] || fail "lib$library/README.md does not have two blocks of CMake"
+    awk -v stem="$project/${library}_" '/^```cmake$/ { n += 1; file = stem n ".cmake"; next } /^```$/ { file = "" }
+      file && /^(find_package|pkg_check_modules|target_link_libraries)/ { print > file }' "$source/docs/guides/cpp.md"
+    [ -f "$project/${library}_2.cmake" ] || fail "docs/guides/cpp.md does not have two blocks of CMake"
+    upper=$(echo "$library" | tr '[:lower:]' '[:upper:]')
     for block in "$project/${library}"_*.cmake; do
       target=$(basename "$block" .cmake)
       mkdir "$project/$target"
       {
         echo "add_executable($target \"$source/tests/install/use_$library.cpp\")"
-        sed "s/my_program/$target/" "$block"
+        sed "s/heights/$target/; s/terrace-terrain/terrace-$library/; s/TERRACE_TERRAIN/TERRACE_$upper/g
+          s/COMPONENTS terrain/COMPONENTS $library/; s/terrace::terrain/terrace::$library/" "$block"
       } >"$project/$target/CMakeLists.txt"
       echo "add_subdirectory($target)" >>"$project/CMakeLists.txt"
     done

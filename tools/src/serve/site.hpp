@@ -80,7 +80,7 @@ inline constexpr const char* kStartEnding = ".start";
 std::vector<std::string> site_names(std::span<const stream::Store> stores);
 
 /// Returns the parts of a store that a view needs to start: a line of JSON with the ground map and
-/// the list of parts, then their bytes. See viewer/README.md.
+/// the list of parts, then their bytes. See docs/background/viewer.md.
 std::string start_file(const stream::Store& store);
 
 struct Published {
