@@ -44,7 +44,7 @@ struct BuildRequest {
   std::optional<std::array<double, 7>> datum_shift{};
   std::string vertical{};  ///< "ellipsoidal", "orthometric" or empty
   std::size_t block_points = 10000;
-  /// Times the diagonal of a block. With 3, clusters hold about 160 points: docs/FIGURES.md.
+  /// Times the diagonal of a block. With 3, clusters hold about 160 points: docs/figures.
   double facility_cost = 3.0;
   cluster::Effort effort = cluster::Effort::standard;
   double z_weight = 1.0;
