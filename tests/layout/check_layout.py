@@ -38,6 +38,7 @@ LICENCES = {
     'python': 'Apache-2.0',
     'tools': 'GPL-3.0-or-later',
     'viewer': 'GPL-3.0-or-later',
+    'docs': 'GPL-3.0-or-later',
     'research': 'GPL-3.0-or-later',
     'tests': 'GPL-3.0-or-later',
 }
