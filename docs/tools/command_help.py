@@ -48,7 +48,7 @@ class Option:
 
     @property
     def takes_file(self):
-        return self.operand or self.value in ('FILE', 'DIR', 'STORE')
+        return self.operand or self.value.startswith('FILE') or self.value in ('LINE', 'METRIC', 'TEXT')
 
 
 def entries_of(lines):

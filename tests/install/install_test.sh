@@ -30,6 +30,11 @@ for library in $libraries; do
 done
 ! grep -E '[" ;]/' "$installed/$libdir"/cmake/terrace/*.cmake || fail 'the CMake package has an absolute path'
 
+for file in man/man1/terrace.1 man/man1/terrace-mesh.1 bash-completion/completions/terrace zsh/site-functions/_terrace \
+  fish/vendor_completions.d/terrace.fish; do
+  [ -s "$installed/share/$file" ] || fail "share/$file is not installed"
+done
+
 for library in $libraries; do
   (cd "$source/lib$library/include" && find . -name '*.hpp') | sed 's,^\./,,' | sort >"$folder/expected"
   (cd "$installed/include" && find "terrace/$library" -name '*.hpp') | sort >"$folder/found"
