@@ -19,6 +19,9 @@ SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
 PROGRAMS = ['python', 'tools', 'viewer']
 # The thesis's algorithms and experiments that are not part of the product. It may use all libraries and their private headers.
 RESEARCH = 'research'
+# What names the version besides the projects of the libraries.
+VERSIONED = ['CITATION.cff', 'python/terrace/__init__.py', 'python/qgis/terrace_processing/metadata.txt', 'viewer/package.json',
+             'viewer/package-lock.json']
 # The rooms of libterrain, in ranks: a room knows those of lower rank only.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
@@ -321,10 +324,11 @@ def check_research(root):
 
 
 def check_versions(root):
-    """The projects of the libraries name the version that the file VERSION has; others read that file."""
+    """These files name the version that the file VERSION has; all others read that file."""
     version = read(root, 'VERSION').strip()
-    for path in [f'lib{library}/meson.build' for library in LIBRARIES] + ['CITATION.cff']:
-        found = re.search(r"^\s*version\s*: '?([^',\n]*)", read(root, path), re.MULTILINE)
+    for path in [f'lib{library}/meson.build' for library in LIBRARIES] + VERSIONED:
+        # In a lock file the first version is that of the project.
+        found = re.search(r"""^\s*["_]*version["_]*\s*[:=]\s*["']?([^"',\s]*)""", read(root, path), re.MULTILINE)
         if not found or found.group(1) != version:
             yield f'{path}: does not have the version {version} of the file VERSION'
 

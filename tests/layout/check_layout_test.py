@@ -41,6 +41,10 @@ def make_tree(root):
     write(root, 'tools/src/main.cpp', f'// {gpl}#include <terrace/tri/a.hpp>\n#include <CLI/CLI.hpp>\n')
     write(root, 'VERSION', '1.2.3\n')
     write(root, 'CITATION.cff', 'cff-version: 1.2.0\nversion: 1.2.3\n')
+    write(root, 'python/terrace/__init__.py', "# SPDX-License-Identifier: Apache-2.0\n__version__ = '1.2.3'\n")
+    write(root, 'python/qgis/terrace_processing/metadata.txt', '[general]\nqgisMinimumVersion=3.22\nversion=1.2.3\n')
+    write(root, 'viewer/package.json', '{\n  "version": "1.2.3"\n}\n')
+    write(root, 'viewer/package-lock.json', '{\n  "version": "1.2.3",\n  "packages": {"": {"version": "2.0.0"}}\n}\n')
     write(root, 'tests/run.sh', f'#!/bin/sh\n# {gpl}')
     write(root, 'research/meson.build', f"# {gpl}executable('a', 'a.cpp')\n")
     write(root, 'research/ears.hpp', f'// {gpl}')
@@ -73,7 +77,9 @@ class CheckLayout(unittest.TestCase):
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/build-x/a.cpp', '')), [])
 
     def test_versions_are_equal(self):
-        for path, text in (('libtri/meson.build', "version : '1.2.4'"), ('CITATION.cff', 'version: 1.2')):
+        for path, text in (('libtri/meson.build', "version : '1.2.4'"), ('CITATION.cff', 'version: 1.2'), ('viewer/package.json', '"version": "1.2"'),
+                           ('viewer/package-lock.json', '  "version": "1.2.30",\n"version": "1.2.3"'), ('python/terrace/__init__.py', "__version__ = '1'"),
+                           ('python/qgis/terrace_processing/metadata.txt', 'version=')):
             found = self.breaches(lambda root: write(root, path, f'# SPDX-License-Identifier: Apache-2.0\n{text}\n'))
             self.assertEqual(found, [f'{path}: does not have the version 1.2.3 of the file VERSION'])
 
