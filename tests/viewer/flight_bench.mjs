@@ -38,14 +38,14 @@ async function inChromium(browser, url, call, ...args) {
       type: 'module',
       content: `${readFileSync(new URL('flyer.mjs', import.meta.url), 'utf8')}
         window.flights = {cruise, dive};
-        window.connect = heard => {
+        window.connect = receive => {
           const worker = new Worker('worker.js');
           worker.onmessage = ({data}) => {
-            heard(data);
+            receive(data);
             const buffer = data.changes?.buffer;
             if (buffer) worker.postMessage({type: 'drawn', buffer}, [buffer]);
           };
-          return {tell: message => worker.postMessage(message)};
+          return {send: message => worker.postMessage(message)};
         };`
     });
     return await page.evaluate(([call, ...args]) => window.flights[call](window.connect, ...args), [call, url, ...args]);
@@ -87,7 +87,7 @@ try {
   let files;
   const inNodeAfter = latency => (fly, ...args) => {
     files = folderFetch(site, undefined, latency);
-    return fly(heard => new Worker(join(site, 'worker.js'), files.fetch, heard), 'http://folder/', name, ...args);
+    return fly(receive => new Worker(join(site, 'worker.js'), files.fetch, receive), 'http://folder/', name, ...args);
   };
   const hosts = [['node', inNodeAfter(1), () => files.log]];
   if (process.env.CHROMIUM && process.argv[2]) {

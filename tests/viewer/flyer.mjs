@@ -3,18 +3,18 @@
 
 /// Sends messages to a worker and waits for its answers.
 export class Flyer {
-  /// connect(heard): starts worker.js and returns {tell(message)}; `heard` receives its messages.
+  /// connect(receive): starts worker.js and returns {send(message)}; `receive` takes its messages.
   /// base: the URL of a published folder. name: a store in it. choose: as in messages.ts.
-  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, choose = false, heard = () => {}} = {}) {
+  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, choose = false, receive = () => {}} = {}) {
     this.serial = 0;
     this.waiting = [];
     this.last = null;  ///< frame
     this.worker = connect(message => {
       if (message.type === 'frame') this.last = message;
-      heard(message);
+      receive(message);
       this.waiting = this.waiting.filter(wait => !wait(message));
     });
-    this.worker.tell({
+    this.worker.send({
       type: 'open',
       base,
       query: '',
@@ -45,7 +45,7 @@ export class Flyer {
   view(camera, settled = true) {
     const serial = ++this.serial;
     const done = this.until(m => m.type === 'frame' && m.serial === serial && (!settled || m.state.settled));
-    this.worker.tell({type: 'view', serial, camera});
+    this.worker.send({type: 'view', serial, camera});
     return done;
   }
 }
@@ -66,7 +66,7 @@ const PICTURE = 1000 / 60;
 export async function cruise(connect, base, name, points, frames, error) {
   let milliseconds = [];
   const flyer = new Flyer(connect, base, name, {
-    heard: message => {
+    receive: message => {
       if (message.type === 'frame') milliseconds.push(message.milliseconds);
     }
   });

@@ -61,7 +61,7 @@ export class Worker {
   constructor(script, fetch, said, haste = 1) {
     this.self = {
       postMessage: message => {
-        if (message.type === 'frame') queueMicrotask(() => this.tell({type: 'drawn', buffer: message.changes.buffer}));
+        if (message.type === 'frame') queueMicrotask(() => this.send({type: 'drawn', buffer: message.changes.buffer}));
         said(message);
       }
     };
@@ -92,7 +92,7 @@ export class Worker {
       Math
     });
   }
-  tell(data) {
+  send(data) {
     this.self.onmessage({data});
   }
 }

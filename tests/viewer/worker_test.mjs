@@ -24,11 +24,11 @@ class Tested extends Flyer {
     const {fetch, log} = folderFetch(site, fault, latency);
     const messages = [];
     let blocks = 0, broken = null;
-    super(heard => new Worker(join(site, 'worker.js'), fetch, heard, haste), 'http://folder/', name, {
+    super(receive => new Worker(join(site, 'worker.js'), fetch, receive, haste), 'http://folder/', name, {
       maxPoints,
       choose,
       asPoints,
-      heard: message => {
+      receive: message => {
         messages.push(message.type);
         // The worker would report an exception from here as its own error.
         try {
@@ -47,7 +47,7 @@ class Tested extends Flyer {
   /// Sends a message and resolves to the answer of that type.
   async ask(message, type) {
     const done = this.until(m => m.type === type);
-    this.worker.tell(message);
+    this.worker.send(message);
     return done;
   }
   /// The sample of the store nearest to a position.
@@ -60,7 +60,7 @@ class Tested extends Flyer {
   }
   async hash() {
     const done = this.until(message => message.type === 'hashed');
-    this.worker.tell({type: 'hash', id: 1});
+    this.worker.send({type: 'hash', id: 1});
     return (await done).hash;
   }
   /// Waits until nothing outdated is drawn.
@@ -438,7 +438,7 @@ test('a scan switches to points and back without further requests', async () => 
   assert.ok(!flyer.log.some(request => request.path === '/body.wasm'));
   for (const kind of ['surface', 'points', 'surface']) {
     const opened = flyer.opened();
-    flyer.worker.tell({type: 'show', asPoints: kind === 'points'});
+    flyer.worker.send({type: 'show', asPoints: kind === 'points'});
     assert.equal((await opened).scene.kind, kind);
     await flyer.settle(stop);
     const [native] = sites.flight('ball', {kind});
@@ -456,12 +456,12 @@ test('manual control: a cluster of a surface expands, collapses and is released;
   const before = (await flyer.settle(camera)).points;
   const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
   assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));
-  flyer.worker.tell({type: 'pin', how: 1});
+  flyer.worker.send({type: 'pin', pin: 1});
   const more = (await flyer.settle(camera)).points;
   assert.ok(more > before, `${before} ${more}`);
   const {lines} = await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
   assert.equal(lines.length % 2, 0);
-  flyer.worker.tell({type: 'pin', how: -1});
+  flyer.worker.send({type: 'pin', pin: -1});
   assert.equal((await flyer.settle(camera)).points, before);
 });
 
@@ -474,7 +474,7 @@ test('a cluster of points expands manually, and its outline lists its points', a
   const pick = async () => (await flyer.ask({type: 'pick', id: 1, origin: [0, 0, 300], direction: [0, 0, -1], angle: 0.05}, 'picked')).hit;
   const coarse = await pick();
   assert.equal((await outline(coarse)).length, 0, 'a cluster of the top is expanded');
-  flyer.worker.tell({type: 'pin', how: 1});
+  flyer.worker.send({type: 'pin', pin: 1});
   const more = (await flyer.settle(camera)).points - before;
   assert.ok(more > 0);
   let lines = new Uint32Array();
@@ -655,7 +655,7 @@ test('an open scan: a ray through its opening meets the far side', async () => {
   await flyer.settle({eye: [40, 0, 0], direction: [-1, 0, 0], error: 0.5});
   await flyer.hash();  // computes the surface from scratch
   const picked = flyer.until(message => message.type === 'picked');
-  flyer.worker.tell({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01});
+  flyer.worker.send({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01});
   const {hit} = await picked;
   assert.ok(hit.place[0] < -6, JSON.stringify(hit));
 });
@@ -668,7 +668,7 @@ test('the module for bodies cannot be fetched: a message, and a retry succeeds',
   assert.match(await flyer.failed(), /HTTP 404/);
   bad = false;
   const opened = flyer.opened();
-  flyer.worker.tell({type: 'retry'});
+  flyer.worker.send({type: 'retry'});
   assert.equal((await opened).scene.kind, 'surface');
 });
 
@@ -739,7 +739,7 @@ for (const [name, [expected, spoil]] of Object.entries(FAULTS)) {
     assert.match(await failed, expected);
     assert.ok(!flyer.last?.state.settled);
     bad = false;
-    flyer.worker.tell({type: 'retry'});
+    flyer.worker.send({type: 'retry'});
     await settled;
     const fine = new Tested('alps');
     await fine.opened();
@@ -763,12 +763,12 @@ test('a server stops answering: a message after two tries, and a retry succeeds'
   const flyer = new Tested('alps', {haste: 100, fault: ({range}, response) => silent(range) ? undefined : response});
   await flyer.opened();
   const failed = flyer.failed(), stop = sites.flight('alps')[1];
-  flyer.worker.tell({type: 'view', serial: 1, camera: {...stop, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800}});
+  flyer.worker.send({type: 'view', serial: 1, camera: {...stop, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800}});
   assert.match(await failed, /silent for 10 seconds/);
   const tries = flyer.log.filter(({range}) => range).map(({path, range}) => path + range);
   assert.ok(tries.some(range => tries.filter(other => other === range).length === 2));
   silent = () => false;
-  flyer.worker.tell({type: 'retry'});
+  flyer.worker.send({type: 'retry'});
   const state = await flyer.settle(stop);
   assert.equal(state.points, stop.points);
 
@@ -797,7 +797,7 @@ test('a missing or damaged start file: a message, and a retry succeeds', async (
     assert.match(await flyer.failed(), expected);
     bad = false;
     const opened = flyer.opened();
-    flyer.worker.tell({type: 'retry'});
+    flyer.worker.send({type: 'retry'});
     await opened;
   }
 });

@@ -51,7 +51,7 @@ Module& module() {
 
 const char* input_text() { return reinterpret_cast<const char*>(module().input.data()); }
 
-void tell(std::span<const stream::ByteRange> ranges) {
+void list_missing(std::span<const stream::ByteRange> ranges) {
   module().text.clear();
   for (const stream::ByteRange& range : ranges.first(std::min(ranges.size(), kMostRanges))) {
     module().text += range.file + '\t' + std::to_string(range.offset) + '\t' +
@@ -64,7 +64,7 @@ int guarded(const Work& work) {
   try {
     return work();
   } catch (const stream::MissingBytes& missing) {
-    tell(missing.ranges());
+    list_missing(missing.ranges());
     return kMissing;
   } catch (const std::exception& error) {
     module().text = error.what();
@@ -209,7 +209,7 @@ TERRACE_EXPORT(frame) int terrace_frame() {
                  static_cast<double>(s.clusters),
                  static_cast<double>(s.stored_bytes),
                  s.waiting ? 1.0 : 0.0};
-    tell(m.scene->missing());
+    list_missing(m.scene->missing());
     m.numbers.push_back(m.text == m.lacking ? 1.0 : 0.0);
     m.lacking = m.text;
     return kDone;
@@ -341,13 +341,13 @@ TERRACE_EXPORT(outline) int terrace_outline(unsigned level, double ordinal) {
 }
 
 /// Pins the cluster picked last: 1 expands it, 0 collapses it, -1 releases every pin.
-TERRACE_EXPORT(pin) int terrace_pin(int how) {
+TERRACE_EXPORT(pin) int terrace_pin(int pin) {
   return guarded([&] {
     Module& m = module();
-    if (how < 0) {
+    if (pin < 0) {
       m.scene->release();
     } else if (m.hit) {
-      m.scene->pin(*m.hit, how > 0 ? tri::ViewPin::expanded : tri::ViewPin::collapsed);
+      m.scene->pin(*m.hit, pin > 0 ? tri::ViewPin::expanded : tri::ViewPin::collapsed);
     }
     return kDone;
   });

@@ -121,9 +121,9 @@ class SceneOf final : public Scene {
                                              double angle) const override;
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const override;
-  void pin(const SceneHit& hit, tri::ViewPin how) override {
+  void pin(const SceneHit& hit, tri::ViewPin pin) override {
     std::vector<tri::ClusterId> clusters;
-    if (how == tri::ViewPin::collapsed) {
+    if (pin == tri::ViewPin::collapsed) {
       if (tri::level_of(hit.cluster) < view_.model().top()) clusters = {hit.cluster};
     } else if (mesh().alive(picked_)) {
       view_.model().heads(picked_, clusters);
@@ -132,7 +132,7 @@ class SceneOf final : public Scene {
       if (clusters.size() > 1) clusters.resize(1);
     }
     for (const tri::ClusterId id : clusters) {
-      view_.pin(id, how);
+      view_.pin(id, pin);
       pinned_.push_back(id);
     }
   }

@@ -113,7 +113,7 @@ class Scene {
                                                      double angle) const = 0;
   /// Expands the clusters headed by the vertex nearest to a hit, one level down, or collapses the
   /// cluster that it is a member of. They stay so until release().
-  virtual void pin(const SceneHit& hit, tri::ViewPin how) = 0;
+  virtual void pin(const SceneHit& hit, tri::ViewPin pin) = 0;
   virtual void release() = 0;
   /// Returns the lines, as slots of their ends, around the triangles whose corners all belong to a
   /// cluster, that is, to its head or below it. For points, returns the points themselves, each as

@@ -117,7 +117,7 @@ interface Exports {
   probe(): number;
   profile(): number;
   outline(level: number, ordinal: number): number;
-  pin(how: number): number;
+  pin(pin: number): number;
 }
 
 export class Core {
@@ -270,8 +270,8 @@ export class Core {
     return Uint32Array.from(this.numbers(1 + 2 * this.numbers(1)[0]).slice(1));
   }
   /// Pins the last pick: 1 expands, 0 collapses, -1 releases all pins.
-  pin(how: number): void {
-    this.check(this.wasm.pin(how));
+  pin(pin: number): void {
+    this.check(this.wasm.pin(pin));
   }
 
   private buffer(bytes: number): ArrayBuffer {

@@ -13,7 +13,7 @@ export type ToWorker =
     |{type: 'view', camera: Camera, serial: number}
     |{type: 'drawn', buffer: ArrayBuffer}  ///< returns the buffer of a frame's changes
     |{type: 'pick', id: number, origin: number[], direction: number[], angle: number}
-    |{type: 'pin', how: number}
+    |{type: 'pin', pin: number}  ///< as Core.pin() takes it
     /// Answered from the store, after fetching missing bytes. A profile replaces a waiting one.
     |{type: 'probe', id: number, stored: number[], reach: number}
     |{type: 'profile', id: number, from: number[], to: number[], axis: number}

@@ -39,12 +39,12 @@ class Watch {
 
   constructor(signal?: AbortSignal) {
     signal?.addEventListener('abort', () => this.abort.abort());
-    this.heard();
+    this.restart();
   }
   get signal(): AbortSignal {
     return this.abort.signal;
   }
-  heard(): void {
+  restart(): void {
     this.end();
     this.timer = setTimeout(() => {
       this.silent = true;
@@ -62,11 +62,11 @@ class Watch {
 }
 
 /// Returns the bytes at a URL, which messages call `what`.
-export async function fetchWhole(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
+export async function fetchAll(url: string, what: string): Promise<Uint8Array<ArrayBuffer>> {
   const watch = new Watch();
   try {
     const response = await fetch(url, {signal: watch.signal});
-    watch.heard();
+    watch.restart();
     if (response.status === 403) throw new FetchFault(`${what}: ${FORBIDDEN}`, false);
     if (!response.ok) throw new FetchFault(`${what}: the server returned HTTP ${response.status}.`, false);
     return new Uint8Array(await response.arrayBuffer());
@@ -89,26 +89,26 @@ interface Flight extends ByteRange {
 }
 
 /// The bytes of files that have been requested.
-export class Asked {
+export class Requested {
   private readonly extents = new Map<string, Array<[number, number]>>();  ///< ascending, apart
 
   add({file, offset, bytes}: ByteRange): void {
     const list = this.extents.get(file) ?? [], end = offset + bytes;
-    const first = Asked.after(list, offset), last = Asked.after(list, end + 1, 0);
+    const first = Requested.after(list, offset), last = Requested.after(list, end + 1, 0);
     const merged: [number, number] = last > first ? [Math.min(offset, list[first][0]), Math.max(end, list[last - 1][1])] : [offset, end];
     list.splice(first, last - first, merged);
     this.extents.set(file, list);
   }
   /// Returns whether any of the bytes in between have been requested.
   meets(file: string, from: number, to: number): boolean {
-    const list = this.extents.get(file) ?? [], at = Asked.after(list, from + 1);
+    const list = this.extents.get(file) ?? [], at = Requested.after(list, from + 1);
     return at < list.length && list[at][0] < to;
   }
   /// Returns the widest range around this one without requested bytes.
   around(file: string, from: number, to: number): [number, number] {
     const list = this.extents.get(file) ?? [];
     return [
-      Math.min(from, list[Asked.after(list, from, 0) - 1]?.[1] ?? 0), Math.max(to, list[Asked.after(list, to + 1)]?.[0] ?? Infinity)
+      Math.min(from, list[Requested.after(list, from, 0) - 1]?.[1] ?? 0), Math.max(to, list[Requested.after(list, to + 1)]?.[0] ?? Infinity)
     ];
   }
   /// Returns the first extent that ends (1) or begins (0) at or after `place`.
@@ -125,7 +125,7 @@ export class Asked {
 
 /// Joins nearby ranges, in the order of their first parts. Across more than a small gap, joins only if none of it has been
 /// requested.
-export function joined(ranges: ByteRange[], asked = new Asked(), gap = GAP, most = MOST_BYTES): ByteRange[] {
+export function joined(ranges: ByteRange[], requested = new Requested(), gap = GAP, most = MOST_BYTES): ByteRange[] {
   const rank = new Map(ranges.map((range, i) => [range, i]));
   const sorted =
       [...ranges].sort((a, b) => a.file < b.file ? -1 : a.file > b.file ? 1 : a.offset - b.offset);
@@ -135,7 +135,7 @@ export function joined(ranges: ByteRange[], asked = new Asked(), gap = GAP, most
     const end = range.offset + range.bytes;
     if (last && last.file === range.file && range.offset <= last.offset + last.bytes + gap &&
         Math.max(end, last.offset + last.bytes) - last.offset <= most &&
-        (range.offset <= last.offset + last.bytes + SMALL_GAP || !asked.meets(range.file, last.offset + last.bytes, range.offset))) {
+        (range.offset <= last.offset + last.bytes + SMALL_GAP || !requested.meets(range.file, last.offset + last.bytes, range.offset))) {
       last.bytes = Math.max(last.bytes, end - last.offset);
       last.rank = Math.min(last.rank, rank.get(range)!);
     } else {
@@ -149,7 +149,7 @@ export class Ranges {
   readonly stats: Stats = {requests: 0, bytes: 0};
   private flights: Flight[] = [];
   private readonly tags = new Map<string, string>();
-  private readonly asked = new Asked();
+  private readonly requested = new Requested();
   private fresh = false;
   private begun = -PAUSE;  ///< start of the last request
   private pause: ReturnType<typeof setTimeout>|undefined;
@@ -187,7 +187,7 @@ export class Ranges {
       if (flight.view !== view && now - flight.wanted > PATIENCE) flight.abort.abort();
     }
     const alone = this.flights.length === 0;
-    const ready = joined(left, this.asked).filter(({bytes}) => bytes >= SMALL || (alone && now >= this.begun + PAUSE));
+    const ready = joined(left, this.requested).filter(({bytes}) => bytes >= SMALL || (alone && now >= this.begun + PAUSE));
     for (const range of ready.slice(0, Math.max(0, MOST_REQUESTS - this.flights.length))) {
       this.begun = now;
       void this.start({...range, abort: new AbortController(), wanted: now, view});
@@ -207,14 +207,14 @@ export class Ranges {
   }
 
   private widened({file, offset, bytes}: ByteRange): ByteRange {
-    const [low, high] = this.asked.around(file, offset, offset + bytes);
+    const [low, high] = this.requested.around(file, offset, offset + bytes);
     const begin = Math.max(low, offset - offset % INDEX_BLOCK);
     const end = Math.min(high, Math.ceil((offset + bytes) / INDEX_BLOCK) * INDEX_BLOCK, this.sizes.get(file) ?? 0);
     return {file, offset: begin, bytes: end - begin};
   }
   private async start(flight: Flight): Promise<void> {
     this.flights.push(flight);
-    this.asked.add(flight);
+    this.requested.add(flight);
     let bytes: Uint8Array|null = null, fault: FetchFault|null = null;
     try {
       bytes = await this.patiently(flight, flight.abort.signal);
@@ -268,7 +268,7 @@ export class Ranges {
       cache: this.fresh ? 'reload' : 'default',
       signal: watch.signal
     });
-    watch.heard();
+    watch.restart();
     const fault = (what: string, fatal: boolean) => {
       response.body?.cancel().catch(() => {});
       return new FetchFault(`${range.file}: ${what}`, fatal);

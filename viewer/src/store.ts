@@ -78,7 +78,7 @@ export function worldPoint(manifest: Manifest, stored: number[]): number[] {
 
 /// Returns the length in metres, on the WGS 84 ellipsoid, of the line between two places of the CRS that is straight in
 /// longitude and latitude; null if coordinates are not degrees.
-export function wayOnEarth(manifest: Manifest, from: number[], to: number[]): number|null {
+export function lengthOnEarth(manifest: Manifest, from: number[], to: number[]): number|null {
   if (!manifest.crs.geographic || manifest.crs.horizontal_unit !== 'degree') return null;
   const PIECES = 256, RADIUS = 6378137, SQUARE = 0.00669437999014;  // squared eccentricity
   const degree = Math.PI / 180, east = (to[0] - from[0]) * degree / PIECES, north = (to[1] - from[1]) * degree / PIECES;

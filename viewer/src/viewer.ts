@@ -6,7 +6,7 @@ import {type Hit, type Kind, type Opened, type Profile, VERTEX_BYTES} from './co
 import type {FromWorker, ToWorker} from './messages';
 import {classColour, GREYS, gradient, heightStops, LEVELS, SLOPE, type Stop} from './ramps';
 import {type Colour, COLOURS, type Look, Renderer} from './render';
-import {type Listed, type Manifest, wayOnEarth, worldPoint} from './store';
+import {lengthOnEarth, type Listed, type Manifest, worldPoint} from './store';
 
 const phone = matchMedia('(max-width: 640px)');
 const touch = matchMedia('(pointer: coarse)').matches;
@@ -55,7 +55,7 @@ function fail(message: string, again = true): void {
 
 /// A clicked place, taken from the picture until the store has answered.
 interface Place extends Hit {
-  state: 'asked'|'known'|'none';
+  state: 'pending'|'known'|'none';
   of: number;  ///< read from points of this level and above
 }
 
@@ -121,7 +121,7 @@ class Viewer {
     return new Promise(resolve => {
       const id = ++this.next;
       this.hashes.set(id, resolve);
-      this.tell({type: 'hash', id});
+      this.send({type: 'hash', id});
     });
   }
   get settled(): boolean {
@@ -143,7 +143,7 @@ class Viewer {
   }
   /// For tests: sets the view of a recorded flight.
   fly(eye: Vec3, direction: Vec3, aspect: number, height: number, error: number): void {
-    this.tell({
+    this.send({
       type: 'view',
       serial: ++this.serial,
       camera: {eye, direction, up: [0, 0, 1], fov: FOV, aspect, height, error}
@@ -171,7 +171,7 @@ class Viewer {
   }
   private listen(worker: Worker, first: boolean): void {
     this.worker = worker;
-    worker.onmessage = event => this.hear(event.data as FromWorker, first);
+    worker.onmessage = event => this.receive(event.data as FromWorker, first);
     worker.onerror = event => fail(event.message || NO_WORKER);
   }
   /// Shows the list of stores, and which of them is open.
@@ -193,10 +193,10 @@ class Viewer {
     element('notice').hidden = false;
     setTimeout(() => element('notice').hidden = true, 10_000);
   }
-  private tell(message: ToWorker): void {
+  private send(message: ToWorker): void {
     this.worker?.postMessage(message);
   }
-  private hear(message: FromWorker, first: boolean): void {
+  private receive(message: FromWorker, first: boolean): void {
     switch (message.type) {
       case 'chosen':
         this.list(message.stores, message.name);
@@ -306,7 +306,7 @@ class Viewer {
     return new Promise(resolve => {
       const id = ++this.next;
       this.picks.set(id, resolve);
-      this.tell({type: 'pick', id, origin, direction, angle});
+      this.send({type: 'pick', id, origin, direction, angle});
     });
   }
 
@@ -342,7 +342,7 @@ class Viewer {
   }
   private sendView(): void {
     if (!this.manifest) return;
-    this.tell({
+    this.send({
       type: 'view',
       serial: ++this.serial,
       camera: {
@@ -408,11 +408,11 @@ class Viewer {
   private showPlace(hit: Hit|null): void {
     this.before = this.hit;
     if (!hit || !this.manifest) return this.closePlace();
-    this.hit = {...hit, state: this.kind === 'points' ? 'known' : 'asked', of: 0};
-    if (this.hit.state === 'asked') {
+    this.hit = {...hit, state: this.kind === 'points' ? 'known' : 'pending', of: 0};
+    if (this.hit.state === 'pending') {
       const id = ++this.next;
       this.probes.set(id, this.hit);
-      this.tell({type: 'probe', id, stored: hit.stored, reach: hit.reach});
+      this.send({type: 'probe', id, stored: hit.stored, reach: hit.reach});
     }
     element('place').hidden = false;
     element('profile').hidden = true;
@@ -442,9 +442,9 @@ class Viewer {
       const named = channel.name === 'classification' && CLASSES[value] ? ` ${CLASSES[value]}` : '';
       rows.push([channel.name.replaceAll('_', ' '), `${Number(value.toPrecision(channel.type === 'float32' ? 7 : 12))}${named}`]);
     });
-    if (before && before.state !== 'asked' && hit.state !== 'asked') {
+    if (before && before.state !== 'pending' && hit.state !== 'pending') {
       const way = add(hit.place as Vec3, before.place as Vec3, -1), both = known && before.state === 'known';
-      const over = wayOnEarth(manifest, worldPoint(manifest, before.stored), world) ?? Math.hypot(way[0], way[1]);
+      const over = lengthOnEarth(manifest, worldPoint(manifest, before.stored), world) ?? Math.hypot(way[0], way[1]);
       const rise = both ? `, ${way[2] < 0 ? '−' : '+'}${this.height(Math.abs(way[2]))}` : '';
       rows.push(['From the last', this.scan ? this.plain(length(way)) : this.ground(over) + rise]);
     }
@@ -488,7 +488,7 @@ class Viewer {
     clearTimeout(this.outlineTimer);
     this.outlineTimer = window.setTimeout(() => {
       this.outlineTimer = 0;
-      if (this.hit) this.tell({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
+      if (this.hit) this.send({type: 'outline', level: this.hit.clusterLevel, ordinal: this.hit.clusterOrdinal});
     }, delay);
   }
   /// Requests the profile of the store between the places, which does not depend on the picture.
@@ -496,7 +496,7 @@ class Viewer {
     const {hit, before} = this;
     if (!hit || !before || (this.kind === 'surface' && !(hit.state === 'known' && before.state === 'known'))) return;
     this.profile = ++this.next;
-    this.tell({type: 'profile', id: this.profile, from: before.stored, to: hit.stored, axis: this.scan && this.camera.yUp ? 1 : 2});
+    this.send({type: 'profile', id: this.profile, from: before.stored, to: hit.stored, axis: this.scan && this.camera.yUp ? 1 : 2});
   }
   private showProfile(profile: Profile): void {
     const {hit, before, manifest} = this;
@@ -529,7 +529,7 @@ class Viewer {
     const digits = Math.min(12, Math.max(0, 2 - Math.floor(Math.log10(rise))));
     const about = profile.level > 0 || profile.sampled ? 'about ' : '';
     const label = (h: number) => `${about}${this.scan ? h.toFixed(digits) : `${rounded(h)}${this.unit}`}`;
-    const metres = wayOnEarth(manifest, worldPoint(manifest, before.stored), worldPoint(manifest, hit.stored)) ?? profile.metres;
+    const metres = lengthOnEarth(manifest, worldPoint(manifest, before.stored), worldPoint(manifest, hit.stored)) ?? profile.metres;
     element('profile-low').textContent = `${label(low)} lowest`;
     element('profile-length').textContent = this.scan ? `${Number(metres.toPrecision(4))}` : this.ground(metres);
     element('profile-high').textContent = `${label(high)} highest`;
@@ -718,7 +718,7 @@ class Viewer {
         this.closePlace();
         this.status = null;
         this.lastDrawn = 0;
-        this.tell({type: 'show', asPoints: points});
+        this.send({type: 'show', asPoints: points});
         this.writeLink();
       });
     }
@@ -765,14 +765,14 @@ class Viewer {
       element('menu').setAttribute('aria-expanded', String(open));
     });
     element('place-close').addEventListener('click', () => this.closePlace());
-    element('expand').addEventListener('click', () => this.tell({type: 'pin', how: 1}));
-    element('collapse').addEventListener('click', () => this.tell({type: 'pin', how: 0}));
-    element('release').addEventListener('click', () => this.tell({type: 'pin', how: -1}));
+    element('expand').addEventListener('click', () => this.send({type: 'pin', pin: 1}));
+    element('collapse').addEventListener('click', () => this.send({type: 'pin', pin: 0}));
+    element('release').addEventListener('click', () => this.send({type: 'pin', pin: -1}));
     element('retry').addEventListener('click', () => {
       if (this.lost) location.reload();
       element('message').hidden = true;
       if (this.manifest) {
-        this.tell({type: 'retry'});
+        this.send({type: 'retry'});
       } else {
         this.open(this.stores.length === 0 ? this.link.get('s') ?? '' : this.store, true);
       }
@@ -816,9 +816,9 @@ class Viewer {
     this.fitted = this.moved = true;
   }
   /// Expands or collapses the cluster under the pointer.
-  private async pinPointed(how: number): Promise<void> {
+  private async pinPointed(pin: number): Promise<void> {
     this.showPlace(await this.pick(...this.pointer, 12));
-    if (this.hit) this.tell({type: 'pin', how});
+    if (this.hit) this.send({type: 'pin', pin});
   }
   private key(event: KeyboardEvent): void {
     const step = event.shiftKey ? 180 : 60;
@@ -837,7 +837,7 @@ class Viewer {
       f: () => this.camera.orbit(0, -4),
       x: () => void this.pinPointed(1),
       c: () => void this.pinPointed(0),
-      v: () => this.tell({type: 'pin', how: -1}),
+      v: () => this.send({type: 'pin', pin: -1}),
       Home: () => this.fit(),
       Escape: () => this.closePlace(),
       Enter: () => void this.pick(0, 0, 12).then(hit => this.showPlace(hit))

@@ -3,7 +3,7 @@
 
 import {type Answer, type ByteRange, type Camera, type Changes, Core, CoreError, type Kind, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
-import {FetchFault, fetchWhole, Ranges} from './ranges';
+import {FetchFault, fetchAll, Ranges} from './ranges';
 import {type Listed, type Manifest, parseManifest, parseStart} from './store';
 
 /// Milliseconds that a frame may take in the worker, and the part reserved for the unpredictable: garbage collection,
@@ -71,7 +71,7 @@ class Session {
 
   async open(): Promise<void> {
     try {
-      const fetched = this.choose().then(name => fetchWhole(this.at(`stores/${encodeURIComponent(name)}.start`) + this.request.query, 'the store'));
+      const fetched = this.choose().then(name => fetchAll(this.at(`stores/${encodeURIComponent(name)}.start`) + this.request.query, 'the store'));
       const [core, bytes] = await Promise.all([this.load('core.wasm'), fetched]);
       this.core = this.points = core;
       let start;
@@ -110,14 +110,14 @@ class Session {
     return this.request.base + path;
   }
   private async load(module: string, kind?: Kind): Promise<Core> {
-    return Core.load(await fetchWhole(this.at(module), 'the viewer') as BufferSource, kind);
+    return Core.load(await fetchAll(this.at(module), 'the viewer') as BufferSource, kind);
   }
   /// Returns the store to open.
   private async choose(): Promise<string> {
     if (this.request.choose) {
       let stores: Listed[];
       try {
-        stores = JSON.parse(new TextDecoder().decode(await fetchWhole(this.at('stores.json') + this.request.query, 'stores.json'))).stores;
+        stores = JSON.parse(new TextDecoder().decode(await fetchAll(this.at('stores.json') + this.request.query, 'stores.json'))).stores;
       } catch (error) {
         throw error instanceof FetchFault ? error : new FetchFault(`stores.json: ${(error as Error).message}`, false);
       }
@@ -164,8 +164,8 @@ class Session {
   outline(request: ToWorker&{type: 'outline'}): void {
     if (this.opened) post({type: 'outlined', lines: this.core.outline(request.level, request.ordinal)});
   }
-  pin(how: number): void {
-    if (this.opened) this.core.pin(how);
+  pin(pin: number): void {
+    if (this.opened) this.core.pin(pin);
     this.wake();
   }
   /// Shows a scan as a surface or as points.
@@ -182,14 +182,14 @@ class Session {
     post({type: 'hashed', id, hash: this.opened ? this.core.hash() : ''});
   }
 
-  private ask<T>(type: string, attempt: () => Answer<T>, tell: (answer: T) => void): void {
+  private ask<T>(type: string, attempt: () => Answer<T>, give: (answer: T) => void): void {
     if (type === 'profile') this.questions = this.questions.filter(question => question.type !== type);
     this.questions.push({
       type,
       answer: () => {
         const result = attempt();
         if ('missing' in result) return result;
-        tell(result.answer);
+        give(result.answer);
         return {answer: undefined};
       }
     });
@@ -405,7 +405,7 @@ self.onmessage = event => {
       session?.outline(message);
       break;
     case 'pin':
-      session?.pin(message.how);
+      session?.pin(message.pin);
       break;
     case 'show':
       void session?.show(message.asPoints);
