@@ -152,8 +152,17 @@ class SharedDelaunay {
         return handles;
       }
       std::vector<typename Mesh::Insertion> made(points.size());
-      mesh_.insert(points, made);
+      // A stop ends the call between portions, and the points inserted so far stay. All points are
+      // checked first, so that invalid ones change nothing; insert() names the first of them.
+      constexpr std::size_t kPortion = 100'000;
+      const bool valid = std::all_of(points.begin(), points.end(), finite<double, N>);
+      const std::size_t portion = valid ? kPortion : points.size();
+      for (std::size_t at = 0; at < points.size() && !stop.stop_requested(); at += portion) {
+        const std::size_t count = std::min(portion, points.size() - at);
+        mesh_.insert(points.subspan(at, count), std::span(made).subspan(at, count));
+      }
       Kind::settle(mesh_);
+      if (stop.stop_requested()) throw stream::Stopped();
       for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i].vertex);
       return handles;
     }));

@@ -130,15 +130,17 @@ py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
 py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
                  const std::optional<Array<std::int32_t>>& vertices, const std::string& method,
                  unsigned iterations, double strength, double pass_band, double edge_height) {
-  const tri::SmoothingOptions options{.method = smoothing_named(method),
-                                      .iterations = iterations,
-                                      .strength = strength,
-                                      .pass_band = pass_band,
-                                      .edge_height = edge_height};
+  tri::SmoothingOptions options{.method = smoothing_named(method),
+                                .iterations = iterations,
+                                .strength = strength,
+                                .pass_band = pass_band,
+                                .edge_height = edge_height};
   const auto values = numbers_of(given, "values");
   std::span<const std::int32_t> only;
   if (vertices) only = numbers_of(*vertices, "vertices");
-  return to_array(shared.read(values.size() * iterations, [&](const auto& mesh) {
+  return to_array(shared.read(values.size() * iterations, [&](const auto& mesh,
+                                                              const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
     std::vector<tri::VertexId> region;
     if (!vertices) {
       for (const tri::VertexId vertex : mesh.all_vertices()) region.push_back(vertex);

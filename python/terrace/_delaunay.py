@@ -190,7 +190,8 @@ class _PointMesh:
         points: shape (n, 2) in the plane or (n, 3) in space.
 
         Returns: int32, shape (n,): the vertex of each point, the same one for equal points.
-        Raises: ValueError for a coordinate that is not finite; then nothing has changed.
+        Raises: ValueError for a coordinate that is not finite; then nothing has changed. After Ctrl-C the points that
+            were inserted before it stay.
         """
         points = as_rows(points, 'points', (self._width,))
         with self._lock:

@@ -111,6 +111,21 @@ class Jobs(StoreCase):
             output, _ = child.communicate(timeout=600)
         self.assertEqual(output.split(), ['interrupted'] * 11)
 
+    def test_ctrl_c_ends_an_insertion_between_portions(self):
+        code = textwrap.dedent('''
+            import os, signal, threading, numpy as np, terrace
+            given = np.random.default_rng(1).random((6_000_000, 2))
+            mesh = terrace.Delaunay2(given[:1000])
+            threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+            try:
+                mesh.insert(given)
+            except KeyboardInterrupt:
+                vertices, points = mesh.vertices, mesh.points
+                print(1000 <= len(mesh) < len(given), len(vertices) == len(mesh), terrace.Delaunay2(points[vertices]).digest() == mesh.digest())
+        ''')
+        output = subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True, timeout=600).stdout
+        self.assertEqual(output.split(), ['True'] * 3)
+
     def test_other_threads_keep_running(self):
         turns, stop = [0], threading.Event()
 
