@@ -106,7 +106,7 @@ std::vector<std::array<double, 3>> points3_of(const Array<double>& given) {
 }
 
 void log_note(const std::string& line) {
-  py::module_::import("terrace._job").attr("notes").attr("info")("%s", message_of(line));
+  py::module_::import("terrace._call").attr("notes").attr("info")("%s", message_of(line));
 }
 
 terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion) {

@@ -5,11 +5,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -74,19 +72,6 @@ inline py::array_t<std::int64_t> with_missing(std::span<const std::uint32_t> num
   std::vector<std::int64_t> result(numbers.begin(), numbers.end());
   std::replace(result.begin(), result.end(), std::int64_t{missing}, std::int64_t{-1});
   return to_array(std::move(result));
-}
-
-/// Returns the value with a name. Throws: ValueError that lists the known names.
-template <class T>
-T named(const std::string& name, const char* what,
-        std::initializer_list<std::pair<std::string_view, T>> known) {
-  std::string list;
-  for (const auto& [text, value] : known) {
-    if (text == name) return value;
-    list += (list.empty() ? "" : ", ") + std::string(text);
-  }
-  throw py::value_error("`" + std::string(what) + "` must be one of " + list + ", not '" + name +
-                        "'");
 }
 
 /// Sets `value` to an option if it is given. Throws: TypeError for a value of another type.

@@ -46,18 +46,11 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
     request.metric = terrain::MetricChoice::parse(options["metric"].cast<std::string>());
   }
   request.selection = reading_of(source, options).selection;
-  const auto text = [&](const char* name, std::string value) {
-    take_option(options, name, value);
-    return value;
-  };
-  request.effort = effort_named(text("effort", "default"));
-  request.strategy = strategy_named(text("method", "automatic"));
-  request.order = named<stream::Order>(text("order", "auto"), "order",
-                                       {{"auto", stream::Order::automatic},
-                                        {"stream", stream::Order::stream},
-                                        {"spatial", stream::Order::spatial}});
-  request.heights_of_colour = colours_of(options);
-  request.entities = entities_of(options);
+  take_named(options, "effort", request.effort);
+  take_named(options, "method", request.strategy);
+  take_named(options, "order", request.order);
+  take_named(options, "heights_of_colour", request.heights_of_colour);
+  take_named(options, "entities", request.entities);
   if (request.block_points < 2 || request.block_points > 1'000'000) {
     throw py::value_error("`block_points` must be between 2 and 1000000");
   }
@@ -71,9 +64,9 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
 
 void bind_build(py::module_& module) {
   module.def("build", [](const py::object& source, const std::string& path, const py::dict& options,
-                         const py::tuple& job) {
+                         const py::tuple& settings) {
     const terrain::BuildRequest request = request_of(source, path, options);
-    const terrain::BuildOutcome outcome = Job(job).run(
+    const terrain::BuildOutcome outcome = Call(settings).run(
         [&](const terrain::Context& context) { return terrain::build_store(request, context); });
     py::dict result;
     result["points"] = outcome.points;

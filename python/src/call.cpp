@@ -55,9 +55,9 @@ void run_apart(const std::function<void()>& work, std::stop_source& stop) {
   if (failed) std::rethrow_exception(failed);
 }
 
-Job::Job(const py::tuple& job) : progress_(job[0]), note_(job[1]) {
-  const auto threads = job[2].cast<unsigned>();
-  const auto memory = job[3].cast<std::uint64_t>();
+Call::Call(const py::tuple& settings) : progress_(settings[0]), note_(settings[1]) {
+  const auto threads = settings[2].cast<unsigned>();
+  const auto memory = settings[3].cast<std::uint64_t>();
   context_.threads = all_or(threads);
   if (memory > 0) context_.memory_bytes = memory;
   context_.stop = stop_.get_token();
@@ -82,7 +82,7 @@ Job::Job(const py::tuple& job) : progress_(job[0]), note_(job[1]) {
   }
 }
 
-void Job::call_python(const std::function<void()>& call) {
+void Call::call_python(const std::function<void()>& call) {
   const py::gil_scoped_acquire held;
   if (raised_) return;
   try {
@@ -93,7 +93,7 @@ void Job::call_python(const std::function<void()>& call) {
   }
 }
 
-void Job::run_here(const std::function<void()>& work) {
+void Call::run_here(const std::function<void()>& work) {
   try {
     run_apart(work, stop_);
   } catch (...) {

@@ -57,14 +57,15 @@ inline unsigned all_or(unsigned threads) {
 }
 
 /// A libterrain call whose context comes from Python objects.
-class Job {
+class Call {
  public:
-  /// job: (progress, note, threads, memory). progress: None, or called repeatedly as progress(what,
-  /// count, fraction, ended); an exception from it ends the job. note: None, or called with lines
-  /// of text. threads: 0 for one per core. memory: in bytes, 0 for the library's default.
-  explicit Job(const py::tuple& job);
-  Job(const Job&) = delete;
-  Job& operator=(const Job&) = delete;
+  /// settings: (progress, note, threads, memory). progress: None, or called repeatedly as
+  /// progress(what, count, fraction, ended); an exception from it ends the work. note: None, or
+  /// called with lines of text. threads: 0 for one per core. memory: in bytes, 0 for the library's
+  /// default.
+  explicit Call(const py::tuple& settings);
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
 
   /// Returns work(context).
   template <class Work>

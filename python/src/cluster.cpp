@@ -46,23 +46,11 @@ cluster::LinkageOptions linkage_options(const py::dict& choices) {
   return options;
 }
 
-cluster::LinkageMethod linkage_named(const std::string& method) {
-  using enum cluster::LinkageMethod;
-  return named<cluster::LinkageMethod>(method, "method",
-                                       {{"single", single},
-                                        {"complete", complete},
-                                        {"average", average},
-                                        {"weighted", weighted},
-                                        {"ward", ward},
-                                        {"centroid", centroid},
-                                        {"median", median}});
-}
-
 /// Returns the linkage of points. edges: if given, single linkage considers only these pairs.
 py::array linkage(const Array<double>& given, const std::string& method,
                   const std::optional<Array<std::uint32_t>>& edges, const py::dict& choices) {
   const std::vector<cluster::Point3> points = points3_of(given);
-  const cluster::LinkageMethod kind = linkage_named(method);
+  const cluster::LinkageMethod kind = named<cluster::LinkageMethod>(method);
   cluster::LinkageOptions options = linkage_options(choices);
   bool gpu = false;
   take_option(choices, "gpu", gpu);
@@ -102,7 +90,7 @@ py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& le
 /// Returns the linkage of `count` things. distances: of all pairs i < j, ordered by i, then j.
 py::array linkage_of_distances(std::size_t count, const Array<double>& given,
                                const std::string& method, const py::dict& choices) {
-  const cluster::LinkageMethod kind = linkage_named(method);
+  const cluster::LinkageMethod kind = named<cluster::LinkageMethod>(method);
   const auto distances = numbers_of(given, "distances");
   if (count == 0 || count > cluster::kMostDendrogramPoints ||
       distances.size() != count * (count - 1) / 2) {
@@ -238,8 +226,8 @@ struct Search {
 Search search_of(const py::dict& given) {
   Search search;
   const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
-  search.options.strategy = strategy_named(given["method"].cast<std::string>());
-  search.options.effort = effort_named(given["effort"].cast<std::string>());
+  take_named(given, "method", search.options.strategy);
+  take_named(given, "effort", search.options.effort);
   set("seed", search.options.seed);
   set("threads", search.options.threads);
   search.options.threads = all_or(search.options.threads);
@@ -385,9 +373,9 @@ py::tuple facility_matrix(const Array<double>& connection, const Array<double>& 
 }
 
 py::array clusters_of_size(const Array<double>& given, double size, std::uint64_t seed,
-                           const py::tuple& job) {
+                           const py::tuple& settings) {
   const std::vector<cluster::Point3> points = points3_of(given);
-  return to_array(Job(job).run([&](const terrain::Context& context) {
+  return to_array(Call(settings).run([&](const terrain::Context& context) {
     const auto report = [&](std::uint64_t done) {
       if (!context.progress) return;
       const double share = static_cast<double>(done) / static_cast<double>(points.size());

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "core.hpp"
 
-#include <array>
-#include <cstddef>
 #include <exception>
 #include <filesystem>
 #include <new>
@@ -15,23 +13,12 @@
 #include <terrace/terrain/error.hpp>
 #include <terrace/tri/multiresolution.hpp>
 
+#include "names.hpp"
+
 namespace terrace::python {
 namespace {
 
-py::handle error_type;  // terrace.Error, kept by the module
-
-/// Parameters that have different names in the libraries (first) and in the module.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParameters{{
-    {"`channel`", "`channels`"},
-    {"`format`", "`input_format`"},
-    {"`memory_bytes`", "`memory`"},
-    {"`output_format`", "`format`"},
-    {"`own_crs`", "`lonlat=False`"},
-    {"`region_crs`", "`crs`"},
-    {"`shift`", "`datum_shift`"},
-    {"`to_crs`", "`crs`"},
-    {"`zoom`", "`zooms`"},
-}};
+py::handle error_type;  // terrace.Error
 
 /// Translates the library's errors to Python's: failed system calls to OSError, bad data to
 /// terrace.Error, invalid values to ValueError.
@@ -67,22 +54,13 @@ py::str text_of(std::string_view text) {
       PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
 }
 
-py::str message_of(std::string text) {
-  for (const auto& [name, own] : kParameters) {
-    for (std::size_t at = 0; (at = text.find(name, at)) != std::string::npos; at += own.size()) {
-      text.replace(at, name.size(), own);
-    }
-  }
-  return text_of(text);
-}
+py::str message_of(std::string text) { return text_of(with_module_parameters(std::move(text))); }
 
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled half of terrace; use the package terrace.";
-  static py::exception<stream::Error> error(module, "Error");
-  error.attr("__module__") = "terrace";
-  error.attr("__doc__") = "Bad data: file, place, cause and remedy in one line.";
-  error_type = error;
+  error_type = py::object(py::module_::import("terrace._errors").attr("Error")).release();
   py::register_exception_translator(&translate);
+  bind_names(module);
   bind_build(module);
   bind_store(module);
   bind_heights(module);

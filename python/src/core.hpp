@@ -18,6 +18,7 @@ py::str text_of(std::string_view text);
 /// Returns a message from the libraries with the module's names of parameters.
 py::str message_of(std::string text);
 
+void bind_names(py::module_& module);
 void bind_build(py::module_& module);
 void bind_store(py::module_& module);
 void bind_heights(py::module_& module);

@@ -27,24 +27,25 @@ namespace {
 
 terrain::SamplerOptions sampler_of(const std::string& method, unsigned level,
                                    std::optional<double> max_edge) {
-  return {.method = interpolation_named(method), .level = level, .max_edge = max_edge};
+  return {.method = named<tri::Interpolation>(method), .level = level, .max_edge = max_edge};
 }
 
 /// Returns rows of height and the gradient to east and north.
 py::array sample(const OpenStore& open, const Array<double>& xy, const std::string& method,
                  unsigned level, std::optional<double> max_edge, const std::string& crs,
-                 const py::tuple& job) {
+                 const py::tuple& settings) {
   const stream::Store store = open.get();
   const auto given = rows_of<2>(xy, "xy");
   const terrain::SamplerOptions options = sampler_of(method, level, max_edge);
-  std::vector<terrain::GroundPoint> found = Job(job).run([&](const terrain::Context& context) {
-    const auto change = change_to(store, crs);
-    if (!change) return sample_places(store, given, options, context);
-    std::vector<terrain::Point2> places(given.begin(), given.end());
-    terrain::check_latitudes(places, change->to().most_latitude(), "`xy`");
-    change->reverse(places);
-    return sample_places(store, places, options, context);
-  });
+  std::vector<terrain::GroundPoint> found =
+      Call(settings).run([&](const terrain::Context& context) {
+        const auto change = change_to(store, crs);
+        if (!change) return sample_places(store, given, options, context);
+        std::vector<terrain::Point2> places(given.begin(), given.end());
+        terrain::check_latitudes(places, change->to().most_latitude(), "`xy`");
+        change->reverse(places);
+        return sample_places(store, places, options, context);
+      });
   auto* const kept = new std::vector<terrain::GroundPoint>(std::move(found));
   const py::capsule owner(
       kept, [](void* p) { delete static_cast<std::vector<terrain::GroundPoint>*>(p); });
@@ -58,7 +59,7 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
 py::array profile(const OpenStore& open, const Array<double>& line,
                   const std::optional<std::string>& crs, std::optional<double> step,
                   const std::string& method, unsigned level, std::optional<double> max_edge,
-                  const py::tuple& job) {
+                  const py::tuple& settings) {
   const stream::Store store = open.get();
   terrain::ProfileRequest request;
   request.sampler = sampler_of(method, level, max_edge);
@@ -73,7 +74,7 @@ py::array profile(const OpenStore& open, const Array<double>& line,
   }
   if (step && !(*step > 0)) throw py::value_error("`step` must be positive");
   request.step = step;
-  return to_array(Job(job).run([&](const terrain::Context& context) {
+  return to_array(Call(settings).run([&](const terrain::Context& context) {
     std::vector<std::array<double, 4>> rows;
     // A growing vector needs its old and its new memory at once.
     const std::uint64_t most = context.memory_or(0) / (3 * sizeof rows[0]);
@@ -102,7 +103,7 @@ bool reaches_wgs84(const stream::Store& store) {
 /// Returns (GeoJSON, whether it is in the store's CRS).
 py::tuple contours(const OpenStore& open, double interval, unsigned level,
                    std::optional<double> max_edge, const py::object& region,
-                   std::optional<bool> lonlat, const py::tuple& job) {
+                   std::optional<bool> lonlat, const py::tuple& settings) {
   const stream::Store store = open.get();
   if (!(interval > 0)) throw py::value_error("`interval` must be positive");
   const terrain::ContourRequest request{.interval = interval,
@@ -110,7 +111,7 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
                                         .max_edge = max_edge,
                                         .region = region_of(region, store),
                                         .own_crs = !(lonlat ? *lonlat : reaches_wgs84(store))};
-  const std::string text = Job(job).run([&](const terrain::Context& context) {
+  const std::string text = Call(settings).run([&](const terrain::Context& context) {
     std::string lines;
     // The growing text needs its old and its new memory at once, and Python copies the result.
     const std::uint64_t most = context.memory_or(0) / 4;
@@ -133,24 +134,18 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
 void write_raster(const OpenStore& open, const std::string& path, const std::string& value,
                   std::optional<double> cell, const std::string& align, const py::object& region,
                   const std::string& crs, const std::string& method, unsigned level,
-                  std::optional<double> max_edge, bool replace, const py::tuple& job) {
+                  std::optional<double> max_edge, bool replace, const py::tuple& settings) {
   format_of_output(terrain::outputs::kRasterFile, path);
   const stream::Store store = open.get();
-  using terrain::RasterValue;
-  terrain::RasterRequest request{
-      .value = named<RasterValue>(value, "value",
-                                  {{"height", RasterValue::height},
-                                   {"slope", RasterValue::slope},
-                                   {"aspect", RasterValue::aspect},
-                                   {"hillshade", RasterValue::hillshade}}),
-      .sampler = sampler_of(method, level, max_edge),
-      .cell = cell,
-      .align = align,
-      .region = region_of(region, store),
-      .output = path,
-      .replace = replace};
+  terrain::RasterRequest request{.value = named<terrain::RasterValue>(value),
+                                 .sampler = sampler_of(method, level, max_edge),
+                                 .cell = cell,
+                                 .align = align,
+                                 .region = region_of(region, store),
+                                 .output = path,
+                                 .replace = replace};
   if (cell && !(*cell > 0)) throw py::value_error("`cell` must be positive");
-  Job(job).run([&](const terrain::Context& context) {
+  Call(settings).run([&](const terrain::Context& context) {
     request.to = change_to(store, crs);
     terrain::write_raster(store, request, context);
   });

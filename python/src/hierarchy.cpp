@@ -111,8 +111,8 @@ py::dict stream_clusters(const py::iterable& batches, const py::function& take,
   set("seed", options.block.seed);
   set("threads", options.threads);
   options.threads = all_or(options.threads);
-  options.block.effort = effort_named(given["effort"].cast<std::string>());
-  options.strategy = strategy_named(given["method"].cast<std::string>());
+  take_named(given, "effort", options.block.effort);
+  take_named(given, "method", options.strategy);
   options.metric = terrain::MetricChoice::parse(given["metric"].cast<std::string>())
                        .on_ground({}, cluster::kIdentityMap);
   CallSink sink(take);

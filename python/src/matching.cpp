@@ -12,6 +12,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 
 namespace terrace::python {
 namespace {
@@ -87,10 +88,8 @@ py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
 py::tuple match_by_halving(const Array<double>& given, bool distances, const std::string& method,
                            std::uint64_t iterations, double seconds, std::uint64_t seed,
                            unsigned threads) {
-  using matching::Halving;
   matching::HalvingOptions options;
-  options.method = named<Halving>(
-      method, "method", {{"monotone", Halving::monotone}, {"monte-carlo", Halving::monte_carlo}});
+  options.method = named<matching::Halving>(method);
   options.iterations = iterations;
   options.seconds = seconds;
   options.seed = seed;

@@ -63,7 +63,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
                const py::list& focuses, const std::string& where,
                const std::optional<std::pair<unsigned, std::uint64_t>>& cluster,
                const std::string& metric, const py::dict& heights, const std::string& crs,
-               const py::tuple& job) {
+               const py::tuple& settings) {
   const stream::Store store = open.get(where);
   terrain::Detail detail = detail_of(store, level, region, focuses);
   if (cluster) {
@@ -75,7 +75,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   if (heights.contains("smoothing")) {
     const auto [method, iterations, strength, pass_band, edge_height] =
         heights["smoothing"].cast<std::tuple<std::string, unsigned, double, double, double>>();
-    options.heights.smoothing = {.method = smoothing_named(method),
+    options.heights.smoothing = {.method = named<tri::Smoothing>(method),
                                  .iterations = iterations,
                                  .strength = strength,
                                  .pass_band = pass_band,
@@ -88,7 +88,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   take_option(heights, "replace", replace);
   if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
   terrain::MeshUnits units;
-  terrain::TriangleMesh made = Job(job).run([&](const terrain::Context& context) {
+  terrain::TriangleMesh made = Call(settings).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
     std::optional<stream::Overlay> overlay;
     if (!overlay_path.empty()) {
@@ -111,10 +111,10 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
 
 /// Returns the surface as arrays_of() does, or (vertices, tetrahedra inside it).
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
-                  const std::string& where, bool tetrahedra, const py::tuple& job) {
+                  const std::string& where, bool tetrahedra, const py::tuple& settings) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, py::list());
-  terrain::ScanSurface made = Job(job).run([&](const terrain::Context& context) {
+  terrain::ScanSurface made = Call(settings).run([&](const terrain::Context& context) {
     return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
   });
   if (!tetrahedra) {
@@ -126,10 +126,10 @@ py::tuple surface(const OpenStore& open, unsigned level, const py::object& regio
 
 /// Returns (vertices, the offset of each line and the total, the number of each line).
 py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
-                const py::list& focuses, const std::string& where, const py::tuple& job) {
+                const py::list& focuses, const std::string& where, const py::tuple& settings) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, focuses);
-  terrain::LineSet made = Job(job).run([&](const terrain::Context& context) {
+  terrain::LineSet made = Call(settings).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
     return detail_lines(store, detail, context);
   });
@@ -143,7 +143,7 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
 }
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
-                      const py::tuple& job) {
+                      const py::tuple& settings) {
   const stream::Store store = open.get(given["where"].cast<std::string>());
   format_of_output(terrain::outputs::kMeshFile, path);
   terrain::BoundedMeshOptions options;
@@ -153,14 +153,15 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   set("max_points", options.max_points);
   set("replace", options.writer.replace.replace);
   options.region = region_of(given["region"], store);
-  options.quality = quality_named(given["quality"].cast<std::string>());
-  options.duplicates = duplicates_named(given["duplicates"].cast<std::string>());
-  options.fill = fill_named(given["fill"].cast<std::string>());
+  take_named(given, "quality", options.quality);
+  take_named(given, "duplicates", options.duplicates);
+  take_named(given, "fill", options.fill);
   const auto crs = given["crs"].cast<std::string>();
-  const terrain::BoundedMeshResult outcome = Job(job).run([&](const terrain::Context& context) {
-    options.places = places_to(store, crs);
-    return write_bounded_mesh(store, options, context);
-  });
+  const terrain::BoundedMeshResult outcome =
+      Call(settings).run([&](const terrain::Context& context) {
+        options.places = places_to(store, crs);
+        return write_bounded_mesh(store, options, context);
+      });
   py::dict result;
   result["units"] = to_python(terrain::MeshUnits(store, options.places));
   result["note"] = outcome.coordinates.note;

@@ -49,11 +49,11 @@ class SharedModel {
     });
     return dict_of(std::move(made));
   }
-  py::dict whole() {
+  py::dict snapshot() {
     MeshChange made;
     released([&] {
       const std::lock_guard lock(mutex_);
-      made = changes().whole();
+      made = changes().snapshot();
     });
     return dict_of(std::move(made));
   }
@@ -140,7 +140,7 @@ void bind_kind(py::module_& module, const char* name) {
              const tri::Detail detail = shared.detail_of(level, focuses);
              return shared.change([&](Model & model) -> auto& { return model.set_detail(detail); });
            })
-      .def("whole", &Shared::whole)
+      .def("snapshot", &Shared::snapshot)
       .def("record", &Shared::record)
       .def("expanded",
            [](Shared& shared) {

@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 
-#include <terrace/cluster/facility_location.hpp>
-#include <terrace/terrain/fill.hpp>
-#include <terrace/tri/grid_tin.hpp>
-#include <terrace/tri/interpolation.hpp>
-#include <terrace/tri/point_tin.hpp>
-#include <terrace/tri/smoothing.hpp>
+#include "core.hpp"
 
-/// The libraries' enumerators by their names in Python. All throw ValueError that lists the known
-/// names.
+/// The names that Python has for enumerators and parameters of the libraries.
 
 namespace terrace::python {
 
-tri::Interpolation interpolation_named(const std::string& name);
-tri::TinQuality quality_named(const std::string& name);
-tri::PointDuplicates duplicates_named(const std::string& name);
-tri::Smoothing smoothing_named(const std::string& name);
-terrain::Fill fill_named(const std::string& name);
-cluster::Effort effort_named(const std::string& name);
-cluster::FacilityStrategy strategy_named(const std::string& name);
+enum class ViewKind : std::uint8_t { mesh, points, surface };
+enum class ViewReader : std::uint8_t { thread, frame };
+
+/// Returns the enumerator with a name. Defined for the enumerations in names.cpp.
+/// Throws: ValueError that names the parameter and lists the known names.
+template <class Enum>
+Enum named(const std::string& name);
+
+/// Sets `value` to the enumerator with the name that an option has, if it is given.
+/// Throws: TypeError for an option that is not a text; ValueError.
+template <class Enum>
+void take_named(const py::dict& options, const char* option, Enum& value);
+
+/// Returns a message of the libraries with the module's names of parameters.
+std::string with_module_parameters(std::string message);
 
 }  // namespace terrace::python

@@ -81,12 +81,12 @@ class PointReader {
 
 /// Returns (points written, points left out because a coordinate is NaN, largest rounding error).
 py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
-                       const std::string& format, bool replace, const py::tuple& job) {
+                       const std::string& format, bool replace, const py::tuple& settings) {
   format_of_output(terrain::outputs::kPointFile, path, format);
   const OpenSource open = opener_of(source);
   std::uint64_t points = 0, nodata = 0;
   double rounding = 0;
-  Job(job).run([&](const terrain::Context& context) {
+  Call(settings).run([&](const terrain::Context& context) {
     stream::SourceOptions options;
     {
       const py::gil_scoped_acquire held;

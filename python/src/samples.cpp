@@ -28,7 +28,7 @@ std::span<const double> heights_of(std::span<const double> values, const Mesh& m
 
 py::array heights(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& places,
                   const std::string& method, unsigned threads) {
-  const tri::Interpolation interpolation = interpolation_named(method);
+  const tri::Interpolation interpolation = named<tri::Interpolation>(method);
   const auto values = numbers_of(given, "values");
   const auto asked = rows_of<2>(places, "places");
   return to_array(shared.read(asked.size(), [&](const auto& mesh) {
@@ -38,7 +38,7 @@ py::array heights(SharedDelaunay2& shared, const Array<double>& given, const Arr
 
 /// Returns compressed rows, one per place: weights, vertices, the offset of each row.
 py::tuple weights(SharedDelaunay2& shared, const Array<double>& places, const std::string& method) {
-  const tri::Interpolation interpolation = interpolation_named(method);
+  const tri::Interpolation interpolation = named<tri::Interpolation>(method);
   const auto asked = rows_of<2>(places, "places");
   std::vector<double> shares;
   std::vector<std::int32_t> vertices;
@@ -90,7 +90,7 @@ py::array triangle_quality(SharedDelaunay2& shared, const Array<double>& given, 
 
 py::dict distances(SharedDelaunay2& shared, const Array<double>& given, const Array<double>& points,
                    const std::string& method, unsigned threads) {
-  const tri::Interpolation interpolation = interpolation_named(method);
+  const tri::Interpolation interpolation = named<tri::Interpolation>(method);
   const auto values = numbers_of(given, "values");
   const auto samples = rows_of<3>(points, "samples");
   const tri::VerticalDistances made = shared.read(samples.size(), [&](const auto& mesh) {
@@ -109,10 +109,7 @@ py::dict distances(SharedDelaunay2& shared, const Array<double>& given, const Ar
 
 py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
                     const Array<double>& places, const std::string& method, unsigned threads) {
-  using tri::GradientFrom;
-  const auto source = named<GradientFrom>(
-      method, "method",
-      {{"linear", GradientFrom::kTriangles}, {"natural", GradientFrom::kNaturalNeighbours}});
+  const auto source = named<tri::GradientFrom>(method);
   const auto values = numbers_of(given, "values");
   const auto asked = rows_of<2>(places, "places");
   return to_array(shared.read(asked.size(), [&](const auto& mesh) {
@@ -130,7 +127,7 @@ py::array gradients(SharedDelaunay2& shared, const Array<double>& given,
 py::array smooth(SharedDelaunay2& shared, const Array<double>& given,
                  const std::optional<Array<std::int32_t>>& vertices, const std::string& method,
                  unsigned iterations, double strength, double pass_band, double edge_height) {
-  tri::SmoothingOptions options{.method = smoothing_named(method),
+  tri::SmoothingOptions options{.method = named<tri::Smoothing>(method),
                                 .iterations = iterations,
                                 .strength = strength,
                                 .pass_band = pass_band,

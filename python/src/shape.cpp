@@ -6,6 +6,7 @@
 #include <terrace/tri/shape.hpp>
 
 #include "delaunay.hpp"
+#include "names.hpp"
 
 namespace terrace::python {
 namespace {
@@ -16,17 +17,10 @@ template <class Metric>
 py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule,
                 const std::string& criterion, double edge_factor, bool keep_vertices, bool lids,
                 unsigned threads) {
-  using tri::ShapeRule, tri::ShapeCriterion;
-  const tri::ShapeOptions options{
-      .rule = named<ShapeRule>(rule, "rule",
-                               {{"poles", ShapeRule::kPoles},
-                                {"flood", ShapeRule::kFlood},
-                                {"published", ShapeRule::kPublished}}),
-      .criterion = named<ShapeCriterion>(
-          criterion, "criterion",
-          {{"gabriel", ShapeCriterion::kGabriel}, {"edge-length", ShapeCriterion::kEdgeLength}}),
-      .edge_factor = edge_factor,
-      .keep_vertices = keep_vertices};
+  const tri::ShapeOptions options{.rule = named<tri::ShapeRule>(rule),
+                                  .criterion = named<tri::ShapeCriterion>(criterion),
+                                  .edge_factor = edge_factor,
+                                  .keep_vertices = keep_vertices};
   std::vector<std::array<std::int32_t, 4>> kept;
   std::vector<std::array<std::int32_t, 3>> faces;
   tri::ShapeParts parts;

@@ -13,6 +13,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 
 namespace terrace::python {
 namespace {
@@ -74,11 +75,6 @@ stream::MemoryRaster raster_of_samples(const py::dict& given) {
   return raster;
 }
 
-std::string name_in(const py::dict& options, const char* key, std::string otherwise) {
-  take_option(options, key, otherwise);
-  return otherwise;
-}
-
 bool opens_twice(const py::object& source) {
   if (!py::isinstance<py::list>(source)) return true;
   const auto names = source.cast<std::vector<std::string>>();
@@ -124,23 +120,6 @@ OpenSource opener_of(const py::object& source) {
   };
 }
 
-stream::HeightsOfColour colours_of(const py::dict& options) {
-  using stream::HeightsOfColour;
-  return named<HeightsOfColour>(name_in(options, "heights_of_colour", "none"), "heights_of_colour",
-                                {{"none", HeightsOfColour::none},
-                                 {"mapbox", HeightsOfColour::mapbox},
-                                 {"terrarium", HeightsOfColour::terrarium}});
-}
-
-stream::Entities entities_of(const py::dict& options) {
-  using stream::Entities;
-  return named<Entities>(name_in(options, "entities", "points"), "entities",
-                         {{"points", Entities::points},
-                          {"triangles", Entities::triangles},
-                          {"segments", Entities::segments},
-                          {"polylines", Entities::polylines}});
-}
-
 stream::SourceOptions reading_of(const py::object& source, const py::dict& given, unsigned threads,
                                  std::stop_token stop) {
   stream::SourceOptions options;
@@ -157,8 +136,8 @@ stream::SourceOptions reading_of(const py::object& source, const py::dict& given
   bool skip_damaged = false;
   set("skip_damaged", skip_damaged);
   if (skip_damaged) options.on_damage = [](const stream::Error&, std::uint64_t) {};
-  options.entities = entities_of(given);
-  options.heights_of_colour = colours_of(given);
+  take_named(given, "entities", options.entities);
+  take_named(given, "heights_of_colour", options.heights_of_colour);
   options.threads = threads;
   options.stop = std::move(stop);
   options.selection = selection_of(source, given, options);

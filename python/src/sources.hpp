@@ -26,7 +26,5 @@ OpenSource opener_of(const py::object& source);
 /// longitudes.
 stream::SourceOptions reading_of(const py::object& source, const py::dict& options,
                                  unsigned threads = 1, std::stop_token stop = {});
-stream::HeightsOfColour colours_of(const py::dict& options);
-stream::Entities entities_of(const py::dict& options);
 
 }  // namespace terrace::python

@@ -128,7 +128,7 @@ class RecordsPart final : public terrain::WantedPart {
 py::array points(const OpenStore& open, unsigned level, const py::object& region,
                  const py::list& focuses, const std::string& where,
                  std::optional<std::pair<unsigned, std::uint64_t>> cluster, const std::string& crs,
-                 const py::tuple& job) {
+                 const py::tuple& settings) {
   const stream::Store store = open.get(where);
   terrain::Detail detail = detail_of(store, level, region, focuses);
   if (cluster) {
@@ -136,7 +136,7 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
     detail.cluster = static_cast<stream::ClusterId>(id);
   }
   const std::size_t payload = store.schema().payload_size();
-  std::vector<std::byte> records = Job(job).run([&](const terrain::Context& context) {
+  std::vector<std::byte> records = Call(settings).run([&](const terrain::Context& context) {
     const auto to = change_to(store, crs);
     note_idle_focuses(store, detail, context);
     std::vector<std::byte> bytes;
@@ -155,10 +155,10 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
 }
 
 /// Returns a row for each cluster of a level: the box in the CRS, error, descendants, members.
-py::array clusters(const OpenStore& open, unsigned level, const py::tuple& job) {
+py::array clusters(const OpenStore& open, unsigned level, const py::tuple& settings) {
   const stream::Store store = open.get();
   if (level > store.top()) throw py::value_error("the store has no level " + std::to_string(level));
-  return to_array(Job(job).run([&](const terrain::Context& context) {
+  return to_array(Call(settings).run([&](const terrain::Context& context) {
     std::vector<std::array<double, 9>> rows;
     const std::uint64_t count = store.levels()[level].clusters;
     rows.reserve(count);
@@ -318,9 +318,9 @@ void bind_store(py::module_& module) {
                return points;
              });
            })
-      .def("verify", [](const OpenStore& open, const py::tuple& job) {
+      .def("verify", [](const OpenStore& open, const py::tuple& settings) {
         const stream::Store store = open.get();
-        return Job(job).run([&](const terrain::Context& context) {
+        return Call(settings).run([&](const terrain::Context& context) {
           std::vector<std::string> faults;
           store.with_stop(context.stop)
               .verify([&](const stream::Problem& problem) { faults.push_back(text_of(problem)); },

@@ -15,15 +15,6 @@
 namespace terrace::python {
 namespace {
 
-terrain::HeightReference reference_named(const std::string& name) {
-  using terrain::HeightReference;
-  return named<HeightReference>(name, "vertical",
-                                {{"recorded", HeightReference::recorded},
-                                 {"ellipsoidal", HeightReference::ellipsoidal},
-                                 {"orthometric", HeightReference::orthometric},
-                                 {"ignore", HeightReference::ignore}});
-}
-
 terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& given) {
   format_of_output(terrain::outputs::kTileSet, folder);
   terrain::TilesRequest request{.folder = folder};
@@ -41,13 +32,9 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
   set("gzip", request.gzip);
   set("resume", request.resume);
   set("replace", request.replace);
-  const auto text = [&](const char* name, std::string value) {
-    take_option(given, name, value);
-    return value;
-  };
-  request.quality = quality_named(text("quality", "removal"));
-  request.vertical = reference_named(text("vertical", "recorded"));
-  request.fill = fill_named(text("fill", "interpolate"));
+  take_named(given, "quality", request.quality);
+  take_named(given, "vertical", request.vertical);
+  take_named(given, "fill", request.fill);
   if (request.fill == terrain::Fill::none)
     throw py::value_error("tiles cannot have holes: `fill` must be flat or interpolate");
   return request;
@@ -56,16 +43,16 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
 /// open: the store to compare heights with, or null.
 py::dict check_tiles(const std::string& folder, const OpenStore* open,
                      std::optional<double> max_error, const std::string& vertical,
-                     const std::string& geoid, const py::tuple& job) {
+                     const std::string& geoid, const py::tuple& settings) {
   if (!terrain::is_tile_folder(folder)) throw py::value_error(folder + " holds no set of tiles");
   std::optional<stream::Store> store;
   if (open != nullptr) store = open->get();
   const terrain::TileCheckRequest request{.folder = folder,
                                           .max_error = max_error,
                                           .store = store ? &*store : nullptr,
-                                          .vertical = reference_named(vertical),
+                                          .vertical = named<terrain::HeightReference>(vertical),
                                           .geoid = geoid};
-  const terrain::TileCheckResult made = Job(job).run(
+  const terrain::TileCheckResult made = Call(settings).run(
       [&](const terrain::Context& context) { return terrain::check_tiles(request, context); });
   py::dict result;
   py::list faults, zooms;
@@ -92,10 +79,10 @@ py::dict check_tiles(const std::string& folder, const OpenStore* open,
 void bind_tiles(py::module_& module) {
   module.def("check_tiles", &check_tiles);
   module.def("write_tiles", [](const OpenStore& open, const std::string& folder,
-                               const py::dict& given, const py::tuple& job) {
+                               const py::dict& given, const py::tuple& settings) {
     const stream::Store store = open.get();
     const terrain::TilesRequest request = tiles_request(folder, given);
-    const terrain::TilesOutcome outcome = Job(job).run([&](const terrain::Context& context) {
+    const terrain::TilesOutcome outcome = Call(settings).run([&](const terrain::Context& context) {
       return terrain::write_tiles(store, request, context);
     });
     py::dict result;

@@ -31,8 +31,8 @@ py::tuple tin_of_points(const Array<double>& x, const Array<double>& y, const Ar
   options.max_error = max_error;
   options.max_points = max_points;
   options.min_angle_degrees = min_angle;
-  options.quality = quality_named(quality);
-  options.duplicates = duplicates_named(duplicates);
+  options.quality = named<tri::TinQuality>(quality);
+  options.duplicates = named<tri::PointDuplicates>(duplicates);
   const auto corners = rows_of<3>(frame, "frame");
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
   tri::PointTin made = released([&] { return tri::point_tin(xs, ys, zs, corners, options); });
@@ -57,7 +57,7 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
       .rows = static_cast<std::uint32_t>(heights.shape(0)),
       .heights = {heights.data(), static_cast<std::size_t>(heights.size())}};
   const tri::GridTinOptions options{.max_error = max_error,
-                                    .quality = quality_named(quality),
+                                    .quality = named<tri::TinQuality>(quality),
                                     .column_step = column_step,
                                     .row_step = row_step,
                                     .measure = true};

@@ -15,6 +15,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "names.hpp"
 #include "store.hpp"
 
 namespace terrace::python {
@@ -42,7 +43,7 @@ class AnyView {
   virtual ~AnyView() = default;
   virtual ViewChange frame(const tri::View& view, double seconds) = 0;
   /// Returns the whole model as a change that adds it.
-  virtual ViewChange whole() = 0;
+  virtual ViewChange snapshot() = 0;
   virtual terrain::ViewTraffic traffic() = 0;
   virtual ViewChange restore(unsigned threads) = 0;
   /// Pins a cluster, or unpins it if `pin` is empty.
@@ -71,7 +72,7 @@ class ViewOf final : public AnyView {
     change.pending = step.pending;
     return change;
   }
-  ViewChange whole() override { return described(changes().whole()); }
+  ViewChange snapshot() override { return described(changes().snapshot()); }
   terrain::ViewTraffic traffic() override { return view_.traffic(); }
   ViewChange restore(unsigned threads) override {
     return described(changes().of(view_.restore(threads)));
@@ -118,7 +119,7 @@ class ViewOf final : public AnyView {
 /// A view that Python's threads may share, but a fork of the process may not use.
 class SharedView {
  public:
-  SharedView(const OpenStore& open, const std::string& kind, bool reads_in_frame,
+  SharedView(const OpenStore& open, const std::string& kind_name, const std::string& reader_name,
              const py::dict& given)
       : process_(getpid()), store_(open.get_whole()) {
     tri::ViewOptions options;
@@ -127,10 +128,12 @@ class SharedView {
     take_option(given, "collapse_below", options.collapse_below);
     take_option(given, "guard", options.guard);
     take_option(given, "silhouette", options.silhouette);
+    const auto kind = named<ViewKind>(kind_name);
+    const bool reads_in_frame = named<ViewReader>(reader_name) == ViewReader::frame;
     const py::gil_scoped_release released;
-    if (kind == "points") {
+    if (kind == ViewKind::points) {
       view_ = std::make_unique<ViewOf<tri::PointCloud>>(store_, options, reads_in_frame);
-    } else if (kind == "surface") {
+    } else if (kind == ViewKind::surface) {
       using Surface = tri::DynamicSurface<std::int32_t>;
       view_ = std::make_unique<ViewOf<Surface>>(store_, options, reads_in_frame);
     } else if (store_.schema().grid) {
@@ -161,8 +164,8 @@ class SharedView {
   py::dict frame(const tri::View& wish, double seconds) {
     return dict_of_view(locked([&] { return view_->frame(wish, seconds); }));
   }
-  py::dict whole() {
-    return dict_of_view(locked([&] { return view_->whole(); }));
+  py::dict snapshot() {
+    return dict_of_view(locked([&] { return view_->snapshot(); }));
   }
   py::tuple traffic() {
     const terrain::ViewTraffic read = locked([&] { return view_->traffic(); });
@@ -245,10 +248,10 @@ tri::View view_of(const py::dict& given) {
 
 void bind_view(py::module_& module) {
   py::class_<SharedView>(module, "SharedView")
-      .def(py::init<const OpenStore&, const std::string&, bool, const py::dict&>())
+      .def(py::init<const OpenStore&, const std::string&, const std::string&, const py::dict&>())
       .def("frame", [](SharedView& view, const py::dict& wish,
                        double seconds) { return view.frame(view_of(wish), seconds); })
-      .def("whole", &SharedView::whole)
+      .def("snapshot", &SharedView::snapshot)
       .def("traffic", &SharedView::traffic)
       .def("restore", &SharedView::restore)
       .def("pin", &SharedView::pin)

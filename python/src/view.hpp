@@ -70,7 +70,7 @@ class MeshChanges {
   }
 
   /// Returns the whole model as a change that adds it.
-  [[nodiscard]] MeshChange whole() const {
+  [[nodiscard]] MeshChange snapshot() const {
     MeshChange change;
     for (const tri::VertexId v : model_.triangulation().all_vertices()) add(change, v);
     if constexpr (kTriangles) {

@@ -32,14 +32,15 @@ Errors: ``ValueError`` for invalid arguments, ``TypeError`` for unusable objects
 
 from ._clustering import (ClusterBlock, Clusters, KMeans, cluster, clusters_of_size, entity_distances, facility_location,
                           flat_clusters, kmeans, linkage, spanning_tree, stream_clusters, tree_linkage)
-from ._core import Error
 from ._crs import Transformation
 from ._delaunay import Delaunay2, Delaunay3, DynamicSurface, MeshChanges, Shape, ellipse, ellipsoid
+from ._errors import Error
+from ._geo import FeatureCollection
 from ._matching import Assignment, HalvingMatching, Matching, assignment, edge_matching, halving_matching, matching
 from ._mesh import BoundedMesh, Mesh
 from ._points import PointReader, point_batches, read_points, write_points
 from ._raster import Raster
-from ._store import FeatureCollection, Store, build, xyz
+from ._store import Store, build, xyz
 from ._tiles import verify_tiles
 from ._tin import bounded_mesh, interpolate, simplify_line
 from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree, rotate_tree

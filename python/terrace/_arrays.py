@@ -1,17 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Converts the arrays that users pass in to numpy arrays."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 
+from ._types import AnyArray, Float64Array, UInt32Array
 
-def filled(array):
+
+def filled(array: Any) -> Any:
     """Returns a masked array of numbers with NaN where it is masked; returns other arrays unchanged."""
     if not isinstance(array, np.ma.MaskedArray) or array.dtype.kind not in 'iuf':
         return array
-    return (array if array.dtype.kind == 'f' else array.astype(np.float64)).filled(np.nan)
+    floats: Any = array if array.dtype.kind == 'f' else array.astype(np.float64)
+    return floats.filled(np.nan)
 
 
-def as_array(given, what):
+def as_array(given: Any, what: str) -> AnyArray:
     """Returns an array of any object with numpy's array interface, the buffer protocol or DLPack.
 
     Masked floats become NaN.
@@ -34,7 +42,7 @@ def as_array(given, what):
     return array
 
 
-def as_numbers(given, what):
+def as_numbers(given: Any, what: str) -> Float64Array:
     """Returns as_array() as contiguous float64. Raises: TypeError unless it holds real numbers."""
     array = as_array(filled(given), what)
     if array.dtype.kind not in 'iufb':
@@ -42,7 +50,7 @@ def as_numbers(given, what):
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def as_rows(given, what, widths=(2, 3)):
+def as_rows(given: Any, what: str, widths: Sequence[int] = (2, 3)) -> Float64Array:
     """Returns points as float64 rows, shape (n, w) with w in ``widths``. An empty list gives zero points."""
     array = as_numbers(given, what)
     if array.size == 0 and array.ndim == 1:
@@ -53,7 +61,7 @@ def as_rows(given, what, widths=(2, 3)):
     return array
 
 
-def as_native(array, what):
+def as_native(array: AnyArray, what: str) -> AnyArray:
     """Returns an array of a type that the library supports, without a copy where possible."""
     if array.dtype.kind == 'b':
         return array.view(np.uint8)
@@ -64,7 +72,7 @@ def as_native(array, what):
     return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder('='))
 
 
-def as_numbered(given, what, width=None, least=0, most=2 ** 32 - 2):
+def as_numbered(given: Any, what: str, width: int | None = None, least: int = 0, most: int = 2 ** 32 - 2) -> AnyArray:
     """Returns integers from ``least`` to ``most``, in one dimension or in rows of ``width``, in the given type.
 
     Raises: TypeError, ValueError.
@@ -81,7 +89,7 @@ def as_numbered(given, what, width=None, least=0, most=2 ** 32 - 2):
     return array
 
 
-def as_labels(labels):
+def as_labels(labels: Any) -> UInt32Array:
     """Renumbers integer labels of any size as 0, 1, ...; None gives an empty array. Raises: TypeError."""
     if labels is None:
         return np.empty(0, np.uint32)
@@ -91,7 +99,7 @@ def as_labels(labels):
     return np.unique(labels, return_inverse=True)[1].reshape(labels.shape).astype(np.uint32)
 
 
-def as_integer(value, what, least=0, bits=64):
+def as_integer(value: Any, what: str, least: int = 0, bits: int = 64) -> int:
     """Returns an integer of at least ``least`` that fits into an unsigned integer of ``bits`` bits.
 
     Raises: TypeError, ValueError.

@@ -1,26 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clustering in memory: facility location, linkage, k-means."""
 
+from __future__ import annotations
+
 import itertools
 import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_array, as_integer, as_numbered, as_numbers, as_rows
-from ._job import job
+from ._call import call_settings, thread_count
+from ._names import ClusterMethod, Effort, LinkageMethod, MatrixMethod
+from ._types import Array, Float64Array, Int64Array, Progress, Records, UInt8Array, UInt32Array, UInt64Array
 
 
-def _threads(threads):
-    return 0 if threads is None else as_integer(threads, 'threads', 1, bits=32)
-
-
-def _weights(weights):
+def _weights(weights: Array | None) -> Float64Array:
     return np.empty(0) if weights is None else as_numbers(weights, 'weights')
 
 
-def linkage(points, method='single', *, edges=None, single_precision=False, memory=None, gpu=False, threads=None):
+def linkage(points: Array, method: LinkageMethod = 'single', *, edges: Array | None = None, single_precision: bool = False,
+            memory: int | None = None, gpu: bool = False, threads: int | None = None) -> Float64Array:
     """Clusters hierarchically with the methods of scipy.cluster.hierarchy.linkage.
 
     points: shape (n, 2) or (n, 3), finite, compared by Euclidean distance; or a one-dimensional array with the
@@ -49,7 +52,7 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
            [2., 3., 4., 3.]])
     """
     array = as_numbers(points, 'points')
-    options = {'threads': _threads(threads), 'single_precision': bool(single_precision), 'gpu': bool(gpu),
+    options = {'threads': thread_count(threads), 'single_precision': bool(single_precision), 'gpu': bool(gpu),
                'memory': 0 if memory is None else as_integer(memory, 'memory', 1)}
     if gpu and method not in ('single', 'complete'):
         raise ValueError("`gpu` needs method='single' or 'complete'")
@@ -67,7 +70,7 @@ def linkage(points, method='single', *, edges=None, single_precision=False, memo
     return _core.linkage(as_rows(array, 'points'), method, edges, options)
 
 
-def tree_linkage(edges, lengths):
+def tree_linkage(edges: Array, lengths: Array) -> Float64Array:
     """Returns the linkage that merges along the edges of a tree, given in any metric, in order of length.
 
     edges: integers, shape (n - 1, 2), in any order, connecting the points 0 .. n - 1.
@@ -83,7 +86,7 @@ def tree_linkage(edges, lengths):
     return _core.tree_linkage(as_numbered(edges, 'edges', 2), as_numbers(lengths, 'lengths'))
 
 
-def spanning_tree(points, *, threads=None):
+def spanning_tree(points: Array, *, threads: int | None = None) -> tuple[UInt32Array, Float64Array]:
     """Returns the minimum spanning tree of points: the edges of least total length that connect all points.
 
     points: shape (n, 2) or (n, 3), finite.
@@ -96,10 +99,10 @@ def spanning_tree(points, *, threads=None):
     >>> spanning_tree([[0, 0], [5, 0], [1, 0]])[1].sum()
     5.0
     """
-    return _core.spanning_tree(as_rows(points, 'points'), _threads(threads))
+    return _core.spanning_tree(as_rows(points, 'points'), thread_count(threads))
 
 
-def flat_clusters(rows, *, count=None, height=None):
+def flat_clusters(rows: Array, *, count: int | None = None, height: float | None = None) -> UInt32Array:
     """Cuts a linkage into flat clusters and returns the label of each point: 0, 1, ... in order of first appearance.
 
     count: cut into at most this many clusters.
@@ -126,17 +129,18 @@ class KMeans:
     inertia: the sum of the (weighted) squared distances.
     """
 
-    centres: np.ndarray
-    labels: np.ndarray
+    centres: Float64Array
+    labels: UInt32Array
     inertia: float
     iterations: int
     converged: bool
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.KMeans: {len(self.centres)} clusters, inertia {self.inertia:g}>'
 
 
-def kmeans(points, clusters, *, weights=None, seed=1, restarts=1, max_iterations=300, tolerance=0.0, threads=None):
+def kmeans(points: Array, clusters: int | Array, *, weights: Array | None = None, seed: int = 1, restarts: int = 1,
+           max_iterations: int = 300, tolerance: float = 0.0, threads: int | None = None) -> KMeans:
     """Runs k-means by Lloyd's iteration, exact, starting from greedy k-means++ seeds or from given centres.
 
     points: shape (n, 2) or (n, 3).
@@ -154,16 +158,16 @@ def kmeans(points, clusters, *, weights=None, seed=1, restarts=1, max_iterations
     <terrace.KMeans: 2 clusters, inertia 1>
     """
     points = as_rows(points, 'points')
-    start, count = None, 0
-    if np.ndim(clusters) == 0:
+    start, count, given = None, 0, as_array(clusters, 'clusters')
+    if given.ndim == 0:
         count = as_integer(clusters, 'clusters', 1)
     else:
-        start = as_rows(clusters, 'clusters', points.shape[1:])
+        start = as_rows(given, 'clusters', points.shape[1:])
         if len(start) == 0:
             raise ValueError('`clusters` has no centres to start from')
     centres, labels, inertia, iterations, converged = _core.k_means(
         points, start, count, _weights(weights), as_integer(seed, 'seed'), as_integer(restarts, 'restarts', 1),
-        as_integer(max_iterations, 'max_iterations'), float(tolerance), _threads(threads))
+        as_integer(max_iterations, 'max_iterations'), float(tolerance), thread_count(threads))
     return KMeans(centres[:, :points.shape[1]], labels, inertia, iterations, converged)
 
 
@@ -176,25 +180,26 @@ class Clusters:
     lower_bound: no solution costs less; 0 if not known.
     """
 
-    facilities: np.ndarray
-    labels: np.ndarray
+    facilities: UInt32Array
+    labels: Int64Array
     opening_cost: float
     connection_cost: float
     outlier_cost: float
     lower_bound: float
 
     @property
-    def cost(self):
+    def cost(self) -> float:
         """The total cost that is minimised: opening, connection and outlier costs."""
         return self.opening_cost + self.connection_cost + self.outlier_cost
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.Clusters: {len(self.facilities)} clusters of {len(self.labels)} points, cost {self.cost:g}>'
 
 
-def _search(method, effort, count, seed, threads, bound_steps, restarts, **more):
-    given = {'method': method, 'effort': effort, 'seed': as_integer(seed, 'seed'), 'threads': _threads(threads),
-             'bound_steps': as_integer(bound_steps, 'bound_steps')}
+def _search(method: ClusterMethod, effort: Effort, count: int | None, seed: int, threads: int | None, bound_steps: int,
+            restarts: int | None, **more: Any) -> dict[str, Any]:
+    given: dict[str, Any] = {'method': method, 'effort': effort, 'seed': as_integer(seed, 'seed'), 'threads': thread_count(threads),
+                             'bound_steps': as_integer(bound_steps, 'bound_steps')}
     if count is not None:
         given['count'] = as_integer(count, 'count', 1)
     if restarts is not None:
@@ -202,9 +207,11 @@ def _search(method, effort, count, seed, threads, bound_steps, restarts, **more)
     return {**given, **more}
 
 
-def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='default', metric='euclidean', weights=None, channels=None,
-            outlier_price=float('inf'), seed=1, bound_steps=0, restarts=None, steps=None, start=None, assign_nearest=False,
-            ordered=False, threads=None):
+def cluster(points: Array, facility_cost: float = 1.0, *, count: int | None = None, method: ClusterMethod | None = None,
+            effort: Effort = 'default', metric: str = 'euclidean', weights: Array | None = None, channels: Array | None = None,
+            outlier_price: float = float('inf'), seed: int = 1, bound_steps: int = 0, restarts: int | None = None,
+            steps: int | None = None, start: Clusters | None = None, assign_nearest: bool = False, ordered: bool = False,
+            threads: int | None = None) -> Clusters:
     """Clusters points by facility location: each cluster has a cost, and the number of clusters follows from it.
 
     Each cluster costs ``facility_cost`` times the diagonal of the points' bounding box. Each point costs its
@@ -242,7 +249,7 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
     entities = array.ndim == 3
     if method is None:
         method = 'automatic' if entities or channels is not None else 'fast'
-    more = {'assign_nearest': bool(assign_nearest)}
+    more: dict[str, Any] = {'assign_nearest': bool(assign_nearest)}
     if steps is not None:
         more['steps'] = as_integer(steps, 'steps')
     if start is not None:
@@ -258,7 +265,7 @@ def cluster(points, facility_cost=1.0, *, count=None, method=None, effort='defau
                                              None if channels is None else as_numbers(channels, 'channels'), float(outlier_price), search))
 
 
-def entity_distances(a, b=None, *, ordered=False):
+def entity_distances(a: Array, b: Array | None = None, *, ordered: bool = False) -> Float64Array:
     """Returns how far the corners of one entity must move to coincide with those of another.
 
     The distance is the root mean square of the moves under the best correspondence of corners.
@@ -282,7 +289,8 @@ def entity_distances(a, b=None, *, ordered=False):
     return _core.entity_distances(a, b, bool(ordered)).reshape(len(a), len(b))
 
 
-def clusters_of_size(points, size, *, seed=1, progress=None, threads=None):
+def clusters_of_size(points: Array, size: float, *, seed: int = 1, progress: Progress | None = None,
+                     threads: int | None = None) -> UInt32Array:
     """Divides a large set of points into compact clusters of about ``size`` points.
 
     A hierarchy is built, and the level whose mean cluster size is closest to ``size`` by ratio is returned. Levels
@@ -300,11 +308,13 @@ def clusters_of_size(points, size, *, seed=1, progress=None, threads=None):
     >>> 150 < labels.max() < 300
     True
     """
-    return _core.clusters_of_size(as_rows(points, 'points'), float(size), as_integer(seed, 'seed'), job(progress, threads))
+    return _core.clusters_of_size(as_rows(points, 'points'), float(size), as_integer(seed, 'seed'), call_settings(progress, threads))
 
 
-def facility_location(connection, opening=None, *, count=None, method='interchange', effort='default', seed=1, bound_steps=300,
-                      restarts=None, seconds=float('inf'), threads=None):
+def facility_location(connection: Array, opening: Array | None = None, *, count: int | None = None,
+                      method: MatrixMethod = 'interchange',
+                      effort: Effort = 'default', seed: int = 1, bound_steps: int = 300, restarts: int | None = None,
+                      seconds: float = float('inf'), threads: int | None = None) -> Clusters:
     """Solves facility location with arbitrary costs: which facilities to open, and which of them serves each client.
 
     connection: shape (facilities, clients), not negative. A matrix of distances clusters entities of any kind.
@@ -333,11 +343,11 @@ def facility_location(connection, opening=None, *, count=None, method='interchan
         if count is None:
             raise ValueError('facility_location() needs `opening` or `count`')
         opening = 0
-    if np.ndim(opening) == 0:
-        opening = np.full(len(connection), opening)
-    opening = as_numbers(opening, 'opening')
-    return Clusters(*_core.facility_matrix(connection, opening, _search(method, effort, count, seed, threads, bound_steps, restarts,
-                                                                        seconds=float(seconds))))
+    costs = as_array(opening, 'opening')
+    if costs.ndim == 0:
+        costs = np.full(len(connection), costs)
+    search = _search(method, effort, count, seed, threads, bound_steps, restarts, seconds=float(seconds))
+    return Clusters(*_core.facility_matrix(connection, as_numbers(costs, 'opening'), search))
 
 
 @dataclass(frozen=True)
@@ -346,22 +356,23 @@ class ClusterBlock:
 
     level: int
     number: int  #: index of the block on its level
-    points: np.ndarray  #: float64, shape (n, 3)
-    values: np.ndarray  #: structured, the other fields of the points; without fields if they have none
-    children: np.ndarray  #: uint64, shape (n, level): the clusters that each point represents on levels 0, 1, ...
-    first: np.ndarray  #: cluster c has the points order[first[c]:first[c + 1]], including its representative
-    order: np.ndarray
-    representatives: np.ndarray  #: int64, the representative of each cluster, -1 for the root
-    boxes: np.ndarray  #: shape (clusters, 6), the box around all points below, minima first
-    errors: np.ndarray  #: no point below is farther from the representative
-    descendants: np.ndarray  #: uint64, the number of points of level 0 below, including the representative
+    points: Float64Array  #: float64, shape (n, 3)
+    values: Records  #: structured, the other fields of the points; without fields if they have none
+    children: UInt64Array  #: uint64, shape (n, level): the clusters that each point represents on levels 0, 1, ...
+    first: UInt32Array  #: cluster c has the points order[first[c]:first[c + 1]], including its representative
+    order: UInt32Array
+    representatives: Int64Array  #: int64, the representative of each cluster, -1 for the root
+    boxes: Float64Array  #: shape (clusters, 6), the box around all points below, minima first
+    errors: Float64Array  #: no point below is farther from the representative
+    descendants: UInt64Array  #: uint64, the number of points of level 0 below, including the representative
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.ClusterBlock: {len(self.representatives)} clusters of {len(self.points)} points, level {self.level}>'
 
 
-def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, effort='default', method='automatic',
-                    metric='euclidean', seed=1, threads=None):
+def stream_clusters(batches: Iterable[Array], sink: Callable[[ClusterBlock], object], *, block_points: int = 10000,
+                    facility_cost: float = 3.0, effort: Effort = 'default', method: ClusterMethod = 'automatic',
+                    metric: str = 'euclidean', seed: int = 1, threads: int | None = None) -> dict[str, Any]:
     """Builds a hierarchy of clusters as in a store, and passes its blocks to a function.
 
     Reads the points in one pass and in constant memory.
@@ -388,20 +399,17 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
     """
     if not callable(sink):
         raise TypeError('`sink` must be a function')
-    batches = iter(batches)
-    head = next(batches, None)
-    fields = []
-    if head is not None:
-        head = as_array(head, 'a batch')
-        if head.dtype.names:
-            fields = [name for name in head.dtype.names if name not in ('x', 'y', 'z')]
-    kind = np.dtype([(name, head.dtype[name]) for name in fields])
+    given = iter(batches)
+    heads = [as_array(batch, 'a batch') for batch in itertools.islice(given, 1)]
+    names = heads[0].dtype.names if heads else None
+    fields = [name for name in names or () if name not in ('x', 'y', 'z')]
+    kind = np.dtype([(name, heads[0].dtype[name]) for name in fields])
     if kind.hasobject:
         raise TypeError('the fields of points must be numbers, not objects')
 
-    def pairs():
-        for batch in [] if head is None else itertools.chain([head], batches):
-            batch = as_array(batch, 'a batch')
+    def pairs() -> Iterator[tuple[Float64Array, UInt8Array]]:
+        for item in itertools.chain(heads, given):
+            batch = as_array(item, 'a batch')
             if not batch.dtype.names:
                 if fields:
                     raise ValueError('the batches do not have the same fields')
@@ -410,10 +418,10 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
                     rows = np.column_stack((rows, np.zeros(len(rows))))
                 yield rows, np.empty((len(rows), 0), np.uint8)
                 continue
-            if batch.dtype.names != head.dtype.names or any(batch.dtype[name] != head.dtype[name] for name in fields):
+            if names is None or batch.dtype.names != names or any(batch.dtype[name] != kind[name] for name in fields):
                 raise ValueError('the batches do not have the same fields')
             batch = batch.reshape(-1)
-            missing = [axis for axis in 'xyz' if axis not in batch.dtype.names]
+            missing = [axis for axis in 'xyz' if axis not in names]
             if missing:
                 raise ValueError(f'points need x, y and z: {", ".join(missing)} is missing')
             values = np.empty(len(batch), kind)
@@ -422,7 +430,7 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
             yield (np.column_stack([as_numbers(batch[axis], axis) for axis in 'xyz']),
                    values.view(np.uint8).reshape(len(batch), -1) if fields else np.empty((len(batch), 0), np.uint8))
 
-    def take(block):
+    def take(block: dict[str, Any]) -> None:
         count, level = len(block['points']), block['level']
         block['values'] = block['values'].view(kind) if fields else np.empty(count, kind)
         block['children'] = block['children'].reshape(count, level)
@@ -430,4 +438,4 @@ def stream_clusters(batches, sink, *, block_points=10000, facility_cost=3.0, eff
 
     return _core.stream_clusters(pairs(), take, {
         'bytes': kind.itemsize, 'block_points': as_integer(block_points, 'block_points', 2), 'facility_cost': float(facility_cost),
-        'effort': effort, 'method': method, 'metric': metric, 'seed': as_integer(seed, 'seed'), 'threads': _threads(threads)})
+        'effort': effort, 'method': method, 'metric': metric, 'seed': as_integer(seed, 'seed'), 'threads': thread_count(threads)})

@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Converts coordinates between reference systems."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from . import _core
 from ._arrays import as_rows
 from ._geo import region as as_region
 from ._sources import crs_text
+from ._types import Array, Crs, Float64Array
 
 
 class Transformation:
@@ -28,26 +33,27 @@ class Transformation:
     array([[ 500000.  , 5316300.22]])
     """
 
-    def __init__(self, source, target, *, area=None, datum_shift=None):
+    def __init__(self, source: Crs, target: Crs, *, area: Sequence[float] | None = None,
+                 datum_shift: Iterable[float] | None = None) -> None:
         texts = [crs_text(crs) for crs in (source, target)]
         if None in texts:
             raise ValueError('a transformation needs two reference systems')
-        if datum_shift is not None:
-            datum_shift = [float(number) for number in datum_shift]
-            if len(datum_shift) not in (3, 7):
-                raise ValueError(f'`datum_shift` must be three or seven numbers, not {len(datum_shift)}')
-            datum_shift += [0.0] * (7 - len(datum_shift))
-        area = as_region(area)
-        if isinstance(area, dict):
+        shift = None if datum_shift is None else [float(number) for number in datum_shift]
+        if shift is not None:
+            if len(shift) not in (3, 7):
+                raise ValueError(f'`datum_shift` must be three or seven numbers, not {len(shift)}')
+            shift += [0.0] * (7 - len(shift))
+        box = as_region(area)
+        if isinstance(box, dict):
             raise ValueError('`area` must be a box')
-        self._core = _core.Transformation(*texts, datum_shift, area)
+        self._core = _core.Transformation(*texts, shift, box)
 
-    def _convert(self, places, back):
-        places = as_rows(places, 'places')
+    def _convert(self, given: Array, back: bool) -> Float64Array:
+        places = as_rows(given, 'places')
         made = self._core.convert(np.ascontiguousarray(places[:, :2]), back)
         return made if places.shape[1] == 2 else np.column_stack((made, places[:, 2]))
 
-    def forward(self, places):
+    def forward(self, places: Array) -> Float64Array:
         """Converts places from the source to the target system.
 
         places: shape (n, 2), or (n, 3), whose heights are kept.
@@ -57,14 +63,14 @@ class Transformation:
         """
         return self._convert(places, False)
 
-    def reverse(self, places):
+    def reverse(self, places: Array) -> Float64Array:
         """Converts places from the target to the source system; otherwise as forward()."""
         return self._convert(places, True)
 
     @property
-    def note(self):
+    def note(self) -> str:
         """A remark on the operation, such as its accuracy; empty if the datum does not change."""
         return self._core.note()
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.Transformation: {self._core.from_title()} to {self._core.to_title()}>'

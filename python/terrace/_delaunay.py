@@ -1,19 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Dynamic Delaunay triangulations in the plane and in space."""
 
+from __future__ import annotations
+
 import threading
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_array, as_integer, as_numbers, as_rows
-from ._matching import _threads
+from ._call import thread_count
 from ._mesh import Mesh
+from ._names import GradientMethod, Interpolation, ShapeCriterion, ShapeRule, Smoothing
 from ._pictures import plane_png
+from ._types import Array, Float64Array, Int32Array, Int64Array, Records
+
+T = TypeVar('T')
 
 
-def ellipse(a, b, angle=0.0):
+def ellipse(a: float, b: float, angle: float = 0.0) -> Float64Array:
     """Returns the metric of an ellipse, shape (2, 2), in which vectors from its centre to its border have length 1.
 
     Edges of a triangulation in this metric tend to follow the long axis.
@@ -32,7 +40,7 @@ def ellipse(a, b, angle=0.0):
     return np.array(_core.ellipse_map(float(a), float(b), float(angle))).reshape(2, 2)
 
 
-def ellipsoid(semi_axes, axes=((1, 0, 0), (0, 1, 0), (0, 0, 1))):
+def ellipsoid(semi_axes: Array, axes: Array = ((1, 0, 0), (0, 1, 0), (0, 0, 1))) -> Float64Array:
     """Returns the metric of an ellipsoid, shape (3, 3).
 
     semi_axes: three lengths, each along the corresponding row of ``axes``.
@@ -46,15 +54,15 @@ def ellipsoid(semi_axes, axes=((1, 0, 0), (0, 1, 0), (0, 0, 1))):
     return np.array(_core.ellipsoid_map(lengths.tolist(), axes.ravel().tolist())).reshape(3, 3)
 
 
-def _map(metric, width):
+def _map(metric: Array, width: int) -> list[float]:
     array = as_numbers(metric, 'metric')
     if array.shape != (width, width):
         raise ValueError(f'`metric` must have the shape ({width}, {width}), not {array.shape}')
     return array.ravel().tolist()
 
 
-def _handles(vertices):
-    vertices = as_array(vertices, 'vertices')
+def _handles(given: Array) -> Int32Array:
+    vertices = as_array(given, 'vertices')
     if vertices.dtype.kind not in 'iu' and vertices.size > 0:
         raise TypeError(f'vertices must be whole numbers, not {vertices.dtype}')
     vertices = np.atleast_1d(vertices)
@@ -70,13 +78,13 @@ class MeshChanges:
     Simplices are given by their corners, as vertex numbers. Apply removals first: a reused number is in both lists.
     """
 
-    added_vertices: np.ndarray
-    removed_vertices: np.ndarray
-    removed_points: np.ndarray  #: the position of each of removed_vertices
-    added_simplices: np.ndarray  #: shape (n, 3), or (n, 4) for tetrahedra
-    removed_simplices: np.ndarray
+    added_vertices: Int32Array
+    removed_vertices: Int32Array
+    removed_points: Float64Array  #: the position of each of removed_vertices
+    added_simplices: Int32Array  #: shape (n, 3), or (n, 4) for tetrahedra
+    removed_simplices: Int32Array
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return (f'<terrace.MeshChanges: {len(self.added_vertices)} vertices and {len(self.added_simplices)} simplices added, '
                 f'{len(self.removed_vertices)} and {len(self.removed_simplices)} removed>')
 
@@ -88,15 +96,15 @@ class _Numbers:
     first one is the vertex; the others are copies, whose numbers belong to no vertex.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._of_slot = np.empty(0, np.int32)  # the number of each slot, -1 for none
         self._slots = np.empty(0, np.int32)  # the slot of each number, -1 for a copy
         self._copies = np.empty((0, 2), np.int32)  # pairs: the number of a copy, the number of its vertex
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self._slots)
 
-    def take(self, slots):
+    def take(self, slots: Int32Array) -> Int32Array:
         """Numbers slots that were just filled and returns the numbers, in the order of the points."""
         first_points = len(self._slots) == 0
         most = int(slots.max(initial=-1)) + 1
@@ -116,28 +124,28 @@ class _Numbers:
             self._slots = np.append(self._slots, distinct)
         return self._of_slot[slots]
 
-    def take_all(self, first, count):
+    def take_all(self, first: int, count: int) -> None:
         """Numbers ``count`` consecutive slots from 0, starting with slot ``first``."""
         self._slots = np.arange(first, first + count, dtype=np.int32)
         self._of_slot = np.append(np.full(first, -1, np.int32), np.arange(count, dtype=np.int32))
 
-    def forget_copies(self, vertices):
+    def forget_copies(self, vertices: Int32Array) -> None:
         """Forgets the copies of vertices that were removed."""
         if len(self._copies):
             self._copies = self._copies[~np.isin(self._copies[:, 1], vertices)]
 
-    def of(self, slots):
+    def of(self, slots: Int32Array) -> Int32Array:
         """Returns the numbers of slots, in the same shape; -1 for a slot of -1."""
         filled = slots[slots >= 0]
         if filled.size and (filled.max() >= len(self._of_slot) or self._of_slot[filled].min() < 0):
             self.take(np.unique(filled))  # an insertion was interrupted before take()
         return np.where(slots < 0, np.int32(-1), self._of_slot[slots]) if filled.size else slots
 
-    def all_slots(self):
+    def all_slots(self) -> Int32Array:
         """Returns the slot of each number; -1 for a copy."""
         return self._slots
 
-    def slots_of(self, numbers):
+    def slots_of(self, numbers: Int32Array) -> Int32Array:
         """Returns the slots of numbers. Raises: ValueError for a number that never belonged to a vertex."""
         for number in numbers[(numbers >= len(self._slots)) | (numbers < 0)]:
             raise ValueError(f'there is no vertex {number}')
@@ -146,7 +154,7 @@ class _Numbers:
             raise ValueError(f'there is no vertex {number}: this point equals an earlier one, whose number is in `ids`')
         return slots
 
-    def by_number(self, rows):
+    def by_number(self, rows: Float64Array) -> Float64Array:
         """Reorders rows from slots to numbers; a copy gets the row of its vertex."""
         result = np.full((len(self._slots), *rows.shape[1:]), np.nan)
         used = (self._slots >= 0) & (self._slots < len(rows))
@@ -154,7 +162,7 @@ class _Numbers:
         result[self._copies[:, 0]] = result[self._copies[:, 1]]
         return result
 
-    def by_slot(self, values):
+    def by_slot(self, values: Float64Array) -> Float64Array:
         """Reorders values, shape (n,), from numbers to slots.
 
         Raises: ValueError unless there is one for each number.
@@ -177,14 +185,16 @@ class _PointMesh:
     """
 
     _width = 0
+    _simplices = ''
+    _core: Any
 
-    def __init__(self):
+    def __init__(self) -> None:
         #: The vertex of each point passed to the constructor: its row, or the row of the first equal point.
-        self.ids = np.empty(0, np.int32)
+        self.ids: Int32Array = np.empty(0, np.int32)
         self._numbers = _Numbers()
         self._lock = threading.RLock()  # keeps the core and the numbers consistent
 
-    def insert(self, points):
+    def insert(self, points: Array) -> Int32Array:
         """Inserts points, many in one call faster than one by one.
 
         points: shape (n, 2) in the plane or (n, 3) in space.
@@ -197,7 +207,7 @@ class _PointMesh:
         with self._lock:
             return self._numbers.take(self._core.insert(points))
 
-    def remove(self, vertices):
+    def remove(self, vertices: Array) -> None:
         """Removes vertices, all different.
 
         The result is the triangulation of the remaining vertices, independent of history.
@@ -209,7 +219,7 @@ class _PointMesh:
             self._of_vertices(vertices, self._core.remove)
             self._numbers.forget_copies(vertices)
 
-    def _of_vertices(self, vertices, work):
+    def _of_vertices(self, vertices: Int32Array, work: Callable[[Int32Array], T]) -> T:
         """Returns work(slots).
 
         Raises: ValueError, with the caller's number, for a vertex that is missing or named twice.
@@ -226,7 +236,7 @@ class _PointMesh:
             raise
 
     @property
-    def points(self):
+    def points(self) -> Float64Array:
         """Coordinates by vertex number, float64, starting with the points of the constructor.
 
         Rows of removed vertices are NaN.
@@ -235,13 +245,13 @@ class _PointMesh:
             return self._numbers.by_number(self._core.points())
 
     @property
-    def vertices(self):
+    def vertices(self) -> Int32Array:
         """The numbers of all current vertices, int32, ascending."""
         with self._lock:
             return np.sort(self._numbers.of(self._core.vertices()))
 
     @property
-    def simplices(self):
+    def simplices(self) -> Int32Array:
         """The corners of all triangles or tetrahedra, int32, as vertex numbers.
 
         ``points[simplices]`` gives their coordinates, as in SciPy. Triangles are counter-clockwise; a tetrahedron (a,
@@ -250,11 +260,11 @@ class _PointMesh:
         with self._lock:
             return self._numbers.of(self._core.simplices())
 
-    def record(self):
+    def record(self) -> None:
         """Starts recording for changes(). Anything recorded before is discarded."""
         self._core.start_journal()
 
-    def changes(self):
+    def changes(self) -> MeshChanges:
         """Returns the net MeshChanges since record() or the previous call, in time proportional to their number.
 
         Raises: ValueError unless record() was called.
@@ -263,30 +273,30 @@ class _PointMesh:
             changes = self._core.take_changes()
             return MeshChanges(**{name: rows if name == 'removed_points' else self._numbers.of(rows) for name, rows in changes.items()})
 
-    def digest(self):
+    def digest(self) -> int:
         """Returns a hash of the set of simplices by their coordinates, independent of history."""
         return self._core.hash()
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self._core.size()
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.{type(self).__name__}: {len(self)} vertices, {self._core.count()} {self._simplices}>'
 
 
 class _Delaunay(_PointMesh):
-    _kind = None
-    _elliptical_kind = None
+    _kind: Any
+    _elliptical_kind: Any
 
-    def __init__(self, points=None, *, metric=None):
+    def __init__(self, points: Array | None = None, *, metric: Array | None = None) -> None:
         super().__init__()
         self._elliptical = metric is not None
-        self._core = self._elliptical_kind(_map(metric, self._width)) if self._elliptical else self._kind()
+        self._core = self._kind() if metric is None else self._elliptical_kind(_map(metric, self._width))
         if points is not None:
             self.ids = self.insert(points)
 
     @property
-    def vertex_neighbor_vertices(self):
+    def vertex_neighbor_vertices(self) -> tuple[Int64Array, Int32Array]:
         """The vertices joined to each vertex by an edge, as in SciPy, counter-clockwise in the plane.
 
         Returns: (begins, int64, the offset of each vertex's neighbours; vertices, int32).
@@ -301,21 +311,21 @@ class _Delaunay(_PointMesh):
             return ends, self._numbers.of(joined[np.repeat(from_ - ends[:-1], counts) + np.arange(ends[-1])])
 
     @property
-    def neighbors(self):
+    def neighbors(self) -> Int32Array:
         """The row in ``simplices`` of each simplex's neighbour opposite to each corner, -1 outside the hull."""
         return self._core.neighbours()
 
-    def find_simplex(self, points):
+    def find_simplex(self, points: Array) -> Int32Array:
         """Returns the row in ``simplices`` of a simplex that contains each point, -1 outside the hull."""
         return self._core.find_simplex(as_rows(points, 'points', (self._width,)))
 
-    def nearest(self, points):
+    def nearest(self, points: Array) -> Int32Array:
         """Returns the vertex nearest to each point, exactly; -1 if there are no vertices."""
         points = as_rows(points, 'points', (self._width,))
         with self._lock:
             return self._numbers.of(self._core.nearest(points))
 
-    def by_vertex(self, values):
+    def by_vertex(self, values: Array) -> Float64Array:
         """Reorders values of the constructor's points by vertex number: float64, NaN for other vertices.
 
         Of several equal points the last one's value is used.
@@ -330,19 +340,19 @@ class _Delaunay(_PointMesh):
         result[self.ids] = values
         return result
 
-    def _values(self, values):
+    def _values(self, values: Array) -> Float64Array:
         """Returns values in the order that the core expects. The caller must hold the lock."""
         return self._numbers.by_slot(as_numbers(values, 'values'))
 
-    def _euclidean(self):
+    def _euclidean(self) -> Any:
         if self._elliptical:
             raise ValueError('triangulations with a `metric` do not support this')
         return self._core
 
-    def _regions(self, regions):
+    def _regions(self, regions: Iterable[tuple[Array, Array]]) -> list[tuple[list[float], list[float], list[float]]]:
         checked = []
-        for box, metric in regions:
-            box = as_numbers(box, 'a box')
+        for given, metric in regions:
+            box = as_numbers(given, 'a box')
             if box.shape != (2 * self._width,):
                 raise ValueError(f'a box must be {2 * self._width} numbers: the minima, then the maxima')
             checked.append((box[:self._width].tolist(), box[self._width:].tolist(), _map(metric, self._width)))
@@ -375,7 +385,7 @@ class Delaunay2(_Delaunay):
     _elliptical_kind = _core.EllipticalDelaunay2
 
     @classmethod
-    def of_grid(cls, columns, rows, origin=(0.0, 0.0), step=1.0):
+    def of_grid(cls, columns: int, rows: int, origin: Sequence[float] = (0.0, 0.0), step: float = 1.0) -> Delaunay2:
         """Returns the triangulation of a complete grid, written directly in O(n).
 
         The vertex of column i and row j has the number j * columns + i.
@@ -399,7 +409,7 @@ class Delaunay2(_Delaunay):
             made.ids = np.arange(columns * rows, dtype=np.int32)
         return made
 
-    def weights(self, places, method='linear'):
+    def weights(self, places: Array, method: Interpolation = 'linear') -> tuple[Float64Array, Int32Array, Int64Array]:
         """Returns the weights with which heights() combines the values of vertices at places.
 
         places, method: as in heights().
@@ -421,7 +431,8 @@ class Delaunay2(_Delaunay):
             weights, vertices, begins = _core.weights_at(self._euclidean(), places, method)
             return weights, self._numbers.of(vertices), begins
 
-    def vertical_distances(self, values, samples, method='linear', *, threads=None):
+    def vertical_distances(self, values: Array, samples: Array, method: Interpolation = 'linear', *,
+                           threads: int | None = None) -> dict[str, Any]:
         """Measures how far samples that are not in the triangulation are above or below its surface.
 
         values, method: as in heights().
@@ -438,9 +449,9 @@ class Delaunay2(_Delaunay):
         """
         with self._lock:
             return _core.vertical_distances(self._euclidean(), self._values(values), as_rows(samples, 'samples', (3,)), method,
-                                            _threads(threads))
+                                            thread_count(threads))
 
-    def heights(self, values, places, method='linear', *, threads=None):
+    def heights(self, values: Array, places: Array, method: Interpolation = 'linear', *, threads: int | None = None) -> Float64Array:
         """Interpolates heights at places between vertices, in about 0.4 microseconds each.
 
         values: the height of each vertex by its number, see by_vertex().
@@ -456,9 +467,10 @@ class Delaunay2(_Delaunay):
         """
         with self._lock:
             return _core.heights_at(self._euclidean(), self._values(values), as_rows(places, 'places', (2,)), method,
-                                    _threads(threads))
+                                    thread_count(threads))
 
-    def gradients(self, values, places, method='linear', *, threads=None):
+    def gradients(self, values: Array, places: Array, method: GradientMethod = 'linear', *,
+                  threads: int | None = None) -> Float64Array:
         """Returns the slope towards +x and towards +y at places, shape (n, 2), as height per unit of length.
 
         method: 'linear' for the triangles' slope, or 'natural' for natural neighbours.
@@ -467,9 +479,10 @@ class Delaunay2(_Delaunay):
         """
         with self._lock:
             return _core.gradients_at(self._euclidean(), self._values(values), as_rows(places, 'places', (2,)), method,
-                                      _threads(threads))
+                                      thread_count(threads))
 
-    def smooth(self, values, method='laplacian', *, vertices=None, iterations=10, strength=0.5, pass_band=0.1, edge_height=0.0):
+    def smooth(self, values: Array, method: Smoothing = 'laplacian', *, vertices: Array | None = None, iterations: int = 10,
+               strength: float = 0.5, pass_band: float = 0.1, edge_height: float = 0.0) -> Float64Array:
         """Returns smoothed heights by vertex number, float64.
 
         values: as in heights().
@@ -482,7 +495,7 @@ class Delaunay2(_Delaunay):
 
         Source: G. Taubin, 1995; C. Tomasi, R. Manduchi, 1998.
         """
-        def smoothed(slots):
+        def smoothed(slots: Int32Array | None) -> Float64Array:
             return self._numbers.by_number(_core.smooth(self._euclidean(), self._values(values), slots, method, iterations,
                                                         float(strength), float(pass_band), float(edge_height)))
 
@@ -490,7 +503,7 @@ class Delaunay2(_Delaunay):
         with self._lock:
             return smoothed(None) if vertices is None else self._of_vertices(_handles(vertices), smoothed)
 
-    def quality(self, values, datum=0.0, *, bins=16):
+    def quality(self, values: Array, datum: float = 0.0, *, bins: int = 16) -> dict[str, Any]:
         """Measures angles (degrees) and edges in the plane, areas, and the volumes between the surface and ``datum``.
 
         values: as in heights().
@@ -502,7 +515,7 @@ class Delaunay2(_Delaunay):
         with self._lock:
             return _core.mesh_quality(self._euclidean(), self._values(values), float(datum), as_integer(bins, 'bins', 1))
 
-    def triangle_quality(self, values, datum=0.0):
+    def triangle_quality(self, values: Array, datum: float = 0.0) -> Records:
         """Measures each triangle as quality() does, in the order of ``simplices``.
 
         Returns: a structured array with min_angle (degrees), aspect (1 for an equilateral triangle, larger for
@@ -513,7 +526,7 @@ class Delaunay2(_Delaunay):
         names = ('min_angle', 'aspect', 'area', 'surface_area', 'volume_above', 'volume_below')
         return made.view([(name, 'f8') for name in names]).reshape(-1)
 
-    def adapted(self, regions):
+    def adapted(self, regions: Iterable[tuple[Array, Array]]) -> Int32Array:
         """Returns the triangles after edge flips that adapt them to a metric in each region.
 
         regions: pairs of a box (min x, min y, max x, max y; infinities are allowed) and a metric such as ellipse().
@@ -528,7 +541,7 @@ class Delaunay2(_Delaunay):
         with self._lock:
             return self._numbers.of(self._euclidean().adapted(self._regions(regions)))
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes:
         with self._lock:
             return plane_png(self.points, self.simplices)
 
@@ -544,14 +557,14 @@ class Shape:
     components, euler_characteristic: of the surface; the characteristic is 2 for a sphere, 0 for a torus.
     """
 
-    tetrahedra: np.ndarray
+    tetrahedra: Int32Array
     surface: Mesh
     volume: float
     open: bool
     components: int
     euler_characteristic: int
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return (f'<terrace.Shape: {len(self.tetrahedra)} tetrahedra, {len(self.surface.triangles)} triangles, '
                 f'volume {self.volume:g}>')
 
@@ -569,7 +582,7 @@ class Delaunay3(_Delaunay):
     _kind = _core.SharedDelaunay3
     _elliptical_kind = _core.EllipticalDelaunay3
 
-    def adapted(self, regions):
+    def adapted(self, regions: Iterable[tuple[Array, Array]]) -> tuple[Int32Array, int]:
         """Returns the tetrahedra after flips that adapt them to a metric in each region.
 
         regions: as in Delaunay2.adapted(), with boxes of six numbers.
@@ -581,7 +594,9 @@ class Delaunay3(_Delaunay):
             tetrahedra, stuck = self._euclidean().adapted(self._regions(regions))
             return self._numbers.of(tetrahedra), stuck
 
-    def shape(self, rule='poles', *, criterion='gabriel', edge_factor=0.5, keep_vertices=True, lids=False, threads=None):
+    def shape(self, rule: ShapeRule = 'poles', *,
+              criterion: ShapeCriterion = 'gabriel', edge_factor: float = 0.5, keep_vertices: bool = True,
+              lids: bool = False, threads: int | None = None) -> Shape:
         """Reconstructs the solid whose surface was scanned: the tetrahedra inside it, and their surface.
 
         rule: 'poles' decides by angles between circumspheres and suits samples of any density. 'flood' and
@@ -600,7 +615,7 @@ class Delaunay3(_Delaunay):
         """
         with self._lock:
             tetrahedra, faces, *rest = _core.shape(self._core, rule, criterion, float(edge_factor), bool(keep_vertices), bool(lids),
-                                                  _threads(threads))
+                                                  thread_count(threads))
             surface = Mesh(self.points, self._numbers.of(faces))
             return Shape(self._numbers.of(tetrahedra), surface, *rest)
 
@@ -626,22 +641,22 @@ class DynamicSurface(_PointMesh):
 
     _width, _simplices = 3, 'triangles'
 
-    def __init__(self, points=None):
+    def __init__(self, points: Array | None = None) -> None:
         super().__init__()
         self._core = _core.SharedSurface()
         if points is not None:
             self.ids = self.insert(points)
 
-    def restore(self, *, threads=None):
+    def restore(self, *, threads: int | None = None) -> None:
         """Recomputes the surface from scratch, as for a new object with the same points (3 microseconds per vertex)."""
-        self._core.restore(_threads(threads))
+        self._core.restore(thread_count(threads))
 
-    def mesh(self):
+    def mesh(self) -> Mesh:
         """Returns the surface as an independent Mesh."""
         with self._lock:
             points, simplices = self.points, self.simplices
         used, corners = np.unique(simplices, return_inverse=True)
         return Mesh(points[used], corners.reshape(-1, 3).astype(np.uint32))
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes:
         return self.mesh()._repr_png_()

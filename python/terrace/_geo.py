@@ -1,41 +1,49 @@
 # SPDX-License-Identifier: Apache-2.0
 """Regions and GeoJSON."""
 
+from __future__ import annotations
+
 import json
 import math
 import os
+from typing import Any, Dict, List, Tuple, Union
 
 import numpy as np
 
 from ._mesh import metres_per_unit
 from ._pictures import lines_png
 from ._sources import crs_text
+from ._types import Float64Array
+
+Box = Tuple[float, ...]  #: six numbers, minima first
+Polygon = List[Float64Array]  #: rings
+CoreRegion = Union[Box, Dict[str, Any]]  #: a region in the form that the core expects
 
 
-class FeatureCollection(dict):
+class FeatureCollection(Dict[str, Any]):
     """A GeoJSON FeatureCollection, which shapely, geopandas and others accept through ``__geo_interface__``."""
 
     @property
-    def __geo_interface__(self):
+    def __geo_interface__(self) -> dict[str, Any]:
         return dict(self)
 
-    _units = None  #: from the core, to draw pictures
+    _units: Any = None  #: from the core, to draw pictures
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes:
         lines = [np.asarray(line['geometry']['coordinates'], np.float64)[:, :2] for line in self['features']]
         ends = np.array([end for line in lines for end in (line.min(axis=0), line.max(axis=0))]).reshape(-1, 2)
         metres = metres_per_unit(np.column_stack((ends, np.zeros(len(ends)))), self._units)[:2]
         return lines_png([line * metres for line in lines])
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.FeatureCollection of {len(self["features"])} features>'
 
 
-def _rings(polygon):
+def _rings(polygon: Any) -> Polygon:
     return [np.ascontiguousarray([place[:2] for place in ring], dtype=np.float64).reshape(-1, 2) for ring in polygon]
 
 
-def _polygons(geometry):
+def _polygons(geometry: Any) -> list[Polygon]:
     kind = geometry.get('type')
     if kind == 'Polygon':
         return [_rings(geometry['coordinates'])]
@@ -49,13 +57,13 @@ def _polygons(geometry):
     return [polygon for part in geometry[parts] for polygon in _polygons(part)]
 
 
-def geojson(given):
+def geojson(given: Any) -> tuple[Any, str | None]:
     """Returns (a GeoJSON dict, the name of its CRS) for a dict, an object with ``__geo_interface__`` or a file name.
 
     The name comes from the object's ``crs``, as in geopandas, or from the dict's ``crs``. It is '' if neither is
     given, None if the dict says that the CRS is unknown.
     """
-    crs = None
+    crs: Any = None
     if isinstance(given, (str, os.PathLike)):
         with open(given, encoding='utf-8') as file:
             given = json.load(file)
@@ -72,7 +80,7 @@ def geojson(given):
     return given, crs
 
 
-def region(given):
+def region(given: Any) -> CoreRegion | None:
     """Returns a region in the form that the core expects; None, for everywhere, stays None.
 
     given: a box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]), in the CRS of the store or

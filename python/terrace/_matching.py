@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Assignment and matching with minimum cost."""
 
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_array, as_integer, as_labels, as_numbered, as_numbers, as_rows
+from ._call import thread_count
+from ._names import HalvingMethod
+from ._types import AnyArray, Array, Float64Array, Int64Array, SparseMatrix
 
 
 @dataclass(frozen=True)
@@ -21,20 +27,21 @@ class Assignment:
         equality for chosen pairs.
     """
 
-    columns: np.ndarray
+    columns: Int64Array
     cost: float
-    row_duals: np.ndarray
-    column_duals: np.ndarray
+    row_duals: AnyArray
+    column_duals: AnyArray
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[Int64Array]:
         rows = np.flatnonzero(self.columns >= 0)
         return iter((rows, self.columns[rows]))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.Assignment: {int((self.columns >= 0).sum())} pairs, cost {self.cost:g}>'
 
 
-def assignment(costs, columns=None, *, shape=None):
+def assignment(costs: Array | SparseMatrix | Callable[[int], Array], columns: Array | None = None, *,
+               shape: tuple[int, int] | None = None) -> Assignment:
     """Assigns rows to columns with minimum total cost (Kuhn-Munkres).
 
     costs: one of these:
@@ -64,8 +71,8 @@ def assignment(costs, columns=None, *, shape=None):
         a = as_rows(costs, 'the rows\' points')
         return Assignment(*_core.assign_points(a, as_rows(columns, 'the columns\' points', a.shape[1:])))
     if hasattr(costs, 'tocsr'):
-        rows = costs.tocsr()
-        return Assignment(*_core.assign_sparse(rows.indptr, rows.indices, as_numbers(rows.data, 'costs'), rows.shape[1]))
+        matrix = costs.tocsr()
+        return Assignment(*_core.assign_sparse(matrix.indptr, matrix.indices, as_numbers(matrix.data, 'costs'), matrix.shape[1]))
     array = as_array(costs, 'costs')
     if array.ndim != 2:
         raise ValueError(f'costs must have two dimensions, not {array.ndim}')
@@ -86,22 +93,23 @@ class Matching:
     optimal: whether the cost is proven to be minimal.
     """
 
-    mates: np.ndarray
+    mates: Int64Array
     cost: float
     bound: float
     optimal: bool
 
     @property
-    def pairs(self):
+    def pairs(self) -> Int64Array:
         """The pairs, int64, shape (n // 2, 2), with the smaller number first."""
         first = np.flatnonzero(self.mates > np.arange(len(self.mates)))
         return np.column_stack((first, self.mates[first]))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.{type(self).__name__}: {len(self.pairs)} pairs, cost {self.cost:g}{", optimal" if self.optimal else ""}>'
 
 
-def matching(points, *, labels=None, exact_limit=500_000, window=50_000, rounds=8, tolerance=1e-3, threads=None):
+def matching(points: Array, *, labels: Array | None = None, exact_limit: int = 500_000, window: int = 50_000, rounds: int = 8,
+             tolerance: float = 1e-3, threads: int | None = None) -> Matching:
     """Pairs points so that the sum of Euclidean distances is minimal.
 
     Of an odd number of points, one stays without a partner.
@@ -125,7 +133,7 @@ def matching(points, *, labels=None, exact_limit=500_000, window=50_000, rounds=
     points = as_rows(points, 'points')
     match = _core.match_points3 if points.shape[1] == 3 else _core.match_points2
     return Matching(*match(points, as_labels(labels), as_integer(exact_limit, 'exact_limit', 1), as_integer(window, 'window', 4),
-                           as_integer(rounds, 'rounds', bits=32), float(tolerance), _threads(threads)))
+                           as_integer(rounds, 'rounds', bits=32), float(tolerance), thread_count(threads)))
 
 
 @dataclass(frozen=True, repr=False)
@@ -137,10 +145,12 @@ class HalvingMatching(Matching):
     """
 
     iterations: int
-    steps: np.ndarray
+    steps: Float64Array
 
 
-def halving_matching(points, *, method='monotone', distances=False, iterations=None, seconds=float('inf'), seed=1, threads=None):
+def halving_matching(points: Array, *, method: HalvingMethod = 'monotone', distances: bool = False,
+                     iterations: int | None = None, seconds: float = float('inf'), seed: int = 1,
+                     threads: int | None = None) -> HalvingMatching:
     """Pairs points by repeatedly dividing them into two random halves, which are matched at the least total distance.
 
     The result is approximate; matching() finds the optimum.
@@ -163,11 +173,11 @@ def halving_matching(points, *, method='monotone', distances=False, iterations=N
     array = as_numbers(points, 'points') if distances else as_rows(points, 'points')
     mates, cost, done, steps = _core.match_by_halving(array, bool(distances), method,
                                                       0 if iterations is None else as_integer(iterations, 'iterations', 1),
-                                                      float(seconds), as_integer(seed, 'seed'), _threads(threads))
+                                                      float(seconds), as_integer(seed, 'seed'), thread_count(threads))
     return HalvingMatching(mates, cost, 0.0, False, done, steps)
 
 
-def edge_matching(edges, weights, count=None):
+def edge_matching(edges: Array, weights: Array, count: int | None = None) -> Matching:
     """Returns the perfect matching of a graph with minimum total weight.
 
     edges: integers, shape (m, 2): vertices 0, 1, ...; parallel edges are allowed.
@@ -188,7 +198,3 @@ def edge_matching(edges, weights, count=None):
     if count > 2 * len(edges):
         raise ValueError(f'{len(edges)} edges cannot match {count} vertices')
     return Matching(*_core.match_edges(count, edges.astype(np.uint32), as_numbers(weights, 'weights')))
-
-
-def _threads(threads):
-    return 0 if threads is None else as_integer(threads, 'threads', 1, bits=32)

@@ -1,17 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Triangle meshes."""
 
+from __future__ import annotations
+
 import os
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_numbered, as_rows
-from ._job import notes
+from ._call import notes
 from ._pictures import light, relief_png, triangles_svg
+from ._types import AnyArray, Array, Float64Array, Path, UInt8Array
 
 
-def metres_per_unit(places, units):
+def metres_per_unit(places: Float64Array, units: Any) -> Float64Array:
     """Returns the metres per unit of x, y and z at the centre of places, shape (n, 3).
 
     units: the units from the core, or None if unknown, which gives ones.
@@ -32,30 +37,30 @@ class Mesh:
     levels: uint8, the highest level of each vertex in its store, or None.
     """
 
-    def __init__(self, vertices, triangles, levels=None):
+    def __init__(self, vertices: Float64Array, triangles: AnyArray, levels: UInt8Array | None = None) -> None:
         self.vertices, self.triangles, self.levels = vertices, triangles, levels
 
     @classmethod
-    def _of(cls, made):
+    def _of(cls, made: Any) -> Mesh:
         """Wraps what the core returns: the arrays, and the units of the coordinates."""
         mesh = Mesh(*made[:3])
         mesh._units = made[3]
         return mesh
 
     @property
-    def vertices(self):
+    def vertices(self) -> Float64Array:
         """Coordinates, float64, shape (n, 3). Setting them discards the units."""
         return self._vertices
 
     @vertices.setter
-    def vertices(self, vertices):
+    def vertices(self, vertices: Float64Array) -> None:
         self._vertices, self._units = vertices, None
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[AnyArray]:
         return iter((self.vertices, self.triangles))
 
     @classmethod
-    def read(cls, path):
+    def read(cls, path: Path) -> Mesh:
         """Reads a mesh file: .ply, .glb, .obj, .off or .stl. Polygons are divided into fans of triangles.
 
         Raises: ValueError for a file without triangles; OSError; Error.
@@ -64,7 +69,7 @@ class Mesh:
         with open(path, 'rb'):  # raises OSError if there is no such file
             return Mesh._of(_core.read_mesh(os.fsencode(path)))
 
-    def save(self, path, replace=False):
+    def save(self, path: Path, replace: bool = False) -> None:
         """Writes a mesh file in the format of its extension: .ply, .obj or .glb, or .svg for a picture from above.
 
         .ply, .obj and .glb files appear only when complete. glTF knows only metres, so .glb files of a store in
@@ -85,11 +90,11 @@ class Mesh:
         if note:
             notes.info(note)
 
-    def _parts(self):
+    def _parts(self) -> tuple[Float64Array, AnyArray]:
         vertices = as_rows(self.vertices, 'vertices', (3,))
         return vertices, as_numbered(self.triangles, 'triangles', 3, most=len(vertices) - 1)
 
-    def measures(self):
+    def measures(self) -> dict[str, Any]:
         """Measures the mesh as a surface in space, in O(n log n) time.
 
         Returns: a dict with faces, vertices (that have a face), edges, area, volume (enclosed, negative if inside
@@ -99,11 +104,11 @@ class Mesh:
         """
         return _core.measure(*self._parts())
 
-    def turned_outward(self):
+    def turned_outward(self) -> Mesh:
         """Returns the mesh with components of negative volume turned inside out. Raises: ValueError."""
         return Mesh._of((self.vertices, _core.turned_outward(*self._parts()), self.levels, self._units))
 
-    def errors(self, samples):
+    def errors(self, samples: Array) -> dict[str, Any]:
         """Measures the vertical distances of samples from the mesh, in O(n) time.
 
         Seen from above, the triangles of the mesh must not overlap.
@@ -121,26 +126,26 @@ class Mesh:
         columns = np.ascontiguousarray(as_rows(samples, 'samples', (3,)).T)
         return _core.measure_surface(*columns, *self._parts())
 
-    def area(self):
+    def area(self) -> float:
         """Returns the area of the surface in space, in square units of its coordinates."""
         a, b, c = (self.vertices[self.triangles[:, i]] for i in range(3))
         return float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
 
     @property
-    def __geo_interface__(self):
+    def __geo_interface__(self) -> dict[str, Any]:
         """The triangles as a GeoJSON MultiPolygon with heights."""
         corners = self.vertices[self.triangles[:, [0, 1, 2, 0]]]
         return {'type': 'MultiPolygon',
                 'coordinates': tuple((tuple(map(tuple, ring)),) for ring in corners.tolist())}
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.{type(self).__name__}: {len(self.vertices)} vertices, {len(self.triangles)} triangles>'
 
-    def _in_metres(self):
+    def _in_metres(self) -> Float64Array:
         vertices = np.asarray(self.vertices, np.float64)
         return vertices * metres_per_unit(vertices, self._units)
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes:
         return relief_png(self._in_metres(), self.triangles)
 
 
@@ -152,7 +157,7 @@ class BoundedMesh(Mesh):
     uncovered: the number of samples on no triangle.
     """
 
-    def __init__(self, vertices, triangles, measured):
+    def __init__(self, vertices: Float64Array, triangles: AnyArray, measured: Mapping[str, Any]) -> None:
         super().__init__(vertices, triangles)
         self._units = measured.get('units')
         self.max_error, self.rms_error = measured['max_error'], measured['rms_error']

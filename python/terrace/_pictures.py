@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures for notebooks, made with numpy and zlib only."""
 
+from __future__ import annotations
+
 import math
 import struct
 import zlib
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
+
+from ._types import AnyArray, Float64Array, Int64Array
 
 MOST_PIXELS = 600  #: length of the longer side, so a picture has at most 360 KB
 MOST_SPANS = 8_000_000  #: pixel rows in triangles, and a quarter of the pixels in them; a picture with more is made smaller
@@ -14,14 +21,14 @@ MOST_WIRES = 3000  #: sides are drawn up to this number of triangles
 _SIDES = [[0, 1], [1, 2], [2, 0]]
 
 
-def png(pixels):
+def png(pixels: AnyArray) -> bytes:
     """Encodes bytes, shape (rows, columns) or (rows, columns, 3), as a PNG."""
     pixels = np.ascontiguousarray(pixels, dtype=np.uint8)
     rows, columns = pixels.shape[:2]
     lines = np.zeros((rows, 1 + pixels[0].size), np.uint8)
     lines[:, 1:] = pixels.reshape(rows, -1)
 
-    def chunk(kind, data):
+    def chunk(kind: bytes, data: bytes) -> bytes:
         return struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
 
     head = struct.pack('>IIBBBBB', columns, rows, 8, 0 if pixels.ndim == 2 else 2, 0, 0, 0)
@@ -29,7 +36,7 @@ def png(pixels):
             chunk(b'IEND', b''))
 
 
-def grey_png(values):
+def grey_png(values: AnyArray) -> bytes:
     """Draws values from dark to light, white where they are not finite. Large rasters are thinned."""
     step = max(1, -(-max(values.shape) // MOST_PIXELS))
     shown = np.asarray(values[::step, ::step], dtype=np.float64)
@@ -45,32 +52,32 @@ def grey_png(values):
 class _Frame:
     """Maps places, shape (n, 2), with y upwards, to the pixels of a picture."""
 
-    def __init__(self, places, most=MOST_PIXELS):
+    def __init__(self, places: Float64Array, most: int = MOST_PIXELS) -> None:
         self.low = places.min(axis=0) if len(places) else np.zeros(2)
         size = places.max(axis=0) - self.low if len(places) else np.zeros(2)
         self.scale = most / max(*size, 1e-300) if max(size) > 0 else 1.0
         self.columns, self.rows = (min(max(1, math.ceil(side * self.scale)), most) for side in size)
 
-    def __call__(self, places):
+    def __call__(self, places: Float64Array) -> Float64Array:
         """Returns columns and rows of places, in pixels from the upper left corner."""
         return np.column_stack(((places[:, 0] - self.low[0]) * self.scale, self.rows - (places[:, 1] - self.low[1]) * self.scale))
 
 
-def _shown(places, parts):
+def _shown(places: Float64Array, parts: Int64Array) -> Int64Array:
     """Returns the rows of ``parts``, shape (n, k), whose places are all small enough to compute pixels."""
     with np.errstate(invalid='ignore'):
         good = (np.abs(places) < 1e150).all(axis=1)
     return parts[good[parts].all(axis=1)]
 
 
-def _spans(corners):
+def _spans(corners: Float64Array) -> tuple[Int64Array, Int64Array]:
     """Returns, for each triangle, the first pixel row whose centre line it crosses and the number of such rows."""
     first = np.ceil(corners[:, :, 1].min(axis=1) - 0.5)
     return first.astype(np.int64), np.maximum(np.floor(corners[:, :, 1].max(axis=1) - 0.5) - first + 1, 0).astype(np.int64)
 
 
 @np.errstate(over='ignore', invalid='ignore', divide='ignore')
-def _depths(corners, heights, shape):
+def _depths(corners: Float64Array, heights: Float64Array, shape: tuple[int, int]) -> Float64Array:
     """Returns the greatest height of the triangles at each pixel's centre, -inf outside all triangles.
 
     corners: in pixels, shape (n, 3, 2).
@@ -87,7 +94,7 @@ def _depths(corners, heights, shape):
     along_y = ((z2 - z0) * (x1 - x0) - (z1 - z0) * (x2 - x0)) / area
     first, count = _spans(corners)
 
-    def fill(triangle, row):
+    def fill(triangle: Int64Array, row: Int64Array) -> None:
         middle = row + 0.5
         left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
         for i, j in ((0, 1), (1, 2), (2, 0)):
@@ -122,13 +129,13 @@ def _depths(corners, heights, shape):
     return deep.reshape(shape)
 
 
-def _counted(counts):
+def _counted(counts: Int64Array) -> tuple[Int64Array, Int64Array]:
     """Returns the indices 0, 1, ..., each repeated by its count, and the position of each entry within its run."""
     of = np.repeat(np.arange(len(counts)), counts)
     return of, np.arange(len(of)) - np.repeat(np.cumsum(counts) - counts, counts)
 
 
-def _draw_lines(ends, shape):
+def _draw_lines(ends: Float64Array, shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
     """Returns a bool array of ``shape`` that marks the pixels under lines.
 
     ends: in pixels, shape (n, 2, 2).
@@ -144,7 +151,7 @@ def _draw_lines(ends, shape):
     return drawn
 
 
-def _slopes(heights, axis):
+def _slopes(heights: Float64Array, axis: int) -> Float64Array:
     """Returns the slope along an axis from the neighbours on both sides or on one; 0 without neighbours."""
     ahead = np.full(heights.shape, np.nan)
     behind = ahead.copy()
@@ -159,7 +166,7 @@ def _slopes(heights, axis):
 
 
 @np.errstate(over='ignore', invalid='ignore')
-def relief_png(vertices, triangles):
+def relief_png(vertices: Float64Array, triangles: AnyArray) -> bytes:
     """Draws triangles from above as shaded relief, lit from the north-west at 45 degrees.
 
     The sides of triangles are drawn if there are few.
@@ -187,7 +194,7 @@ def relief_png(vertices, triangles):
     return png(np.where(shown, tones, 255))
 
 
-def plane_png(points, triangles):
+def plane_png(points: Float64Array, triangles: AnyArray) -> bytes:
     """Draws the sides of triangles in the plane or, if these would touch, the density of vertices (darker is denser).
     """
     triangles = _shown(points, triangles.astype(np.int64))
@@ -207,16 +214,16 @@ def plane_png(points, triangles):
     return png(np.where(counts > 0, 225 - 165 * np.log1p(counts) / np.log1p(counts.max(initial=1)), 240))
 
 
-def lines_png(lines):
+def lines_png(lines: Iterable[Float64Array]) -> bytes:
     """Draws lines from above. lines: arrays of shape (n, 2)."""
-    ends = [np.stack((line[:-1], line[1:]), axis=1) for line in lines if len(line) > 1]
-    ends = np.concatenate(ends).reshape(-1, 2) if ends else np.zeros((0, 2))
+    sides = [np.stack((line[:-1], line[1:]), axis=1) for line in lines if len(line) > 1]
+    ends = np.concatenate(sides).reshape(-1, 2) if sides else np.zeros((0, 2))
     frame = _Frame(ends)
     drawn = _draw_lines(frame(ends).reshape(-1, 2, 2), (frame.rows, frame.columns))
     return png(np.where(drawn, 60, 255))
 
 
-def triangles_svg(xy, triangles, shade):
+def triangles_svg(xy: Float64Array, triangles: AnyArray, shade: Float64Array) -> str:
     """Draws all triangles from above. shade: from 0 to 1, one per triangle."""
     tones = np.clip(60 + 190 * shade, 0, 255).astype(int)
     places = xy if len(xy) else np.zeros((1, 2))
@@ -230,7 +237,7 @@ def triangles_svg(xy, triangles, shade):
     return '\n'.join(rows) + '\n</svg>'
 
 
-def light(vertices, triangles):
+def light(vertices: Float64Array, triangles: AnyArray) -> Float64Array:
     """Returns the brightness of each triangle, 0 to 1, under a light from the north-west."""
     a, b, c = (vertices[triangles[:, i]] for i in range(3))
     normals = np.cross(b - a, c - a)

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads points from files and writes them, without a store."""
 
+from __future__ import annotations
+
 import os
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
 
 from . import _core
+from ._call import call_settings, thread_count
 from ._geo import region as as_region
-from ._job import job
-from ._matching import _threads
 from ._sources import source_of
 from ._store import checked, real_values
+from ._types import Array, Crs, Path, Progress, Records
 
 _READ_OPTIONS = {
     'input_format', 'where', 'region', 'keep', 'drop', 'resolution', 'skip_damaged', 'band', 'cell', 'heights_of_colour', 'entities',
@@ -18,7 +22,8 @@ _READ_OPTIONS = {
 }
 
 
-def _reading(sources, transform, crs, nodata, attributes, options, function):
+def _reading(sources: Any, transform: Iterable[float] | None, crs: Crs | None, nodata: float | None,
+             attributes: Mapping[str, Array] | None, options: dict[str, Any], function: str) -> tuple[Any, dict[str, Any]]:
     given = checked(options, _READ_OPTIONS, function)
     if 'region' in given:
         given['region'] = as_region(given['region'])
@@ -35,26 +40,27 @@ class PointReader:
     crs: a dict that describes the CRS of the source, as in Store.info.
     """
 
-    def __init__(self, core):
+    def __init__(self, core: Any) -> None:
         self._core = core
         self._attributes = core.attributes()
         self.dtype = real_values(np.empty(0, core.type()), self._attributes).dtype
         self.crs = core.crs()
 
-    def __iter__(self):
+    def __iter__(self) -> PointReader:
         return self
 
-    def __next__(self):
+    def __next__(self) -> Records:
         batch = self._core.next()
         if batch is None:
             raise StopIteration
         return real_values(batch, self._attributes)
 
-    def __repr__(self):
-        return f'<terrace.PointReader: {", ".join(self.dtype.names)}>'
+    def __repr__(self) -> str:
+        return f'<terrace.PointReader: {", ".join(self.dtype.names or ())}>'
 
 
-def point_batches(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
+def point_batches(sources: Any, *, transform: Iterable[float] | None = None, crs: Crs | None = None, nodata: float | None = None,
+                  attributes: Mapping[str, Array] | None = None, threads: int | None = None, **options: Any) -> PointReader:
     """Reads points of files or arrays in batches, in constant memory.
 
     Points that are close together in the source share a batch.
@@ -72,10 +78,11 @@ def point_batches(sources, *, transform=None, crs=None, nodata=None, attributes=
     [10000, 10000, 5000]
     """
     source, given = _reading(sources, transform, crs, nodata, attributes, options, 'point_batches')
-    return PointReader(_core.PointReader(source, given, _threads(threads)))
+    return PointReader(_core.PointReader(source, given, thread_count(threads)))
 
 
-def read_points(sources, *, transform=None, crs=None, nodata=None, attributes=None, threads=None, **options):
+def read_points(sources: Any, *, transform: Iterable[float] | None = None, crs: Crs | None = None, nodata: float | None = None,
+                attributes: Mapping[str, Array] | None = None, threads: int | None = None, **options: Any) -> Records:
     """Reads all points of files or arrays into one structured array.
 
     Arguments and errors are those of point_batches().
@@ -87,8 +94,10 @@ def read_points(sources, *, transform=None, crs=None, nodata=None, attributes=No
     return np.concatenate([np.empty(0, reader.dtype), *reader])
 
 
-def write_points(path, points, *, transform=None, crs=None, nodata=None, attributes=None, format=None, replace=False, progress=None,
-                 threads=None, **options):
+def write_points(path: Path, points: Any, *, transform: Iterable[float] | None = None, crs: Crs | None = None,
+                 nodata: float | None = None, attributes: Mapping[str, Array] | None = None, format: str | None = None,
+                 replace: bool = False, progress: Progress | None = None, threads: int | None = None,
+                 **options: Any) -> dict[str, Any]:
     """Writes points to a file in the format of its extension: .laz, .las, .copc.laz, .ply, .csv or .xyz.
 
     The file appears only when complete.
@@ -107,5 +116,6 @@ def write_points(path, points, *, transform=None, crs=None, nodata=None, attribu
     {'points': 2, 'nodata': 0, 'rounding': 0.0}
     """
     source, given = _reading(points, transform, crs, nodata, attributes, options, 'write_points')
-    written, missing, rounding = _core.write_points(source, given, os.fsencode(path), format or '', bool(replace), job(progress, threads))
+    written, missing, rounding = _core.write_points(source, given, os.fsencode(path), format or '', bool(replace),
+                                                    call_settings(progress, threads))
     return {'points': written, 'nodata': missing, 'rounding': rounding}

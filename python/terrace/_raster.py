@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rasters computed from a store."""
 
+from __future__ import annotations
+
 import os
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._pictures import grey_png
+from ._types import AnyArray, Path
 
 
 class Raster:
@@ -18,16 +22,18 @@ class Raster:
     crs: 'EPSG:n' or WKT, None if unknown.
     """
 
-    def __init__(self, values, transform, crs):
+    def __init__(self, values: AnyArray, transform: tuple[float, float, float, float, float, float],
+                 crs: str | None) -> None:
         self.values, self.transform, self.crs = values, transform, crs
 
     @property
-    def shape(self):
+    def shape(self) -> tuple[int, int]:
         """The numbers of rows and columns."""
-        return self.values.shape
+        rows, columns = self.values.shape
+        return rows, columns
 
     @property
-    def bounds(self):
+    def bounds(self) -> tuple[float, float, float, float]:
         """The box around all cells: min x, min y, max x, max y."""
         a, b, c, d, e, f = self.transform
         rows, columns = self.shape
@@ -35,17 +41,17 @@ class Raster:
         y = [f + d * i + e * j for i in (0, columns) for j in (0, rows)]
         return min(x), min(y), max(x), max(y)
 
-    def __array__(self, dtype=None):
+    def __array__(self, dtype: Any = None) -> AnyArray:
         return self.values if dtype is None else self.values.astype(dtype)
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.Raster: {self.shape[1]} x {self.shape[0]} cells>'
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes:
         return grey_png(self.values)
 
 
-def read_raster(path):
+def read_raster(path: Path) -> Raster:
     samples, valid, centres, crs = _core.read_geotiff(os.fsencode(path))
     if samples.dtype.kind == 'f':
         samples[valid == 0] = np.nan

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sources of a store: files, and arrays of numpy and other packages."""
 
+from __future__ import annotations
+
 import os
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ._arrays import as_array, as_native, filled
-from ._job import notes
+from ._call import notes
+from ._types import AnyArray
 
 
-def crs_text(crs):
+def crs_text(crs: Any) -> str | None:
     """Returns the name, code or WKT of a CRS object or text of any package; None if it is empty.
 
     Raises: TypeError for other objects.
@@ -23,7 +28,7 @@ def crs_text(crs):
     raise TypeError(f'`crs` must be a text such as EPSG:32632, or have to_wkt(), unlike {crs!r}')
 
 
-def _centred(transform):
+def _centred(transform: Iterable[float] | None) -> tuple[float, ...]:
     """Converts a transform of cell corners, as in rasterio and GDAL, to one of cell centres."""
     if transform is None:
         return (1.0, 0.0, 0.0, 0.0, -1.0, 0.0)
@@ -35,7 +40,8 @@ def _centred(transform):
     return (a, b, c + (a + b) / 2, d, e, f + (d + e) / 2)
 
 
-def _raster(samples, transform, nodata, name, scale=1.0, offset=0.0):
+def _raster(samples: AnyArray, transform: Iterable[float] | None, nodata: float | None, name: str, scale: float = 1.0,
+            offset: float = 0.0) -> dict[str, Any]:
     samples = as_native(samples, 'the raster')
     if samples.ndim == 3 and samples.shape[0] == 1:
         samples = samples[0]
@@ -47,11 +53,11 @@ def _raster(samples, transform, nodata, name, scale=1.0, offset=0.0):
             'nodata': None if nodata is None else float(nodata), 'scale': float(scale), 'offset': float(offset)}
 
 
-def _column(name, array, scale=1.0, offset=0.0):
+def _column(name: str, array: AnyArray, scale: float = 1.0, offset: float = 0.0) -> dict[str, Any]:
     return {'name': name, 'array': as_native(array, f'"{name}"'), 'scale': float(scale), 'offset': float(offset)}
 
 
-def _points(columns, attributes, name):
+def _points(columns: list[dict[str, Any]], attributes: list[dict[str, Any]], name: str) -> dict[str, Any]:
     sizes = {column['array'].shape for column in columns + attributes}
     if len(sizes) != 1 or len(next(iter(sizes))) != 1:
         raise ValueError('the columns of points must have one dimension and the same length')
@@ -60,7 +66,8 @@ def _points(columns, attributes, name):
     return {'name': name, 'columns': columns, 'attributes': attributes}
 
 
-def _records(array, fields, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
+def _records(array: Any, fields: Sequence[str], name: str, scales: Sequence[float] = (1, 1, 1),
+             offsets: Sequence[float] = (0, 0, 0)) -> dict[str, Any]:
     """Returns a source for records with x, y and z, or with X, Y and Z as LAS stores them (with scales and offsets).
 
     Fields of several numbers become name_0, name_1, ...
@@ -81,7 +88,7 @@ def _records(array, fields, name, scales=(1, 1, 1), offsets=(0, 0, 0)):
     return _points(columns, attributes, name)
 
 
-def _laspy_crs(data):
+def _laspy_crs(data: Any) -> Any:
     """Returns the CRS of a laspy.LasData, which laspy reads with pyproj, or None."""
     try:
         return data.header.parse_crs()
@@ -90,7 +97,7 @@ def _laspy_crs(data):
         return None
 
 
-def _xarray(array, transform, crs, nodata):
+def _xarray(array: Any, transform: Any, crs: Any, nodata: float | None) -> tuple[Any, Any, float | None]:
     """Returns transform, CRS and nodata of an xarray.DataArray.
 
     They come from rioxarray's accessor, or from the CF attributes that rioxarray writes, or from the coordinates.
@@ -122,12 +129,13 @@ def _xarray(array, transform, crs, nodata):
     return transform, crs, nodata
 
 
-def _alone(kind, transform, nodata, attributes):
+def _alone(kind: str, transform: Any, nodata: float | None, attributes: Any) -> None:
     if transform is not None or nodata is not None or attributes is not None:
         raise ValueError(f'{kind} do not support `transform`, `nodata` and `attributes`')
 
 
-def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
+def source_of(given: Any, transform: Iterable[float] | None = None, crs: Any = None, nodata: float | None = None,
+              attributes: Mapping[str, Any] | None = None) -> tuple[dict[str, Any] | list[bytes], str | None]:
     """Returns (the source in the form that the core expects, its CRS as text or None).
 
     Raises: TypeError, ValueError.
@@ -168,7 +176,8 @@ def source_of(given, transform=None, crs=None, nodata=None, attributes=None):
             samples = filled(given.read(1, masked=masked))
             scale, offset = given.scales[0], given.offsets[0]
         nodata = getattr(given, 'nodata', None) if nodata is None else nodata
-        return (_raster(as_array(filled(samples), 'the raster'), given.transform if transform is None else transform, nodata, '<raster>', scale, offset),
+        return (_raster(as_array(filled(samples), 'the raster'), given.transform if transform is None else transform, nodata,
+                        '<raster>', scale, offset),
                 crs_text(crs or getattr(given, 'crs', None)))
     if hasattr(given, 'columns') and all(axis in given.columns for axis in 'xyz'):  # a pandas.DataFrame, or another frame
         given = {name: given[name] for name in given.columns}

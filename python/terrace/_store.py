@@ -1,21 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Builds stores from files and arrays, and queries them."""
 
+from __future__ import annotations
+
 import errno
 import json
 import math
 import os
 import tempfile
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Literal, overload
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_integer, as_rows
-from ._geo import FeatureCollection, geojson, region as as_region
-from ._job import job, notes
+from ._call import call_settings, notes
+from ._errors import Error
+from ._geo import CoreRegion, FeatureCollection, geojson, region as as_region
 from ._mesh import BoundedMesh, Mesh
-from ._raster import read_raster
+from ._names import Duplicates, Fill, Interpolation, Quality, RasterValue, Smoothing
+from ._raster import Raster, read_raster
 from ._sources import crs_text, source_of
+from ._types import Array, ClusterId, Crs, Float64Array, Focuses, GeoInterface, Int64Array, Path, Progress, Records, Region, UInt32Array
 
 _BUILD_OPTIONS = {
     'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
@@ -28,34 +35,35 @@ _TILE_OPTIONS = {
 }
 
 
-def checked(options, known, function):
+def checked(options: dict[str, Any], known: set[str], function: str) -> dict[str, Any]:
     for name in options:
         if name not in known:
             raise TypeError(f'{function}() has no option {name!r}; it has {", ".join(sorted(known))}')
     return {name: value for name, value in options.items() if value is not None}
 
 
-def xyz(points):
+def xyz(points: Records) -> Float64Array:
     """Returns the coordinates of a structured array of points as an array of shape (n, 3), without a copy.
 
     Raises: TypeError, ValueError.
     """
     if not isinstance(points, np.ndarray):
         raise TypeError('`points` must be a structured array')
-    fields = points.dtype.fields or {}
-    if points.ndim != 1 or any(fields.get(axis, ())[:2] != (np.dtype(np.float64), 8 * i) for i, axis in enumerate('xyz')):
+    fields = points.dtype.fields
+    wanted = {axis: (np.dtype(np.float64), 8 * i) for i, axis in enumerate('xyz')}
+    if points.ndim != 1 or fields is None or any(axis not in fields or fields[axis][:2] != wanted[axis] for axis in wanted):
         raise ValueError('`points` must have one dimension and begin with the float64 fields x, y and z')
     return np.lib.stride_tricks.as_strided(points['x'], (len(points), 3), (points.strides[0], 8))
 
 
-def real_values(records, attributes):
+def real_values(records: Records, attributes: list[dict[str, Any]]) -> Records:
     """Converts attributes that are stored with a scale or offset to real values (float64)."""
     scaled = {a['name']: a for a in attributes if a['scale'] != 1 or a['offset'] != 0}
     if not scaled:
         return records
-    kind = [(name, 'f8' if name in scaled else records.dtype[name]) for name in records.dtype.names]
-    real = np.empty(records.shape, kind)
-    for name in records.dtype.names:
+    names = records.dtype.names or ()
+    real = np.empty(records.shape, [(name, 'f8' if name in scaled else records.dtype[name]) for name in names])
+    for name in names:
         real[name] = records[name]
         if name in scaled:
             real[name] *= scaled[name]['scale']
@@ -63,12 +71,14 @@ def real_values(records, attributes):
     return real
 
 
-def _smoothing(method='laplacian', iterations=10, strength=0.5, pass_band=0.1, edge_height=0.0):
+def _smoothing(method: str = 'laplacian', iterations: int = 10, strength: float = 0.5, pass_band: float = 0.1,
+               edge_height: float = 0.0) -> tuple[str, int, float, float, float]:
     return method, as_integer(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height)
 
 
-def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=None, progress=None, threads=None,
-          memory=None, **options):
+def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None, crs: Crs | None = None,
+          nodata: float | None = None, attributes: Mapping[str, Array] | None = None, progress: Progress | None = None,
+          threads: int | None = None, memory: int | None = None, **options: Any) -> Store:
     """Streams points or rasters once, in constant memory, into a store, and opens it.
 
     sources: a file name or several (GeoTIFF, LAS, LAZ, COPC, PLY, text and others; several rasters form a mosaic), or
@@ -136,7 +146,7 @@ def build(sources, store, *, transform=None, crs=None, nodata=None, attributes=N
     path = os.fspath(store)
     if os.path.lexists(path) and not given.get('replace'):
         raise FileExistsError(errno.EEXIST, 'already exists; pass another name or replace=True', path)
-    _core.build(source, os.fsencode(path), given, job(progress, threads, memory))
+    _core.build(source, os.fsencode(path), given, call_settings(progress, threads, memory))
     return Store(path)
 
 
@@ -149,43 +159,43 @@ class Store:
     Raises: FileNotFoundError; Error if the store is damaged or was written by a newer version.
     """
 
-    def __init__(self, path):
+    def __init__(self, path: Path) -> None:
         if isinstance(path, _core.OpenStore):  # a view of another store
             self._core = path
         else:
             path = os.fspath(path)
             try:
                 self._core = _core.OpenStore(os.fsencode(path))
-            except _core.Error as error:
+            except Error as error:
                 if not os.path.lexists(path):
                     raise FileNotFoundError(errno.ENOENT, 'there is no store here', path) from error
                 raise
         self._info = self._core.info()
 
     @classmethod
-    def open(cls, path):
+    def open(cls, path: Path) -> Store:
         """Opens the store in a folder, like ``Store(path)``."""
         return cls(path)
 
-    def close(self):
+    def close(self) -> None:
         """Closes the store. Calls that are running in other threads still finish."""
         self._core.close()
 
     @property
-    def closed(self):
+    def closed(self) -> bool:
         """Whether close() has been called."""
         return self._core.closed()
 
-    def __enter__(self):
+    def __enter__(self) -> Store:
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self._info['points']
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         info, name = self._info, os.path.basename(os.path.normpath(self._info['path']))
         levels = info['top'] + 1
         kind = f'raster of {info["columns"]} x {info["rows"]}' if info['grid'] else 'points'
@@ -194,16 +204,16 @@ class Store:
         return (f'<terrace.Store {name!r}: {info["points"]} points, {levels} level{"s" if levels > 1 else ""}, {kind}'
                 f'{", closed" if self.closed else ""}>')
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes | None:
         if self.closed:
             return None
         try:
             return self.mesh(level=self.level_within(100_000))._repr_png_()
-        except _core.Error:
+        except Error:
             return None
 
     @property
-    def info(self):
+    def info(self) -> dict[str, Any]:
         """A dict that describes the store.
 
         points, bytes, top, checksum, parameters: of the whole store.
@@ -216,16 +226,17 @@ class Store:
         return json.loads(json.dumps(self._info))
 
     @property
-    def bounds(self):
+    def bounds(self) -> tuple[float, float, float, float, float, float]:
         """The bounding box (min x, min y, min z, max x, max y, max z) in the CRS."""
-        return tuple(self._info['bounds'])
+        x0, y0, z0, x1, y1, z1 = self._info['bounds']
+        return x0, y0, z0, x1, y1, z1
 
     @property
-    def top(self):
+    def top(self) -> int:
         """The coarsest level; level 0 has all points."""
         return self._info['top']
 
-    def where(self, condition):
+    def where(self, condition: str) -> Store:
         """Returns a view of the store: a Store with only the points that meet a condition.
 
         The view answers queries as a store built from these points alone would at level 0; a coarser level has those
@@ -248,12 +259,13 @@ class Store:
         """
         return Store(self._core.where(condition))
 
-    def level_within(self, most_points):
+    def level_within(self, most_points: int) -> int:
         """Returns the finest level with at most ``most_points`` points; the top level if all have more."""
         return _core.level_within(self._core, as_integer(most_points, 'most_points'))
 
-    def points(self, region=None, level=None, where=None, *, focus=(), cluster=None, crs=None, progress=None,
-               threads=None):
+    def points(self, region: Region | None = None, level: int | None = None, where: str | None = None, *,
+               focus: Focuses = (), cluster: ClusterId | None = None, crs: Crs | None = None,
+               progress: Progress | None = None, threads: int | None = None) -> Records:
         """Returns the points of a level and above that are in a region and meet a condition.
 
         region: a box of four or six numbers in the store's CRS, polygons (an object with ``__geo_interface__``, a
@@ -274,47 +286,47 @@ class Store:
         if level is None:
             level = cluster[0] if cluster else 0
         records = self._core.points(as_integer(level, 'level', bits=32), as_region(region), focuses, where or '', cluster,
-                                    (crs_text(crs) or ''), job(progress, threads))
+                                    crs_text(crs) or '', call_settings(progress, threads))
         return real_values(records, self._info['attributes'])
 
     @staticmethod
-    def _cluster(cluster, region, focus):
+    def _cluster(cluster: ClusterId | None, region: Region | None, focus: list[tuple[Region, int]]) -> tuple[int, int] | None:
         if cluster is None:
             return None
         if region is not None or len(focus):
             raise ValueError('pass either `cluster` or `region` and `focus`')
-        cluster = tuple(cluster)
-        if len(cluster) != 2:
+        pair = tuple(cluster)
+        if len(pair) != 2:
             raise ValueError('`cluster` must be a pair of a level and a number')
-        return as_integer(cluster[0], 'cluster', bits=32), as_integer(cluster[1], 'cluster')
+        return as_integer(pair[0], 'cluster', bits=32), as_integer(pair[1], 'cluster')
 
     @staticmethod
-    def _focuses(focus):
+    def _focuses(focus: Focuses) -> list[tuple[CoreRegion | None, int]]:
         return [(as_region(place), as_integer(level, 'level', bits=32)) for place, level in focus]
 
-    def clusters(self, level=0, *, progress=None, threads=None):
+    def clusters(self, level: int = 0, *, progress: Progress | None = None, threads: int | None = None) -> Records:
         """Describes each cluster of a level.
 
         Returns: a structured array with bounds (six numbers in the CRS: a slightly enlarged box around all points
             below), error (metres; no point below is farther from the representative), descendants (the number of
             points of level 0 below) and members. Row N describes the cluster ``points(cluster=(level, N))``.
         """
-        made = self._core.clusters(as_integer(level, 'level', bits=32), job(progress, threads))
+        made = self._core.clusters(as_integer(level, 'level', bits=32), call_settings(progress, threads))
         return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
 
-    def count(self, box):
+    def count(self, box: Sequence[float]) -> int:
         """Counts the points in a box of four or six numbers, reading only clusters on its border.
 
         Points within rounding of the border may or may not count.
 
         Raises: ValueError for a rotated raster.
         """
-        box = as_region(box)
-        if not isinstance(box, tuple):
+        checked_box = as_region(box)
+        if not isinstance(checked_box, tuple):
             raise ValueError('count() needs a box')
-        return self._core.count(box)
+        return self._core.count(checked_box)
 
-    def own_region(self, region, crs):
+    def own_region(self, region: Region, crs: Crs) -> dict[str, Any]:
         """Converts a region from another CRS to the store's CRS.
 
         Corners are added so that outlines deviate by at most a millionth of their length. The heights of a box are
@@ -330,7 +342,8 @@ class Store:
         return {'type': 'MultiPolygon', 'crs': {'type': 'name', 'properties': {'name': name}},
                 'coordinates': [[ring + ring[:1] for ring in polygon] for polygon in polygons]}
 
-    def query(self, *, box=None, near=None, k=None, radius=None, level=0, where=''):
+    def query(self, *, box: Sequence[float] | None = None, near: Sequence[float] | None = None, k: int | None = None,
+              radius: float | None = None, level: int = 0, where: str = '') -> Records:
         """Returns the points in a box, or near a place: the ``k`` nearest, or all within a ``radius``.
 
         near: (x, y) or (x, y, z) in the store's CRS. Distances are in metres on the ground; they include heights only
@@ -344,7 +357,7 @@ class Store:
         if (box is None) == (near is None):
             raise ValueError('query() needs either `box` or `near`')
         level = as_integer(level, 'level', bits=32)
-        if box is not None:
+        if near is None:
             if k is not None or radius is not None:
                 raise ValueError('`k` and `radius` need `near`')
             return self.points(region=box, level=level, where=where)
@@ -355,12 +368,14 @@ class Store:
             k = as_integer(k, 'k', 1)
         return real_values(self._core.near(place, k, radius, level, where), self._info['attributes'])
 
-    def _sample(self, xy, method, level, max_edge, crs, progress, threads, memory):
-        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, as_integer(level, 'level', bits=32), max_edge, (crs_text(crs) or ''),
-                            job(progress, threads, memory))
+    def _sample(self, xy: Array, method: Interpolation, level: int, max_edge: float | None, crs: Crs | None, progress: Progress | None,
+                threads: int | None, memory: int | None) -> Float64Array:
+        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, as_integer(level, 'level', bits=32), max_edge,
+                            crs_text(crs) or '', call_settings(progress, threads, memory))
 
-    def heights(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
-                memory=None):
+    def heights(self, xy: Array, method: Interpolation = 'linear', *, level: int = 0, max_edge: float | None = None,
+                crs: Crs | None = None, progress: Progress | None = None, threads: int | None = None,
+                memory: int | None = None) -> Float64Array:
         """Returns the heights of the surface at places.
 
         Pass many places at once: each takes about a microsecond, and only the parts of the store around them are
@@ -376,8 +391,9 @@ class Store:
         """
         return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 0]
 
-    def gradients(self, xy, method='linear', *, level=0, max_edge=None, crs=None, progress=None, threads=None,
-                  memory=None):
+    def gradients(self, xy: Array, method: Interpolation = 'linear', *, level: int = 0, max_edge: float | None = None,
+                  crs: Crs | None = None, progress: Progress | None = None, threads: int | None = None,
+                  memory: int | None = None) -> Float64Array:
         """Returns the gradients of the surface at places, east and north in the store's CRS.
 
         The arguments are those of heights().
@@ -386,8 +402,10 @@ class Store:
         """
         return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 1:]
 
-    def raster(self, value='height', *, cell=None, align=None, region=None, crs=None, method='linear', level=0, max_edge=None,
-               path=None, replace=False, progress=None, threads=None, memory=None):
+    def raster(self, value: RasterValue = 'height', *, cell: float | None = None,
+               align: Path | None = None, region: Region | None = None, crs: Crs | None = None, method: Interpolation = 'linear',
+               level: int = 0, max_edge: float | None = None, path: Path | None = None, replace: bool = False,
+               progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Raster:
         """Computes the surface, or a value derived from it, on a grid.
 
         value: 'height', 'slope' (degrees), 'aspect' (degrees clockwise from north, downhill) or 'hillshade' (1 to
@@ -402,10 +420,10 @@ class Store:
 
         Returns: a Raster: ``values``, ``transform``, ``crs``.
         """
-        def make(name):
+        def make(name: str) -> Raster:
             _core.write_raster(self._core, os.fsencode(name), value, cell, b'' if align is None else os.fsencode(align),
-                               as_region(region), (crs_text(crs) or ''), method, as_integer(level, 'level', bits=32),
-                               max_edge, replace, job(progress, threads, memory))
+                               as_region(region), crs_text(crs) or '', method, as_integer(level, 'level', bits=32),
+                               max_edge, replace, call_settings(progress, threads, memory))
             return read_raster(name)
 
         if path is not None:
@@ -413,7 +431,9 @@ class Store:
         with tempfile.TemporaryDirectory() as folder:
             return make(os.path.join(folder, 'raster.tif'))
 
-    def profile(self, line, step=None, *, method='linear', level=0, max_edge=None, progress=None, threads=None):
+    def profile(self, line: Array | GeoInterface | Mapping[str, Any], step: float | None = None, *,
+                method: Interpolation = 'linear', level: int = 0, max_edge: float | None = None, progress: Progress | None = None,
+                threads: int | None = None) -> Float64Array:
         """Returns the surface along a line.
 
         line: shape (n, 2), in the store's CRS; or a LineString as a GeoJSON dict or an object with
@@ -424,15 +444,17 @@ class Store:
         Returns: float64, shape (m, 4): metres from the start of the line (geodesic if the CRS is known), x, y, height
             (NaN where there is no surface).
         """
+        places: Any = line
         crs = None
         if hasattr(line, '__geo_interface__') or isinstance(line, dict):
-            line, crs = geojson(line)
-            line = np.asarray([place[:2] for place in line['coordinates']])
-        return _core.profile(self._core, as_rows(line, 'line', (2,)), crs, step, method, as_integer(level, 'level', bits=32), max_edge,
-                             job(progress, threads))
+            given, crs = geojson(line)
+            places = np.asarray([place[:2] for place in given['coordinates']])
+        return _core.profile(self._core, as_rows(places, 'line', (2,)), crs, step, method, as_integer(level, 'level', bits=32), max_edge,
+                             call_settings(progress, threads))
 
-    def contours(self, interval, *, level=0, max_edge=None, region=None, lonlat=None, progress=None, threads=None,
-                 memory=None):
+    def contours(self, interval: float, *, level: int = 0, max_edge: float | None = None, region: Region | None = None,
+                 lonlat: bool | None = None, progress: Progress | None = None, threads: int | None = None,
+                 memory: int | None = None) -> FeatureCollection:
         """Returns contour lines of the surface.
 
         interval: the height between contours, in the store's vertical unit.
@@ -444,15 +466,18 @@ class Store:
         Raises: Error if longitude and latitude are requested but not known.
         """
         text, own = _core.contours(self._core, float(interval), as_integer(level, 'level', bits=32), max_edge, as_region(region),
-                                   None if lonlat is None else bool(lonlat), job(progress, threads, memory))
+                                   None if lonlat is None else bool(lonlat), call_settings(progress, threads, memory))
         if own and lonlat is None:
             notes.info('contours are in the store\'s own x and y: its CRS cannot be converted to WGS 84')
         lines = FeatureCollection(json.loads(text))
         lines._units = _core.units(self._core) if own else _core.lonlat_units()
         return lines
 
-    def mesh(self, level=None, region=None, *, focus=(), where=None, cluster=None, metric='euclidean', crs=None, max_points=None,
-             smoothing=None, overlay=None, save_overlay=None, replace=False, progress=None, threads=None, memory=None):
+    def mesh(self, level: int | None = None, region: Region | None = None, *, focus: Focuses = (),
+             where: str | None = None, cluster: ClusterId | None = None, metric: str = 'euclidean', crs: Crs | None = None,
+             max_points: int | None = None, smoothing: Smoothing | Mapping[str, Any] | None = None, overlay: Path | None = None,
+             save_overlay: Path | None = None, replace: bool = False, progress: Progress | None = None,
+             threads: int | None = None, memory: int | None = None) -> Mesh:
         """Returns the Delaunay triangulation of a level, with finer detail in focuses.
 
         Areas of a raster without data have no triangles, unless they are narrower than the clusters next to them.
@@ -476,16 +501,18 @@ class Store:
             level = self.level_within(100_000 if max_points is None else max_points)
         elif max_points is not None:
             raise ValueError('mesh() accepts either `level` or `max_points`')
-        heights = {'replace': bool(replace)}
+        heights: dict[str, Any] = {'replace': bool(replace)}
         if smoothing is not None:
             heights['smoothing'] = _smoothing(**({'method': smoothing} if isinstance(smoothing, str) else smoothing))
         for name, path in (('overlay', overlay), ('save', save_overlay)):
             if path is not None:
                 heights[name] = os.fsencode(path)
         return Mesh._of(_core.mesh(self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '',
-                                   cluster, metric, heights, (crs_text(crs) or ''), job(progress, threads, memory)))
+                                   cluster, metric, heights, crs_text(crs) or '', call_settings(progress, threads, memory)))
 
-    def lines(self, level=0, region=None, where=None, *, focus=(), progress=None, threads=None, memory=None):
+    def lines(self, level: int = 0, region: Region | None = None, where: str | None = None, *,
+              focus: Focuses = (), progress: Progress | None = None, threads: int | None = None,
+              memory: int | None = None) -> tuple[list[Float64Array], Int64Array]:
         """Returns the lines of a store built with ``entities`` 'segments' or 'polylines', at mixed levels of detail.
 
         All lines are held in memory. A line is divided where parts of it are left out.
@@ -497,10 +524,21 @@ class Store:
         Raises: ValueError if the store has no lines.
         """
         vertices, begins, numbers = _core.lines(self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus),
-                                                where or '', job(progress, threads, memory))
+                                                where or '', call_settings(progress, threads, memory))
         return np.split(vertices, begins[1:-1]) if len(numbers) else [], numbers
 
-    def surface(self, level=0, region=None, where=None, *, tetrahedra=False, progress=None, threads=None, memory=None):
+    @overload
+    def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: Literal[False] = False,
+                progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Mesh: ...
+
+    @overload
+    def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: Literal[True],
+                progress: Progress | None = None, threads: int | None = None,
+                memory: int | None = None) -> tuple[Float64Array, UInt32Array]: ...
+
+    def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: bool = False,
+                progress: Progress | None = None, threads: int | None = None,
+                memory: int | None = None) -> Mesh | tuple[Float64Array, UInt32Array]:
         """Reconstructs the surface in space that a scan was taken from, through its points.
 
         The surface is open where the scan does not go all the way round. All points are held in memory.
@@ -514,11 +552,14 @@ class Store:
         Source: J. Skala, section 8.3.
         """
         made = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
-                             job(progress, threads, memory))
+                             call_settings(progress, threads, memory))
         return made if tetrahedra else Mesh._of(made)
 
-    def bounded_mesh(self, max_error=None, *, max_points=None, quality='removal', duplicates='all', fill='none',
-                     region=None, where=None, crs=None, path=None, replace=False, progress=None, threads=None, memory=None):
+    def bounded_mesh(self, max_error: float | None = None, *, max_points: int | None = None, quality: Quality = 'removal',
+                     duplicates: Duplicates = 'all',
+                     fill: Fill = 'none', region: Region | None = None,
+                     where: str | None = None, crs: Crs | None = None, path: Path | None = None, replace: bool = False,
+                     progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> BoundedMesh:
         """Returns a mesh with few triangles that is within ``max_error`` metres of every sample, verified on each.
 
         Give either max_error or max_points. The mesh is computed window by window; memory is constant apart from the
@@ -537,7 +578,7 @@ class Store:
         """
         if (max_error is None) == (max_points is None):
             raise ValueError('bounded_mesh() needs either `max_error` or `max_points`')
-        options = {'quality': quality, 'duplicates': duplicates, 'fill': fill, 'region': as_region(region),
+        options: dict[str, Any] = {'quality': quality, 'duplicates': duplicates, 'fill': fill, 'region': as_region(region),
                    'where': where or '', 'replace': replace, 'crs': crs_text(crs) or ''}
         if max_error is not None:
             max_error = float(max_error)
@@ -546,15 +587,16 @@ class Store:
             options['max_error'] = max_error
         else:
             options['max_points'] = as_integer(max_points, 'max_points', 3)
-        context = job(progress, threads, memory)
+        context = call_settings(progress, threads, memory)
 
-        def make(name, say=None):
+        def make(name: str, say: Callable[[str], object] | None = None) -> BoundedMesh:
             measured = _core.bounded_mesh(self._core, os.fsencode(name), options, context)
             if say and measured['note']:
                 say(measured['note'])
             if measured['triangles'] == 0:  # Mesh.read() refuses such a file
                 return BoundedMesh(np.empty((0, 3)), np.empty((0, 3), np.uint32), measured)
-            return BoundedMesh(*_core.read_mesh(os.fsencode(name))[:2], measured)
+            vertices, triangles, *_ = _core.read_mesh(os.fsencode(name))
+            return BoundedMesh(vertices, triangles, measured)
 
         if path is not None:
             path = os.fspath(path)
@@ -566,7 +608,8 @@ class Store:
         with tempfile.TemporaryDirectory() as folder:
             return make(os.path.join(folder, 'mesh.ply'))
 
-    def tiles(self, folder, zooms=None, *, progress=None, threads=None, memory=None, **options):
+    def tiles(self, folder: Path, zooms: tuple[int, int] | None = None, *, progress: Progress | None = None,
+              threads: int | None = None, memory: int | None = None, **options: Any) -> dict[str, Any]:
         """Writes quantized-mesh tiles for web globes, and layer.json.
 
         zooms: (first, last); by default from 0 to the zoom that shows every sample.
@@ -580,14 +623,14 @@ class Store:
         given = checked(options, _TILE_OPTIONS, 'tiles')
         if zooms is not None:
             given['first_zoom'], given['last_zoom'] = (as_integer(zoom, 'zooms', bits=32) for zoom in zooms)
-        return _core.write_tiles(self._core, os.fsencode(folder), given, job(progress, threads, memory))
+        return _core.write_tiles(self._core, os.fsencode(folder), given, call_settings(progress, threads, memory))
 
-    def verify(self, *, progress=None, threads=None):
+    def verify(self, *, progress: Progress | None = None, threads: int | None = None) -> list[str]:
         """Checks every byte and invariant. Returns: a list of faults, empty if the store is sound."""
-        return self._core.verify(job(progress, threads))
+        return self._core.verify(call_settings(progress, threads))
 
     @property
-    def __geo_interface__(self):
+    def __geo_interface__(self) -> dict[str, Any]:
         """The bounds in the store's CRS as a GeoJSON Polygon."""
         x0, y0, _, x1, y1, _ = self.bounds
         return {'type': 'Polygon', 'coordinates': (((x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)),)}

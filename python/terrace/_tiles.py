@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks sets of tiles."""
 
+from __future__ import annotations
+
 import os
+from typing import Any
 
 from . import _core
-from ._job import job
+from ._call import call_settings
+from ._names import Vertical
 from ._store import Store
+from ._types import Path, Progress
 
 
-def verify_tiles(folder, store=None, *, max_error=None, vertical='recorded', geoid=None, progress=None, threads=None,
-                 memory=None):
+def verify_tiles(folder: Path, store: Store | None = None, *, max_error: float | None = None,
+                 vertical: Vertical = 'recorded', geoid: Path | None = None,
+                 progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> dict[str, Any]:
     """Decodes and checks every tile of a set written by Store.tiles(): layer.json, bytes, meshes and shared sides.
 
     store: also compares the tiles' heights with each sample of this store.
@@ -25,4 +31,4 @@ def verify_tiles(folder, store=None, *, max_error=None, vertical='recorded', geo
         raise TypeError(f'`store` must be a Store, not {store!r}')
     return _core.check_tiles(os.fsencode(folder), None if store is None else store._core,
                              None if max_error is None else float(max_error), vertical,
-                             '' if geoid is None else os.fsencode(geoid), job(progress, threads, memory))
+                             '' if geoid is None else os.fsencode(geoid), call_settings(progress, threads, memory))

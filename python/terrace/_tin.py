@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bounded-error meshes and interpolation, directly from arrays."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -9,15 +13,19 @@ from . import _core
 from ._arrays import as_integer, as_numbers, as_rows
 from ._delaunay import Delaunay2
 from ._mesh import BoundedMesh
+from ._names import Duplicates, Interpolation, Quality
 from ._sources import source_of
+from ._types import Array, Float64Array, Int64Array
 
 
-def _values(column):
+def _values(column: dict[str, Any]) -> Float64Array:
     return np.ascontiguousarray(column['array'] * column['scale'] + column['offset'], dtype=np.float64)
 
 
-def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal', duplicates='all', min_angle=5.0, frame=None, transform=None,
-                 nodata=None):
+def bounded_mesh(samples: Any, max_error: float | None = None, *, max_points: int | None = None, quality: Quality = 'removal',
+                 duplicates: Duplicates = 'all', min_angle: float = 5.0,
+                 frame: Array | None = None, transform: Iterable[float] | None = None,
+                 nodata: float | None = None) -> BoundedMesh:
     """Meshes an array with few triangles and within ``max_error`` of every sample, verified on each.
 
     Give either max_error or max_points. Store.bounded_mesh() handles data larger than memory.
@@ -76,7 +84,7 @@ def bounded_mesh(samples, max_error=None, *, max_points=None, quality='removal',
     return BoundedMesh(vertices, triangles, measured)
 
 
-def interpolate(samples, places, method='linear', *, threads=None):
+def interpolate(samples: Array, places: Array, method: Interpolation = 'linear', *, threads: int | None = None) -> Float64Array:
     """Interpolates heights at places between scattered samples, as scipy.interpolate.griddata does.
 
     To compute gradients, or to interpolate repeatedly, use Delaunay2.heights().
@@ -96,7 +104,7 @@ def interpolate(samples, places, method='linear', *, threads=None):
     return mesh.heights(mesh.by_vertex(samples[:, 2]), places, method, threads=threads)
 
 
-def simplify_line(t, heights, max_error):
+def simplify_line(t: Array, heights: Array, max_error: float) -> tuple[Int64Array, float]:
     """Selects few samples of a line so that the straight pieces between them are within ``max_error`` of all samples.
 
     It takes both ends, then repeatedly the sample with the largest error. The result depends only on these samples,

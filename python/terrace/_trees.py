@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trees of repeated matching, and queries in bounding volume hierarchies."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_integer, as_labels, as_numbered, as_numbers, as_rows
-from ._matching import _threads
+from ._call import thread_count
+from ._types import Array, Float64Array, Int64Array, UInt32Array
 
 
 @dataclass(frozen=True)
@@ -20,16 +25,17 @@ class MatchingTree:
     positions: the (weighted) mean of the points below each row's node.
     """
 
-    rows: np.ndarray
-    levels: np.ndarray
-    positions: np.ndarray
+    rows: Float64Array
+    levels: UInt32Array
+    positions: Float64Array
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         depth = int(self.levels.max()) if len(self.levels) else 0
         return f'<terrace.MatchingTree: {len(self.rows)} rows, {depth} levels>'
 
 
-def matching_tree(points, *, weights=None, labels=None, matcher=None, threads=None):
+def matching_tree(points: Array, *, weights: Array | None = None, labels: Array | None = None,
+                  matcher: Callable[[Float64Array], Array] | None = None, threads: int | None = None) -> MatchingTree:
     """Builds the binary tree of repeated matching.
 
     Matches points, replaces each pair by a point, and repeats until one is left.
@@ -58,10 +64,11 @@ def matching_tree(points, *, weights=None, labels=None, matcher=None, threads=No
     make = _core.matching_tree3 if points.shape[1] == 3 else _core.matching_tree2
     return MatchingTree(*make(points, weights, as_labels(labels),
                               None if matcher is None else lambda nodes: as_numbered(matcher(nodes), 'partners', least=-1),
-                              _threads(threads)))
+                              thread_count(threads)))
 
 
-def rotate_tree(tree, lower, upper=None, *, passes=16):
+def rotate_tree(tree: MatchingTree | Array, lower: Array, upper: Array | None = None, *,
+                passes: int = 16) -> UInt32Array:
     """Makes the boxes of a tree smaller by rotations from the leaves upward.
 
     A rotation exchanges a child with a child of its sibling if that helps.
@@ -86,7 +93,7 @@ def rotate_tree(tree, lower, upper=None, *, passes=16):
     return rotate(_children(tree, lower), lower, upper, as_integer(passes, 'passes', bits=32))
 
 
-def _children(tree, points):
+def _children(tree: MatchingTree | Array | None, points: Float64Array) -> Float64Array:
     """Returns the two columns of children of a tree in any accepted form; None gives a new matching_tree()."""
     if tree is None:
         tree = matching_tree(points) if len(points) else np.empty((0, 4))
@@ -95,20 +102,24 @@ def _children(tree, points):
 
 
 class _Tree:
+    _core: Any
+    _count: int
+    _what: str
+
     @property
-    def cost(self):
+    def cost(self) -> float:
         """The expected cost of a random ray that hits the root's box, by the surface area heuristic with unit costs."""
         return self._core.cost()
 
     @property
-    def depth(self):
+    def depth(self) -> int:
         """The number of nodes above the deepest leaf."""
         return self._core.depth()
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self._count
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.{type(self).__name__}: {self._count} {self._what}, depth {self.depth}>'
 
 
@@ -128,13 +139,13 @@ class PointTree(_Tree):
 
     _what = 'points'
 
-    def __init__(self, points, tree=None):
+    def __init__(self, points: Array, tree: MatchingTree | Array | None = None) -> None:
         points = as_rows(points, 'points')
         self._count, self._width = points.shape
         kind = _core.PointTree3 if self._width == 3 else _core.PointTree2
         self._core = kind(_children(tree, points), points)
 
-    def nearest(self, places, k=1):
+    def nearest(self, places: Array, k: int = 1) -> tuple[Int64Array, Float64Array]:
         """Finds the ``k`` points nearest to each place.
 
         Returns: (indices, int64; distances, float64), both of shape (m, k), nearest first; -1 and infinity if there
@@ -148,7 +159,7 @@ class PointTree(_Tree):
         return (np.pad(found.reshape(shape), more, constant_values=-1),
                 np.pad(distances.reshape(shape), more, constant_values=np.inf))
 
-    def hit(self, origins, directions, radius):
+    def hit(self, origins: Array, directions: Array, radius: float) -> tuple[Int64Array, Float64Array]:
         """Finds the first ball along each ray, among balls of one radius around the points, which must be in space.
 
         origins, directions: shape (m, 3).
@@ -178,14 +189,14 @@ class TriangleTree(_Tree):
 
     _what = 'triangles'
 
-    def __init__(self, vertices, triangles, tree=None):
+    def __init__(self, vertices: Array, triangles: Array, tree: MatchingTree | Array | None = None) -> None:
         vertices = as_rows(vertices, 'vertices', (3,))
         triangles = as_numbered(triangles, 'triangles', 3, most=len(vertices) - 1)
         self._count = len(triangles)
         middles = _core.centroids(vertices, triangles)
         self._core = _core.TriangleTree(_children(tree, middles), vertices, triangles)
 
-    def nearest(self, places):
+    def nearest(self, places: Array) -> tuple[Int64Array, Float64Array]:
         """Finds the triangle nearest to each place, shape (m, 3). Ties go to the lowest index.
 
         Returns: (indices, int64; distances, float64); -1 and infinity if there are no triangles.
@@ -193,7 +204,7 @@ class TriangleTree(_Tree):
         """
         return self._core.nearest(as_rows(places, 'places', (3,)))
 
-    def hit(self, origins, directions):
+    def hit(self, origins: Array, directions: Array) -> tuple[Int64Array, Float64Array]:
         """Finds the first triangle along each ray, from either side.
 
         No ray slips between triangles that share an edge.

@@ -1,21 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Live views: a camera in, changes of the mesh out."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from . import _core
 from ._arrays import as_integer, as_numbered, as_numbers, as_rows
+from ._call import thread_count
 from ._geo import region as as_region
-from ._matching import _threads
 from ._mesh import Mesh
+from ._names import ViewKind, ViewReader
 from ._store import Store
+from ._types import Array, ClusterId, Float64Array, Int32Array, Records, UInt64Array
 
 
-def _box(box):
-    box = as_region(as_numbers(box, 'a box').ravel())
-    return [float(number) for number in box]
+def _box(box: Array) -> list[float]:
+    region = as_region(as_numbers(box, 'a box').ravel())
+    return [float(number) for number in region or ()]
 
 
 @dataclass(frozen=True)
@@ -25,16 +31,16 @@ class MeshDelta:
     Numbers of vertices and triangles are small int32 values. Each stays the same while its vertex or triangle exists.
     """
 
-    added_vertices: np.ndarray  #: shape (n,)
-    added_positions: np.ndarray  #: shape (n, 3)
-    removed_vertices: np.ndarray
-    moved_vertices: np.ndarray  #: now represent another point
-    moved_positions: np.ndarray
-    added_triangles: np.ndarray  #: shape (m,)
-    added_corners: np.ndarray  #: shape (m, 3), vertex numbers, counter-clockwise
-    removed_triangles: np.ndarray
+    added_vertices: Int32Array  #: shape (n,)
+    added_positions: Float64Array  #: shape (n, 3)
+    removed_vertices: Int32Array
+    moved_vertices: Int32Array  #: now represent another point
+    moved_positions: Float64Array
+    added_triangles: Int32Array  #: shape (m,)
+    added_corners: Int32Array  #: shape (m, 3), vertex numbers, counter-clockwise
+    removed_triangles: Int32Array
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return (f'<terrace.MeshDelta: {len(self.added_triangles)} triangles added, {len(self.removed_triangles)} removed, '
                 f'{len(self.added_vertices)} and {len(self.removed_vertices)} vertices>')
 
@@ -50,7 +56,7 @@ class ViewDelta(MeshDelta):
     points: int  #: number of points now
     settled: bool  #: another frame with the same camera would change nothing
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return (f'<terrace.ViewDelta: {len(self.added_triangles)} triangles added, {len(self.removed_triangles)} removed, '
                 f'{self.points} points{", settled" if self.settled else ""}>')
 
@@ -75,22 +81,22 @@ class View:
     Source: J. Skala, Algorithms for manipulating large geometric data, section 8.4.
     """
 
-    def __init__(self, store, kind='mesh', *, reader='thread', max_points=1 << 22, max_bytes=1 << 28, collapse_below=0.75, guard=0.05,
-                 silhouette=1.0):
+    def __init__(self, store: Store, kind: ViewKind = 'mesh', *,
+                 reader: ViewReader = 'thread', max_points: int = 1 << 22, max_bytes: int = 1 << 28,
+                 collapse_below: float = 0.75, guard: float = 0.05, silhouette: float = 1.0) -> None:
         if not isinstance(store, Store):
             raise TypeError(f'a view needs a terrace.Store, not {type(store).__name__}')
-        if not isinstance(kind, str) or kind not in ('mesh', 'points', 'surface'):
-            raise ValueError(f'`kind` must be one of mesh, points, surface, not {kind!r}')
-        if not isinstance(reader, str) or reader not in ('thread', 'frame'):
-            raise ValueError(f'`reader` must be one of thread, frame, not {reader!r}')
         options = {'max_points': as_integer(max_points, 'max_points'), 'max_bytes': as_integer(max_bytes, 'max_bytes'),
                    'collapse_below': float(collapse_below), 'guard': float(guard), 'silhouette': float(silhouette)}
-        self._core = _core.SharedView(store._core, kind, reader == 'frame', options)
+        self._core = _core.SharedView(store._core, kind, reader, options)
         self._first = True
         self._points = 0
 
-    def frame(self, position=None, direction=(0.0, 1.0, -0.5), up=(0.0, 0.0, 1.0), *, fov=60.0, size=(1920, 1080),
-              ground_height=None, matrix=None, pixel_error=2.0, ground_error=float('inf'), focus=(), regions=(), seconds=0.01):
+    def frame(self, position: Sequence[float] | None = None, direction: Sequence[float] = (0.0, 1.0, -0.5),
+              up: Sequence[float] = (0.0, 0.0, 1.0), *, fov: float = 60.0, size: tuple[int, int] = (1920, 1080),
+              ground_height: float | None = None, matrix: Array | None = None, pixel_error: float = 2.0,
+              ground_error: float = float('inf'), focus: Iterable[tuple[Array, int]] = (),
+              regions: Iterable[tuple[Array, float]] = (), seconds: float = 0.01) -> ViewDelta:
         """Moves the mesh towards what a camera needs, in at most about ``seconds``.
 
         position, direction, up: of the eye, three numbers each.
@@ -110,32 +116,32 @@ class View:
         width, height = size
         if not (width > 0 and height > 0):
             raise ValueError('`size` must be the width and height of a picture in pixels')
-        position, direction, up, matrix = (
-            None if given is None else as_numbers(given, what) for what, given in
-            (('position', position), ('direction', direction), ('up', up), ('matrix', matrix)))
         if direction is None or up is None:
             raise TypeError('`direction` and `up` must be three numbers each')
+        arrays = {'position': position, 'direction': direction, 'up': up, 'matrix': matrix}
+        camera: dict[str, Any] = {name: None if given is None else as_numbers(given, name) for name, given in arrays.items()}
         delta = self._core.frame(
-            {'position': position, 'direction': direction, 'up': up, 'fov': fov, 'width': width, 'height': height,
-             'ground_height': None if ground_height is None else float(ground_height), 'matrix': matrix, 'pixel_error': pixel_error,
-             'ground_error': ground_error, 'focus': [(_box(box), as_integer(level, 'level', bits=32)) for box, level in focus],
+            {**camera, 'fov': fov, 'width': width, 'height': height,
+             'ground_height': None if ground_height is None else float(ground_height), 'pixel_error': pixel_error,
+             'ground_error': ground_error,
+             'focus': [(_box(box), as_integer(level, 'level', bits=32)) for box, level in focus],
              'regions': [(_box(box), float(error)) for box, error in regions]}, float(seconds))
         if self._first:
-            whole_mesh = self._core.whole()
+            everything = self._core.snapshot()
             for name in ('expanded', 'collapsed', 'missing', 'pending'):
-                whole_mesh[name] = delta[name]
-            delta, self._first = whole_mesh, False
+                everything[name] = delta[name]
+            delta, self._first = everything, False
         self._points = delta['points']
         return ViewDelta(**delta)
 
-    def restore(self, *, threads=None):
+    def restore(self, *, threads: int | None = None) -> ViewDelta:
         """Recomputes the surface of a scan, which frames only update locally. Call it when the camera rests.
 
         Returns: the ViewDelta to the new surface; an empty one for other kinds.
         """
-        return ViewDelta(**self._core.restore(_threads(threads)))
+        return ViewDelta(**self._core.restore(thread_count(threads)))
 
-    def pin(self, cluster, expanded):
+    def pin(self, cluster: ClusterId, expanded: bool | None) -> None:
         """Keeps a cluster, (level, number), expanded (True) or collapsed (False); None returns control to the camera.
 
         Raises: ValueError for a cluster that the store does not have.
@@ -143,7 +149,7 @@ class View:
         level, number = cluster
         self._core.pin(as_integer(level, 'cluster', bits=32), as_integer(number, 'cluster'), None if expanded is None else bool(expanded))
 
-    def attributes(self, vertices):
+    def attributes(self, vertices: Array) -> Records:
         """Returns the stored attributes of vertices as a structured array.
 
         The attributes of vertices that a frame added are available until the next frame.
@@ -152,20 +158,20 @@ class View:
         """
         return self._core.attributes(as_numbered(vertices, 'vertices', most=2 ** 31 - 1))
 
-    def to_metres(self, points):
+    def to_metres(self, points: Array) -> Float64Array:
         """Converts points, shape (n, 3), from the store's CRS to metres in the frame of the view and its cameras."""
         return self._core.to_metres(as_rows(points, 'points', (3,)))
 
-    def snapshot(self):
+    def snapshot(self) -> ViewDelta:
         """Returns the whole current mesh as a ViewDelta that adds it."""
-        return ViewDelta(**self._core.whole())
+        return ViewDelta(**self._core.snapshot())
 
     @property
-    def traffic(self):
+    def traffic(self) -> dict[str, int]:
         """A dict of the numbers of clusters, points and bytes read so far."""
         return dict(zip(('clusters', 'points', 'bytes'), self._core.traffic()))
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         return f'<terrace.View: {self._points} points>'
 
 
@@ -193,7 +199,7 @@ class Multiresolution:
     (True, 1)
     """
 
-    def __init__(self, store, level=None, *, focus=()):
+    def __init__(self, store: Store, level: int | None = None, *, focus: Iterable[tuple[Array, int]] = ()) -> None:
         if not isinstance(store, Store):
             raise TypeError(f'a model needs a terrace.Store, not {type(store).__name__}')
         self._top, self._units = store.top, _core.units(store._core)
@@ -201,36 +207,36 @@ class Multiresolution:
         self._core = kind(store._core, store.top if level is None else as_integer(level, 'level', bits=32), self._focuses(focus))
 
     @staticmethod
-    def _flat(box):
+    def _flat(box: Array) -> list[float]:
         box = _box(box)
         return box[:2] + box[3:5]
 
     @classmethod
-    def _focuses(cls, focus):
+    def _focuses(cls, focus: Iterable[tuple[Array, int]]) -> list[tuple[list[float], int]]:
         return [(cls._flat(box), as_integer(level, 'level', bits=32)) for box, level in focus]
 
     @staticmethod
-    def _cluster(cluster):
+    def _cluster(cluster: ClusterId) -> tuple[int, int]:
         level, number = cluster
         return as_integer(level, 'cluster', bits=32), as_integer(number, 'cluster')
 
-    def expand(self, cluster):
+    def expand(self, cluster: ClusterId) -> MeshDelta:
         """Adds the members of a cluster whose parent is the root or an expanded cluster."""
         return MeshDelta(**self._core.expand(self._cluster(cluster)))
 
-    def collapse(self, cluster):
+    def collapse(self, cluster: ClusterId) -> MeshDelta:
         """Removes the members of a cluster, after those of the expanded clusters below it."""
         return MeshDelta(**self._core.collapse(self._cluster(cluster)))
 
-    def refine(self, box, level):
+    def refine(self, box: Array, level: int) -> MeshDelta:
         """Expands clusters until a box (min x, min y, max x, max y) has all its points of ``level`` and above."""
         return MeshDelta(**self._core.set_region(self._flat(box), as_integer(level, 'level', bits=32), True, False))
 
-    def coarsen(self, box, level):
+    def coarsen(self, box: Array, level: int) -> MeshDelta:
         """Collapses the clusters below ``level`` that are inside a box."""
         return MeshDelta(**self._core.set_region(self._flat(box), as_integer(level, 'level', bits=32), False, True))
 
-    def set_detail(self, level, *, focus=()):
+    def set_detail(self, level: int, *, focus: Iterable[tuple[Array, int]] = ()) -> MeshDelta:
         """Shows all points of ``level`` and above, and in each focus those of the focus's level and above.
 
         Other points are shown only if they share a cluster with these.
@@ -239,27 +245,27 @@ class Multiresolution:
         """
         return MeshDelta(**self._core.set_detail(as_integer(level, 'level', bits=32), self._focuses(focus)))
 
-    def snapshot(self):
+    def snapshot(self) -> MeshDelta:
         """Returns the whole current mesh as a MeshDelta that adds it."""
-        return MeshDelta(**self._core.whole())
+        return MeshDelta(**self._core.snapshot())
 
     @property
-    def mesh(self):
+    def mesh(self) -> Mesh:
         """The current triangulation as a Mesh."""
-        whole_mesh = self._core.whole()
-        corners = np.searchsorted(whole_mesh['added_vertices'], whole_mesh['added_corners'])
-        return Mesh._of((whole_mesh['added_positions'], corners.astype(np.uint32), self._core.levels(), self._units))
+        everything = self._core.snapshot()
+        corners = np.searchsorted(everything['added_vertices'], everything['added_corners'])
+        return Mesh._of((everything['added_positions'], corners.astype(np.uint32), self._core.levels(), self._units))
 
     @property
-    def expanded(self):
+    def expanded(self) -> UInt64Array:
         """The expanded clusters, without the root: uint64, shape (n, 2), pairs of level and number."""
         return self._core.expanded()
 
-    def children(self, cluster=None):
+    def children(self, cluster: ClusterId | None = None) -> UInt64Array:
         """Returns the clusters directly below an expanded one, by default the root: shape (n, 2)."""
         return self._core.children((self._top, 0) if cluster is None else self._cluster(cluster))
 
-    def cluster_info(self, cluster):
+    def cluster_info(self, cluster: ClusterId) -> dict[str, Any]:
         """Describes a cluster that is expanded or can be.
 
         Returns: a dict with bounds (six numbers in the CRS: a box around all points below), error (metres; no point
@@ -267,12 +273,12 @@ class Multiresolution:
         """
         return dict(zip(('bounds', 'error', 'members'), self._core.record(self._cluster(cluster))))
 
-    def __len__(self):
+    def __len__(self) -> int:
         return self._core.count()[0]
 
-    def __repr__(self):
+    def __repr__(self) -> str:
         points, triangles = self._core.count()
         return f'<terrace.Multiresolution: {points} points, {triangles} triangles, {len(self.expanded)} clusters expanded>'
 
-    def _repr_png_(self):
+    def _repr_png_(self) -> bytes:
         return self.mesh._repr_png_()

@@ -10,7 +10,7 @@ import unittest
 
 import terrace
 from terrace import _core
-from terrace._job import job
+from terrace._call import call_settings
 from python_case import ROOT
 
 GOLDEN = os.path.join(ROOT, 'tests', 'golden')
@@ -97,7 +97,7 @@ class Golden(unittest.TestCase):
         self.hills.raster('slope', cell=40, path='slope.tif')
         self.check('terrace raster hills.terrace --value slope --cell 40 -o slope.tif')
         with open('contour.geojson', 'w', encoding='ascii') as file:
-            file.write(_core.contours(self.hills._core, 100, 0, None, None, None, job())[0])
+            file.write(_core.contours(self.hills._core, 100, 0, None, None, None, call_settings())[0])
         self.check('terrace contour hills.terrace --interval 100 -o contour.geojson')
         coast = terrace.build('coast.tif', 'coast.terrace', block_points=500, vertical='ellipsoidal')
         coast.tiles('coast-tiles', (0, 11))
