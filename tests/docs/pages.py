@@ -152,10 +152,15 @@ class Session:
 
 def run_shell(code, folder, environment):
     """Returns (output, exit status)."""
-    done = subprocess.run(['bash', '-eu', '-o', 'pipefail', '-c', code], cwd=folder, env=environment, text=True,
-                          stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=SECONDS,
-                          check=False)
-    return done.stdout, done.returncode
+    shell = subprocess.Popen(['bash', '-eu', '-o', 'pipefail', '-c', code], cwd=folder, env=environment, text=True,
+                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, start_new_session=True)
+    try:
+        output, _ = shell.communicate(timeout=SECONDS)
+    except subprocess.TimeoutExpired:
+        os.killpg(shell.pid, signal.SIGKILL)
+        shell.communicate()
+        raise Fault(f'not done after {SECONDS} s:\n{code}') from None
+    return output, shell.returncode
 
 
 def run_server(code, folder, environment):

@@ -6,7 +6,9 @@ import os
 import sys
 import tempfile
 import unittest
+from unittest import mock
 
+import pages
 from pages import MOST_SKIPPED, Fault, Page
 
 
@@ -48,6 +50,10 @@ class PagesTest(unittest.TestCase):
         self.run_text('<!-- test: exit 2 -->', '```sh', 'exit 2', '```')
         self.refused('ZeroDivisionError', '```python', '1 / 0', '```')
         self.refused('ended without an address', '<!-- test: serves -->', '```sh', 'echo no', '```')
+
+    def test_a_block_without_end_is_stopped(self):
+        with mock.patch.object(pages, 'SECONDS', 0.3):
+            self.refused('not done after 0.3 s', '```sh', 'sleep 60 | cat', '```')
 
     def test_blocks_share_a_folder_and_python_its_names(self):
         self.run_text('<!-- test: file a/b.txt -->', '```json', '{}', '```', '```python', 'x = open("a/b.txt").read()', '```',
