@@ -197,21 +197,22 @@ class Descent {
     const std::vector<std::uint64_t> ordinals = take_heads(level);
     const std::size_t each = static_cast<std::size_t>(clusters_per_part(level));
     base::in_order((ordinals.size() + each - 1) / each, threads_,
-             [&](unsigned worker, std::size_t i) {
-               Read read = begin(worker);
-               stream::ClusterPoints points;
-               for (std::size_t k = i * each; k < std::min(ordinals.size(), (i + 1) * each); ++k) {
-                 const stream::ClusterId id = stream::cluster_id(level, ordinals[k]);
-                 const auto record = wanted(id);
-                 // Higher levels are always read, for the clusters that their points head.
-                 if (!record || (level == 0 && !store_.may_match(id))) continue;
-                 store_.read(id, points);
-                 add(read, id, *record, points);
-               }
-               read.part->end();
-               return read;
-             },
-             [&](std::size_t, Read&& read) { take(std::move(read)); });
+                   [&](unsigned worker, std::size_t i) {
+                     Read read = begin(worker);
+                     stream::ClusterPoints points;
+                     for (std::size_t k = i * each; k < std::min(ordinals.size(), (i + 1) * each);
+                          ++k) {
+                       const stream::ClusterId id = stream::cluster_id(level, ordinals[k]);
+                       const auto record = wanted(id);
+                       // Higher levels are always read, for the clusters that their points head.
+                       if (!record || (level == 0 && !store_.may_match(id))) continue;
+                       store_.read(id, points);
+                       add(read, id, *record, points);
+                     }
+                     read.part->end();
+                     return read;
+                   },
+                   [&](std::size_t, Read&& read) { take(std::move(read)); });
   }
 
   [[nodiscard]] std::uint64_t clusters_per_part(unsigned level) const {

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include <fmt/core.h>
-
 #include <terrace/base/ordered_work.hpp>
 
 #include "base/units.hpp"

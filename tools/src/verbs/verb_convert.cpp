@@ -8,10 +8,9 @@
 #include <utility>
 #include <vector>
 
-#include <terrace/base/ordered_work.hpp>
-
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
+#include <terrace/base/ordered_work.hpp>
 
 #include "base/units.hpp"
 #include "build/damage_report.hpp"

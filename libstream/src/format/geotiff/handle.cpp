@@ -208,7 +208,8 @@ std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) con
   }
   if (found != 1 || data == nullptr) return {};
   if (TIFFFieldDataType(known) != type) {
-    throw fault(fmt::format("has TIFF type {} instead of {}", static_cast<int>(TIFFFieldDataType(known)), type))
+    throw fault(fmt::format("has TIFF type {} instead of {}",
+                            static_cast<int>(TIFFFieldDataType(known)), type))
         .at(fmt::format("field {}", tag))
         .remedy("check that it is a complete GeoTIFF file (gdalinfo)");
   }
