@@ -21,6 +21,7 @@ PAGES = {
     'CONTRIBUTING.md': 'project/contributing.md',
     'CHANGELOG.md': 'project/changes.md',
     'libstream/FORMAT.md': 'reference/store-format.md',
+    'research/README.md': 'background/research.md',
     'tools/README.md': 'reference/command-details.md',
     'viewer/README.md': 'reference/viewer.md',
     'python/README.md': 'reference/python-overview.md',
