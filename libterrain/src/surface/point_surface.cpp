@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <utility>
 
@@ -23,6 +24,8 @@ constexpr std::uint32_t kFarthest = 8;
 constexpr std::size_t kManyCells = 128;
 /// Memory for decoded clusters, for circles that reach beyond the loaded points.
 constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
+/// The number of heights of points beyond the loaded ones to keep: triangles over voids share them.
+constexpr std::size_t kDistant = 1024;
 
 double square_of(double dx, double dy) { return dx * dx + dy * dy; }
 
@@ -65,7 +68,8 @@ PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t me
     : cloud_(cloud),
       too_long_(std::move(too_long)),
       memory_bytes_(memory_bytes),
-      query_(cloud.store, kSurfaceCacheBytes) {
+      query_(cloud.store, kSurfaceCacheBytes),
+      distant_(kDistant, {{}, NAN}) {
   own_.clear();
 }
 
@@ -294,6 +298,9 @@ void PointSurface::find_star(const Point2& centre) {
 
 double PointSurface::height(const Point2& point) {
   if (cells_->knows(point)) return cells_->height(point);
+  const std::hash<double> hash;
+  SurfaceCorner& kept = distant_[(31 * hash(point[0]) + hash(point[1])) % distant_.size()];
+  if (kept.place == point && !std::isnan(kept.height)) return kept.height;
   const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   const StoredBox box{point, point};
   std::optional<double> found;
@@ -308,7 +315,8 @@ double PointSurface::height(const Point2& point) {
           found = p[2] * channel.scale + channel.offset;
         }
       });
-  return found.value_or(NAN);
+  kept = {point, found.value_or(NAN)};
+  return kept.height;
 }
 
 SurfaceTriangle PointSurface::with_heights(const Corners& corners) {

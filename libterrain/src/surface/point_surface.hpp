@@ -112,6 +112,7 @@ class PointSurface {
   const PointCells* cells_ = &own_;
   std::optional<Corners> triangle_;  ///< a triangle of the triangulation of all points
   PointStar star_;
+  std::vector<SurfaceCorner> distant_;  ///< by hash of the place; NaN: none
   std::vector<CircleCover> covers_;
   std::vector<SurfaceTriangle> meeting_;
   std::vector<Point2> points_;
