@@ -24,8 +24,9 @@ constexpr std::uint32_t kFarthest = 8;
 constexpr std::size_t kManyCells = 128;
 /// Memory for decoded clusters, for circles that reach beyond the loaded points.
 constexpr std::uint64_t kSurfaceCacheBytes = std::uint64_t{4} << 20;
-/// The number of heights of points beyond the loaded ones to keep: triangles over voids share them.
-constexpr std::size_t kDistant = 1024;
+/// The number of corners whose heights are kept. Neighbouring triangles share them, and finding a
+/// height takes long between crowded points and beyond the loaded ones.
+constexpr std::size_t kCorners = 1024;
 
 double square_of(double dx, double dy) { return dx * dx + dy * dy; }
 
@@ -69,7 +70,7 @@ PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t me
       too_long_(std::move(too_long)),
       memory_bytes_(memory_bytes),
       query_(cloud.store, kSurfaceCacheBytes),
-      distant_(kDistant, {{}, NAN}) {
+      corners_(kCorners, {{}, NAN}) {
   own_.clear();
 }
 
@@ -297,10 +298,14 @@ void PointSurface::find_star(const Point2& centre) {
 }
 
 double PointSurface::height(const Point2& point) {
-  if (cells_->knows(point)) return cells_->height(point);
   const std::hash<double> hash;
-  SurfaceCorner& kept = distant_[(31 * hash(point[0]) + hash(point[1])) % distant_.size()];
+  SurfaceCorner& kept = corners_[(31 * hash(point[0]) + hash(point[1])) % corners_.size()];
   if (kept.place == point && !std::isnan(kept.height)) return kept.height;
+  kept = {point, cells_->knows(point) ? cells_->height(point) : read_height(point)};
+  return kept.height;
+}
+
+double PointSurface::read_height(const Point2& point) {
   const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   const StoredBox box{point, point};
   std::optional<double> found;
@@ -315,8 +320,7 @@ double PointSurface::height(const Point2& point) {
           found = p[2] * channel.scale + channel.offset;
         }
       });
-  kept = {point, found.value_or(NAN)};
-  return kept.height;
+  return found.value_or(NAN);
 }
 
 SurfaceTriangle PointSurface::with_heights(const Corners& corners) {

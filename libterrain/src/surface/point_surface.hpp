@@ -70,6 +70,8 @@ class PointSurface {
   SurfacePoint at_nearest(const Point2& place) { return at_point(nearest(place)); }
 
  private:
+  /// The height of a point that is not among the loaded ones.
+  double read_height(const Point2& point);
   using Corners = std::array<Point2, 3>;  ///< counter-clockwise
   /// A place moved infinitesimally towards another one, and infinitely less to the left of that
   /// direction. So it is not on any line through two points.
@@ -112,7 +114,7 @@ class PointSurface {
   const PointCells* cells_ = &own_;
   std::optional<Corners> triangle_;  ///< a triangle of the triangulation of all points
   PointStar star_;
-  std::vector<SurfaceCorner> distant_;  ///< by hash of the place; NaN: none
+  std::vector<SurfaceCorner> corners_;  ///< recent ones, by hash of the place; NaN: none
   std::vector<CircleCover> covers_;
   std::vector<SurfaceTriangle> meeting_;
   std::vector<Point2> points_;
