@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures reading and writing of point files with a warm cache: survey coordinates (millimetres in
-// a UTM zone), alone, with three more columns, and with those of LAS point format 6. Items are
+// a UTM zone), without attributes, with three, and with those of LAS point format 6. Items are
 // points.
 #include <cmath>
 #include <cstddef>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the restoring of shapes, from scratch and after a change, on a noisy torus of 200,000
-// points and on the scans in the folder named by TERRACE_DATA. A table shows the quality of the
-// results for the scans.
+// Measures shape restoration, from scratch and after a change, on a noisy torus of 200,000 points.
+// If TERRACE_DATA is set, prints a table of times and quality for the scans in its subfolder `scan`
+// too, except in small runs (TERRACE_BENCH_SMALL).
 //
-// Times are those of restoring alone, after the build. "collapse" follows the removal of the 100
-// points nearest to one of them, "expand" their reinsertion.
+// Times exclude building the triangulation. "collapse" is the change after the removal of the 100
+// points nearest to one of them, "expand" that after their reinsertion.
 #include <algorithm>
 #include <array>
 #include <chrono>

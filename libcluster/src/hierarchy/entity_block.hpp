@@ -14,9 +14,10 @@ namespace terrace::cluster {
 /// object per thread.
 class EntityBlockClusterer {
  public:
-  /// corners: on the ground, `count` contiguous ones per entity. `ordered` is as in PayloadCorners.
-  /// facility_cost: multiple of the diagonal of the bounding box of all corners. The costs in
-  /// `result` are not filled in.
+  /// corners: in ground coordinates, `count` consecutive ones for each entity. ordered: as in
+  /// PayloadCorners. weights: one per entity. facility_cost: a multiple of the diagonal of the
+  /// bounding box of all corners. The automatic strategy searches small blocks with at least
+  /// Effort::fine. Sets the costs in `result` to 0.
   /// Throws: std::invalid_argument as solve(FacilityEntities) does.
   void run(std::span<const Point3> corners, std::size_t count, bool ordered,
            std::span<const double> weights, double facility_cost, const FacilityOptions& options,

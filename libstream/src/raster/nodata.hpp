@@ -9,15 +9,15 @@
 
 namespace terrace::stream {
 
-/// The raw samples that count as nodata: those in the closed range [low, high], which is empty if
-/// low > high, and for floats always NaN and the infinities. It is a range because the text of a
+/// The raw samples that mean nodata: the closed range [low, high] of the sample type, empty if
+/// low > high. Of floats, NaN and the infinities always do. It is a range because the text of a
 /// float is often rounded to fewer digits than the float has.
 struct NodataRule {
-  std::optional<double> value;                     ///< as in the file
+  std::optional<double> value;                     ///< the value in the file, if it has one
   bool unmatched = false;                          ///< no sample of this type can have that value
-  double low = 1, high = 0;                        ///< floats
-  std::int64_t low_integer = 1, high_integer = 0;  ///< integers except u64
-  std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< u64
+  double low = 1, high = 0;                        ///< the range of floats
+  std::int64_t low_integer = 1, high_integer = 0;  ///< of integers except u64
+  std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< of u64
 
   /// Parses a file's text (GDAL_NODATA) for samples of `type`, as GDAL does: accepts "nan", "inf"
   /// and "-inf" in any case and decimals for integer samples ("-9999.0"); floats match within two

@@ -9,7 +9,7 @@
 
 namespace terrace::terrain {
 
-/// Reports the progress of one task to its context, and on destruction its end.
+/// Reports the progress of one task to its context; the destructor reports its end.
 class ProgressReport {
  public:
   /// what: the things counted, such as "points". The context must outlive the report.

@@ -8,7 +8,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kLeastGridSide = 16, kMostGridSide = 1024, kCellsPerCorner = 10;
-/// Limit on the cells that edges mark, counted per edge.
+/// The most cells to mark; a cell counts once for each edge that marks it.
 constexpr double kMostMarks = 0x1p25;
 constexpr auto kOutside = static_cast<std::uint8_t>(Overlap::none);
 constexpr auto kRing = static_cast<std::uint8_t>(Overlap::part);
@@ -50,7 +50,7 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
     }
   }
   while (side_ < kMostGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
-  // Spikes across the whole box would mark the same cells many times.
+  // Many edges across the whole box would mark the same cells again and again: take larger cells.
   const Point2 reach = reach_of(polygons, low_, high_);
   while (side_ > kLeastGridSide &&
          (reach[0] + reach[1]) * static_cast<double>(side_) > kMostMarks) {
@@ -58,7 +58,7 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
   }
   for (std::size_t axis = 0; axis < 2; ++axis) {
     per_unit_[axis] = static_cast<double>(side_) / (high_[axis] - low_[axis]);
-    // Rounding moves points between the ends of an edge by less than this.
+    // More than the rounding error of interpolated points on an edge.
     margin_[axis] = std::max(std::abs(low_[axis]), std::abs(high_[axis])) * 0x1p-48;
   }
   cells_.assign(side_ * side_, kOutside);
@@ -107,7 +107,8 @@ void RegionGrid::mark_edge(const Point2& a, const Point2& b) {
   }
 }
 
-/// Neighbouring cells of a row without a ring between them are on the same side, so one is tested.
+/// Neighbouring cells of a row without a crossed cell between them are on the same side, so one
+/// test decides for all of them.
 void RegionGrid::classify(const std::function<bool(const Point2&)>& inside) {
   for (std::size_t row = 0; row < side_; ++row) {
     const double y = low_[1] + (static_cast<double>(row) + 0.5) / per_unit_[1];

@@ -21,8 +21,9 @@ struct OneTile {
   static std::uint32_t of(std::uint32_t) { return 0; }
 };
 
-/// Returns approximately the greatest error first: 4 buckets per power of two, last in, first out.
-/// The meshes are as good as with the exact order, and it is several times as fast.
+/// A priority queue with approximate order: 4 buckets per power of two, the greatest errors first,
+/// last in, first out within a bucket. The meshes are as good as with the exact order, and it is
+/// several times as fast.
 ///
 /// Sorts each bucket by tiles when its turn comes, so that triangles close to each other in the
 /// plane are also close in time and memory. `tiles.of(place)` is a number below `tiles.count()`.
@@ -100,7 +101,8 @@ class ErrorBuckets {
   std::vector<std::vector<std::uint32_t>> buckets_;
 };
 
-/// Returns exactly the greatest error first; of equal errors the smallest number first.
+/// A priority queue with exact order: the greatest error first, of equal errors the smallest
+/// number.
 class ErrorHeap {
  public:
   void push(const Triangle& triangle, std::uint32_t number) {
@@ -122,9 +124,9 @@ class ErrorHeap {
   std::vector<std::pair<float, std::uint32_t>> heap_;
 };
 
-/// Handles samples in parts of `together` numbers, one part after the other. If the numbers of a
-/// part are close to each other in the plane, it and its triangles stay in the cache; the result is
-/// as good as if all parts were handled together.
+/// Processes samples in parts of `together` consecutive numbers, one part after another. If the
+/// samples of a part are close to each other in the plane, it and its triangles stay in the cache;
+/// the result is as good as if all parts were handled together.
 class ErrorParts {
  public:
   ErrorParts(float least, std::size_t samples, std::size_t together)

@@ -2,8 +2,8 @@
 #include "view/control.hpp"
 #include "view/geomorph.hpp"
 
-/// Instantiates the model of a surface in space, its view control and its geomorphs, on integers.
-/// Separate from those of the plane, which do not need space.
+/// Explicit instantiations for surfaces in space with integer coordinates. They have their own file
+/// so that programs for the plane do not link the code for space.
 
 namespace terrace::tri {
 

@@ -15,14 +15,16 @@
 
 namespace terrace::base {
 
-/// Makes a result of each item of a sequence in several threads, including the calling one, and
-/// takes the results in order. next(worker) returns items as optionals, an empty one at the end.
-/// make(worker, item) then runs on the same thread, numbered `worker` (0 to threads - 1).
-/// commit(result) receives the results in the order of the items, on any of the threads. Calls of
-/// next never overlap, nor do calls of commit. So the effect does not depend on the number of
-/// threads, and no thread waits for another's commits while there is work. At most two results per
-/// thread wait. Rethrows the exception of the first item that failed; an exception from next counts
-/// for the item that it did not return. Other threads then stop after their current result.
+/// Runs a pipeline on `threads` threads, including the caller's.
+///
+/// next(worker) returns the next item, or nullopt at the end. make(worker, item) computes its
+/// result on the same thread, whose number is `worker` (0 to threads - 1). commit(result) receives
+/// the results in the order of the items, on any thread. Neither next nor commit is called while
+/// another call of it runs, so the effect does not depend on the number of threads. No thread waits
+/// for another's commit while there is work. At most two results per thread are waiting.
+///
+/// Rethrows the exception of the first item that failed; an exception from next counts for the item
+/// that it did not return. Other threads then stop after their current result.
 template <class Next, class Make, class Commit>
 void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& commit) {
   using Item = typename std::invoke_result_t<Next&, unsigned>::value_type;
@@ -118,7 +120,7 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
   if (failure) std::rethrow_exception(failure);
 }
 
-/// The same for the numbers below `count`: make(worker, i), then commit(i, result).
+/// Runs make(worker, i) for i = 0 to count - 1 on several threads, and commit(i, result) in order.
 template <class Make, class Commit>
 void in_order(std::size_t count, unsigned threads, const Make& make, const Commit& commit) {
   std::size_t given = 0, committed = 0;

@@ -47,7 +47,8 @@ class OverlayWriter {
   /// Values added so far.
   [[nodiscard]] std::uint64_t values() const;
 
-  /// Publishes the file. Returns its size in bytes. Afterwards only values() may be called.
+  /// Publishes the file and returns its size in bytes. Afterwards only values() may be called. A
+  /// writer that is destroyed without finish() leaves no file. Throws: Error.
   std::uint64_t finish();
 
  private:
@@ -74,9 +75,10 @@ class Overlay {
   /// Returns the values of a cluster in ascending order of indices, empty if it has none; valid
   /// until the next call. Cost: a binary search over the pages, and reading one page unless it is
   /// the last page used, so visiting clusters in ascending order reads every page once. Throws:
-  /// Error for damage.
+  /// Error if the overlay is damaged.
   [[nodiscard]] std::span<const OverlayValue> find(ClusterId cluster);
-  /// Visits all clusters that have values, in ascending order. Throws: Error for damage.
+  /// Visits all clusters that have values, in ascending order. Throws: Error if the overlay is
+  /// damaged.
   void for_each(const std::function<void(ClusterId, std::span<const OverlayValue>)>& visit);
 
  private:

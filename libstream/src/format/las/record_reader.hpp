@@ -15,13 +15,14 @@ namespace terrace::stream {
 class RecordReader {
  public:
   virtual ~RecordReader() = default;
-  /// The next records, at least one and at most `wanted`; valid until the next call. Called only
-  /// for records that the header promises, not counting lost(). Empty if all remaining records are
-  /// lost. Throws: Error if they do not exist and there is no handler for damage; Stopped.
+  /// Returns the next records, at least one and at most `wanted`; valid until the next call. Empty
+  /// if all remaining records are lost. The caller never asks for more than the header's count
+  /// minus the records read and lost(). Throws: Error if records are missing and no handler for
+  /// damage is set; Stopped on a stop request.
   virtual std::string_view read(std::uint64_t wanted) = 0;
   /// Number of records in damaged parts so far (see SourceOptions::on_damage).
   [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
-  /// The part of the minimum memory, in bytes, that depends on the file.
+  /// The memory in bytes that this file needs in addition to the fixed minimum.
   [[nodiscard]] virtual std::uint64_t held_bytes() const { return 0; }
 };
 

@@ -8,12 +8,13 @@
 
 namespace terrace::stream::store {
 
-/// Sets differences[i], from i = 1 on, to values[i] - values[i - 1], minus the same difference of
-/// the preceding column unless `beside` is null. Returns false if all values are equal.
+/// Sets differences[i] to values[i] - values[i - 1] for 1 <= i < n. Also subtracts the same
+/// difference of the preceding column, `beside`, unless that is null. Returns false if all values
+/// are equal.
 bool find_differences(const std::int64_t* values, const std::int64_t* beside,
                       std::int64_t* differences, std::uint32_t n);
 
-/// Sets the numbers that represent n differences, and their classes.
+/// Zigzag-encodes n differences into `numbers`, and sets the size class of each in `classes`.
 void classify(const std::int64_t* differences, std::uint64_t* numbers, std::uint8_t* classes,
               std::uint32_t n);
 

@@ -32,10 +32,10 @@ struct LineSet {
 /// True for a store of segments or polylines (see stream::Entities).
 [[nodiscard]] bool holds_lines(const stream::StoreSchema& schema);
 
-/// Returns what `detail` wants from a store of lines, in the store's CRS, exactly as it was read. A
-/// piece is located at its first vertex. Consecutive pieces are joined, so level 0 without a region
-/// returns all lines in the order in which they were read. A line that is wanted only in part is
-/// returned as several consecutive lines.
+/// Returns the lines that `detail` selects, in the store's CRS, with coordinates exactly as they
+/// were read. A piece is selected by its first vertex. Consecutive pieces are joined, so level 0
+/// without a region returns all lines in the order in which they were read. A line that is wanted
+/// only in part is returned as several consecutive lines.
 ///
 /// Uses half of the available memory unless the context sets another bound. Throws: stream::Error
 /// on a damaged store, or if the lines do not fit in memory (the message says how much they need);
@@ -46,8 +46,8 @@ struct LineSet {
 /// Writes lines as GeoJSON, each as a Feature with its number as the property "line". Numbers have
 /// enough digits to read back exactly. crs: the CRS of the lines. Unless it is longitude and
 /// latitude of WGS 84, the member "crs" (GeoJSON of 2008, which GDAL and others read) names it by
-/// its EPSG code; null if nothing is known about it. Throws: UsageError for a CRS without a code,
-/// and what `write` throws.
+/// its EPSG code; the member is null if the CRS is unknown. Throws: UsageError for a CRS without a
+/// code, and what `write` throws.
 void write_geojson(const LineSet& lines, const stream::Crs& crs,
                    const std::function<void(std::string_view)>& write);
 

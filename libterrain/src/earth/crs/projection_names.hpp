@@ -11,7 +11,7 @@
 
 namespace terrace::terrain {
 
-/// The meaning of a parameter, whatever the method calls it.
+/// The role of a projection parameter. Methods give the same role different names.
 enum class ParameterRole : std::uint8_t {
   latitude,
   longitude,
@@ -35,13 +35,13 @@ struct ParameterName {
 const ParameterName* parameter_of_code(int code);
 ParameterKind kind_of(ParameterRole role);
 
-/// Whether a method or parameter is that of the table: by its code if EPSG's is given, otherwise by
-/// its name.
+/// True if PROJ's method or parameter (authority, id, called) is the EPSG entry (code, name).
+/// Compares codes if the authority is EPSG and there is an id, otherwise names with plain_name().
 bool is_called(int code, const char* name, const char* authority, const char* id,
                const char* called);
 
-/// A parameter of a conversion, in degrees, metres or as a factor. role: nullopt if the table has
-/// neither its code nor its name.
+/// A parameter of a conversion. `value` is in degrees, in metres or a scale factor. `role` is
+/// nullopt if neither its code nor its name is known.
 struct ConversionParameter {
   std::optional<ParameterRole> role;
   double value = 0;
@@ -51,8 +51,8 @@ std::vector<ConversionParameter> parameters_of(const PJ* conversion);
 /// Lower case, letters and digits only: the form in which names are compared.
 std::string plain_name(std::string_view name);
 
-/// Clean a factor to degrees or metres of the rounding in texts: 0.0174532925199433 radians become
-/// exactly one degree.
+/// Convert the size of a unit and undo the rounding in texts of CRSs: 0.0174532925199433 radians
+/// give exactly one degree.
 double degrees_of(double radians);
 double metres_of(double metres);
 
