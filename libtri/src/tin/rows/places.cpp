@@ -161,7 +161,8 @@ bool is_rectangle(std::span<const Point3> frame) {
     for (std::size_t k = 0; k < 2; ++k)
       if (!(p[k] >= 0.0 && p[k] < kFarthest && p[k] == std::floor(p[k]))) return false;
   }
-  const auto [low, high] = region_of(frame);
+  const auto region = region_of(frame);
+  const auto &low = region.min, &high = region.max;
   const double width = high[0] - low[0], height = high[1] - low[1];
   if (!(width > 0.0 && height > 0.0)) return false;
   // Distances along the sides, from the south-west corner.
