@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cassert>
+#include <mutex>
 #include <utility>
+#include <vector>
 
 #include <terrace/base/work_ahead.hpp>
 
@@ -38,14 +40,18 @@ class ReadAhead final : public PointSource {
     give_blocks();
     Ahead ahead = ahead_.take();
     progress_ = ahead.progress;
-    // The caller's buffers are used for another block, so that in the long run nothing is allocated
-    // or set to zero.
     std::swap(block, ahead.block);
     if (!ahead.more) {
       block.clear();
       return false;
     }
-    ahead_.give(std::move(ahead));
+    // The caller's buffers are used for another block, so that in the long run nothing is allocated
+    // or set to zero. If reading is slow, few blocks have buffers.
+    {
+      const std::lock_guard lock(mutex_);
+      if (spare_.size() < most_) spare_.push_back(std::move(ahead.block));
+    }
+    ahead_.give({});
     return true;
   }
 
@@ -74,6 +80,7 @@ class ReadAhead final : public PointSource {
     return [this, ended = false](Ahead& ahead) mutable {
       if (!ended) {
         ended = true;
+        ahead.block = spare();
         ahead.more = source_->next(ahead.block);
         ended = !ahead.more;
       } else {
@@ -83,12 +90,24 @@ class ReadAhead final : public PointSource {
     };
   }
 
+  PointBlock spare() {
+    PointBlock block;
+    const std::lock_guard lock(mutex_);
+    if (!spare_.empty()) {
+      block = std::move(spare_.back());
+      spare_.pop_back();
+    }
+    return block;
+  }
+
   const std::unique_ptr<PointSource> source_;  // used only by the thread once it runs
   const std::size_t most_;
   const SourceInfo info_;
   std::stop_source reading_;
   std::stop_callback<Forward> on_stop_;
   Progress progress_;  // used only by the caller
+  std::mutex mutex_;
+  std::vector<PointBlock> spare_;  // with buffers for further blocks; guarded by mutex_
   base::WorkAhead<Ahead> ahead_;
 };
 
