@@ -7,14 +7,22 @@
 namespace terrace::stream {
 
 LazEncoders::LazEncoders(const laz::Vlr& vlr, unsigned threads, Write write)
-    : write_(std::move(write)), ahead_(threads > 1 ? threads : 0, [vlr] {
+    : write_(std::move(write)), ahead_(threads, [vlr] {
         return [encoder = std::make_shared<laz::Encoder>(vlr)](Chunk& chunk) {
           chunk.coded.clear();
           encoder->encode_chunk(chunk.records, chunk.coded);
         };
-      }) {}
+      }) {
+  if (threads <= 1) own_.emplace(vlr);
+}
 
 void LazEncoders::encode(std::span<const std::byte> records) {
+  if (own_) {
+    coded_.clear();
+    own_->encode_chunk(records, coded_);
+    write_(coded_);
+    return;
+  }
   while (ahead_.threads() > 0 && ahead_.size() > ahead_.threads()) pass_on();
   Chunk chunk;
   if (!spare_.empty()) {

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,7 +35,9 @@ class LazEncoders {
   void pass_on();
 
   Write write_;
-  std::vector<Chunk> spare_;  ///< their buffers are used again
+  std::optional<laz::Encoder> own_;  ///< with one thread, which needs no copy of the records
+  std::vector<std::byte> coded_;     ///< by own_
+  std::vector<Chunk> spare_;         ///< their buffers are used again
   base::WorkAhead<Chunk> ahead_;
 };
 
