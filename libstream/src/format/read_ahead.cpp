@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cassert>
+#include <exception>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -75,18 +76,19 @@ class ReadAhead final : public PointSource {
     while (ahead_.size() < most_) ahead_.give({});
   }
 
-  /// After the end or an error the source is not asked again.
+  /// After the end or an error the source is not asked again; the error is thrown every time.
   base::WorkAhead<Ahead>::Work reader() {
-    return [this, ended = false](Ahead& ahead) mutable {
-      if (!ended) {
-        ended = true;
+    return [this, ended = false, error = std::exception_ptr()](Ahead& ahead) mutable {
+      if (error) std::rethrow_exception(error);
+      try {
         ahead.block = spare();
-        ahead.more = source_->next(ahead.block);
+        ahead.more = !ended && source_->next(ahead.block);
         ended = !ahead.more;
-      } else {
-        ahead.more = false;
+        ahead.progress = source_->progress();
+      } catch (...) {
+        error = std::current_exception();
+        throw;
       }
-      ahead.progress = source_->progress();
     };
   }
 
