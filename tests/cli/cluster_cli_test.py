@@ -419,6 +419,17 @@ class ClusterTest(unittest.TestCase):
         self.assertLess(bounds[1], bounds[2])
         self.assertLessEqual(bounds[2], summary['cost'])
 
+    def test_a_bound_that_would_take_minutes_is_left_out_and_said(self):
+        """One cluster of many points: a step of the bound examines all pairs of points."""
+        source = self.even(30000)
+        result = terrace('cluster', source, '--facility-cost', 1e6, '--labels', self.path('one.txt'), '--force')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('30,000 points, 1 cluster,', result.stdout)
+        self.assertNotIn('lower bound', result.stdout)
+        self.assertIn('no lower bound of the cost', result.stderr)
+        summary, _ = self.clustered('--facility-cost', 1e6, '--bound-iterations', 1, source=source)
+        self.assertLessEqual(summary['lower_bound'], summary['cost'])
+
     def test_z_weight_scales_the_influence_of_heights(self):
         generator = random.Random(11)
         points = [[generator.uniform(0, 100) for _ in range(3)] for _ in range(300)]

@@ -108,24 +108,42 @@ void no_channels(const FacilityPoints& problem, const char* method) {
   }
 }
 
-/// Returns the number of steps for the lower bound: as requested, otherwise about some seconds'
-/// worth. Each step examines as many points around each point as a few clusters have.
-double bound_of(const ClusterRequest& request, const FacilityPoints& problem,
-                const FacilitySolution& solution, const ClusterProgress& progress) {
-  const auto points = static_cast<double>(problem.points.size());
-  const double distances = 4.0 * points * points / static_cast<double>(solution.facilities.size());
+/// Returns the number of steps for the lower bound that take some seconds; 0 if the fewest that are
+/// useful take much longer, because there are many points and few clusters. Each step examines as
+/// many points around each point as a few clusters have.
+std::uint32_t default_bound_steps(std::size_t points, std::size_t clusters) {
+  constexpr double kFewest = 15.0, kMost = 300.0;
+  constexpr double kDistances = 3e9, kMostDistances = 6e9;
+  const double per_step = 4.0 * static_cast<double>(points) * static_cast<double>(points) /
+                          static_cast<double>(clusters);
+  if (kFewest * per_step > kMostDistances) return 0;
+  return static_cast<std::uint32_t>(std::clamp(kDistances / per_step, kFewest, kMost));
+}
+
+/// Returns the outcome of `solution` with a lower bound, or with a note that none was computed.
+ClusterOutcome bounded_outcome(const ClusterRequest& request, const FacilityPoints& problem,
+                               FacilitySolution&& solution, const ClusterProgress& progress) {
   const std::uint32_t steps = request.bound_iterations.value_or(
-      static_cast<std::uint32_t>(std::clamp(3e9 / distances, 15.0, 300.0)));
-  if (steps == 0) return 0.0;
-  cluster::LowerBoundOptions options;
-  options.steps = steps;
-  options.threads = request.threads;
-  options.progress = [&](std::size_t done, std::size_t total) {
-    progress(static_cast<double>(done) / static_cast<double>(total));
-    return true;
-  };
-  options.check_stop = check_interrupt;
-  return cluster::lower_bound(problem, solution, options).lower_bound;
+      default_bound_steps(problem.points.size(), solution.facilities.size()));
+  if (steps > 0) {
+    cluster::LowerBoundOptions options;
+    options.steps = steps;
+    options.threads = request.threads;
+    options.progress = [&](std::size_t done, std::size_t total) {
+      progress(static_cast<double>(done) / static_cast<double>(total));
+      return true;
+    };
+    options.check_stop = check_interrupt;
+    solution.lower_bound = std::max(solution.lower_bound,
+                                    cluster::lower_bound(problem, solution, options).lower_bound);
+  }
+  ClusterOutcome outcome = outcome_of(std::move(solution));
+  if (steps == 0 && !request.bound_iterations && !outcome.lower_bound) {
+    outcome.notes.emplace_back(
+        "no lower bound of the cost: with few clusters of many points it takes long; "
+        "--bound-iterations 15 computes one");
+  }
+  return outcome;
 }
 
 ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const FacilityPoints& problem,
@@ -162,8 +180,7 @@ ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const Facili
   }
   FacilitySolution solution = cluster::solve(problem, options);
   progress(1.0);
-  solution.lower_bound = bound_of(request, problem, solution, progress);
-  return outcome_of(std::move(solution));
+  return bounded_outcome(request, problem, std::move(solution), progress);
 }
 
 /// Clusters by the primal-dual method.
@@ -173,9 +190,7 @@ ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPo
   FacilitySolution solution = cluster::solve(problem, {.strategy = FacilityStrategy::greedy_stars,
                                                        .memory_limit = request.memory_bytes / 3 * 2,
                                                        .check_stop = check_interrupt});
-  solution.lower_bound =
-      std::max(solution.lower_bound, bound_of(request, problem, solution, progress));
-  return outcome_of(std::move(solution));
+  return bounded_outcome(request, problem, std::move(solution), progress);
 }
 
 ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityPoints& problem) {
@@ -515,7 +530,8 @@ class ClusterCommand final : public Command {
         ->check(CLI::Range(1U, 4294967295U))
         ->capture_default_str();
     app.add_option("--bound-iterations", request_.bound_iterations,
-                   "steps for a lower bound of the cost; 0: none (default: a few seconds' worth)")
+                   "steps for a lower bound of the cost; 0: none (default: a few seconds' worth; "
+                   "none if 15 steps take much longer)")
         ->type_name("N");
     app.add_option(
            "--metric", metric_,
