@@ -179,6 +179,15 @@ class ViewTest(Stores):
         other.stderr.close()
         self.assertNotEqual(query, self.query)
 
+    def test_ctrl_c_prints_the_summary_of_a_server(self):
+        with subprocess.Popen([TERRACE, 'view', self.store, '--no-open', '--json'], stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True) as server:
+            server.stderr.readline()
+            server.send_signal(signal.SIGINT)
+            out, error = server.communicate(timeout=20)
+        self.assertEqual((server.returncode, error), (0, ''))
+        self.assertEqual(json.loads(out)['stores'], 1)
+
     def test_the_content_security_policy(self):
         """The page and the server have the same policy: nothing from elsewhere, and no inline script."""
         _, headers, page = self.get('/')

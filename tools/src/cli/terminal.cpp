@@ -81,7 +81,9 @@ void print_message(std::string_view line) {
 void print_lines(std::string_view text) { std::fputs(printable(text).c_str(), stderr); }
 
 void print_result(std::string_view text) {
-  stream::Sink output("-", false, stop_token());
+  // Ctrl-C ends a write that waits for a reader, but not the summary of `terrace view`, which runs
+  // until Ctrl-C.
+  stream::Sink output("-", false, interrupted() ? std::stop_token() : stop_token());
   output.write(text);
   output.commit();
 }
