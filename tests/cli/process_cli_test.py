@@ -132,6 +132,13 @@ class ClosedPipeTest(ProcessTest):
                 self.assertEqual(result.returncode, 1, result.stderr)
                 self.assertEqual(result.stderr.count('\n'), 1, result.stderr)
 
+    def test_verify_names_both_kinds_of_folders_that_it_checks(self):
+        for path in self.path('none'), self.folder:
+            result = terrace('verify', path)
+            self.assertEqual(result.returncode, 1)
+            self.assertEqual(result.stderr, f'terrace: {path}: there is neither a store nor a tile set here; '
+                             'give a folder written by terrace build or terrace tile\n')
+
     def test_problems_found_by_verify_keep_their_exit_code(self):
         store = self.store()
         level = os.path.join(store, sorted(n for n in os.listdir(store) if 'manifest' not in n)[0])

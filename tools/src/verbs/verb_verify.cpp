@@ -56,6 +56,10 @@ class VerifyCommand final : public Command {
           "--store, --where, --max-error, --vertical and --geoid are for tile sets, and " + path_ +
           " is not one");
     }
+    if (!stream::Store::exists(path_)) {
+      throw stream::Error(path_, "there is neither a store nor a tile set here")
+          .remedy("give a folder written by terrace build or terrace tile");
+    }
     return store(common);
   }
 
