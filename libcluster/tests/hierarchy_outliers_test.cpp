@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "block/linear_block.hpp"
-#include "hierarchy/outliers.hpp"
+#include "hierarchy/metric_block.hpp"
 #include "hierarchy_laws.hpp"
 #include "inputs.hpp"
 #include "recording_sink.hpp"
