@@ -31,6 +31,35 @@ STREAM_ROOMS = {'io': 0, 'laz': 0, 'order': 1, 'raster': 1, 'store': 1, 'format'
 MOST_SOURCES = 40
 # As in meson.build.
 UNITY_SIZE = 30
+# A file with fewer lines, or a private header that one file includes, is usually part of another concept.
+FEWEST_LINES = 25
+# The most such files a room may have besides those with a reason below. Lower a number when a merge allows it; never raise one.
+MOST_SHORT_FILES = {'libcluster': 4, 'libstream': 23, 'libterrain': 15, 'libtri': 10, 'research': 1, 'tools': 6}
+MOST_SINGLE_USER_HEADERS = {'libcluster': 17, 'libmatching': 4, 'libstream': 34, 'libterrain': 34, 'libtri': 31, 'python': 1,
+                            'research': 2, 'tools': 8, 'viewer': 3}
+VECTORS = 'compiled with the flags of one instruction set'
+SHORT_FILES = {
+    'libcluster/include/terrace/cluster/point.hpp': 'the type that all public headers share',
+    'libcluster/src/cuda/cuda_probe.cu': 'compiled alone, when Meson looks for a CUDA compiler',
+    'libcluster/src/linkage/kernels_avx2.cpp': VECTORS,
+    'libcluster/src/linkage/kernels_avx512.cpp': VECTORS,
+    'libcluster/src/linkage/kernels_portable.cpp': VECTORS,
+    'libmatching/include/terrace/matching/point.hpp': 'the type that all public headers share',
+    'libmatching/src/assignment/scan_kernels_avx2.cpp': VECTORS,
+    'libmatching/src/assignment/scan_kernels_avx512.cpp': VECTORS,
+    'libmatching/src/assignment/scan_kernels_portable.cpp': VECTORS,
+    'tools/src/main.cpp': 'the entry point',
+    'tools/src/pch/command.hpp': 'the precompiled header',
+    'tools/src/serve/viewer_files.hpp': 'the interface of a generated source',
+}
+ON_CPU = 'code for a GPU that tests run on the CPU'
+SINGLE_USER_HEADERS = {
+    'libcluster/src/cuda/cuda_rounds.hpp': 'joins a source that nvcc compiles to one that it does not',
+    'libcluster/src/cuda/device_complete.hpp': ON_CPU,
+    'libcluster/src/cuda/device_dendrogram.hpp': ON_CPU,
+    'libcluster/src/cuda/device_single.hpp': ON_CPU,
+    'tools/src/pch/command.hpp': 'the precompiled header, which the compiler includes',
+}
 LICENCES = {
     'libbase': 'Apache-2.0',
     'libstream': 'Apache-2.0',
@@ -342,6 +371,47 @@ def check_folders(root):
                 yield f'{place}: has {count} sources, more than {MOST_SOURCES}'
 
 
+def is_production(path):
+    return path.endswith(('.cpp', '.hpp', '.h', '.cu', '.cuh')) and not re.search(r'(^|/)(tests|bench|fuzz|examples)/', path)
+
+
+def users_of_headers(texts):
+    """The production files that include each file, without the source of the same name."""
+    users = collections.defaultdict(set)
+    for path, text in texts.items():
+        room = path.split('/')[0]
+        for line in text.split('\n'):
+            included = INCLUDE.match(line)
+            if not included:
+                continue
+            name = included.group(2)
+            # Besides its own room, a file may name the private headers of a library, as research and the viewer's core do.
+            folders = [os.path.dirname(path), f'{room}/src', room] + [f'lib{library}/src' for library in LIBRARIES] + ['']
+            for target in (os.path.normpath(os.path.join(folder, name)) for folder in folders):
+                if target in texts:
+                    if os.path.splitext(target)[0] != os.path.splitext(path)[0]:
+                        users[target].add(path)
+                    break
+    return users
+
+
+def check_sizes(root):
+    """Short files and private headers with one user, which are counted in each room. Tests are not users."""
+    texts = {path: read(root, path) for room in LICENCES for path in files_below(root, room) if is_production(path)}
+    users = users_of_headers(texts)
+    short = {path for path, text in texts.items() if text.count('\n') < FEWEST_LINES}
+    single = {path for path in texts if path.endswith(('.hpp', '.h', '.cuh')) and '/include/' not in path and len(users[path]) < 2}
+    for found, reasons, most, what in ((short, SHORT_FILES, MOST_SHORT_FILES, f'files under {FEWEST_LINES} lines'),
+                                       (single, SINGLE_USER_HEADERS, MOST_SINGLE_USER_HEADERS, 'private headers with one user')):
+        for path in sorted(set(reasons) - found):
+            yield f'{path}: is in the list of {what} and does not belong there'
+        counts = collections.Counter(path.split('/')[0] for path in found - set(reasons))
+        for room, count in sorted(counts.items()):
+            if count > most.get(room, 0):
+                yield (f'{room}: has {count} {what}, more than {most.get(room, 0)}; merge one into its user or into the concept '
+                       'it belongs to')
+
+
 def check_unity(build):
     """Meson 1.0 looks for one object too many if a unity build joins a multiple of unity_size sources and another target
     takes their objects."""
@@ -362,6 +432,7 @@ def breaches(root):
     yield from check_research(root)
     yield from check_versions(root)
     yield from check_folders(root)
+    yield from check_sizes(root)
 
 
 def main():

@@ -60,7 +60,8 @@ class CheckLayout(unittest.TestCase):
         with tempfile.TemporaryDirectory() as root:
             make_tree(root)
             change(root)
-            with mock.patch.dict(check_layout.MAY_DIFFER, allowed, clear=True):
+            # The files of these small trees are short, and nothing includes some of them.
+            with mock.patch.dict(check_layout.MAY_DIFFER, allowed, clear=True), mock.patch.object(check_layout, 'check_sizes', lambda root: []):
                 return list(check_layout.breaches(root))
 
     def test_finds_the_numbers_of_sources_that_break_unity_builds(self):
@@ -164,6 +165,50 @@ class CheckLayout(unittest.TestCase):
             for number in range(41):
                 write(root, f'libtri/src/b/{number}.cpp', head('libtri'))
         self.assertEqual(self.breaches(fill), ['libtri/src/b: has 41 sources, more than 40'])
+
+    def sizes(self, files, short=(), single=(), short_reasons=(), single_reasons=()):
+        """The breaches of check_sizes() in a tree of these files, with the allowed numbers and the reasons."""
+        with tempfile.TemporaryDirectory() as root:
+            for path, text in files.items():
+                write(root, path, text)
+            with mock.patch.multiple(check_layout, MOST_SHORT_FILES=dict(short), MOST_SINGLE_USER_HEADERS=dict(single),
+                                     SHORT_FILES=dict(short_reasons), SINGLE_USER_HEADERS=dict(single_reasons)):
+                return list(check_layout.check_sizes(root))
+
+    def test_short_files_are_counted(self):
+        at_limit = {'libtri/src/a.cpp': '\n' * 25, 'libtri/src/tests/b.cpp': '', 'libtri/tests/c.cpp': '', 'tests/d.cpp': ''}
+        self.assertEqual(self.sizes(at_limit), [])
+        files = {'libtri/src/a.cpp': '\n' * 24, 'libtri/include/terrace/tri/b.hpp': '', 'libbase/src/a.cpp': '\n' * 30}
+        self.assertEqual(len(self.sizes(files, short={'libtri': 2})), 0)
+        found = self.sizes(files, short={'libtri': 1})
+        self.assertEqual(len(found), 1)
+        self.assertIn('libtri: has 2 files under 25 lines, more than 1', found[0])
+        self.assertEqual(self.sizes(files, short={'libtri': 1}, short_reasons={'libtri/src/a.cpp': 'a reason'}), [])
+        found = self.sizes(files, short={'libtri': 2}, short_reasons={'libbase/src/a.cpp': 'a reason'})
+        self.assertEqual(found, ['libbase/src/a.cpp: is in the list of files under 25 lines and does not belong there'])
+
+    def test_private_headers_with_one_user_are_counted(self):
+        long = '\n' * 30
+
+        def found(includes, **allowed):
+            files = {'libtri/src/b/a.hpp': long} | {path: line + long for path, line in includes.items()}
+            return self.sizes(files, **allowed)
+
+        # Its own source, tests and a second include line of the same file are no further users.
+        own = {'libtri/src/b/a.cpp': '#include "b/a.hpp"\n', 'libtri/src/c.cpp': '#include "b/a.hpp"\n#include "b/a.hpp"\n',
+               'libtri/tests/d.cpp': '#include "b/a.hpp"\n'}
+        self.assertEqual(len(found(own)), 1)
+        self.assertIn('libtri: has 1 private headers with one user, more than 0', found(own)[0])
+        self.assertEqual(found(own, single={'libtri': 1}), [])
+        self.assertEqual(found(own, single_reasons={'libtri/src/b/a.hpp': 'a reason'}), [])
+        # Names relative to the file count as well as those relative to src/, also from research.
+        for path, name in (('libtri/src/b/d.cpp', 'a.hpp'), ('libtri/src/d.cpp', 'b/a.hpp'), ('research/d.cpp', 'b/a.hpp')):
+            with self.subTest(path=path):
+                self.assertEqual(found(own | {path: f'#include "{name}"\n'}), [])
+        two = own | {'libtri/src/d.cpp': '#include "b/a.hpp"\n'}
+        self.assertEqual(len(found(two, single_reasons={'libtri/src/b/a.hpp': 'a reason'})), 1)
+        # A public header may have any number of users.
+        self.assertEqual(self.sizes({'libtri/include/terrace/tri/a.hpp': long}), [])
 
     def test_tests_may_compare_with_what_is_gpl(self):
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
