@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Long work calls its check at intervals, and what the check throws ends it.
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <random>
+#include <span>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -15,8 +17,10 @@
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/dynamic_surface.hpp"
+#include "terrace/tri/grid_tin.hpp"
 #include "terrace/tri/interpolation.hpp"
 #include "terrace/tri/metric.hpp"
+#include "terrace/tri/point_tin.hpp"
 #include "terrace/tri/shape.hpp"
 #include "terrace/tri/smoothing.hpp"
 
@@ -210,6 +214,115 @@ TEST(StopCheck, EndsSmoothingAndFlips) {
         static_cast<void>(metric_triangles(triangulation, field, TriangleFilter(), check));
       },
       200);
+}
+
+TEST(StopCheck, EndsFlipsInSpace) {
+  Delaunay3<double> triangulation;
+  triangulation.build(some<3, double>(3000));
+  const LinearMap3 map{2, 0, 0, 0, 1, 0, 0, 0, 1};
+  const Box3 half{{-1, -1, -1}, {5e5, 2e6, 2e6}}, all{{-1, -1, -1}, {2e6, 2e6, 2e6}};
+  for (const Box3& box : {half, all}) {
+    const MetricField3 field({{box, map}});
+    expect_stops(
+        [&](const base::StopCheck& check) {
+          static_cast<void>(metric_tetrahedra(triangulation, field, check));
+        },
+        10);
+  }
+}
+
+TEST(StopCheck, EndsRemovals) {
+  const auto places = some<2, double>(20000);
+  const auto points = some<3, double>(5000);
+  const auto remove_most = [](auto triangulation, const auto& from, const base::StopCheck& check) {
+    const std::vector<VertexId> vertices = triangulation.build(from);
+    triangulation.set_check_stop(check);
+    triangulation.remove(std::span(vertices).subspan(10));
+  };
+  expect_stops(
+      [&](const base::StopCheck& check) { remove_most(Delaunay2<double>(), places, check); }, 20);
+  expect_stops(
+      [&](const base::StopCheck& check) { remove_most(Delaunay3<double>(), points, check); }, 5);
+  // The triangles at the middle of a circle are a hole whose filling takes quadratic time.
+  std::vector<std::array<double, 2>> circle{{0, 0}};
+  for (int i = 0; i < 5000; ++i) {
+    circle.push_back({std::cos(0.00125 * i), std::sin(0.00125 * i)});
+  }
+  expect_stops(
+      [&](const base::StopCheck& check) {
+        Delaunay2<double> triangulation;
+        const std::vector<VertexId> vertices = triangulation.build(circle);
+        triangulation.set_check_stop(check);
+        triangulation.remove(vertices[0]);
+      },
+      1);
+}
+
+TEST(StopCheck, EndsTins) {
+  constexpr std::uint32_t kSize = 60;
+  std::mt19937_64 random(1);
+  std::vector<double> heights, x, y;
+  for (std::uint32_t row = 0; row < kSize; ++row) {
+    for (std::uint32_t column = 0; column < kSize; ++column) {
+      heights.push_back(static_cast<double>(random() % 1000));
+      x.push_back(column + 1);
+      y.push_back(row + 1);
+    }
+  }
+  const GridWindow<double> window{kSize, kSize, heights};
+  const std::vector<Point3> frame{{0, 0, 0}, {100, 0, 0}, {100, 100, 0}, {0, 100, 0}};
+  for (const TinQuality quality :
+       {TinQuality::kGreedy, TinQuality::kRemoval, TinQuality::kFitted}) {
+    SCOPED_TRACE(static_cast<int>(quality));
+    GridTinOptions grid{.max_error = 10, .quality = quality};
+    expect_stops(
+        [&](const base::StopCheck& check) {
+          grid.check_stop = check;
+          grid_tin(window, settle_sides(window, 10), grid);
+        },
+        1000);
+    expect_stops(
+        [&](const base::StopCheck& check) {
+          grid.check_stop = check;
+          grid_tin_of_points(window, 500, grid);
+        },
+        500);
+    PointTinOptions points;
+    points.max_error = 10;
+    points.quality = quality;
+    expect_stops(
+        [&](const base::StopCheck& check) {
+          points.check_stop = check;
+          static_cast<void>(point_tin(x, y, heights, {}, points));
+        },
+        1000);
+    // Samples in rows and columns have their own loops.
+    points.lattice = TinLattice{0, 0.5};
+    const std::span<const double> columns = std::span(x).first(kSize);
+    expect_stops(
+        [&](const base::StopCheck& check) {
+          points.check_stop = check;
+          static_cast<void>(point_tin(SampleRows{columns, columns, heights}, frame, points));
+        },
+        500);
+  }
+}
+
+TEST(StopCheck, EndsMeasuringAndLines) {
+  const auto samples = some<3, double>(20000);
+  std::vector<double> x, y, z;
+  for (const auto& p : samples) x.push_back(p[0]), y.push_back(p[1]), z.push_back(p[2]);
+  const std::vector<Point3> corners{{0, 0, 0}, {2e6, 0, 0}, {0, 2e6, 0}};
+  const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}};
+  expect_stops(
+      [&](const base::StopCheck& check) {
+        static_cast<void>(measure_surface(x, y, z, corners, triangles, check));
+      },
+      10);
+  std::sort(x.begin(), x.end());
+  expect_stops(
+      [&](const base::StopCheck& check) { static_cast<void>(simplify_line(x, z, 1, {}, check)); },
+      5);
 }
 
 }  // namespace

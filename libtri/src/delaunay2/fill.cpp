@@ -88,6 +88,7 @@ class ApexChoice {
 template <class Kernel>
 void fill_hole(Mesh<Kernel>& mesh) {
   auto& hole = mesh.hole;
+  constexpr std::size_t kTicksOfCandidate = 16;
   const ApexChoice<Kernel> choose_apex(hole);
   const auto count = static_cast<std::uint32_t>(hole.vertex.size());
   assert(hole.vertex.front() != kGhost && hole.vertex.back() != kGhost);
@@ -102,6 +103,7 @@ void fill_hole(Mesh<Kernel>& mesh) {
   while (!hole.parts.empty()) {
     const auto [first, last, mate] = hole.parts.back();
     hole.parts.pop_back();
+    mesh.ticks(kTicksOfCandidate * (last - first));
     const std::uint32_t apex = choose_apex(first, last);
     const std::uint32_t t = hole.slots.back();
     hole.slots.pop_back();

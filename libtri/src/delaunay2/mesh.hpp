@@ -156,7 +156,7 @@ struct Mesh {
   FreeSlots free_triangles;
 
   Journal<Point, 3> journal;
-  base::StopTicks ticks;  ///< of building and inserting
+  base::StopTicks ticks;  ///< of building, inserting and removing
 
   // Scratch memory, kept between calls.
   std::vector<Side> sides;

@@ -67,6 +67,7 @@ void turn_ghost_inside(Hole<Point>& hole) {
 template <class Kernel>
 void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   if (mesh.flat) {
+    mesh.ticks(mesh.line.size());
     remove_flat(mesh, vertex);
     return;
   }

@@ -331,7 +331,10 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
     return;
   }
   if (vertices.size() >= kMinSet && SetRemoval<Kernel>(mesh, vertices).run()) return;
-  for (const std::uint32_t v : vertices) remove_vertex(mesh, v);
+  for (const std::uint32_t v : vertices) {
+    mesh.ticks(kTicksOfWalk);
+    remove_vertex(mesh, v);
+  }
 }
 
 #ifdef TERRACE_TRI_CORE

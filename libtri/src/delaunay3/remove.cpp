@@ -9,6 +9,7 @@
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "hilbert.hpp"
+#include "insert.hpp"
 #include "int_kernel.hpp"
 
 namespace terrace::tri::spatial {
@@ -16,6 +17,8 @@ namespace {
 
 /// Filling a hole tests each of its vertices for each facet, so larger sets are divided.
 constexpr std::size_t kMaxSet = 512;
+/// Replacing this many tetrahedra takes about as long as an insertion.
+constexpr std::size_t kSlotsPerInsertion = 24;
 
 template <class Kernel>
 class Removal {
@@ -41,6 +44,7 @@ class Removal {
         return;
       }
       for (const std::uint32_t t : hole_.slots) mesh_.mark[t] = kUnknown;
+      mesh_.ticks(kTicksOfInsertion * hole_.slots.size() / kSlotsPerInsertion);
       fill_(mesh_);
     }
     for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);

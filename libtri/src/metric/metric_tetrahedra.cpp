@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "delaunay3/elliptical_kernel.hpp"
 #include "delaunay3/predicates.hpp"
 #include "terrace/tri/metric.hpp"
@@ -27,6 +29,8 @@ using namespace spatial;
 /// A copy of tetrahedra that can be flipped. It has no ghosts; kHullSide represents the outside.
 class Flips {
  public:
+  explicit Flips(const base::StopCheck& check_stop) : ticks_(check_stop) {}
+
   using Vertex = EllipticalKernel::Vertex;
   static constexpr Side kHullSide = 0xFFFFFFFFu;
   static constexpr std::uint32_t kNoRegion = 0xFFFFFFFFu;
@@ -68,6 +72,7 @@ class Flips {
   std::size_t flips_ = 0;
   std::uint32_t free_ = kNone;
   std::priority_queue<Pending> pending_;
+  base::StopTicks ticks_;
 };
 
 std::uint32_t Flips::region_of(std::uint32_t t) const {
@@ -100,6 +105,7 @@ bool Flips::is_delaunay(std::uint32_t t, std::uint32_t i) const {
 std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>& own) {
   number_ = number;
   for (const std::uint32_t t : own) {
+    ticks_(512);
     for (std::uint32_t i = 0; i < 4; ++i) {
       // Takes each facet from one side.
       const Side mate = tetrahedron[t].mate[i];
@@ -114,6 +120,7 @@ std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>
     while (!pending_.empty()) {
       const Pending next = pending_.top();
       pending_.pop();
+      ticks_(1024);
       const std::uint32_t t = tetrahedron_of(next.side);
       if (!alive(t) || key_of(next.side) != next.key || is_delaunay(t, index_of(next.side)))
         continue;
@@ -328,7 +335,7 @@ void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
 /// Triangulates points that are all in one region from scratch, without flips.
 template <class Triangulation>
 void build_anew(const Triangulation& triangulation, const LinearMap3& map,
-                MetricTetrahedra& result) {
+                const base::StopCheck& check_stop, MetricTetrahedra& result) {
   std::vector<Delaunay3<double>::Point> points;
   std::vector<VertexId> vertices;
   for (const VertexId v : triangulation.all_vertices()) {
@@ -338,6 +345,7 @@ void build_anew(const Triangulation& triangulation, const LinearMap3& map,
     vertices.push_back(v);
   }
   Delaunay3<double, EllipticalMetric3> elliptical(map);
+  elliptical.set_check_stop(check_stop);
   const std::vector<VertexId> built = elliptical.build(points);
   std::vector<VertexId> given(elliptical.vertex_slots(), kNoVertex);
   for (std::size_t i = 0; i < built.size(); ++i) given[slot(built[i])] = vertices[i];
@@ -352,17 +360,18 @@ void build_anew(const Triangulation& triangulation, const LinearMap3& map,
 }  // namespace
 
 template <class Triangulation>
-MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation, const MetricField3& field) {
+MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation, const MetricField3& field,
+                                   const base::StopCheck& check_stop) {
   const LinearMap3 given = map_of(triangulation.metric());
   MetricTetrahedra result;
-  Flips flips;
+  Flips flips(check_stop);
   flips.vertex.resize(triangulation.vertex_slots());
   flips.region.resize(triangulation.vertex_slots(), Flips::kNoRegion);
   flips.rank.resize(triangulation.vertex_slots());
   const std::vector<LinearMap3> maps = find_regions(triangulation, field, flips);
   if (triangulation.tetrahedron_count() == 0) return result;
   if (maps.size() == 1 && maps[0] != given) {
-    build_anew(triangulation, maps[0], result);
+    build_anew(triangulation, maps[0], check_stop, result);
     return result;
   }
   rank_vertices(triangulation, flips);
@@ -388,9 +397,11 @@ MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation, const Met
   return result;
 }
 
-template MetricTetrahedra metric_tetrahedra(const Delaunay3<std::int32_t>&, const MetricField3&);
-template MetricTetrahedra metric_tetrahedra(const Delaunay3<double>&, const MetricField3&);
+template MetricTetrahedra metric_tetrahedra(const Delaunay3<std::int32_t>&, const MetricField3&,
+                                            const base::StopCheck&);
+template MetricTetrahedra metric_tetrahedra(const Delaunay3<double>&, const MetricField3&,
+                                            const base::StopCheck&);
 template MetricTetrahedra metric_tetrahedra(const Delaunay3<double, EllipticalMetric3>&,
-                                            const MetricField3&);
+                                            const MetricField3&, const base::StopCheck&);
 
 }  // namespace terrace::tri

@@ -6,6 +6,7 @@
 #include <span>
 
 #include <terrace/base/simd.hpp>
+#include <terrace/base/stop_check.hpp>
 
 #include "terrace/tri/grid_tin.hpp"
 #include "terrace/tri/point_tin.hpp"
@@ -23,7 +24,8 @@ GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,
-                               double tolerance, base::SimdPath set);
+                               double tolerance, base::SimdPath set,
+                               const base::StopCheck& check_stop = {});
 
 namespace rows {
 

@@ -143,7 +143,8 @@ class LatticeSamples {
 /// Starts with the two triangles of a rectangle and inserts the other vertices on its sides.
 /// `frame`: vertices on the sides, counter-clockwise, including the four corners.
 template <class S>
-Refinement<S> start_in_rectangle(S samples, std::vector<typename S::Vertex> frame) {
+Refinement<S> start_in_rectangle(S samples, std::vector<typename S::Vertex> frame,
+                                 base::StopCheck check_stop) {
   using Vertex = typename S::Vertex;
   Vertex low = frame[0], high = frame[0];
   for (const Vertex& p : frame) {
@@ -160,7 +161,8 @@ Refinement<S> start_in_rectangle(S samples, std::vector<typename S::Vertex> fram
   Refinement<S> made(std::move(samples),
                      {std::move(frame),
                       {{{corner[0], corner[1], corner[2]}, {kNone, 1, kNone}, 0, 0.0F},
-                       {{corner[0], corner[2], corner[3]}, {kNone, kNone, 0}, 0, 0.0F}}});
+                       {{corner[0], corner[2], corner[3]}, {kNone, kNone, 0}, 0, 0.0F}}},
+                     std::move(check_stop));
   std::uint32_t near = 0;
   for (std::uint32_t v = 0; v < made.mesh().vertices.size(); ++v) {
     const Vertex p = made.mesh().vertices[v];

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "cavity.hpp"
 #include "mesh.hpp"
 #include "scan.hpp"
@@ -107,10 +109,14 @@ class Refinement {
   using Vertex = typename S::Vertex;
 
   /// `mesh`: a Delaunay triangulation of the region. Vertices without triangles may be inserted
-  /// afterwards.
-  Refinement(S samples, Mesh<typename S::Vertices> mesh)
-      : samples_(std::move(samples)), mesh_(std::move(mesh)) {}
+  /// afterwards. check_stop: called once per vertex, whose triangles may have many samples.
+  Refinement(S samples, Mesh<typename S::Vertices> mesh, base::StopCheck check_stop)
+      : samples_(std::move(samples)), mesh_(std::move(mesh)), check_stop_(std::move(check_stop)) {}
 
+  void check_stop() const {
+    if (check_stop_) check_stop_();
+  }
+  [[nodiscard]] base::StopTicks ticks() const { return base::StopTicks(check_stop_); }
   S& samples() { return samples_; }
   Mesh<typename S::Vertices>& mesh() { return mesh_; }
 
@@ -179,7 +185,10 @@ class Refinement {
   /// Judges all triangles and enters them into the queue.
   template <class Queue>
   void judge_all(Queue& queue) {
-    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) judge(queue, t);
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      check_stop();
+      judge(queue, t);
+    }
   }
 
   /// Inserts samples until all that can become vertices are within the bound, or a limit is
@@ -190,6 +199,7 @@ class Refinement {
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v)
       vertices += samples_.counts(mesh_.vertices[v]) ? 1 : 0;
     while (vertices < limits.vertices && mesh_.triangles.size() <= limits.triangles) {
+      check_stop();
       const std::uint32_t t = queue.pop(mesh_.triangles);
       if (t == kNone) break;
       const std::uint32_t place = mesh_.triangles[t].place;
@@ -238,6 +248,7 @@ class Refinement {
     };
     std::size_t removed = 0;
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+      check_stop();
       if (triangle_of[v] == kNone || !star.gather(mesh_.triangles, v, triangle_of[v]) ||
           !hole.gather(mesh_, star, v))
         continue;
@@ -256,6 +267,7 @@ class Refinement {
     const std::vector<std::uint32_t> triangle_of =
         triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+      check_stop();
       if (triangle_of[v] == kNone) continue;
       Vertex& own = mesh_.vertices[v];
       Interval rises;
@@ -328,6 +340,7 @@ class Refinement {
 
   S samples_;
   Mesh<typename S::Vertices> mesh_;
+  base::StopCheck check_stop_;
   Cavity cavity_;
   bool delaunay_ = true;
 };

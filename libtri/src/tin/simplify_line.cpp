@@ -56,7 +56,8 @@ struct Piece {
 }  // namespace
 
 SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> heights,
-                             double max_error, const std::optional<TinLattice>& lattice) {
+                             double max_error, const std::optional<TinLattice>& lattice,
+                             const base::StopCheck& check_stop) {
   check(t, heights, max_error, lattice);
   SimplifiedLine result;
   // The first of several samples at one position represents them.
@@ -73,9 +74,11 @@ SimplifiedLine simplify_line(std::span<const double> t, std::span<const double> 
   // Taking the greatest error first splits each piece independently, so the order of pieces does
   // not matter.
   std::vector<Piece> pieces{{begin, end, 0, samples.size()}};
+  base::StopTicks ticks(check_stop);
   while (!pieces.empty()) {
     const Piece piece = pieces.back();
     pieces.pop_back();
+    ticks(2 * (piece.last - piece.first));
     double worst = 0;
     double worst_free = max_error;
     std::size_t at = samples.size();

@@ -188,8 +188,8 @@ class Delaunay2 {
   void restart();
   /// Reserves room for this many vertices, so that nothing is reallocated until then.
   void reserve(std::size_t vertices);
-  /// Sets what build() and insert() call at intervals. After it has thrown, the object can only be
-  /// cleared or destroyed.
+  /// Sets what build(), insert() and remove() call at intervals. After it has thrown, the object
+  /// can only be cleared or destroyed.
   void set_check_stop(base::StopCheck check_stop);
 
   // ---- Reading --------------------------------------------------------------------------------

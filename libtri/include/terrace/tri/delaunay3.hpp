@@ -118,8 +118,8 @@ class Delaunay3 {
   /// Reserves room for this many vertices, distributed in space, so that nothing is reallocated
   /// until then.
   void reserve(std::size_t vertices);
-  /// Sets what build() and insert() call at intervals, by their threads. After it has thrown, the
-  /// object can only be cleared or destroyed.
+  /// Sets what build(), insert() and remove() call at intervals, by their threads. After it has
+  /// thrown, the object can only be cleared or destroyed.
   void set_check_stop(base::StopCheck check_stop);
 
   // ---- Reading --------------------------------------------------------------------------------

@@ -70,8 +70,8 @@ class DynamicSurface {
   /// follow(). O(vertices).
   [[nodiscard]] std::size_t removal_work(std::span<const VertexId> vertices) const;
   void reserve(std::size_t vertices);
-  /// Sets what building, inserting and restoring call at intervals. After it has thrown, the object
-  /// can only be destroyed.
+  /// Sets what building, inserting, removing and restoring call at intervals. After it has thrown,
+  /// the object can only be destroyed.
   void set_check_stop(base::StopCheck check_stop);
 
   /// Brings the surface up to date, in about 16 us per point inserted or removed. Starts from

@@ -7,6 +7,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 /// Builds TINs of raster windows, within an error bound at every sample.
 ///
 /// Vertices are inserted greedily (M. Garland, P. S. Heckbert, "Fast polygonal approximation of
@@ -60,12 +62,14 @@ struct GridTinCheck {
 template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
-                            double tolerance = 0);
+                            double tolerance = 0, const base::StopCheck& check_stop = {});
 
 extern template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<const Point3>,
-                                            std::span<const std::array<std::uint32_t, 3>>, double);
+                                            std::span<const std::array<std::uint32_t, 3>>, double,
+                                            const base::StopCheck&);
 extern template GridTinCheck check_grid_tin(const GridWindow<double>&, std::span<const Point3>,
-                                            std::span<const std::array<std::uint32_t, 3>>, double);
+                                            std::span<const std::array<std::uint32_t, 3>>, double,
+                                            const base::StopCheck&);
 
 /// How much work to spend on reducing the number of triangles.
 enum class TinQuality : std::uint8_t {
@@ -87,6 +91,8 @@ struct GridTinOptions {
   double row_step = -1;
   /// Measures the errors of the result. Not needed if the caller checks the written file.
   bool measure = true;
+  /// Called for each vertex and each triangle that is measured.
+  base::StopCheck check_stop{};
 };
 
 /// The vertices on the sides of a window: ascending sample numbers, including both ends.
@@ -140,7 +146,8 @@ GridSides settle_sides(const GridWindow<T>& window, double max_error);
 ///
 /// Throws std::invalid_argument for a window without samples or with more than 65,535 columns or
 /// rows, for `heights` of the wrong length, heights beyond 1e150, sides that do not ascend from end
-/// to end, and options out of range.
+/// to end, and options out of range. Lets exceptions of
+/// options.check_stop pass.
 template <class T>
 GridTin grid_tin(const GridWindow<T>& window, const GridSides& sides,
                  const GridTinOptions& options);

@@ -230,6 +230,7 @@ struct MetricTetrahedra {
 /// Triangulation: any Delaunay3, also one of a MultiresolutionModel.
 template <class Triangulation>
 [[nodiscard]] MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation,
-                                                 const MetricField3& field);
+                                                 const MetricField3& field,
+                                                 const base::StopCheck& check_stop = {});
 
 }  // namespace terrace::tri

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/grid_tin.hpp"
 
 /// Error-bounded triangulated surfaces (TINs) of irregular points: few vertices, vertically within
@@ -55,6 +57,8 @@ struct PointTinOptions {
   /// several samples round to one position, the first one inserted is the vertex. Errors are
   /// measured at the samples' true positions. Requires a frame with integer x, y in [0, 2^30).
   std::optional<TinLattice> lattice;
+  /// Called for each vertex and at intervals between. An exception ends the work.
+  base::StopCheck check_stop{};
 };
 
 /// The value of PointTin::sample for a vertex of the frame.
@@ -156,7 +160,8 @@ struct SampleGrid {
 /// lengths and for a triangle with a vertex that does not exist.
 [[nodiscard]] TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
                                         std::span<const double> z, std::span<const Point3> vertices,
-                                        std::span<const std::array<std::uint32_t, 3>> triangles);
+                                        std::span<const std::array<std::uint32_t, 3>> triangles,
+                                        const base::StopCheck& check_stop = {});
 
 struct LineVertex {
   double t = 0;
@@ -182,6 +187,7 @@ struct SimplifiedLine {
 /// vertices. Usually O(n log n), at worst O(n^2).
 [[nodiscard]] SimplifiedLine simplify_line(std::span<const double> t,
                                            std::span<const double> heights, double max_error,
-                                           const std::optional<TinLattice>& lattice = {});
+                                           const std::optional<TinLattice>& lattice = {},
+                                           const base::StopCheck& check_stop = {});
 
 }  // namespace terrace::tri

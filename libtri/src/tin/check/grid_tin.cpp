@@ -140,7 +140,8 @@ namespace tin {
 template <class T>
 GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,
-                               double tolerance, base::SimdPath set) {
+                               double tolerance, base::SimdPath set,
+                               const base::StopCheck& check_stop) {
   check_shape(window, "check_grid_tin");
   if (!(tolerance >= 0 && tolerance <= 1))
     throw std::invalid_argument("check_grid_tin: tolerance must be in [0, 1]");
@@ -148,6 +149,7 @@ GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Poin
   Checker<T> checker(window, tolerance, set);
   bool first_left = false;
   for (std::size_t i = 0; i < triangles.size(); ++i) {
+    if (check_stop) check_stop();
     const auto& [a, b, c] = triangles[i];
     const double area = checker.visit(points[a], points[b], points[c]);
     if (i == 0) first_left = area > 0;
@@ -158,23 +160,26 @@ GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Poin
 
 template GridTinCheck check_grid_tin_by(const GridWindow<float>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
-                                        base::SimdPath);
+                                        base::SimdPath, const base::StopCheck&);
 template GridTinCheck check_grid_tin_by(const GridWindow<double>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
-                                        base::SimdPath);
+                                        base::SimdPath, const base::StopCheck&);
 
 }  // namespace tin
 
 template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
-                            double tolerance) {
-  return tin::check_grid_tin_by(window, points, triangles, tolerance, base::best_simd_path());
+                            double tolerance, const base::StopCheck& check_stop) {
+  return tin::check_grid_tin_by(window, points, triangles, tolerance, base::best_simd_path(),
+                                check_stop);
 }
 
 template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<const Point3>,
-                                     std::span<const std::array<std::uint32_t, 3>>, double);
+                                     std::span<const std::array<std::uint32_t, 3>>, double,
+                                     const base::StopCheck&);
 template GridTinCheck check_grid_tin(const GridWindow<double>&, std::span<const Point3>,
-                                     std::span<const std::array<std::uint32_t, 3>>, double);
+                                     std::span<const std::array<std::uint32_t, 3>>, double,
+                                     const base::StopCheck&);
 
 }  // namespace terrace::tri

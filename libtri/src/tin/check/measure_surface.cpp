@@ -142,7 +142,7 @@ double height_at(const Point3& a, const Point3& b, const Point3& c, double x, do
 
 TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
                           std::span<const double> z, std::span<const Point3> vertices,
-                          std::span<const Corners> triangles) {
+                          std::span<const Corners> triangles, const base::StopCheck& check_stop) {
   if (x.size() != y.size() || x.size() != z.size())
     throw std::invalid_argument("measure_surface: x, y and z must have equal lengths");
   for (std::size_t t = 0; t < triangles.size(); ++t)
@@ -159,7 +159,9 @@ TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
   const auto precedes = [&](std::size_t a, std::size_t b) {
     return std::array{x[a], y[a], z[a]} < std::array{x[b], y[b], z[b]};
   };
+  base::StopTicks ticks(check_stop);
   for (std::size_t i = 0; i < x.size(); ++i) {
+    ticks(64);
     const Corners* corners = raster.find(x[i], y[i]);
     if (corners == nullptr) continue;
     const double height = height_at(vertices[(*corners)[0]], vertices[(*corners)[1]],

@@ -80,8 +80,9 @@ bool floats_suffice(const Range& range, double bound) {
 }
 
 template <class T>
-void measure(const GridWindow<T>& window, bool wanted, std::size_t data, GridTin& tin) {
-  if (!wanted) {
+void measure(const GridWindow<T>& window, const GridTinOptions& options, std::size_t data,
+             GridTin& tin) {
+  if (!options.measure) {
     tin.check.samples = data;
     return;
   }
@@ -90,7 +91,7 @@ void measure(const GridWindow<T>& window, bool wanted, std::size_t data, GridTin
   for (const GridVertex& vertex : tin.vertices)
     points.push_back(
         {static_cast<double>(vertex.column), static_cast<double>(vertex.row), vertex.height});
-  tin.check = check_grid_tin<T>(window, points, tin.triangles);
+  tin.check = check_grid_tin<T>(window, points, tin.triangles, 0, options.check_stop);
 }
 
 /// The vertices on the sides of the window, its corners first.
@@ -127,7 +128,8 @@ GridTin make(const GridWindow<T>& window, const GridSides& sides, const GridTinO
   RasterSamples<Real> samples(window, options, true, set);
   samples.judge_coarsely_first();
   std::vector<GridCorner<Real>> frame = frame_of(samples, sides);
-  Refinement refinement = start_in_rectangle(std::move(samples), std::move(frame));
+  Refinement refinement =
+      start_in_rectangle(std::move(samples), std::move(frame), options.check_stop);
   refine_to_bound(refinement, options.quality, 0);
   return result_of(refinement, options);
 }
@@ -147,7 +149,7 @@ GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
   if (window.columns > 1 && window.rows > 1 && range.data > 0)
     tin = floats_suffice(range, options.max_error) ? make<float>(window, sides, options, set)
                                                    : make<double>(window, sides, options, set);
-  measure(window, options.measure, range.data, tin);
+  measure(window, options, range.data, tin);
   return tin;
 }
 
@@ -176,13 +178,14 @@ GridTin grid_tin_of_points(const GridWindow<T>& window, std::size_t max_points,
   if (window.columns > 1 && window.rows > 1 && range.data > 0) {
     tin::RasterSamples<double> samples(window, options, false, base::best_simd_path());
     auto frame = tin::frame_of(samples, {});
-    tin::Refinement refinement = tin::start_in_rectangle(std::move(samples), std::move(frame));
+    tin::Refinement refinement =
+        tin::start_in_rectangle(std::move(samples), std::move(frame), options.check_stop);
     tin::ErrorHeap queue;
     refinement.judge_all(queue);
     refinement.refine(queue, {.vertices = max_points});
     result = tin::result_of(refinement, options);
   }
-  tin::measure(window, options.measure, range.data, result);
+  tin::measure(window, options, range.data, result);
   return result;
 }
 

@@ -60,7 +60,9 @@ Measured list_samples(PointRefinement& refinement, std::uint32_t step) {
   ErrorSum sum(refinement.samples().bound());
   // Consecutive samples are close to each other, so walks are short.
   std::uint32_t at = first_live(mesh.triangles);
+  base::StopTicks ticks = refinement.ticks();
   for (std::uint64_t i = 0; i < samples.size(); i += step) {
+    ticks(128);
     const auto index = static_cast<std::uint32_t>(i);
     Sample& sample = samples[index];
     if (sample.next == kIsVertex) {
@@ -89,7 +91,9 @@ Measured measure_lists(PointRefinement& refinement) {
   ErrorSum sum(refinement.samples().bound());
   for (std::uint32_t i = 0; i < samples.size(); ++i)
     (samples[i].next == kOutside ? sum.result.errors.uncovered : sum.result.errors.covered) += 1;
+  base::StopTicks ticks = refinement.ticks();
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    ticks(64);
     Triangle& triangle = mesh.triangles[t];
     triangle.error = 0;
     if (!triangle.live() || heads[t] == kNone) continue;
@@ -114,7 +118,9 @@ void sweep(PointRefinement& refinement, std::uint32_t step) {
   PointSamples& samples = refinement.samples();
   Pool<Sample>& all = samples.all();
   std::uint32_t at = first_live(mesh.triangles);
+  base::StopTicks ticks = refinement.ticks();
   for (std::uint64_t i = 0; i < all.size(); i += step) {
+    ticks(512);
     const auto index = static_cast<std::uint32_t>(i);
     Sample& sample = all[index];
     if (sample.next == kIsVertex) continue;

@@ -66,7 +66,8 @@ class Maker {
           return p[0] <= kMostWhole && p[1] <= kMostWhole;
         });
     PointSamples samples(samples_, bound, options_, !frame_.empty(), whole, mesh.triangles);
-    PointRefinement& refinement = refinement_.emplace(std::move(samples), std::move(mesh));
+    PointRefinement& refinement =
+        refinement_.emplace(std::move(samples), std::move(mesh), options_.check_stop);
     insert(refinement, max_vertices, quality != TinQuality::kGreedy);
     removed_ = 0;
     if (quality == TinQuality::kGreedy) {

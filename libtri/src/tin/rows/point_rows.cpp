@@ -255,8 +255,8 @@ PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
   for (const Point3& p : frame)
     vertices.push_back(
         {static_cast<std::int32_t>(p[0]), static_cast<std::int32_t>(p[1]), p[2], kNone});
-  Refinement refinement =
-      start_in_rectangle(PlacedSamples(*std::move(padded), options, set), std::move(vertices));
+  Refinement refinement = start_in_rectangle(PlacedSamples(*std::move(padded), options, set),
+                                             std::move(vertices), options.check_stop);
   refine_to_bound(refinement, options.quality, frame.size());
   PointTin tin;
   refinement.samples().measure(refinement.mesh(), tin);
