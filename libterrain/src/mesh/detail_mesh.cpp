@@ -315,8 +315,10 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
   std::optional<ClusterTop> part;
   if (detail.cluster) part.emplace(store, *detail.cluster);
   tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
+  tri::Delaunay2<Coord> empty;
+  empty.set_check_stop([&] { store.check_stop(); });
   return finish(tri::Multiresolution2<Coord>(source, in_stored_coordinates(detail, placement),
-                                             {.deltas = false}));
+                                             {.deltas = false}, std::move(empty)));
 }
 
 /// Three corners, their places in order, and the mesh.

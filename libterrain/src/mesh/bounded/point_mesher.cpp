@@ -191,6 +191,7 @@ PointMeshOptions PointMesher::mesh_options(double max_error) const {
   out.tin.max_error = aim.sure;
   out.tin.duplicates = options_.duplicates;
   out.tin.quality = options_.quality;
+  out.tin.check_stop = [this] { context_.check_stop(); };
   return out;
 }
 

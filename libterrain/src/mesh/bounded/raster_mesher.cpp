@@ -322,6 +322,7 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
   out.region = options_.region;
   out.places = options_.places;
   out.tin.quality = options_.quality;
+  out.tin.check_stop = [this] { context_.check_stop(); };
   const GroundMap ground = Ground(placement_).map(store_.bounds());
   const bool mirrored = ground[0] * ground[4] - ground[1] * ground[3] < 0.0;
   out.tin.column_step = base::hypot(ground[0], ground[3]);
