@@ -73,7 +73,8 @@ Dendrogram single_linkage(std::span<const Point3> points, const LinkageOptions& 
   return make_dendrogram(points.size(), spanning_tree(points, options), options.check_stop);
 }
 
-Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointPair> candidates) {
+Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointPair> candidates,
+                          const base::StopCheck& check_stop) {
   const LinkagePoints linkage_points(points);
   const std::vector<Point3>& scaled = linkage_points.scaled();
   std::vector<TreeEdge> edges(candidates.size());
@@ -86,10 +87,15 @@ Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointP
     }
     edges[e] = TreeEdge::of(squared_distance(scaled[i], scaled[j]), i, j);
   }
-  std::sort(edges.begin(), edges.end());
+  base::StopTicks ticks(check_stop);
+  std::sort(edges.begin(), edges.end(), [&](const TreeEdge& a, const TreeEdge& b) {
+    ticks();
+    return a < b;
+  });
   base::UnionFind sets(points.size());
   std::vector<Link> links;
   for (const TreeEdge& edge : edges) {
+    ticks(16);
     if (sets.unite(edge.low, edge.high)) {
       links.push_back({edge.low, edge.high, linkage_points.height(edge.square)});
     }
@@ -100,7 +106,7 @@ Dendrogram single_linkage(std::span<const Point3> points, std::span<const PointP
                                   " with point 0; add the edges of a Delaunay triangulation");
     }
   }
-  return make_dendrogram(points.size(), links);
+  return make_dendrogram(points.size(), links, check_stop);
 }
 
 }  // namespace terrace::cluster

@@ -72,7 +72,8 @@ using PointPair = std::array<std::uint32_t, 2>;
 /// Throws: std::invalid_argument as above, if a pair names a point that does not exist, and if the
 /// pairs do not connect a point with point 0 (the message names the point).
 [[nodiscard]] Dendrogram single_linkage(std::span<const Point3> points,
-                                        std::span<const PointPair> candidates);
+                                        std::span<const PointPair> candidates,
+                                        const base::StopCheck& check_stop = {});
 
 /// Returns the edges of the minimum spanning tree with their lengths, in no particular order.
 [[nodiscard]] std::vector<Link> spanning_tree(std::span<const Point3> points,
