@@ -59,7 +59,7 @@ py::array linkage(const Array<double>& given, const std::string& method,
   return to_array(released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     const std::span<const cluster::Point3> all(points);
-    if (edges) return rows_of_merges(cluster::single_linkage(all, pairs));
+    if (edges) return rows_of_merges(cluster::single_linkage(all, pairs, options.check_stop));
     if (gpu) {
       return rows_of_merges(kind == cluster::LinkageMethod::single
                                 ? cluster::cuda_single_linkage(all)

@@ -80,7 +80,9 @@ py::array adapted2(SharedDelaunay2& shared, const MetricRegions<2>& regions) {
 py::tuple adapted3(SharedDelaunay3& shared, const MetricRegions<3>& regions) {
   const tri::MetricField3 field = field_of<3>(regions);
   const tri::MetricTetrahedra made =
-      shared.read(0, [&](const auto& mesh) { return metric_tetrahedra(mesh, field); });
+      shared.read(0, [&](const auto& mesh, const std::stop_token& stop) {
+        return metric_tetrahedra(mesh, field, stop_check(stop));
+      });
   return py::make_tuple(to_array(numbers_of_corners(made.tetrahedra)), made.stuck);
 }
 

@@ -170,16 +170,22 @@ class SharedDelaunay {
 
   void remove(const Array<std::int32_t>& given) {
     const auto handles = numbers_of(given, "vertices");
-    locked(handles.size(), [&] {
-      const std::vector<tri::VertexId> vertices = checked(handles);
+    locked(handles.size(), [&](const std::stop_token& stop) {
+      std::vector<tri::VertexId> vertices = checked(handles);
       std::vector<std::int32_t> sorted(handles.begin(), handles.end());
       std::sort(sorted.begin(), sorted.end());
       const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
       if (twice != sorted.end()) {
         throw std::invalid_argument("vertex " + std::to_string(*twice) + " is named twice");
       }
-      mesh_.remove(vertices);
+      // A stop ends the call between portions of vertices that are close together.
+      constexpr std::size_t kPortion = 20'000;
+      if (vertices.size() > kPortion) vertices = in_near_order(vertices);
+      for (std::size_t at = 0; at < vertices.size() && !stop.stop_requested(); at += kPortion) {
+        mesh_.remove(std::span(vertices).subspan(at, std::min(kPortion, vertices.size() - at)));
+      }
       Kind::settle(mesh_);
+      if (stop.stop_requested()) throw stream::Stopped();
       return 0;
     });
   }
@@ -343,6 +349,17 @@ class SharedDelaunay {
     Row row{};
     std::transform(corners.begin(), corners.end(), row.begin(), handle);
     return row;
+  }
+
+  [[nodiscard]] std::vector<tri::VertexId> in_near_order(
+      std::span<const tri::VertexId> vertices) const {
+    std::vector<Point> places;
+    for (const tri::VertexId v : vertices) places.push_back(mesh_.point(v));
+    std::vector<tri::VertexId> ordered;
+    for (const std::size_t i : near_order(std::span<const Point>(places))) {
+      ordered.push_back(vertices[i]);
+    }
+    return ordered;
   }
 
   /// Inserts the first points into an empty mesh, which stays empty if this is stopped or fails.

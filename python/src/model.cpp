@@ -34,9 +34,15 @@ class SharedModel {
 
   SharedModel(const OpenStore& open, unsigned level,
               const std::vector<std::pair<FlatBox, unsigned>>& focuses)
-      : store_(open.get_whole()), source_(store_) {
+      : store_(open.get_whole()) {
     const tri::Detail start = detail_of(level, focuses);
-    released([&] { model_ = std::make_unique<Model>(source_, start); });
+    // Ctrl-C ends only this call. Later ones keep the view and its check, which do nothing then.
+    released([&](const std::stop_token& stop) {
+      store_ = store_.with_stop(stop);
+      tri::Delaunay2<Coord> empty;
+      empty.set_check_stop(stop_check(stop));
+      model_ = std::make_unique<Model>(source_, start, tri::ModelOptions{}, std::move(empty));
+    });
   }
 
   /// Applies step(model), which returns its delta.
@@ -105,7 +111,7 @@ class SharedModel {
   }
 
   stream::Store store_;
-  terrain::StoreSource source_;
+  terrain::StoreSource source_{store_};
   std::mutex mutex_;
   std::unique_ptr<Model> model_;
 };

@@ -295,7 +295,8 @@ void bind_store(py::module_& module) {
       .def("where",
            [](const OpenStore& open, const std::string& condition) {
              const stream::Store view = open.get(condition);
-             released([&] { return view.bounds(); });  // throws if no point meets the condition
+             // Throws if no point meets the condition.
+             released([&](const std::stop_token& stop) { return view.with_stop(stop).bounds(); });
              return OpenStore(view);
            })
       .def("info", &info_of)
@@ -310,10 +311,11 @@ void bind_store(py::module_& module) {
                throw py::value_error(
                    "the raster is rotated: boxes do not follow its columns and rows");
              const terrain::Region region = region_of(given, store).value();
-             return released([&] {
+             return released([&](const std::stop_token& stop) {
+               const stream::Store stoppable = store.with_stop(stop);
                std::uint64_t points = 0;
                for (const stream::Box3& box : boxes_of(region)) {
-                 points += stream::StoreQuery(store).count(stored_box(store.schema(), box));
+                 points += stream::StoreQuery(stoppable).count(stored_box(store.schema(), box));
                }
                return points;
              });

@@ -35,7 +35,10 @@ py::tuple tin_of_points(const Array<double>& x, const Array<double>& y, const Ar
   options.duplicates = named<tri::PointDuplicates>(duplicates);
   const auto corners = rows_of<3>(frame, "frame");
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
-  tri::PointTin made = released([&] { return tri::point_tin(xs, ys, zs, corners, options); });
+  tri::PointTin made = released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
+    return tri::point_tin(xs, ys, zs, corners, options);
+  });
   const tri::TinErrors& errors = made.errors;
   return py::make_tuple(
       to_array(std::move(made.vertices)), to_array(std::move(made.triangles)),
@@ -56,13 +59,14 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
       .columns = static_cast<std::uint32_t>(heights.shape(1)),
       .rows = static_cast<std::uint32_t>(heights.shape(0)),
       .heights = {heights.data(), static_cast<std::size_t>(heights.size())}};
-  const tri::GridTinOptions options{.max_error = max_error,
-                                    .quality = named<tri::TinQuality>(quality),
-                                    .column_step = column_step,
-                                    .row_step = row_step,
-                                    .measure = true};
+  tri::GridTinOptions options{.max_error = max_error,
+                              .quality = named<tri::TinQuality>(quality),
+                              .column_step = column_step,
+                              .row_step = row_step,
+                              .measure = true};
   std::vector<tri::Point3> vertices;
-  tri::GridTin made = released([&] {
+  tri::GridTin made = released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
     tri::GridTin tin = max_points > 0 ? grid_tin_of_points(window, max_points, options)
                                       : grid_tin(window, settle_sides(window, max_error), options);
     vertices.reserve(tin.vertices.size());
@@ -80,8 +84,9 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
 py::tuple simplify_line(const Array<double>& t, const Array<double>& heights, double max_error) {
   const auto along = numbers_of(t, "t"), values = numbers_of(heights, "heights");
   double largest = 0;
-  auto samples = released([&] {
-    const tri::SimplifiedLine made = tri::simplify_line(along, values, max_error);
+  auto samples = released([&](const std::stop_token& stop) {
+    const tri::SimplifiedLine made =
+        tri::simplify_line(along, values, max_error, {}, stop_check(stop));
     largest = made.largest_error;
     std::vector<std::int64_t> kept;
     for (const tri::LineVertex& vertex : made.vertices) kept.push_back(vertex.sample);
@@ -96,8 +101,9 @@ py::dict measure_surface(const Array<double>& x, const Array<double>& y, const A
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
   const auto places = rows_of<3>(vertices, "vertices");
   const auto corners = rows_of<3>(triangles, "triangles");
-  const tri::TinErrors made =
-      released([&] { return tri::measure_surface(xs, ys, zs, places, corners); });
+  const tri::TinErrors made = released([&](const std::stop_token& stop) {
+    return tri::measure_surface(xs, ys, zs, places, corners, stop_check(stop));
+  });
   py::dict result = measures(made.largest, made.rms, made.covered + made.uncovered, made.uncovered);
   result["worst"] =
       made.largest_at == tri::kNoSample ? std::int64_t{-1} : std::int64_t{made.largest_at};

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <pybind11/stl.h>
+#include <terrace/base/stop_check.hpp>
 #include <terrace/matching/matching_tree.hpp>
 #include <terrace/matching/point_hierarchy.hpp>
 #include <terrace/matching/triangle_hierarchy.hpp>
@@ -102,6 +103,9 @@ py::array rotated(const Array<double>& rows, const Array<double>& lower, const A
   }));
 }
 
+/// See base::StopTicks.
+constexpr std::size_t kTicksOfQuery = 4096;
+
 /// Indices and distances of the items found, -1 and infinity for none.
 struct Found {
   explicit Found(std::size_t count)
@@ -125,9 +129,11 @@ py::tuple nearest_points(const matching::PointHierarchy<N>& tree, const Array<do
                          std::size_t k) {
   const auto asked = rows_of<N>(places, "places");
   Found found(asked.size() * k);
-  released([&] {
+  released([&](const std::stop_token& stop) {
+    base::StopTicks ticks(stop_check(stop));
     std::vector<matching::Neighbour> near;
     for (std::size_t i = 0; i < asked.size(); ++i) {
+      ticks(kTicksOfQuery);
       tree.nearest(asked[i], k, near);
       for (std::size_t j = 0; j < near.size(); ++j) found.set(i * k + j, near[j], near[j].distance);
     }
@@ -144,8 +150,10 @@ py::tuple first_hits(const Array<double>& origins, const Array<double>& directio
                           std::to_string(towards.size()) + " directions");
   }
   Found found(from.size());
-  released([&] {
+  released([&](const std::stop_token& stop) {
+    base::StopTicks ticks(stop_check(stop));
     for (std::size_t i = 0; i < from.size(); ++i) {
+      ticks(kTicksOfQuery);
       if (const auto first = hit(matching::Ray{from[i], towards[i]}))
         found.set(i, *first, first->t);
     }
@@ -202,8 +210,10 @@ void bind_trees(py::module_& module) {
            [](const Triangles& tree, const Array<double>& places) {
              const auto asked = rows_of<3>(places, "places");
              Found found(asked.size());
-             released([&] {
+             released([&](const std::stop_token& stop) {
+               base::StopTicks ticks(stop_check(stop));
                for (std::size_t i = 0; i < asked.size(); ++i) {
+                 ticks(kTicksOfQuery);
                  if (const auto near = tree.nearest(asked[i])) found.set(i, *near, near->distance);
                }
              });

@@ -212,11 +212,17 @@ class _PointMesh:
 
         The result is the triangulation of the remaining vertices, independent of history.
 
-        Raises: ValueError for a vertex that does not exist; then nothing has changed.
+        Raises: ValueError for a vertex that does not exist; then nothing has changed. After Ctrl-C the vertices that
+            were removed before it are missing.
         """
         vertices = _handles(vertices)
         with self._lock:
-            self._of_vertices(vertices, self._core.remove)
+            try:
+                self._of_vertices(vertices, self._core.remove)
+            except KeyboardInterrupt:
+                stays = np.isin(self._numbers.slots_of(vertices), self._core.vertices())
+                self._numbers.forget_copies(vertices[~stays])
+                raise
             self._numbers.forget_copies(vertices)
 
     def _of_vertices(self, vertices: Int32Array, work: Callable[[Int32Array], T]) -> T:

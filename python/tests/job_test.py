@@ -94,11 +94,14 @@ class Jobs(StoreCase):
             import os, signal, threading, numpy as np, terrace
             random = np.random.default_rng(1)
             plane, space = random.random((6_000_000, 2)), random.random((3_000_000, 3))
+            noise, pairs = random.random((2000, 2000)), random.integers(0, 1_000_000, (8_000_000, 2))
             for call in (lambda: terrace.Delaunay2(plane), lambda: terrace.Delaunay3(space), lambda: terrace.DynamicSurface(space),
                          lambda: terrace.linkage(space[:60_000], 'ward'), lambda: terrace.linkage(space[:20_000], 'average'),
                          lambda: terrace.linkage(space[:20_000], 'complete'), lambda: terrace.kmeans(space, 100_000),
                          lambda: terrace.cluster(space[:4000], method='greedy-stars'), lambda: terrace.cluster(space[:40_000], count=1000),
-                         lambda: terrace.matching(space[:400_000]), lambda: terrace.assignment(space[:200_000], space[200_000:400_000])):
+                         lambda: terrace.matching(space[:400_000]), lambda: terrace.assignment(space[:200_000], space[200_000:400_000]),
+                         lambda: terrace.bounded_mesh(space, 0.0), lambda: terrace.bounded_mesh(noise, 0.0, transform=(1, 0, 0, 0, -1, 0)),
+                         lambda: terrace.linkage(space[:1_000_000], edges=pairs)):
                 timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
                 timer.start()
                 try:
@@ -109,7 +112,7 @@ class Jobs(StoreCase):
         ''')
         with subprocess.Popen([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True) as child:
             output, _ = child.communicate(timeout=600)
-        self.assertEqual(output.split(), ['interrupted'] * 11)
+        self.assertEqual(output.split(), ['interrupted'] * 14)
 
     def test_ctrl_c_ends_an_insertion_between_portions(self):
         code = textwrap.dedent('''
@@ -122,6 +125,20 @@ class Jobs(StoreCase):
             except KeyboardInterrupt:
                 vertices, points = mesh.vertices, mesh.points
                 print(1000 <= len(mesh) < len(given), len(vertices) == len(mesh), terrace.Delaunay2(points[vertices]).digest() == mesh.digest())
+        ''')
+        output = subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True, timeout=600).stdout
+        self.assertEqual(output.split(), ['True'] * 3)
+
+    def test_ctrl_c_ends_a_removal_between_portions(self):
+        code = textwrap.dedent('''
+            import os, signal, threading, numpy as np, terrace
+            mesh = terrace.Delaunay2(np.random.default_rng(1).random((2_000_000, 2)))
+            threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+            try:
+                mesh.remove(np.arange(1_999_000))
+            except KeyboardInterrupt:
+                vertices, points = mesh.vertices, mesh.points
+                print(1000 <= len(mesh) < 2_000_000, len(vertices) == len(mesh), terrace.Delaunay2(points[vertices]).digest() == mesh.digest())
         ''')
         output = subprocess.run([sys.executable, '-c', code], stdout=subprocess.PIPE, text=True, timeout=600).stdout
         self.assertEqual(output.split(), ['True'] * 3)
