@@ -234,6 +234,23 @@ class LasFormatTest(LasCase):
         strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')
         self.assertIn(b"'NAVD88' in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
 
+    def test_ellipsoidal_heights_are_kept(self):
+        """Also if only --vertical says so, and after a conversion of x and y."""
+        for unit, name in (None, 'z'), ('metre', 'z (m)'), ('foot', 'z (ft)'):
+            rows = '\n'.join(f'{i},{40 + i / 5},{i * i / 4}' for i in range(50))
+            table = self.put('table.csv', f'x,y,{name}\n{rows}\n'.encode())
+            for crs, options in (('EPSG:32632', ('--vertical', 'ellipsoidal')), ('EPSG:4326', ('--vertical', 'ellipsoidal')),
+                                 ('EPSG:4326+5773', ('--vertical', 'ellipsoidal')), ('EPSG:4979', ())):
+                store = self.path('ellipsoidal.store')
+                shutil.rmtree(store, ignore_errors=True)
+                self.run_ok('build', table, '--crs', crs, *options, '-o', store)
+                for file, to in (('own.las', ()), ('own.laz', ()), ('other.laz', ('--to-crs', 'EPSG:3857'))):
+                    self.run_ok('points', store, *to, '-o', self.path(file), '--force')
+                    info = self.info(self.path(file))
+                    self.assertEqual(info['vertical'], 'ellipsoidal', (unit, crs, file))
+                    if unit == 'foot':
+                        self.assertEqual(info['crs']['vertical_unit'], 'foot', (crs, file))
+
     def test_wkt_after_the_points_is_read_from_files_and_requested_for_pipes(self):
         records = random_records(6, 20)
         data = las(6, records, encoding=16, evlrs=[

@@ -44,8 +44,8 @@ std::optional<CrsDefinition> definition_in_file(const stream::Placement& own,
 
 }  // namespace
 
-stream::Crs crs_of_point_file(const stream::Placement& own,
-                              const std::optional<stream::Crs>& other) {
+stream::Crs crs_of_point_file(const stream::Placement& own, const std::optional<stream::Crs>& other,
+                              const std::string& vertical) {
   stream::Crs crs = other.value_or(own.crs);
   try {
     const std::string unit = unit_of_heights(own, other.has_value());
@@ -53,10 +53,22 @@ stream::Crs crs_of_point_file(const stream::Placement& own,
     const std::optional<double> metres = metres_in_unit(unit);
     std::optional<CrsDefinition> definition = definition_in_file(own, other);
     if (definition) {
+      if (vertical == name_of(Heights::ellipsoidal) &&
+          definition->heights != Heights::ellipsoidal) {
+        forget_heights(*definition);
+        definition->heights = Heights::ellipsoidal;
+      }
       // Without a unit, readers assume metres for heights, unless x and y are in feet.
       const bool assumed = definition->geographic || definition->metres_per_unit >= 1;
       const bool said = definition->metres_per_height != 0;
-      if (metres && (said || !assumed || *metres != 1)) write_height_unit(*definition, *metres);
+      // The vertical system that has the unit also says that heights are ellipsoidal.
+      const bool unsaid =
+          definition->heights == Heights::ellipsoidal && definition->height_wkt.empty();
+      if (metres && (said || unsaid || !assumed || *metres != 1)) {
+        write_height_unit(*definition, *metres);
+      } else if (unsaid) {
+        write_height_unit(*definition, assumed ? 1 : definition->metres_per_unit);
+      }
       stream::Crs known = CoordinateSystem(*definition).crs_with_wkt1();
       known.vertical_unit = crs.vertical_unit;
       return known;

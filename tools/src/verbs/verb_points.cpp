@@ -127,10 +127,13 @@ class PointsCommand final : public Command {
   static stream::PointHeader header(const stream::Store& store,
                                     std::vector<stream::Channel> attributes,
                                     const std::optional<Transformation>& to) {
-    stream::PointHeader wanted{
-        .attributes = std::move(attributes),
-        .comments = {kWriterMark},
-        .crs = [&store, other = crs_of(to)] { return crs_of_point_file(store.schema(), other); }};
+    stream::PointHeader wanted{.attributes = std::move(attributes),
+                               .comments = {kWriterMark},
+                               .crs =
+                                   [&store, other = crs_of(to)] {
+                                     return crs_of_point_file(store.schema(), other,
+                                                              store.schema().vertical);
+                                   }};
     if (!to) {
       wanted.lattice = lattice_of(store.schema());
       wanted.bounds = world_box(store.schema(), store.whole().bounds());

@@ -14,9 +14,11 @@ namespace terrace::terrain {
 /// Returns the CRS that stream::PointHeader records for points placed by `own`. It has WKT 1 (OGC
 /// 01-009), which LAS requires, or WKT 2 if WKT 1 cannot express it. It names the unit of heights,
 /// except for metres if readers assume them. other: the CRS that x and y were converted to; heights
-/// are not converted. An unknown CRS is returned unchanged.
+/// are not converted. vertical: stream::StoreSchema::vertical; "ellipsoidal" is recorded even if
+/// the CRS does not say so. An unknown CRS is returned unchanged.
 stream::Crs crs_of_point_file(const stream::Placement& own,
-                              const std::optional<stream::Crs>& other = std::nullopt);
+                              const std::optional<stream::Crs>& other = std::nullopt,
+                              const std::string& vertical = {});
 
 /// Returns a note that the file does not record the unit of heights, so that readers assume another
 /// one; empty if it records the unit or if nothing is lost. path: of the file.
