@@ -218,9 +218,18 @@ class LasFormatTest(LasCase):
             self.run_ok('build', copy, '--crs', 'EPSG:32632', '-o', store)
             self.run_ok('points', store, '-o', file, '--force')
             self.assertEqual(metres(file), expected, unit)
-            for ending in '.csv', '.xyz', '.ply':
+            for ending in '.xyz', '.ply':
                 result = terrace('convert', copy, '-o', self.path('lost' + ending), '--force')
                 self.assertEqual(b'no place for a unit' in result.stderr, unit != 'metre', result.stderr)
+            # CSV names the unit in its header.
+            head = {'foot': 'x,y,z (ft)', 'US survey foot': 'x,y,z (ftUS)', 'metre': 'x,y,z'}[unit]
+            for verb, source in (('convert', copy), ('points', store)):
+                text = self.path('kept.csv')
+                result = terrace(verb, source, '-o', text, '--force')
+                self.assertNotIn(b'no place', result.stderr)
+                with open(text, encoding='ascii') as rows:
+                    self.assertTrue(rows.readline().startswith(head), head)
+                self.assertEqual(metres(text), expected, (verb, unit))
         # Nor does it if the file's own CRS is WKT.
         feet = (f'COMPD_CS["c",{UTM_WKT},VERT_CS["h",VERT_DATUM["d",2005],'
                 'UNIT["US survey foot",0.304800609601219]]]')

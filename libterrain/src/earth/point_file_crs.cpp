@@ -85,10 +85,20 @@ stream::Crs crs_of_point_file(const stream::Placement& own, const std::optional<
   return crs;
 }
 
+std::string height_unit_of_point_file(const stream::Placement& own,
+                                      const std::optional<stream::Crs>& other) {
+  if (is_geocentric(own.crs)) return {};
+  try {
+    return unit_of_heights(own, other.has_value());
+  } catch (const CrsError&) {
+    return {};
+  }
+}
+
 std::string lost_height_unit(const std::string& path, const stream::PointWriter& writer,
                              const stream::Placement& own,
                              const std::optional<stream::Crs>& other) {
-  if (is_geocentric(own.crs)) return {};
+  if (is_geocentric(own.crs) || writer.names_height_unit()) return {};
   try {
     const std::string unit = unit_of_heights(own, other.has_value());
     // Without a CRS the unit is a code of a GeoKey, which these two units do not have.
@@ -98,7 +108,7 @@ std::string lost_height_unit(const std::string& path, const stream::PointWriter&
     return path + ": heights are in " + plural_unit(unit) + ", and the format has no place for " +
            (writer.records_units() ? "that" : "a") + " unit, so programs read them as metres; " +
            (writer.records_units() ? "name the CRS to keep it"
-                                   : "write LAS or LAZ to keep the unit");
+                                   : "write LAS, LAZ or CSV to keep the unit");
   } catch (const CrsError&) {
     return {};
   }

@@ -393,13 +393,14 @@ void write_clustered(const std::string& path, stream::WriterOptions writing,
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
   const std::uint64_t held = table.payload.size() + table.size() * sizeof(stream::Point3);
   writing.memory_bytes -= std::min(writing.memory_bytes, held);
-  const auto writer =
-      stream::open_point_writer(path,
-                                {.attributes = std::move(attributes),
-                                 .comments = {kWriterMark},
-                                 .crs = [&table] { return crs_of_point_file(table.info); },
-                                 .lattice = lattice_of(table.info)},
-                                writing);
+  const auto writer = stream::open_point_writer(
+      path,
+      {.attributes = std::move(attributes),
+       .comments = {kWriterMark},
+       .crs = [&table] { return crs_of_point_file(table.info); },
+       .height_unit = [&table] { return height_unit_of_point_file(table.info); },
+       .lattice = lattice_of(table.info)},
+      writing);
   writing_within_memory(*writer, path, common.memory_or(0), held);
   const std::string lost = lost_height_unit(path, *writer, table.info);
   if (!lost.empty()) common.say(lost);

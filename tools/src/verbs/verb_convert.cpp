@@ -68,13 +68,14 @@ class ConvertCommand : public Command {
     const std::uint64_t held = reading_within_memory(*source, memory);
     writing.memory_bytes -= std::min(writing.memory_bytes, held);
     const stream::SourceInfo& info = source->info();
-    const auto writer =
-        stream::open_point_writer(output_,
-                                  {.attributes = info.attributes,
-                                   .comments = {kWriterMark},
-                                   .crs = [&info] { return crs_of_point_file(located(info)); },
-                                   .lattice = lattice_of(info)},
-                                  writing);
+    const auto writer = stream::open_point_writer(
+        output_,
+        {.attributes = info.attributes,
+         .comments = {kWriterMark},
+         .crs = [&info] { return crs_of_point_file(located(info)); },
+         .height_unit = [&info] { return height_unit_of_point_file(located(info)); },
+         .lattice = lattice_of(info)},
+        writing);
     writing_within_memory(*writer, output_, memory, held);
     UndeclaredVoids voids(info);
     ProgressMeter meter(common.progress, "points");

@@ -133,6 +133,10 @@ class PointsCommand final : public Command {
                                    [&store, other = crs_of(to)] {
                                      return crs_of_point_file(store.schema(), other,
                                                               store.schema().vertical);
+                                   },
+                               .height_unit =
+                                   [&store, other = crs_of(to)] {
+                                     return height_unit_of_point_file(store.schema(), other);
                                    }};
     if (!to) {
       wanted.lattice = lattice_of(store.schema());

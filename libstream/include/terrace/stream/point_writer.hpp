@@ -25,6 +25,9 @@ struct PointHeader {
   /// if it has no WKT. Other formats do not call it, because finding the WKT may mean searching a
   /// database. Empty if the CRS is unknown.
   std::function<Crs()> crs{};
+  /// Returns the unit of heights, as in Channel::unit; empty if it is unknown. Formats that record
+  /// it apart from the CRS (CSV) call it.
+  std::function<std::string()> height_unit{};
   /// The lattice of the coordinates, if they are on one. Text gets its decimals (849393.95, not
   /// 849393.9500000001), and formats with integer coordinates (LAS) use it. Without a lattice,
   /// these use a power of ten that suits the first points and the bounds.
@@ -65,6 +68,8 @@ class PointWriter {
   [[nodiscard]] virtual std::uint64_t points() const = 0;
   /// True if the file can state the CRS and the units of coordinates.
   [[nodiscard]] virtual bool records_units() const { return false; }
+  /// True if the file names the unit that PointHeader::height_unit returns.
+  [[nodiscard]] virtual bool names_height_unit() const { return false; }
   /// Maximum distance by which a coordinate was moved to fit the format's integers; 0 if none was
   /// moved by more than the rounding of doubles.
   [[nodiscard]] virtual double rounding() const { return 0.0; }

@@ -10,6 +10,7 @@
 #include "format/plain_point_writer.hpp"
 #include "format/writers.hpp"
 #include "io/number.hpp"
+#include "terrace/stream/unit_words.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -23,6 +24,15 @@ std::string csv_field(const std::string& name) {
     out += c == '"' || c == ',' || c == ';' ? '_' : c;
   }
   return out + "\"";
+}
+
+/// Returns the unit of heights as the reader finds it in a header; empty for metres, which readers
+/// assume, and for words that are not units of length.
+std::string unit_in_brackets(const std::string& unit) {
+  const std::string name = canonical_unit(unit);
+  if (name == "metre" || !is_length_unit(name)) return {};
+  if (name == "foot") return " (ft)";
+  return " (" + (name == "US survey foot" ? "ftUS" : name) + ")";
 }
 
 /// Writes a coordinate. On a lattice with decimal steps (LAS) it is a rounded k * scale + offset,
@@ -78,8 +88,9 @@ class XyzWriter final : public PlainPointWriter {
     }
   }
 
-  void write_header() {
-    std::string text = "x,y,z";
+  void write_header(const std::string& height_unit) {
+    names_height_unit_ = true;
+    std::string text = "x,y,z" + unit_in_brackets(height_unit);
     for (std::size_t i = 0; i < columns().size(); ++i) {
       text += ',';
       text += csv_field(columns().name(i));
@@ -87,6 +98,8 @@ class XyzWriter final : public PlainPointWriter {
     text += '\n';
     sink().write(text);
   }
+
+  [[nodiscard]] bool names_height_unit() const override { return names_height_unit_; }
 
  private:
   void put(const PointBlock& block, std::string& out) const override {
@@ -103,6 +116,7 @@ class XyzWriter final : public PlainPointWriter {
   }
 
   char separator_;
+  bool names_height_unit_ = false;
   std::array<CoordinateText, 3> coordinates_;
 };
 
@@ -116,7 +130,7 @@ std::unique_ptr<PointWriter> open_xyz_writer(const std::string& path, const Poin
 std::unique_ptr<PointWriter> open_csv_writer(const std::string& path, const PointHeader& header,
                                              const WriterOptions& options) {
   auto writer = std::make_unique<XyzWriter>(path, header, options, ',');
-  writer->write_header();
+  writer->write_header(header.height_unit ? header.height_unit() : std::string());
   return writer;
 }
 
