@@ -158,6 +158,26 @@ class AnswerTest(OutputCase):
     def test_the_version_names_no_driver(self):
         self.assertNotIn('driver', self.ok('--version').stdout)
 
+    @unittest.skipUnless(shutil.which('gdal_translate'), 'needs gdal-bin')
+    def test_force_keeps_the_copies_that_gdal_makes_of_a_raster(self):
+        """GDAL copies the Software tag. Strips, tiles, a COG, and one tile whose values all fit into the directory."""
+        for ours, command in (('cog.tif', ('raster', self.store)), ('plain.tif', ('synth', 'dem', '--size', '300x20'))):
+            ours = self.path(ours)
+            self.ok(*command, '-o', ours)
+            self.ok(*command, '-o', ours, '--force')
+            copy = self.path('copy.tif')
+            for more in ([], ['-co', 'TILED=YES'], ['-co', 'TILED=YES', '-a_nodata', 'none'], ['-of', 'COG'],
+                         ['-of', 'COG', '-a_nodata', 'none', '-co', 'BLOCKSIZE=128', '-co', 'PREDICTOR=YES']):
+                subprocess.run(['gdal_translate', '-q', *more, ours, copy], check=True)
+                with open(copy, 'rb') as file:
+                    self.assertIn(b'terrace', file.read())
+                self.refuse(1, 'not written by terrace', *command, '-o', copy, '--force')
+            if shutil.which('gdal_edit.py'):
+                shutil.copy(ours, copy)
+                subprocess.run(['gdal_edit.py', '-mo', 'AUTHOR=someone', copy], check=True, stderr=subprocess.DEVNULL)
+                self.refuse(1, 'not written by terrace', *command, '-o', copy, '--force')
+            os.remove(copy)
+
     def test_interrupted_tiles_name_the_option_that_resumes(self):
         folder = tempfile.mkdtemp(dir=self.folder)
         env = dict(os.environ, LD_PRELOAD=os.environ['FAULT_SHIM'], FAULT_STEP='8', FAULT_KIND='pause')

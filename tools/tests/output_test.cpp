@@ -137,21 +137,30 @@ TEST_F(MayReplace, FindsTheTagInAllKindsOfTiff) {
     put(big_tiff ? 43 : 42, 2);
     if (big_tiff) put(8, 2), put(0, 2);
     put(big_tiff ? 16 : 8, word);  // offset of the directory
-    put(2, big_tiff ? 8 : 2);
-    for (const std::uint64_t entry : {std::uint64_t{256}, tag}) {
+    put(4, big_tiff ? 8 : 2);
+    constexpr std::uint64_t kGeoKeys = 34735;
+    const auto put_geo_keys = [&] {
+      for (const std::uint64_t number : {1U, 1U, 1U, 0U}) put(number, 2);
+    };
+    for (const std::uint64_t entry : {std::uint64_t{256}, tag, std::uint64_t{322}, kGeoKeys}) {
       put(entry, 2);
-      put(entry == 256 ? 3 : 2, 2);
-      put(entry == 256 ? 1 : name.size(), word);
-      if (entry == 256) {
-        put(16, word);
-      } else if (big_tiff) {
+      put(entry == tag ? 2 : 3, 2);
+      put(entry == tag ? name.size() : entry == kGeoKeys ? 4U : 1U, word);
+      if (entry != tag && entry != kGeoKeys) {
+        put(big_endian ? std::uint64_t{16} << 8 * (word - 2) : 16, word);
+      } else if (!big_tiff) {
+        put(8 + 2 + 48 + 4 + (entry == tag ? 0U : 8U), word);
+      } else if (entry == tag) {
         bytes += name;
       } else {
-        put(8 + 2 + 24 + 4, word);
+        put_geo_keys();
       }
     }
     put(0, word);
-    if (!big_tiff) bytes += name;
+    if (!big_tiff) {
+      bytes += name;
+      put_geo_keys();
+    }
     return bytes;
   };
   const std::string ours("terrace\0", 8), other("terrain\0", 8);
@@ -164,9 +173,11 @@ TEST_F(MayReplace, FindsTheTagInAllKindsOfTiff) {
       expect_foreign("of another program");
       write(tiff(big_endian, big_tiff, 270, ours));
       expect_foreign("in its description");
+      write(bytes + "tile");
+      expect_foreign("with the directory before the tiles, as GDAL writes it");
       for (std::size_t size = 1; size < bytes.size(); ++size) {
         write(bytes.substr(0, size));
-        if (size < bytes.size() - (big_tiff ? 8 : 0)) expect_foreign(std::to_string(size));
+        expect_foreign(std::to_string(size));
       }
     }
   }

@@ -2,6 +2,7 @@
 #include "base/file_marks.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <fstream>
 
@@ -89,12 +90,23 @@ bool is_our_png(std::ifstream& file) {
   }
 }
 
-/// Searches the first directory of a classic TIFF or a BigTIFF.
+/// Returns the bytes of a value of a TIFF type; 0 for an unknown type.
+std::uint64_t bytes_of_tiff_type(std::uint64_t type) {
+  constexpr std::array<std::uint8_t, 19> kBytes{0, 1, 1, 2, 4, 8, 1, 1, 2, 4,
+                                                8, 4, 8, 4, 0, 0, 8, 8, 8};
+  return type < kBytes.size() ? kBytes[static_cast<std::size_t>(type)] : 0;
+}
+
+/// Searches the first directory of a classic TIFF or a BigTIFF. The Software tag is not enough,
+/// because GDAL copies it and keeps it when it edits a file. So the directory must also be where
+/// terrace writes it, with its values in the order of the tags, and name version 1.1 of GeoTIFF:
+/// GDAL orders them differently, if there is a choice, and writes version 1.0.
 bool is_our_tiff(std::ifstream& file, bool big_endian, bool big_tiff) {
-  constexpr std::string_view kMark("terrace\0", 8);
-  constexpr std::uint64_t kSoftware = 305, kAscii = 2;
+  constexpr std::string_view kMark("terrace\0", 8), kStructure("GDAL_STRUCTURAL_METADATA_SIZE=");
+  constexpr std::uint64_t kSoftware = 305, kTileWidth = 322, kGeoKeys = 34735, kAscii = 2;
+  constexpr std::uint64_t kStructureBytes = 184;
   const std::size_t word = big_tiff ? 8 : 4, entry_bytes = big_tiff ? 20 : 12;
-  const std::size_t count_bytes = big_tiff ? 8 : 2;
+  const std::size_t count_bytes = big_tiff ? 8 : 2, head_bytes = big_tiff ? 16 : 8;
   const auto directory = number_at(read_at(file, big_tiff ? 8 : 4, word), 0, word, big_endian);
   if (!directory) return false;
   const auto entries =
@@ -102,18 +114,33 @@ bool is_our_tiff(std::ifstream& file, bool big_endian, bool big_tiff) {
   if (!entries || *entries > kLongestHeader / entry_bytes) return false;
   const Bytes bytes =
       read_at(file, *directory + count_bytes, static_cast<std::size_t>(*entries) * entry_bytes);
+  file.clear();
+  file.seekg(0, std::ios::end);
+  const auto size = static_cast<std::uint64_t>(file.tellg());
+  // Where the values begin that are too long for their entries.
+  std::uint64_t next = *directory + count_bytes + *entries * entry_bytes + word;
+  bool marked = false, tiled = false, current = false;
   for (std::size_t at = 0; at + entry_bytes <= bytes.size(); at += entry_bytes) {
-    if (number_at(bytes, at, 2, big_endian) != kSoftware) continue;
-    if (number_at(bytes, at + 2, 2, big_endian) != kAscii ||
-        number_at(bytes, at + 4, word, big_endian) != kMark.size()) {
-      return false;
-    }
+    const auto tag = number_at(bytes, at, 2, big_endian);
+    const auto type = number_at(bytes, at + 2, 2, big_endian);
+    const auto count = number_at(bytes, at + 4, word, big_endian);
+    if (!tag || !type || !count || *count > size) return false;
     const std::size_t value = at + 4 + word;
-    if (big_tiff) return bytes.compare(value, kMark.size(), kMark) == 0;
-    const auto offset = number_at(bytes, value, word, big_endian);
-    return offset && read_at(file, *offset, kMark.size()) == kMark;
+    const std::uint64_t length = *count * bytes_of_tiff_type(*type);
+    Bytes head = bytes.substr(value, word);
+    if (length > word) {
+      if (number_at(bytes, value, word, big_endian) != next) return false;
+      head = read_at(file, next, kMark.size());
+      next += length + length % 2;
+    }
+    current |= tag == kGeoKeys && number_at(head, 2, 2, big_endian) == 1 &&
+               number_at(head, 4, 2, big_endian) == 1;
+    tiled |= tag == kTileWidth;
+    marked |= tag == kSoftware && type == kAscii && length == kMark.size() && head == kMark;
   }
-  return false;
+  const bool structured = read_at(file, head_bytes, kStructure.size()) == kStructure;
+  return marked && tiled && current &&
+         (structured ? *directory == head_bytes + kStructureBytes : next == size);
 }
 
 }  // namespace
