@@ -336,6 +336,16 @@ class NothingSelectedTest(unittest.TestCase):
                 self.assertIn(named or self.path(out), result.stderr)
                 self.assertEqual(note in result.stderr, named is not None, result.stderr)
 
+    def test_errors_about_a_focus_name_it(self):
+        store = self.build(f'{x} {y} 1\n' for x in range(20) for y in range(20))
+        for focus, message in (('1,2,3:0', "the box '1,2,3' has 3 numbers"), ('9,8,7,6:0', "the box '9,8,7,6' has a minimum"),
+                               ('none.json:0', 'neither a box nor a file'), ('1,2,3,4:x', "'x' is not a level"),
+                               ('1,2,3,4', 'names no level'), ('1,2,3,4:99', 'the store has no level 99')):
+            for verb, out in (('points', 'none.csv'), ('mesh', 'none.ply'), ('render', 'none.png')):
+                result = terrace(verb, store, '--focus', '0,0,1,1:0', '--focus', focus, '-o', self.path(out))
+                self.assertIn(result.returncode, (1, 2), result.stderr)
+                self.assertIn(f'terrace: --focus {focus}: {message}', result.stderr)
+
     def test_asking_for_zero_nearest_points_is_an_error(self):
         store = self.build(f'{x} {x} 1\n' for x in range(9))
         result = terrace('points', store, '--near', '1,1', '-k', '0', '-o', self.path('none.csv'))

@@ -574,6 +574,8 @@ class GeodesyTest(unittest.TestCase):
             for verb, *how in wanted:
                 error = self.refused(1, verb, store, *how, '-o', self.path(outputs[verb]))
                 self.assertRegex(error, 'the latitude -?95 is beyond a pole', (verb, how))
+                if '--focus' in how:
+                    self.assertIn(f'--focus {box}:0: the latitude', error)
         # A global raster may extend beyond the poles by half a cell.
         self.ok('points', degrees, '--region', '-180.5,-90.5,180.5,90.5', '-o', self.path('all.ply'))
 

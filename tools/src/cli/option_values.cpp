@@ -128,8 +128,20 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
   }
   if (!region.empty()) detail.region = conversion(Region::parse(region, stop_token()));
   for (const std::string& text : focuses) {
-    Focus focus = parse_focus(text);
-    detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
+    const std::string name = "--focus " + text;
+    try {
+      Focus focus = parse_focus(text);
+      detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
+    } catch (const UsageError& error) {
+      throw UsageError(name + ": " + error.what());
+    } catch (const stream::Error& error) {
+      // Names the option in place of its value and of "the region".
+      stream::Error::Parts parts = error.parts();
+      parts.file =
+          parts.file.empty() || text.starts_with(parts.file) ? name : name + ": " + parts.file;
+      if (parts.where == "the region") parts.where.clear();
+      throw stream::Error(std::move(parts));
+    }
   }
   return detail;
 }
@@ -159,7 +171,7 @@ stream::ClusterId parse_cluster(const std::string& text) {
 Focus parse_focus(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos) {
-    throw UsageError("the focus '" + text + "' names no level; write BOX:L");
+    throw UsageError("'" + text + "' names no level; write BOX:L");
   }
   return {.region = Region::parse(text.substr(0, colon), stop_token()),
           .level = parse_level(text.substr(colon + 1))};
