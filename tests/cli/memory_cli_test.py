@@ -506,6 +506,25 @@ class MachineMemoryTest(MemoryCase):
         self.assertEqual(code, 0, err)
         self.assertLessEqual(peak, said * MIB)
 
+    def test_a_picture_of_a_dendrogram_takes_no_more_than_it_says(self):
+        tree = self.path('tree.csv')
+        points = 200_000
+        with open(tree, 'w') as file:
+            file.write('a,b,height,size\n0,1,1,2\n')
+            for i in range(2, points):
+                file.write(f'{i},{points + i - 2},{i},{i + 1}\n')
+        args = ('render', tree, '-o', self.path('tree.png'), '--size', '100x100', '--memory')
+        low, high = 34, 200
+        code, _, err, _ = run(*args, f'{low}M')
+        self.assertEqual(code, 1, err)
+        while high - low > 1:  # it reads only as far as the memory goes
+            middle = (low + high) // 2
+            code, _, err, peak = run(*args, f'{middle}M')
+            low, high = (low, middle) if code == 0 else (middle, high)
+        code, _, err, peak = run(*args, f'{high}M')
+        self.assertEqual(code, 0, err)
+        self.assertLessEqual(peak, high * MIB)
+
 
 if __name__ == '__main__':
     unittest.main()

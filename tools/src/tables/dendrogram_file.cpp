@@ -36,7 +36,9 @@ void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendro
   file.commit();
 }
 
-std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
+std::optional<cluster::Dendrogram> read_dendrogram(
+    const std::string& path, const std::function<void(std::uint64_t rows)>& check_rows) {
+  constexpr std::size_t kBetweenChecks = 4096;
   std::optional<CsvRows> rows = CsvRows::open(path, kDendrogramHead);
   if (!rows) return std::nullopt;
   cluster::Dendrogram dendrogram;
@@ -50,10 +52,14 @@ std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path) {
     cluster::Merge merge{};
     if (!parse_row(line, merge)) throw refused("is not a row of a dendrogram").at(rows->where());
     dendrogram.merges.push_back(merge);
+    if (check_rows && dendrogram.merges.size() % kBetweenChecks == 0) {
+      check_rows(dendrogram.merges.size());
+    }
     if (dendrogram.merges.size() >= cluster::kMostDendrogramPoints) {
       throw refused("is one row too many").at(rows->where());
     }
   }
+  if (check_rows) check_rows(dendrogram.merges.size());
   dendrogram.points = dendrogram.merges.size() + 1;
   const std::string fault = cluster::dendrogram_fault(dendrogram);
   if (!fault.empty()) throw refused("is not a dendrogram: " + fault);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -17,7 +19,9 @@ void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendro
 
 /// Reads the dendrogram from a file that starts with the line "a,b,height,size"; returns nullopt
 /// for any other file. Throws stream::Error, which names the line, if a row is malformed or the
-/// rows do not form a dendrogram.
-std::optional<cluster::Dendrogram> read_dendrogram(const std::string& path);
+/// rows do not form a dendrogram. check_rows: called at intervals with the number of rows read so
+/// far, and at the end; an exception from it ends the reading.
+std::optional<cluster::Dendrogram> read_dendrogram(
+    const std::string& path, const std::function<void(std::uint64_t rows)>& check_rows = {});
 
 }  // namespace terrace::tools

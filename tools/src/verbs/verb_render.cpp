@@ -121,6 +121,8 @@ PictureInput from_mesh(stream::MeshFile file) {
 constexpr std::uint64_t kBytesPerPixel = 4 * (16 + 12) + 3;
 /// Peak bytes per point of a cloud, or per vertex with its two triangles, while drawing.
 constexpr std::uint64_t kDrawnBytesPerPoint = 112;
+/// Peak bytes per row of a dendrogram, while reading or drawing.
+constexpr std::uint64_t kBytesPerMerge = 88;
 /// Memory for reading a file, in bytes.
 constexpr std::uint64_t kReadingBytes = std::uint64_t{64} << 20;
 
@@ -355,7 +357,12 @@ class RenderCommand : public Command {
       throw UsageError("--points applies to results of 'terrace match'; '" + input_ +
                        "' is something else");
     }
-    if (const auto tree = read_dendrogram(input_)) return render_tree(*tree, size, replace, watch);
+    const auto check_rows = [&](std::uint64_t rows) {
+      memory_for_points(input_, size, rows * kBytesPerMerge, common);
+    };
+    if (const auto tree = read_dendrogram(input_, check_rows)) {
+      return render_tree(*tree, size, replace, watch);
+    }
     selection_.triangles = wire_;
     PictureInput input = read_picture_input(input_, selection_, size, common);
     if (!input.guess.empty()) common.say(input_ + ": " + input.guess);
