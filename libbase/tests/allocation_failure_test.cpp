@@ -22,6 +22,7 @@ std::atomic<std::int64_t> left{kNever};
 
 }  // namespace
 
+// Inlined into only one of new and delete, they look to GCC like malloc() with delete.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   void* memory = left.fetch_sub(1, std::memory_order_relaxed) > 0 ? std::malloc(size) : nullptr;
   if (memory == nullptr) throw std::bad_alloc();

@@ -19,13 +19,14 @@ std::atomic<std::int64_t> left{std::numeric_limits<std::int64_t>::max()};
 
 }  // namespace
 
-void* operator new(std::size_t size) {
+// Inlined into only one of new and delete, they look to GCC like malloc() with delete.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   void* memory = left.fetch_sub(1, std::memory_order_relaxed) > 0 ? std::malloc(size) : nullptr;
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace terrace::cluster {
 namespace {
