@@ -261,7 +261,8 @@ void SharedPlaces::add(const MeshSamples& samples) {
 PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& detail,
                                    const PointMeshCuts& cuts, const std::string& path,
                                    unsigned threads, const PlaceConversion& places)
-    : cuts_(cuts),
+    : store_(store),
+      cuts_(cuts),
       file_(place_for(path), true),
       chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(),
                                kLeastChunk, kMostChunk)),
@@ -305,6 +306,7 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
       if (box.contains({p[0], p[1]})) out.add(p);
     }
   };
+  store_.check_stop();
   std::vector<stream::Point3> chunk(chunk_points_);
   const auto bytes = std::as_writable_bytes(std::span(chunk));
   for (const std::uint32_t number : chunks_[cell]) {

@@ -127,13 +127,15 @@ class PointMeshSamples {
 
   [[nodiscard]] std::size_t count(std::uint32_t first_cell, std::uint32_t cells) const;
   /// Appends the samples of some cells that are in the box, cell by cell. Within a cell they are in
-  /// the order of the store: by level from the top down, in each level by id.
+  /// the order of the store: by level from the top down, in each level by id. Throws:
+  /// stream::Error, stream::Stopped.
   void read(std::uint32_t first_cell, std::uint32_t cells, const PlaneBox& box, MeshSamples& out);
 
  private:
   void deal(std::size_t cell, const stream::Point3& p);
   void read_cell(std::size_t cell, const PlaneBox& box, MeshSamples& out);
 
+  const stream::Store& store_;
   const PointMeshCuts& cuts_;
   stream::AtomicFile file_;
   std::size_t chunk_points_;

@@ -356,6 +356,7 @@ RasterMesher::Sample RasterMesher::sample(double max_error, tri::TinQuality qual
   base::in_order(
       windows.size(), threads_,
       [&](unsigned worker, std::size_t i) {
+        context_.check_stop();
         return meshers[worker]->count(plan.window(windows[i]), quality);
       },
       [&](std::size_t i, const WindowCount& count) {

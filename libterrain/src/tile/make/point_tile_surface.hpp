@@ -44,6 +44,7 @@ class PointTileSurface final : public TileSurface {
  public:
   explicit PointTileSurface(const TiledCloud& cloud);
 
+  void check_stop() const override { cloud_.store.check_stop(); }
   [[nodiscard]] GeographicBox bounds() const override { return cloud_.places.bounds(); }
   [[nodiscard]] double spacing() const override { return cloud_.spacing; }
   void expect(const GeographicBox& box) override;

@@ -19,6 +19,7 @@ class RasterTileSurface : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
 
+  void check_stop() const override { raster_.store.check_stop(); }
   [[nodiscard]] GeographicBox bounds() const override { return raster_.places.bounds(); }
   [[nodiscard]] double spacing() const override { return raster_.spacing; }
   void expect(const GeographicBox& box) override;

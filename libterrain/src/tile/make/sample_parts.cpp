@@ -54,6 +54,7 @@ void for_each_part(const GeographicBox& box, TileSurface& surface,
   std::vector<GeographicBox> open{box};
   SurfaceSamples samples;
   while (!open.empty()) {
+    surface.check_stop();
     const GeographicBox part = open.back();
     open.pop_back();
     if (!may_have_samples(part, surface)) continue;

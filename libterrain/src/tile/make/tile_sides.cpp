@@ -79,6 +79,7 @@ std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
   const GeographicBox data = surface.bounds();
   std::vector<TileLeaf> leaves, open{{}};
   while (!open.empty()) {
+    surface.check_stop();
     const TileLeaf leaf = open.back();
     open.pop_back();
     const auto wide = [&] {

@@ -54,6 +54,8 @@ class TileSurface {
  public:
   virtual ~TileSurface() = default;
 
+  /// Throws: stream::Stopped if a stop was requested. For loops that may not read.
+  virtual void check_stop() const {}
   /// A box around all samples.
   [[nodiscard]] virtual GeographicBox bounds() const = 0;
   /// The smallest spacing of samples along a parallel or meridian, in degrees.

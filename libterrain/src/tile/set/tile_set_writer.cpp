@@ -42,6 +42,7 @@ double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface)
   double widest = 0.0;
   const GeographicBox data = surface.bounds();
   for (const TileAddress& tile : tiles) {
+    surface.check_stop();
     const GeographicBox box = box_of(tile);
     auto range = surface.range(box);
     if (!range) continue;
