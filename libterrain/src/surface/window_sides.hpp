@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+namespace terrace::terrain {
+
+/// A vertex on a side of a window.
+struct SideVertex {
+  double at = 0.0;  ///< position along the side
+  double height = 0.0;
+};
+/// Ascending, the ends of the side included.
+using SideVertices = std::vector<SideVertex>;
+
+/// The vertices on the sides of windows, which are the same for the windows on both sides. Computes
+/// them on first use. Thread-safe.
+template <class Key>
+class WindowSides {
+ public:
+  /// With a limit, at most twice `most_vertices` and two sides are kept; the oldest are dropped.
+  explicit WindowSides(std::size_t most_vertices = std::numeric_limits<std::size_t>::max())
+      : most_vertices_(most_vertices) {}
+
+  /// Returns the vertices of a side. If they are unknown, settle() returns them. It must depend
+  /// only on the side, because several threads may call it at once.
+  template <class Settle>
+  std::shared_ptr<const SideVertices> vertices(const Key& side, const Settle& settle) {
+    if (auto known = find(side)) return known;
+    auto settled = std::make_shared<const SideVertices>(settle());
+    const std::lock_guard lock(mutex_);
+    if (vertices_ > most_vertices_) {
+      older_ = std::exchange(recent_, {});
+      vertices_ = 0;
+    }
+    const auto [known, fresh] = recent_.try_emplace(side, std::move(settled));
+    if (fresh) vertices_ += known->second->size();
+    return known->second;
+  }
+  /// Returns null for an unknown side.
+  [[nodiscard]] std::shared_ptr<const SideVertices> find(const Key& side) const {
+    const std::lock_guard lock(mutex_);
+    for (const Sides* sides : {&recent_, &older_}) {
+      if (const auto known = sides->find(side); known != sides->end()) return known->second;
+    }
+    return nullptr;
+  }
+  /// Drops a side that no window needs any more.
+  void drop(const Key& side) {
+    const std::lock_guard lock(mutex_);
+    if (const auto known = recent_.find(side); known != recent_.end()) {
+      vertices_ -= known->second->size();
+      recent_.erase(known);
+    }
+    older_.erase(side);
+  }
+  void clear() {
+    const std::lock_guard lock(mutex_);
+    recent_.clear();
+    older_.clear();
+    vertices_ = 0;
+  }
+
+ private:
+  using Sides = std::map<Key, std::shared_ptr<const SideVertices>>;
+  std::size_t most_vertices_;
+  mutable std::mutex mutex_;
+  Sides recent_, older_;
+  std::size_t vertices_ = 0;  ///< in recent_
+};
+
+}  // namespace terrace::terrain
