@@ -4,12 +4,14 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "mesh/bounded/lattice_plan.hpp"
 #include "surface/window_sides.hpp"
 
 namespace terrace::terrain {
@@ -91,6 +93,33 @@ TEST(WindowMesh, AStopEndsTheWorkBeforeTheNextWindow) {
                std::runtime_error);
   EXPECT_EQ(made, 3);
   EXPECT_EQ(taken, 3);
+}
+
+TEST(LatticePlan, CountsTheWindowsOfASample) {
+  const LatticeWindow whole{3, 5, 40, 23};
+  for (const std::int64_t cells : {1, 7, 100}) {
+    const LatticePlan plan(whole, cells);
+    std::map<std::uint64_t, std::vector<std::size_t>> windows;
+    for (const bool counted : {false, true}) {
+      for (std::size_t i = 0; i < plan.size(); ++i) {
+        const LatticeWindow window = plan.window(i);
+        for (std::int64_t row = 0; row < window.rows; ++row) {
+          for (std::int64_t column = 0; column < window.columns; ++column) {
+            const LatticePlan::Sample sample = plan.sample(i, column, row);
+            std::vector<std::size_t>& known = windows[sample.place];
+            if (!counted) {
+              known.push_back(i);
+            } else {
+              ASSERT_EQ(sample.windows, known.size());
+              ASSERT_EQ(sample.last, known.back());
+            }
+          }
+        }
+      }
+    }
+    EXPECT_EQ(windows.size(), whole.size());
+    EXPECT_EQ(windows.rbegin()->first + 1, whole.size());
+  }
 }
 
 TEST(WindowSides, ComputeEachSideOnce) {

@@ -5,14 +5,13 @@
 #include <cmath>
 #include <cstdint>
 #include <string>
-#include <utility>
 
-#include <terrace/base/ordered_work.hpp>
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 
 #include "base/progress_report.hpp"
 #include "mesh/bounded/mesh_spool.hpp"
+#include "surface/window_mesh.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 
 namespace terrace::terrain {
@@ -37,6 +36,11 @@ struct WindowMeasures {
   std::uint64_t duplicates = 0;
   std::uint64_t work = 0;  ///< the window's share of the whole work
   double reading_seconds = 0.0, meshing_seconds = 0.0;
+};
+
+/// The mesh of one window, in the CRS of the file.
+struct BoundedWindow : WindowMesh<stream::Point3> {
+  WindowMeasures measures;
 };
 
 /// Meshes the samples of a store window by window, possibly for several bounds in turn. Heights and
@@ -74,27 +78,26 @@ class BoundedMesher {
   [[nodiscard]] unsigned threads_within_memory(std::uint64_t each, std::uint64_t shared,
                                                const std::string& purpose = {}) const;
 
-  /// Makes windows with `threads` threads and joins them in order: make(worker, i) returns a
-  /// window's mesh, join(i, mesh) spools it and returns its WindowMeasures. total_work: of all
-  /// windows.
-  template <class Make, class Join>
+  /// Makes windows with `threads` threads, joins them in order and spools them. make(worker, i)
+  /// returns a BoundedWindow or a type derived from it. joined(i, window) is called in order and
+  /// may correct the measures. total_work: of all windows.
+  template <class Make, class Joined>
   BoundedMeshResult run_windows(std::size_t windows, unsigned threads, std::uint64_t total_work,
                                 MeshSpool& spool, std::uint64_t most_vertices, const Make& make,
-                                const Join& join) const {
+                                const Joined& joined) const {
     BoundedMeshResult result;
     ProgressReport report(context_, "samples");
     double squares = 0.0, covered = 0.0;
     std::uint64_t work = 0;
     struct Enough {};
     try {
-      base::in_order(
-          windows, threads,
-          [&](unsigned worker, std::size_t i) {
-            context_.check_stop();
-            return make(worker, i);
-          },
+      mesh_windows(
+          windows, threads, [&] { context_.check_stop(); }, make,
           [&](std::size_t i, auto&& mesh) {
-            const WindowMeasures window = join(i, std::forward<decltype(mesh)>(mesh));
+            joined(i, mesh);
+            spool.add_vertices(mesh.vertices);
+            spool.add_triangles(mesh.triangles);
+            const WindowMeasures& window = mesh.measures;
             work += window.work;
             if (spool.vertices() > most_vertices) throw Enough{};
             result.max_error = std::max(result.max_error, window.max_error);

@@ -52,10 +52,6 @@ MeshSpool::MeshSpool(const std::string& path)
     : vertex_file_(spool_name(path), spool_naming(path)),
       triangle_file_(spool_name(path), spool_naming(path)) {}
 
-void MeshSpool::add_vertex(const stream::Point3& position) {
-  add_vertices(std::span(&position, 1));
-}
-
 void MeshSpool::add_vertices(std::span<const stream::Point3> positions) {
   if (positions.size() > std::numeric_limits<std::uint32_t>::max() - vertices_) {
     throw stream::Error({.file = vertex_file_.target().string(),
@@ -64,10 +60,6 @@ void MeshSpool::add_vertices(std::span<const stream::Point3> positions) {
   }
   vertex_file_.write(std::as_bytes(positions));
   vertices_ += positions.size();
-}
-
-void MeshSpool::add_triangle(const stream::TriangleIndices& triangle) {
-  add_triangles(std::span(&triangle, 1));
 }
 
 void MeshSpool::add_triangles(std::span<const stream::TriangleIndices> triangles) {

@@ -24,9 +24,7 @@ class MeshSpool {
 
   /// All throw stream::Error, for example if the disk is full. There must be fewer than 2^32
   /// vertices.
-  void add_vertex(const stream::Point3& position);
   void add_vertices(std::span<const stream::Point3> positions);
-  void add_triangle(const stream::TriangleIndices& triangle);
   void add_triangles(std::span<const stream::TriangleIndices> triangles);
 
   /// Writes the file. bounds, frame: see stream::MeshHeader.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <numeric>
 #include <string>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -92,69 +91,6 @@ double PointMeshEstimate::per_cell(double max_error) const {
   return vertices / 4.0;
 }
 
-/// Joins the meshes of a plan's windows into one mesh. Memory: 4 bytes per knot, and per vertex on
-/// sides between windows that are in the mesh and windows that are not yet.
-class PointMeshJoiner {
- public:
-  /// Drops sides that no window needs any more.
-  PointMeshJoiner(const PointMeshPlan& plan, PointMeshSides& sides, MeshSpool& spool);
-
-  /// Adds window i; windows come in order.
-  WindowMeasures add(std::size_t i, const PointWindowTin& tin);
-
- private:
-  const PointMeshPlan& plan_;
-  PointMeshSides& sides_;
-  MeshSpool& spool_;
-  std::vector<std::uint32_t> knots_;  ///< numbers of vertices
-  std::unordered_map<std::uint32_t, std::vector<std::uint32_t>> open_sides_;
-};
-
-PointMeshJoiner::PointMeshJoiner(const PointMeshPlan& plan, PointMeshSides& sides, MeshSpool& spool)
-    : plan_(plan), sides_(sides), spool_(spool), knots_(plan.knots.size(), kNoNumber) {}
-
-WindowMeasures PointMeshJoiner::add(std::size_t i, const PointWindowTin& tin) {
-  std::vector<std::uint32_t> numbers;
-  numbers.reserve(tin.vertices.size());
-  for (std::size_t v = 0; v < tin.vertices.size(); ++v) {
-    std::uint32_t own = kNoNumber;
-    std::uint32_t* known = &own;
-    if (v < tin.shared.size()) {
-      const PointWindowTin::Shared& shared = tin.shared[v];
-      if (shared.knot != kNoNumber) {
-        known = &knots_[shared.knot];
-      } else if (shared.side != kNoNumber) {
-        std::vector<std::uint32_t>& side = open_sides_[shared.side];
-        if (side.size() <= shared.place) side.resize(shared.place + 1, kNoNumber);
-        known = &side[shared.place];
-      }
-    }
-    if (*known == kNoNumber) {
-      *known = static_cast<std::uint32_t>(spool_.vertices());
-      spool_.add_vertex(tin.vertices[v]);
-    }
-    numbers.push_back(*known);
-  }
-  for (const auto& t : tin.triangles) {
-    spool_.add_triangle({numbers[t[0]], numbers[t[1]], numbers[t[2]]});
-  }
-  for (const std::uint32_t side : plan_.windows[i].sides) {
-    // The later of its two windows closes it.
-    if (std::max(plan_.sides[side].windows[0], plan_.sides[side].windows[1]) != i) continue;
-    open_sides_.erase(side);
-    sides_.drop(side);
-  }
-  return {.max_error = tin.errors.largest,
-          .rms_error = tin.errors.rms,
-          .covered = tin.errors.covered,
-          .samples = tin.samples,
-          .uncovered = tin.uncovered,
-          .duplicates = tin.duplicates,
-          .work = tin.samples,
-          .reading_seconds = tin.reading_seconds,
-          .meshing_seconds = tin.meshing_seconds};
-}
-
 }  // namespace
 
 PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
@@ -199,16 +135,15 @@ BoundedMeshResult PointMesher::run_whole(const PointMeshOptions& options, MeshSp
   const Stopwatch meshing;
   const std::uint64_t points = scan_.whole->size();
   static_cast<void>(threads_for(points * kBytesPerPoint, points));
-  const PointWindowTin tin =
-      mesh_samples(*scan_.whole, {}, {}, options, rounding_, store_.path().string());
+  const BoundedWindow mesh = mesh_samples(*scan_.whole, {}, {}, options, rounding_, store_);
   BoundedMeshResult result;
-  result.max_error = tin.errors.largest;
-  result.rms_error = tin.errors.rms;
-  result.samples = tin.samples;
-  result.uncovered = tin.uncovered;
-  result.duplicates = tin.duplicates;
-  for (const tri::Point3& p : tin.vertices) spool.add_vertex(p);
-  for (const auto& triangle : tin.triangles) spool.add_triangle(triangle);
+  result.max_error = mesh.measures.max_error;
+  result.rms_error = mesh.measures.rms_error;
+  result.samples = mesh.measures.samples;
+  result.uncovered = mesh.measures.uncovered;
+  result.duplicates = mesh.measures.duplicates;
+  spool.add_vertices(mesh.vertices);
+  spool.add_triangles(mesh.triangles);
   result.vertices = spool.vertices();
   result.meshing_seconds = meshing.seconds();
   return result;
@@ -249,13 +184,15 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
     each = std::max(each, points * (window.cells == 1 ? kBytesPerPoint : kBytesPerSample));
   }
   PointMeshSides sides(plan, *samples_, options.tin.duplicates, options.tin.max_error);
-  const PointWindowMesher mesher(plan, *samples_, sides, options, rounding_,
-                                 store_.path().string());
-  PointMeshJoiner joiner(plan, sides, spool);
+  const PointWindowMesher mesher(plan, *samples_, sides, options, rounding_, store_);
   return run_windows(
       plan.windows.size(), threads_for(each, most), scan_.samples, spool, most_vertices,
       [&](unsigned, std::size_t i) { return mesher.mesh(i); },
-      [&](std::size_t i, const PointWindowTin& tin) { return joiner.add(i, tin); });
+      [&](std::size_t i, const BoundedWindow&) {
+        for (const std::uint32_t side : plan.windows[i].sides) {
+          if (plan.sides[side].last() == i) sides.drop(side);
+        }
+      });
 }
 
 double PointMesher::estimate(double max_error) const {

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 #include <utility>
 
@@ -133,10 +134,10 @@ bool on_border(const PlaneBox& box, const Point2& a, const Point2& b) {
 
 /// Measures the mesh that a reader decodes from a format that rounds.
 tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
-                               const PointWindowTin& tin, const stream::MeshRounding& rounding) {
+                               const BoundedWindow& mesh, const stream::MeshRounding& rounding) {
   std::vector<tri::Point3> read;
-  read.reserve(tin.vertices.size());
-  for (const tri::Point3& p : tin.vertices) read.push_back(rounding(p));
+  read.reserve(mesh.vertices.size());
+  for (const tri::Point3& p : mesh.vertices) read.push_back(rounding(p));
   // The window's straight sides move as a whole. Samples that they pass then belong to the
   // neighbour, whose surface is the same at the side.
   const tri::Point3 low = rounding({box.min[0], box.min[1], 0.0});
@@ -144,7 +145,7 @@ tri::TinErrors measure_rounded(const MeshSamples& samples, const PlaneBox& box,
   MeshSamples moved = samples;
   for (double& x : moved.x) x = std::min(std::max(x, low[0]), high[0]);
   for (double& y : moved.y) y = std::min(std::max(y, low[1]), high[1]);
-  return tri::measure_surface(moved.x, moved.y, moved.z, read, tin.triangles);
+  return tri::measure_surface(moved.x, moved.y, moved.z, read, mesh.triangles);
 }
 
 /// Keeps one sample per place, with the height that represents it.
@@ -202,12 +203,13 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
 
 /// As mesh_samples(), with the target options.tin.max_error. may_miss: allows a result beyond the
 /// bound.
-PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
-                           const PlaneBox& box, const PointMeshOptions& options,
-                           const stream::MeshRounding& rounding, const std::string& source,
-                           bool may_miss) {
+BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
+                          const PlaneBox& box, const PointMeshOptions& options,
+                          const stream::MeshRounding& rounding, const stream::Store& store,
+                          bool may_miss) {
+  store.check_stop();
   const auto fail = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = source, .cause = cause, .remedy = remedy});
+    throw stream::Error({.file = store.path().string(), .cause = cause, .remedy = remedy});
   };
   const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
   MeshSamples left;
@@ -236,24 +238,28 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
                 std::max(1.0, static_cast<double>(tin.errors.covered + vertex_places)));
   tin.errors.covered += vertex_places;
   tin.duplicates += samples.size() - taken->size() - vertex_places;
-  PointWindowTin out;
-  out.samples = samples.size();
-  out.duplicates = tin.duplicates;
+  BoundedWindow out;
   out.vertices = std::move(tin.vertices);
   out.triangles = std::move(tin.triangles);
-  out.errors = tin.errors;
+  tri::TinErrors errors = tin.errors;
   const bool exact = rounding.largest() == stream::Point3{};
   if (!exact) {
     const bool some_count = tin.duplicates > 0 && !all;
-    out.errors = measure_rounded(
-        some_count ? one_a_place(samples, options.tin.duplicates) : samples, box, out, rounding);
+    errors = measure_rounded(some_count ? one_a_place(samples, options.tin.duplicates) : samples,
+                             box, out, rounding);
   }
-  out.uncovered = out.triangles.empty() ? samples.size() : out.errors.uncovered;
+  out.measures = {.max_error = errors.largest,
+                  .rms_error = errors.rms,
+                  .covered = errors.covered,
+                  .samples = samples.size(),
+                  .uncovered = out.triangles.empty() ? samples.size() : errors.uncovered,
+                  .duplicates = tin.duplicates,
+                  .work = samples.size()};
   const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
-  const bool beyond = out.errors.largest > options.bound;
+  const bool beyond = errors.largest > options.bound;
   if (missed || (beyond && !may_miss)) {
     fail(missed ? "the mesh leaves out samples"
-                : "the mesh misses its bound: " + plain_number(out.errors.largest) + " of " +
+                : "the mesh misses its bound: " + plain_number(errors.largest) + " of " +
                       plain_number(options.bound),
          exact ? "this is a fault of terrace, please report it" : "write PLY, which is exact");
   }
@@ -264,7 +270,7 @@ PointWindowTin mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Po
 /// the hull, the corners and the samples that the bound needs.
 struct PointMeshFrame {
   std::vector<tri::Point3> vertices;
-  std::vector<PointWindowTin::Shared> shared;  ///< parallel to vertices
+  std::vector<SharedVertex> shared;
 };
 
 /// sides: the vertices of window.sides, in parallel.
@@ -273,7 +279,7 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
                         const MeshSamples& samples, const tri::PointTinOptions& options) {
   struct Vertex {
     double height = 0.0;
-    PointWindowTin::Shared shared;
+    std::optional<SharedVertex> shared;
     std::vector<double> samples;  ///< at a corner of the hull
   };
   std::map<Point2, Vertex> vertices;
@@ -281,8 +287,12 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
     const PointMeshPlan::Side& side = plan.sides[window.sides[i]];
     for (std::uint32_t k = 0; k < sides[i]->size(); ++k) {
       const SideVertex& v = (*sides[i])[k];
-      PointWindowTin::Shared shared{kNoNumber, window.sides[i], k};
-      if (k == 0 || k + 1 == sides[i]->size()) shared = {side.knots[k == 0 ? 0 : 1], kNoNumber, 0};
+      const bool is_knot = k == 0 || k + 1 == sides[i]->size();
+      const std::uint32_t knot = side.knots[k == 0 ? 0 : 1];
+      // Knots are numbered first, then the vertices of one side after another.
+      const SharedVertex shared =
+          is_knot ? SharedVertex{0, knot, plan.knots[knot].last}
+                  : SharedVertex{0, std::uint64_t{window.sides[i] + 1} << 32 | k, side.last()};
       const Point2 place = side.axis == 0 ? Point2{side.line, v.at} : Point2{v.at, side.line};
       vertices.try_emplace(place, Vertex{v.height, shared, {}});
     }
@@ -313,21 +323,22 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
   PointMeshFrame frame;
   const auto height_at = [&](const Point2& place) {
     const Vertex& v = vertices.at(place);
-    const bool settled = v.shared.knot != kNoNumber || v.shared.side != kNoNumber;
-    assert(settled || !v.samples.empty());
-    return settled ? v.height : merged_height(v.samples, options.duplicates);
+    assert(v.shared || !v.samples.empty());
+    return v.shared ? v.height : merged_height(v.samples, options.duplicates);
   };
   const auto [low, high] = std::minmax_element(samples.z.begin(), samples.z.end());
   const bool level = low == high || *low == *high;
   for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (std::optional<SharedVertex> shared = vertices.at(ring[i]).shared) {
+      shared->vertex = static_cast<std::uint32_t>(frame.vertices.size());
+      frame.shared.push_back(*shared);
+    }
     frame.vertices.push_back({ring[i][0], ring[i][1], height_at(ring[i])});
-    frame.shared.push_back(vertices.at(ring[i]).shared);
     if (on_border(window.box, ring[i], after(i))) continue;
     OuterSide& side = outer.between(ring[i], after(i));
     for (const tri::Point3& p :
          simplify(side, height_at(ring[i]), height_at(after(i)), level, options)) {
       frame.vertices.push_back(p);
-      frame.shared.emplace_back();
     }
   }
   return frame;
@@ -335,29 +346,30 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
 
 }  // namespace
 
-PointWindowTin mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
-                            const PlaneBox& box, const PointMeshOptions& options,
-                            const stream::MeshRounding& rounding, const std::string& source) {
+BoundedWindow mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
+                           const PlaneBox& box, const PointMeshOptions& options,
+                           const stream::MeshRounding& rounding, const stream::Store& store) {
   if (options.first_aim > options.tin.max_error) {
     PointMeshOptions first = options;
     first.tin.max_error = options.first_aim;
-    PointWindowTin tin = mesh_to_aim(samples, frame, box, first, rounding, source, true);
-    if (!(tin.errors.largest > options.bound)) return tin;
+    BoundedWindow mesh = mesh_to_aim(samples, frame, box, first, rounding, store, true);
+    if (!(mesh.measures.max_error > options.bound)) return mesh;
   }
-  return mesh_to_aim(samples, frame, box, options, rounding, source, false);
+  return mesh_to_aim(samples, frame, box, options, rounding, store, false);
 }
 
 PointWindowMesher::PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples,
                                      PointMeshSides& sides, const PointMeshOptions& options,
-                                     const stream::MeshRounding& rounding, std::string source)
+                                     const stream::MeshRounding& rounding,
+                                     const stream::Store& store)
     : plan_(plan),
       samples_(samples),
       sides_(sides),
       options_(options),
       rounding_(rounding),
-      source_(std::move(source)) {}
+      store_(store) {}
 
-PointWindowTin PointWindowMesher::mesh(std::size_t number) const {
+BoundedWindow PointWindowMesher::mesh(std::size_t number) const {
   const PointMeshPlan::Window& window = plan_.windows[number];
   const Stopwatch reading;
   std::vector<std::shared_ptr<const SideVertices>> sides;
@@ -369,11 +381,11 @@ PointWindowTin PointWindowMesher::mesh(std::size_t number) const {
 
   const Stopwatch meshing;
   PointMeshFrame frame = frame_of(plan_, window, sides, samples, options_.tin);
-  PointWindowTin out =
-      mesh_samples(samples, frame.vertices, window.box, options_, rounding_, source_);
+  BoundedWindow out =
+      mesh_samples(samples, frame.vertices, window.box, options_, rounding_, store_);
   out.shared = std::move(frame.shared);
-  out.reading_seconds = reading_seconds;
-  out.meshing_seconds = meshing.seconds();
+  out.measures.reading_seconds = reading_seconds;
+  out.measures.meshing_seconds = meshing.seconds();
   return out;
 }
 

@@ -92,11 +92,11 @@ std::uint32_t Planner::add_cut(const Part& part, unsigned axis, double line) {
     if (meets) {
       const auto [known, fresh] =
           cuts_[ancestor].knots.try_emplace(line, static_cast<std::uint32_t>(plan_.knots.size()));
-      if (fresh) plan_.knots.push_back({place, false});
+      if (fresh) plan_.knots.push_back({place, false, 0});
       cut.knots[border] = known->second;
     } else {
       cut.knots[crossing] = static_cast<std::uint32_t>(plan_.knots.size());
-      plan_.knots.push_back({place, true});
+      plan_.knots.push_back({place, true, 0});
     }
   }
   cuts_.push_back(std::move(cut));
@@ -150,6 +150,7 @@ void Planner::add_sides() {
   for (const PointMeshPlan::Side& side : plan_.sides) {
     for (const std::uint32_t knot : side.knots) {
       if (++ends[knot] > 1) plan_.knots[knot].at_hull = false;
+      plan_.knots[knot].last = std::max(plan_.knots[knot].last, side.last());
     }
   }
 }
@@ -283,7 +284,6 @@ PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samp
       duplicates_(duplicates),
       side_error_(kPointSideShare * max_error),
       windows_at_(plan.knots.size()),
-      known_(plan.sides.size()),
       heights_(plan.knots.size()) {
   for (const PointMeshPlan::Side& side : plan.sides) {
     for (const std::uint32_t knot : side.knots) {
@@ -293,23 +293,6 @@ PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samp
       windows.erase(std::unique(windows.begin(), windows.end()), windows.end());
     }
   }
-}
-
-std::shared_ptr<const SideVertices> PointMeshSides::vertices(std::uint32_t side) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (known_[side]) return known_[side];
-  }
-  // Two threads may compute it twice, with the same result.
-  auto settled = std::make_shared<const SideVertices>(settle(plan_.sides[side]));
-  const std::lock_guard lock(mutex_);
-  if (!known_[side]) known_[side] = std::move(settled);
-  return known_[side];
-}
-
-void PointMeshSides::drop(std::uint32_t side) {
-  const std::lock_guard lock(mutex_);
-  known_[side].reset();
 }
 
 double PointMeshSides::height_at(std::uint32_t knot) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -13,6 +14,7 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "mesh/bounded/point_mesh_cells.hpp"
+#include "surface/window_sides.hpp"
 #include "terrace/terrain/region.hpp"
 
 /// The windows of irregular samples, and the vertices on their sides.
@@ -27,6 +29,7 @@ struct PointMeshPlan {
   struct Knot {
     Point2 place{};
     bool at_hull = false;
+    std::uint32_t last = 0;  ///< the last window with a side that ends here
   };
   /// A part of a cut line between two knots, with one window on each side.
   struct Side {
@@ -34,6 +37,8 @@ struct PointMeshPlan {
     double line = 0.0;
     std::array<std::uint32_t, 2> knots{};    ///< the lower first
     std::array<std::uint32_t, 2> windows{};  ///< the one with smaller coordinates first
+
+    [[nodiscard]] std::uint32_t last() const { return std::max(windows[0], windows[1]); }
   };
   struct Window {
     PlaneBox box;
@@ -54,12 +59,6 @@ PointMeshPlan plan_point_mesh(
     const PointMeshCuts& cuts, std::span<const Point2> hull,
     const std::function<bool(std::uint32_t first, std::uint32_t cells)>& together);
 
-/// A vertex on a side: its position along it and its height.
-struct SideVertex {
-  double at = 0.0, height = 0.0;
-};
-using SideVertices = std::vector<SideVertex>;
-
 /// The vertices on the sides of windows, computed before the windows are meshed: the Delaunay
 /// triangulation of the samples close to a side, intersected with it, within a share of the bound.
 /// It depends only on these samples, so both windows at a side have the same vertices there.
@@ -71,8 +70,10 @@ class PointMeshSides {
                  tri::PointDuplicates duplicates, double max_error);
 
   /// Returns the vertices of a side, its knots included, ascending. Kept until drop().
-  std::shared_ptr<const SideVertices> vertices(std::uint32_t side);
-  void drop(std::uint32_t side);
+  std::shared_ptr<const SideVertices> vertices(std::uint32_t side) {
+    return known_.vertices(side, [&] { return settle(plan_.sides[side]); });
+  }
+  void drop(std::uint32_t side) { known_.drop(side); }
 
  private:
   [[nodiscard]] SideVertices settle(const PointMeshPlan::Side& side);
@@ -85,8 +86,8 @@ class PointMeshSides {
   tri::PointDuplicates duplicates_;
   double side_error_;
   std::vector<std::vector<std::uint32_t>> windows_at_;  ///< per knot
-  std::mutex mutex_;
-  std::vector<std::shared_ptr<const SideVertices>> known_;
+  WindowSides<std::uint32_t> known_;
+  std::mutex mutex_;                            ///< for heights_
   std::vector<std::optional<double>> heights_;  ///< of knots
 };
 

@@ -5,16 +5,15 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include <terrace/base/ordered_work.hpp>
 #include <terrace/base/portable_math.hpp>
 
 #include "earth/ground.hpp"
+#include "mesh/bounded/lattice_plan.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -83,157 +82,25 @@ LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>
   return {c0, r0, c1 - c0 + 1, r1 - r0 + 1};
 }
 
-std::vector<std::int64_t> cut(std::int64_t first, std::int64_t samples, std::int64_t cells) {
-  const std::int64_t total = samples - 1;
-  const std::int64_t parts = std::max<std::int64_t>(1, (total + cells / 2) / cells);
-  std::vector<std::int64_t> sides;
-  for (std::int64_t i = 0; i <= parts; ++i) sides.push_back(first + total * i / parts);
-  return sides;
-}
-
-/// A rectangle of samples divided into windows that share their sides: the last column of one is
-/// the first of the next.
-class LatticePlan {
+/// Counts samples on sides of windows that no window covers.
+class SideSamples {
  public:
-  /// whole: at least 1 sample along each axis. cells: the target size of a window along each axis;
-  /// windows are equal to within one cell and at most 1.5 times as large.
-  LatticePlan(const LatticeWindow& whole, std::int64_t cells);
-
-  [[nodiscard]] const LatticeWindow& whole() const { return whole_; }
-  [[nodiscard]] std::size_t across() const { return columns_.size() - 1; }
-  [[nodiscard]] std::size_t down() const { return rows_.size() - 1; }
-  [[nodiscard]] std::size_t size() const { return across() * down(); }
-  /// Window i, counted along rows from the first row on.
-  [[nodiscard]] LatticeWindow window(std::size_t i) const;
+  /// Adds samples that a window does not cover. Returns the number of those that none of the
+  /// windows that share them covers, once each.
+  std::uint64_t add(const std::vector<RasterWindow::SideSample>& uncovered) {
+    std::uint64_t by_none = 0;
+    for (const RasterWindow::SideSample& sample : uncovered) {
+      const auto known = windows_.try_emplace(sample.place, 0U).first;
+      if (++known->second < sample.windows) continue;
+      ++by_none;
+      windows_.erase(known);
+    }
+    return by_none;
+  }
 
  private:
-  LatticeWindow whole_;
-  std::vector<std::int64_t> columns_, rows_;  ///< of the sides
+  std::map<std::uint64_t, unsigned> windows_;  ///< by place: those that do not cover it
 };
-
-LatticePlan::LatticePlan(const LatticeWindow& whole, std::int64_t cells)
-    : whole_(whole),
-      columns_(cut(whole.column, whole.columns, cells)),
-      rows_(cut(whole.row, whole.rows, cells)) {
-  assert(whole.columns > 0 && whole.rows > 0 && cells > 0);
-}
-
-LatticeWindow LatticePlan::window(std::size_t i) const {
-  assert(i < size());
-  const std::size_t x = i % across(), y = i / across();
-  return {columns_[x], rows_[y], columns_[x + 1] - columns_[x] + 1, rows_[y + 1] - rows_[y] + 1};
-}
-
-constexpr std::uint32_t kNoVertex = std::numeric_limits<std::uint32_t>::max();
-
-/// Joins the meshes of a plan's windows into one mesh, in which a vertex on a side of several
-/// windows is one vertex. Memory: 4 bytes per column of the raster, samples on sides next to cells
-/// without data, and the spool.
-class WindowJoiner {
- public:
-  WindowJoiner(const LatticePlan& plan, MeshSpool& spool);
-
-  /// Adds window i; windows come in order.
-  WindowMeasures add(std::size_t i, WindowTin&& tin);
-
- private:
-  /// Returns the number of samples on the sides and inside of this window that are on no triangle.
-  /// A shared sample counts once all windows that share it have been added.
-  std::uint64_t uncovered(const WindowTin& tin);
-  [[nodiscard]] std::uint32_t* shared(const WindowTin& tin, const tri::GridVertex& vertex);
-
-  const LatticePlan& plan_;
-  MeshSpool& spool_;
-  // Numbers of the vertices on the lines of sides above and below the current row of windows, and
-  // on the left and right side of the window.
-  std::vector<std::uint32_t> above_, below_, left_, right_;
-  /// By row and column, the number of windows that do not cover a sample on their sides. It is
-  /// uncovered if all the windows that share it do not cover it.
-  std::map<std::pair<std::int64_t, std::int64_t>, unsigned> on_sides_;
-};
-
-WindowJoiner::WindowJoiner(const LatticePlan& plan, MeshSpool& spool)
-    : plan_(plan),
-      spool_(spool),
-      above_(static_cast<std::size_t>(plan.whole().columns), kNoVertex),
-      below_(above_) {}
-
-std::uint32_t* WindowJoiner::shared(const WindowTin& tin, const tri::GridVertex& vertex) {
-  // A corner belongs to two sides. The line above or below contains it in any case, the left or
-  // right side only if it is in between.
-  const std::int64_t column = tin.window.column - plan_.whole().column + vertex.column;
-  if (vertex.row == 0) return &above_[static_cast<std::size_t>(column)];
-  if (vertex.row + 1 == tin.window.rows) return &below_[static_cast<std::size_t>(column)];
-  if (vertex.column == 0) return &left_[vertex.row];
-  if (vertex.column + 1 == tin.window.columns) return &right_[vertex.row];
-  return nullptr;
-}
-
-std::uint64_t WindowJoiner::uncovered(const WindowTin& tin) {
-  std::uint64_t uncovered = 0;
-  const LatticeWindow &window = tin.window, &whole = plan_.whole();
-  for (const std::uint32_t at : tin.uncovered) {
-    const std::int64_t column = at % window.columns, row = at / window.columns;
-    const auto between = [](std::int64_t place, std::int64_t first, std::int64_t count,
-                            std::int64_t whole_first, std::int64_t whole_count) {
-      return (place == 0 && first > whole_first) ||
-             (place + 1 == count && first + count < whole_first + whole_count);
-    };
-    const unsigned windows =
-        (between(column, window.column, window.columns, whole.column, whole.columns) ? 2U : 1U) *
-        (between(row, window.row, window.rows, whole.row, whole.rows) ? 2U : 1U);
-    if (windows == 1) {
-      ++uncovered;
-      continue;
-    }
-    const auto known = on_sides_.try_emplace({window.row + row, window.column + column}, 0U).first;
-    if (++known->second < windows) continue;
-    ++uncovered;
-    on_sides_.erase(known);
-  }
-  return uncovered;
-}
-
-WindowMeasures WindowJoiner::add(std::size_t i, WindowTin&& tin) {
-  const WindowMeasures measures{.max_error = tin.check.max_error,
-                                .rms_error = tin.check.rms_error,
-                                .covered = tin.check.covered,
-                                .samples = tin.samples,
-                                .uncovered = uncovered(tin),
-                                .work = tin.window.size(),
-                                .reading_seconds = tin.reading_seconds,
-                                .meshing_seconds = tin.meshing_seconds};
-  const auto rows = static_cast<std::size_t>(tin.window.rows);
-  if (i % plan_.across() == 0) {
-    if (i > 0) above_ = std::exchange(below_, std::vector<std::uint32_t>(below_.size(), kNoVertex));
-    left_.assign(rows, kNoVertex);
-  } else {
-    left_ = std::move(right_);
-  }
-  right_.assign(rows, kNoVertex);
-
-  // Vertices that already exist make room for those after them.
-  std::vector<std::uint32_t> numbers;
-  numbers.reserve(tin.vertices.size());
-  const auto first = static_cast<std::uint32_t>(spool_.vertices());
-  std::uint32_t fresh = 0;
-  for (std::size_t k = 0; k < tin.vertices.size(); ++k) {
-    std::uint32_t* const at_side = shared(tin, tin.vertices[k]);
-    if (at_side != nullptr && *at_side != kNoVertex) {
-      numbers.push_back(*at_side);
-      continue;
-    }
-    numbers.push_back(first + fresh);
-    tin.positions[fresh++] = tin.positions[k];
-    if (at_side != nullptr) *at_side = numbers.back();
-  }
-  for (auto& triangle : tin.triangles) {
-    for (std::uint32_t& vertex : triangle) vertex = numbers[vertex];
-  }
-  spool_.add_vertices(std::span(tin.positions).first(fresh));
-  spool_.add_triangles(tin.triangles);
-  return measures;
-}
 
 }  // namespace
 
@@ -249,9 +116,11 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
                          .remedy = "use a profile or its points instead of a mesh"});
   }
   const bool interpolates = options.fill == Fill::interpolate;
-  threads_ = threads_within_memory(
-      kBytesPerThread, kRasterBytesBeside + 8 * static_cast<std::uint64_t>(whole_.columns) +
-                           (interpolates ? kFillBytes : 0));
+  threads_ =
+      threads_within_memory(kBytesPerThread, kRasterBytesBeside +
+                                                 WindowJoiner::kBytesPerShared *
+                                                     static_cast<std::uint64_t>(whole_.columns) +
+                                                 (interpolates ? kFillBytes : 0));
   if (interpolates) fill_ = std::make_shared<StoreFill>(store);
   if (options.places.has_effect()) most_cells_ = straight_cells();
 }
@@ -379,11 +248,13 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
   }
   const LatticePlan plan(whole_, std::min(cells, most_cells_));
   const auto meshers = this->meshers(max_error);
-  WindowJoiner joiner(plan, spool);
+  SideSamples side_samples;
   BoundedMeshResult result = run_windows(
       plan.size(), threads_, whole_.size(), spool, most_vertices,
-      [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan.window(i)); },
-      [&](std::size_t i, WindowTin&& tin) { return joiner.add(i, std::move(tin)); });
+      [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan, i); },
+      [&](std::size_t, RasterWindow& window) {
+        window.measures.uncovered += side_samples.add(window.uncovered);
+      });
   result.reading_seconds += sample.reading_seconds;
   result.meshing_seconds += sample.meshing_seconds;
   return result;

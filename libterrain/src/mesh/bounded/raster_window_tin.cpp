@@ -18,53 +18,6 @@
 namespace terrace::terrain {
 namespace {
 
-void keep_what_touches(WindowTin& tin, const Region& region) {
-  std::erase_if(tin.triangles, [&](const std::array<std::uint32_t, 3>& t) {
-    return !region.touches({tin.positions[t[0]], tin.positions[t[1]], tin.positions[t[2]]});
-  });
-}
-
-void order_by_use(WindowTin& tin) {
-  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> numbers(tin.vertices.size(), kNone);
-  std::vector<tri::GridVertex> vertices;
-  std::vector<stream::Point3> positions;
-  vertices.reserve(tin.vertices.size());
-  positions.reserve(tin.vertices.size());
-  for (auto& triangle : tin.triangles) {
-    for (std::uint32_t& vertex : triangle) {
-      std::uint32_t& number = numbers[vertex];
-      if (number == kNone) {
-        number = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(tin.vertices[vertex]);
-        positions.push_back(tin.positions[vertex]);
-      }
-      vertex = number;
-    }
-  }
-  tin.vertices = std::move(vertices);
-  tin.positions = std::move(positions);
-}
-
-/// Bounds the rounding of an error of 0 in these triangles: their gradients are sums of products
-/// divided by the area, multiplied by the size of the triangle's box.
-double rounding_of_errors(const WindowTin& tin) {
-  double most = 0.0;
-  for (const auto& [i, j, k] : tin.triangles) {
-    const tri::GridVertex &a = tin.vertices[i], &b = tin.vertices[j], &c = tin.vertices[k];
-    const auto [left, right] = std::minmax({a.column, b.column, c.column});
-    const auto [top, bottom] = std::minmax({a.row, b.row, c.row});
-    const double bx = static_cast<double>(b.column) - a.column;
-    const double by = static_cast<double>(b.row) - a.row;
-    const double cx = static_cast<double>(c.column) - a.column;
-    const double cy = static_cast<double>(c.row) - a.row;
-    const double box = static_cast<double>(right - left) * static_cast<double>(bottom - top);
-    const double rise = std::fabs(b.height - a.height) + std::fabs(c.height - a.height);
-    most = std::max(most, 0x1p-48 * rise * box / std::fabs(bx * cy - by * cx));
-  }
-  return most;
-}
-
 /// Twice the area of a triangle, positive if it is counter-clockwise.
 double twice_area(std::span<const tri::Point3> points, const std::array<std::uint32_t, 3>& t) {
   const tri::Point3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
@@ -110,6 +63,75 @@ bool turn_back(std::span<const tri::Point3> points,
 }
 
 }  // namespace
+
+/// The mesh of one window.
+struct WindowMesher::WindowTin {
+  LatticeWindow window;
+  std::vector<tri::GridVertex> vertices;  ///< columns and rows relative to the window
+  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS of the file
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  /// Measured on the mesh as a reader decodes it; coverage is determined on the lattice.
+  tri::GridTinCheck check;
+  /// Number of samples with data, before filling and inside the region; those on the first row and
+  /// column count in the previous window.
+  std::uint64_t samples = 0;
+  /// Indices in the window of such samples, including the first row and column, that are on no
+  /// triangle of this window.
+  std::vector<std::uint32_t> uncovered;
+  double reading_seconds = 0.0, meshing_seconds = 0.0;
+
+  void keep_what_touches(const Region& region);
+  /// Orders vertices by their first use in triangles, and drops unused ones.
+  void order_by_use();
+  /// Bounds the rounding of an error of 0 in these triangles: their gradients are sums of products
+  /// divided by the area, multiplied by the size of the triangle's box.
+  [[nodiscard]] double rounding_of_errors() const;
+};
+
+void WindowMesher::WindowTin::keep_what_touches(const Region& region) {
+  std::erase_if(triangles, [&](const std::array<std::uint32_t, 3>& t) {
+    return !region.touches({positions[t[0]], positions[t[1]], positions[t[2]]});
+  });
+}
+
+void WindowMesher::WindowTin::order_by_use() {
+  constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> numbers(vertices.size(), kNone);
+  std::vector<tri::GridVertex> used;
+  std::vector<stream::Point3> used_positions;
+  used.reserve(vertices.size());
+  used_positions.reserve(vertices.size());
+  for (auto& triangle : triangles) {
+    for (std::uint32_t& vertex : triangle) {
+      std::uint32_t& number = numbers[vertex];
+      if (number == kNone) {
+        number = static_cast<std::uint32_t>(used.size());
+        used.push_back(vertices[vertex]);
+        used_positions.push_back(positions[vertex]);
+      }
+      vertex = number;
+    }
+  }
+  vertices = std::move(used);
+  positions = std::move(used_positions);
+}
+
+double WindowMesher::WindowTin::rounding_of_errors() const {
+  double most = 0.0;
+  for (const auto& [i, j, k] : triangles) {
+    const tri::GridVertex &a = vertices[i], &b = vertices[j], &c = vertices[k];
+    const auto [left, right] = std::minmax({a.column, b.column, c.column});
+    const auto [top, bottom] = std::minmax({a.row, b.row, c.row});
+    const double bx = static_cast<double>(b.column) - a.column;
+    const double by = static_cast<double>(b.row) - a.row;
+    const double cx = static_cast<double>(c.column) - a.column;
+    const double cy = static_cast<double>(c.row) - a.row;
+    const double box = static_cast<double>(right - left) * static_cast<double>(bottom - top);
+    const double rise = std::fabs(b.height - a.height) + std::fabs(c.height - a.height);
+    most = std::max(most, 0x1p-48 * rise * box / std::fabs(bx * cy - by * cx));
+  }
+  return most;
+}
 
 /// The samples of a window and of the lines around it, as far as the raster extends.
 template <class T>
@@ -289,14 +311,14 @@ void WindowMesher::fail(const WindowTin& tin, const std::string& cause,
 void WindowMesher::require_sound(const WindowTin& tin) const {
   const bool exact = rounding_.largest() == stream::Point3{};
   if (options_.places.has_effect() && tin.check.max_error > options_.bound &&
-      !(exact && tin.check.max_error <= rounding_of_errors(tin))) {
+      !(exact && tin.check.max_error <= tin.rounding_of_errors())) {
     fail(tin,
          "the mesh misses its bound in the other CRS: " + plain_number(tin.check.max_error) +
              " of " + plain_number(options_.bound),
          "allow a larger `max_error`, or write the mesh in the store's CRS");
   }
   if (tin.check.max_error > options_.bound &&
-      !(exact && tin.check.max_error <= rounding_of_errors(tin))) {
+      !(exact && tin.check.max_error <= tin.rounding_of_errors())) {
     if (exact) {
       fail(tin,
            "the mesh misses its bound: " + plain_number(tin.check.max_error) + " of " +
@@ -320,8 +342,8 @@ void WindowMesher::require_no_holes(const WindowTin& tin) const {
 }
 
 template <class T>
-WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality quality,
-                                bool checked) {
+WindowMesher::WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality quality,
+                                              bool checked) {
   const Stopwatch reading;
   const Samples<T> samples = read<T>(window);
   WindowTin out;
@@ -351,6 +373,7 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
   options.quality = quality;
   options.measure = false;  // the decoded mesh is checked instead
   const auto mesh_to = [&](double aim) {
+    store_.check_stop();
     options.max_error = aim;
     tri::GridTin tin = tri::grid_tin<T>(grid, sides, options);
     out.vertices = std::move(tin.vertices);
@@ -383,28 +406,50 @@ WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality qua
         out.uncovered.push_back(at);
       }
     }
-    if (options_.region) keep_what_touches(out, *options_.region);
-    order_by_use(out);
+    if (options_.region) out.keep_what_touches(*options_.region);
+    out.order_by_use();
     options_.places(std::span<stream::Point3>(out.positions));
   }
   out.meshing_seconds = meshing.seconds();
   return out;
 }
 
-WindowTin WindowMesher::mesh(const LatticeWindow& window) {
+RasterWindow WindowMesher::mesh(const LatticePlan& plan, std::size_t i) {
+  const LatticeWindow window = plan.window(i);
+  RasterWindow out;
+  out.measures.work = window.size();
   if (options_.region) {
     constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
     const stream::Box3 box{
         {static_cast<double>(window.column), static_cast<double>(window.row), -kAnyHeight},
         {static_cast<double>(window.column + window.columns - 1),
          static_cast<double>(window.row + window.rows - 1), kAnyHeight}};
-    WindowTin nothing;
-    nothing.window = window;
-    if (options_.region->overlap(world_box(placement_, box)) == Overlap::none) return nothing;
+    if (options_.region->overlap(world_box(placement_, box)) == Overlap::none) return out;
   }
   const tri::TinQuality quality = options_.tin.quality;
-  return reader_.float_is_exact() ? mesh_as<float>(window, quality, true)
-                                  : mesh_as<double>(window, quality, true);
+  WindowTin tin = reader_.float_is_exact() ? mesh_as<float>(window, quality, true)
+                                           : mesh_as<double>(window, quality, true);
+  out.measures.max_error = tin.check.max_error;
+  out.measures.rms_error = tin.check.rms_error;
+  out.measures.covered = tin.check.covered;
+  out.measures.samples = tin.samples;
+  out.measures.reading_seconds = tin.reading_seconds;
+  out.measures.meshing_seconds = tin.meshing_seconds;
+  for (const std::uint32_t at : tin.uncovered) {
+    const auto sample = plan.sample(i, at % window.columns, at / window.columns);
+    if (sample.windows == 1) {
+      ++out.measures.uncovered;
+    } else {
+      out.uncovered.push_back({sample.place, sample.windows});
+    }
+  }
+  for (std::uint32_t k = 0; k < tin.vertices.size(); ++k) {
+    const auto sample = plan.sample(i, tin.vertices[k].column, tin.vertices[k].row);
+    if (sample.windows > 1) out.shared.push_back({k, sample.place, sample.last});
+  }
+  out.vertices = std::move(tin.positions);
+  out.triangles = std::move(tin.triangles);
+  return out;
 }
 
 WindowCount WindowMesher::count(const LatticeWindow& window, tri::TinQuality quality) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -12,6 +13,8 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
 
+#include "mesh/bounded/bounded_mesher.hpp"
+#include "mesh/bounded/lattice_plan.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/region.hpp"
@@ -35,20 +38,15 @@ struct WindowTinOptions {
 };
 
 /// The mesh of one window. Vertices are in the order in which triangles first use them.
-struct WindowTin {
-  LatticeWindow window;
-  std::vector<tri::GridVertex> vertices;  ///< columns and rows relative to the window
-  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS of the file
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  /// Measured on the mesh as a reader decodes it; coverage is determined on the lattice.
-  tri::GridTinCheck check;
-  /// Number of samples with data, before filling and inside the region; those on the first row and
-  /// column count in the previous window.
-  std::uint64_t samples = 0;
-  /// Indices in the window of such samples, including the first row and column, that are on no
-  /// triangle of this window.
-  std::vector<std::uint32_t> uncovered;
-  double reading_seconds = 0.0, meshing_seconds = 0.0;
+struct RasterWindow : BoundedWindow {
+  /// A sample on a side to a neighbour.
+  struct SideSample {
+    std::uint64_t place = 0;  ///< as in LatticePlan::Sample
+    unsigned windows = 0;     ///< how many windows share it
+  };
+  /// Samples on such sides, with data and inside the region, that are on no triangle of this
+  /// window. The measures do not count them.
+  std::vector<SideSample> uncovered;
 };
 
 struct WindowCount {
@@ -62,14 +60,15 @@ class WindowMesher {
   WindowMesher(const stream::Store& store, WindowTinOptions options,
                const stream::MeshRounding& rounding);
 
-  /// Meshes a window. The vertices on a side depend only on the samples on it and next to it, so
-  /// two windows that share it have the same vertices there. Throws: stream::Error on a damaged
-  /// store, and if rounded positions break the bound.
-  WindowTin mesh(const LatticeWindow& window);
+  /// Meshes window i of a plan. The vertices on a side depend only on the samples on it and next to
+  /// it, so two windows that share it have the same vertices there. Throws: stream::Error on a
+  /// damaged store, and if rounded positions break the bound.
+  RasterWindow mesh(const LatticePlan& plan, std::size_t i);
   /// Returns the number of vertices, unchecked, and the time to compute it.
   WindowCount count(const LatticeWindow& window, tri::TinQuality quality);
 
  private:
+  struct WindowTin;
   template <class T>
   struct Samples;
   template <class T>
