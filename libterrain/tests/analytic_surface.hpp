@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "base/digest.hpp"
 #include "tile/make/tile_surface.hpp"
 
@@ -95,7 +97,12 @@ class AnalyticSurface final : public TileSurface {
     return digest.value();
   }
 
+  void check_stop() const override {
+    if (stop_check) stop_check();
+  }
+
   bool in_rows = true;  ///< whether part() returns rows
+  base::StopCheck stop_check;
 
  private:
   [[nodiscard]] double longitude(int column) const { return west_ + step_ * column; }

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <terrace/base/portable_math.hpp>
 #include <terrace/base/random.hpp>
+#include <terrace/stream/error.hpp>
 #include <terrace/tri/point_tin.hpp>
 
 #include "analytic_surface.hpp"
@@ -281,7 +282,7 @@ TEST(TileMesher, SharedSidesChangeNothing) {
     SCOPED_TRACE(zoom);
     const ZoomPlan plan = plan_of(zoom, 10, surface);
     const TileRange range = tiles_in(surface.bounds(), zoom);
-    SharedSides shared;
+    SharedSides shared{kMostSharedVertices};
     for (std::uint32_t y = range.y0; y <= std::min(range.y1, range.y0 + 2); ++y) {
       for (std::uint32_t x = range.x0; x <= std::min(range.x1, range.x0 + 2); ++x) {
         const MadeTile alone = make_tile({zoom, x, y}, plan, surface, {});
@@ -290,18 +291,26 @@ TEST(TileMesher, SharedSidesChangeNothing) {
       }
     }
     // The tiles shared sides with each other.
-    EXPECT_TRUE(shared.find({true, 0, range.y0 + 1, range.x0}) ||
-                shared.find({true, 1, range.y0 + 1, 2 * std::uint64_t{range.x0}}));
+    EXPECT_TRUE(
+        shared.find({true, 0, range.y0 + 1, range.x0}) ||
+        shared.find({true, 1, 2 * (std::uint64_t{range.y0} + 1), 2 * std::uint64_t{range.x0}}));
   }
 }
 
-TEST(SharedSides, DropOldest) {
-  SharedSides shared;
-  const std::vector<TileSideVertex> side(1000);
-  for (std::uint32_t line = 0; line < 2000; ++line) shared.keep({true, 0, line, 0}, side);
-  EXPECT_TRUE(shared.find({true, 0, 1999, 0}));
-  EXPECT_TRUE(shared.find({true, 0, 1950, 0}));
-  EXPECT_FALSE(shared.find({true, 0, 0, 0}));
+TEST(TileMesher, AStopEndsItBetweenLeaves) {
+  AnalyticSurface surface = alps();
+  const TileAddress tile{0, 1, 0};
+  const ZoomPlan plan = plan_of(0, expected_error(0), surface);
+  int checks = 0;
+  surface.stop_check = [&] { ++checks; };
+  ASSERT_GT(leaves_of(tile, plan, surface).size(), 2U);
+  const int to_divide = checks;
+  checks = 0;
+  surface.stop_check = [&] {
+    if (++checks > to_divide + 1) throw stream::Stopped();
+  };
+  EXPECT_THROW(static_cast<void>(make_tile(tile, plan, surface, {})), stream::Stopped);
+  EXPECT_EQ(checks, to_divide + 2);
 }
 
 TEST(TileLeaves, CoverTileOnce) {
@@ -334,14 +343,14 @@ TEST(TileSides, GoAroundTheLeaf) {
     const std::uint32_t west = leaf_unit(leaf.x, leaf.depth), south = leaf_unit(leaf.y, leaf.depth);
     const std::uint32_t east = leaf_unit(leaf.x + 1, leaf.depth);
     const std::uint32_t north = leaf_unit(leaf.y + 1, leaf.depth);
-    const std::vector<TileSideVertex> ring = sides.around(leaf);
+    const std::vector<TileVertex> ring = sides.around(leaf);
     ASSERT_EQ(ring.front().u, west);
     ASSERT_EQ(ring.front().v, south);
     // Each step goes along one side, forward.
     unsigned turns = 0;
     for (std::size_t i = 0; i < ring.size(); ++i) {
-      const TileSideVertex& a = ring[i];
-      const TileSideVertex& b = ring[(i + 1) % ring.size()];
+      const TileVertex& a = ring[i];
+      const TileVertex& b = ring[(i + 1) % ring.size()];
       const bool forward = (a.v == south && b.v == south && a.u < b.u) ||
                            (a.u == east && b.u == east && a.v < b.v) ||
                            (a.v == north && b.v == north && a.u > b.u) ||

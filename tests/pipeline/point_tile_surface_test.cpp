@@ -455,7 +455,7 @@ TEST(CrowdedLeaf, IsWithinTheBoundOfAllItsSamples) {
                                  place(surface.bounds().south, box.south)};
     terrain::TileSides sides(tile, plan, surface);
     std::vector<tri::Point3> frame;
-    for (const terrain::TileSideVertex& vertex : sides.around(leaf)) {
+    for (const terrain::TileVertex& vertex : sides.around(leaf)) {
       frame.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
     }

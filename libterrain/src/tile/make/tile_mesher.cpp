@@ -5,12 +5,12 @@
 #include <cmath>
 #include <optional>
 #include <span>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "base/vector.hpp"
 #include "earth/ground.hpp"
+#include "surface/window_mesh.hpp"
 #include "tile/format/ellipsoid.hpp"
 #include "tile/format/quantized_mesh_layout.hpp"
 #include "tile/make/crowded_leaf.hpp"
@@ -19,27 +19,16 @@
 namespace terrace::terrain {
 namespace {
 
-/// A mesh in units of the tile and steps of height, assembled from leaves.
-struct Pieces {
-  std::vector<TileSideVertex> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  std::unordered_map<std::uint32_t, std::uint32_t> by_place;  ///< vertices on sides of leaves
+/// A mesh in units of the tile and steps of height: of a leaf, or of the whole tile.
+struct LeafMesh : WindowMesh<TileVertex> {
   double max_error = 0.0;
   bool has_data = false;
-
-  std::uint32_t side_vertex(const TileSideVertex& vertex) {
-    const std::uint32_t place = vertex.v << 16 | vertex.u;
-    const auto [found, fresh] =
-        by_place.try_emplace(place, static_cast<std::uint32_t>(vertices.size()));
-    if (fresh) vertices.push_back(vertex);
-    return found->second;
-  }
 };
 
 /// Returns the error of a leaf with samples in `range`, if no sample becomes a vertex.
-double flat_error(const std::vector<TileSideVertex>& frame, double step, const HeightRange& range) {
+double flat_error(const std::vector<TileVertex>& frame, double step, const HeightRange& range) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
-  for (const TileSideVertex& vertex : frame) {
+  for (const TileVertex& vertex : frame) {
     const double height = static_cast<double>(vertex.height) * step;
     low = std::min(low, height);
     high = std::max(high, height);
@@ -106,24 +95,26 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, highest);
 }
 
-void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
-               TileSurface& surface, tri::TinQuality quality,
-               const std::vector<TileSideVertex>& frame, Pieces& pieces) {
+/// frame: from TileSides. has_data: whether the tile is known to have a sample.
+LeafMesh mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& plan,
+                   TileSurface& surface, tri::TinQuality quality, std::vector<TileVertex>&& frame,
+                   bool has_data) {
+  LeafMesh mesh;
   const auto range = surface.range(box_of(tile, leaf));
   bool measured = false;
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
-    if (error <= plan.max_error && (range->certain || pieces.has_data)) {
+    if (error <= plan.max_error && (range->certain || has_data)) {
       // Any triangles are within the bound, so nothing needs to be read.
-      pieces.max_error = std::max(pieces.max_error, error);
-      pieces.has_data = true;
+      mesh.max_error = error;
+      mesh.has_data = true;
     } else {
       measured = true;
     }
   }
   std::vector<tri::Point3> corners;
   corners.reserve(frame.size());
-  for (const TileSideVertex& vertex : frame) {
+  for (const TileVertex& vertex : frame) {
     corners.push_back({static_cast<double>(vertex.u), static_cast<double>(vertex.v),
                        static_cast<double>(vertex.height) * plan.height_step});
   }
@@ -131,33 +122,55 @@ void mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan& pl
   options.max_error = plan.max_error;
   options.quality = quality;
   options.lattice = tri::TinLattice{0.0, plan.height_step};
-  const tri::PointTin tin = tin_of(tile, leaf, surface, measured, corners, options);
-  if (measured) pieces.max_error = std::max(pieces.max_error, tin.errors.largest);
-  if (tin.errors.covered > 0) pieces.has_data = true;
+  tri::PointTin tin = tin_of(tile, leaf, surface, measured, corners, options);
+  if (measured) mesh.max_error = tin.errors.largest;
+  if (tin.errors.covered > 0) mesh.has_data = true;
 
-  std::vector<std::uint32_t> number;
-  number.reserve(tin.vertices.size());
-  for (std::size_t i = 0; i < tin.vertices.size(); ++i) {
-    if (i < frame.size()) {
-      number.push_back(pieces.side_vertex(frame[i]));
-    } else {
-      const tri::Point3& p = tin.vertices[i];
-      number.push_back(static_cast<std::uint32_t>(pieces.vertices.size()));
-      pieces.vertices.push_back({static_cast<std::uint32_t>(p[0]), static_cast<std::uint32_t>(p[1]),
-                                 std::llround(p[2] / plan.height_step)});
-    }
+  for (std::uint32_t i = 0; i < frame.size(); ++i) {
+    mesh.shared.push_back({.vertex = i, .place = frame[i].v << 16 | frame[i].u});
   }
-  for (const auto& t : tin.triangles) {
-    pieces.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+  mesh.vertices = std::move(frame);
+  for (std::size_t i = mesh.vertices.size(); i < tin.vertices.size(); ++i) {
+    const tri::Point3& p = tin.vertices[i];
+    mesh.vertices.push_back({static_cast<std::uint32_t>(p[0]), static_cast<std::uint32_t>(p[1]),
+                             std::llround(p[2] / plan.height_step)});
   }
+  mesh.triangles = std::move(tin.triangles);
+  return mesh;
+}
+
+/// Meshes a tile leaf by leaf. Parameters: as make_tile().
+LeafMesh mesh_leaves(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                     tri::TinQuality quality, SharedSides* shared) {
+  LeafMesh whole;
+  TileSides sides(tile, plan, surface, shared);
+  const std::vector<TileLeaf> leaves = leaves_of(tile, plan, surface);
+  // On one thread, because others make other tiles. Then each leaf follows the previous one's take.
+  mesh_windows(
+      leaves.size(), 1, [&] { surface.check_stop(); },
+      [&](unsigned, std::size_t i) {
+        const GeographicBox box = box_of(tile, leaves[i]);
+        const auto range = surface.range(box);
+        // If heights differ by less than the bound, usually only the sides are read.
+        if (range && range->high - range->low > plan.max_error) surface.expect(box);
+        return mesh_leaf(tile, leaves[i], plan, surface, quality, sides.around(leaves[i]),
+                         whole.has_data);
+      },
+      [&](std::size_t, const LeafMesh& leaf) {
+        whole.vertices.insert(whole.vertices.end(), leaf.vertices.begin(), leaf.vertices.end());
+        whole.triangles.insert(whole.triangles.end(), leaf.triangles.begin(), leaf.triangles.end());
+        whole.max_error = std::max(whole.max_error, leaf.max_error);
+        whole.has_data = whole.has_data || leaf.has_data;
+      });
+  return whole;
 }
 
 /// Sets heights as 15-bit numbers from the lowest to the highest, which clients use for culling.
 /// Two neighbours decode a shared height to within half of such a number each. Returns the largest
 /// change of a vertex.
-double set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
-  std::int64_t lowest = pieces.vertices.front().height, highest = lowest;
-  for (const TileSideVertex& vertex : pieces.vertices) {
+double set_heights(const std::vector<TileVertex>& vertices, double step, TileMesh& mesh) {
+  std::int64_t lowest = vertices.front().height, highest = lowest;
+  for (const TileVertex& vertex : vertices) {
     lowest = std::min(lowest, vertex.height);
     highest = std::max(highest, vertex.height);
   }
@@ -170,7 +183,7 @@ double set_heights(const Pieces& pieces, double step, TileMesh& mesh) {
   mesh.lowest = static_cast<float>(static_cast<double>(lowest) * step);
   mesh.highest = static_cast<float>(static_cast<double>(highest) * step);
   double moved = 0.0;
-  for (const TileSideVertex& vertex : pieces.vertices) {
+  for (const TileVertex& vertex : vertices) {
     mesh.u.push_back(static_cast<std::uint16_t>(vertex.u));
     mesh.v.push_back(static_cast<std::uint16_t>(vertex.v));
     const std::int64_t above = vertex.height - lowest;
@@ -261,18 +274,11 @@ void set_water(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
 
 MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
                    const TileMeshOptions& options, SharedSides* shared) {
-  Pieces pieces;
-  TileSides sides(tile, plan, surface, shared);
-  for (const TileLeaf& leaf : leaves_of(tile, plan, surface)) {
-    const auto range = surface.range(box_of(tile, leaf));
-    // If heights differ by less than the bound, usually only the sides are read.
-    if (range && range->high - range->low > plan.max_error) surface.expect(box_of(tile, leaf));
-    mesh_leaf(tile, leaf, plan, surface, options.quality, sides.around(leaf), pieces);
-  }
+  LeafMesh leaves = mesh_leaves(tile, plan, surface, options.quality, shared);
   MadeTile made;
-  made.has_data = pieces.has_data;
-  made.max_error = pieces.max_error + set_heights(pieces, plan.height_step, made.mesh);
-  made.mesh.triangles = std::move(pieces.triangles);
+  made.has_data = leaves.has_data;
+  made.max_error = leaves.max_error + set_heights(leaves.vertices, plan.height_step, made.mesh);
+  made.mesh.triangles = std::move(leaves.triangles);
   order_vertices(made.mesh);
   made.header = header_of(tile, made.mesh);
   if (options.normals) set_normals(tile, surface, made.mesh);

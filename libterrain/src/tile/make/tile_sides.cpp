@@ -21,8 +21,6 @@ constexpr double kMostSidePlaces = 4096.0;
 /// Share of the bound for sides. Samples so close to a side that no vertex fits in between have the
 /// error of the side.
 constexpr double kSideShare = 0.75;
-/// Vertices that SharedSides keeps twice, at 16 bytes each.
-constexpr std::size_t kMostSideVertices = std::size_t{1} << 16;
 
 /// Returns the width of a tile's part at a depth; exact.
 double width_at(unsigned zoom, unsigned depth) {
@@ -99,42 +97,13 @@ std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
   return leaves;
 }
 
-std::optional<std::vector<TileSideVertex>> SharedSides::find(const Key& key) const {
-  const std::lock_guard lock(mutex_);
-  for (const Sides* sides : {&recent_, &older_}) {
-    if (const auto found = sides->find(key); found != sides->end()) return found->second;
-  }
-  return std::nullopt;
-}
-
-void SharedSides::keep(const Key& key, const std::vector<TileSideVertex>& vertices) {
-  const std::lock_guard lock(mutex_);
-  if (vertices_ > kMostSideVertices) {
-    older_ = std::exchange(recent_, {});
-    vertices_ = 0;
-  }
-  if (recent_.try_emplace(key, vertices).second) vertices_ += vertices.size();
-}
-
-void SharedSides::clear() {
-  const std::lock_guard lock(mutex_);
-  recent_.clear();
-  older_.clear();
-  vertices_ = 0;
-}
-
 TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
                      SharedSides* shared)
-    : tile_(tile), plan_(plan), surface_(surface), shared_(shared), data_(surface.bounds()) {}
-
-std::optional<SharedSides::Key> TileSides::shared_key(const Side& side) const {
-  const std::uint32_t parts = 1U << side.depth;
-  if (shared_ == nullptr || (side.line != 0 && side.line != parts)) return std::nullopt;
-  const auto [across, along] =
-      side.along_parallel ? std::pair(tile_.y, tile_.x) : std::pair(tile_.x, tile_.y);
-  return SharedSides::Key{side.along_parallel, side.depth, across + (side.line == 0 ? 0 : 1),
-                          std::uint64_t{along} * parts + side.k};
-}
+    : tile_(tile),
+      plan_(plan),
+      surface_(surface),
+      border_(shared != nullptr ? *shared : own_),
+      data_(surface.bounds()) {}
 
 bool TileSides::is_cut(const Side& side) const {
   if (side.depth == kDeepestLeaf) return false;
@@ -209,14 +178,14 @@ bool TileSides::is_flat(const GeographicBox& band) const {
   return range && range->high - range->low + plan_.height_step <= kSideShare * plan_.max_error;
 }
 
-std::vector<TileSideVertex> TileSides::settle(const Side& side) {
+SideVertices TileSides::settle(const Side& side) {
   if (is_cut(side)) {
     const Side first{side.along_parallel, side.depth + 1, 2 * side.line, 2 * side.k};
     Side second = first;
     ++second.k;
-    std::vector<TileSideVertex> all = vertices(first);
-    const std::vector<TileSideVertex>& rest = vertices(second);
-    all.insert(all.end(), rest.begin() + 1, rest.end());
+    SideVertices all = *vertices(first);
+    const auto rest = vertices(second);
+    all.insert(all.end(), rest->begin() + 1, rest->end());
     return all;
   }
   const std::uint32_t from = leaf_unit(side.k, side.depth);
@@ -257,44 +226,40 @@ std::vector<TileSideVertex> TileSides::settle(const Side& side) {
   }
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,
                                                       tri::TinLattice{0.0, plan_.height_step});
-  std::vector<TileSideVertex> vertices;
+  SideVertices vertices;
   for (const tri::LineVertex& vertex : line.vertices) {
-    const auto at = static_cast<std::uint32_t>(vertex.t);
-    vertices.push_back({side.along_parallel ? at : across, side.along_parallel ? across : at,
-                        std::llround(vertex.height / plan_.height_step)});
+    vertices.push_back({vertex.t, vertex.height});
   }
   return vertices;
 }
 
-const std::vector<TileSideVertex>& TileSides::vertices(const Side& side) {
-  const auto key = std::make_tuple(side.along_parallel, side.depth, side.line, side.k);
-  if (const auto found = known_.find(key); found != known_.end()) return found->second;
-  const std::optional<SharedSides::Key> shared = shared_key(side);
-  std::optional<std::vector<TileSideVertex>> there;
-  if (shared) there = shared_->find(*shared);
-  if (there) {
-    const std::uint32_t across = side.line == 0 ? 0 : kTileUnits;
-    for (TileSideVertex& vertex : *there) (side.along_parallel ? vertex.v : vertex.u) = across;
-    return known_[key] = std::move(*there);
-  }
-  std::vector<TileSideVertex> settled = settle(side);
-  if (shared) shared_->keep(*shared, settled);
-  return known_[key] = std::move(settled);
+std::shared_ptr<const SideVertices> TileSides::vertices(const Side& side) {
+  const std::uint64_t parts = std::uint64_t{1} << side.depth;
+  const auto [across, along] =
+      side.along_parallel ? std::pair(tile_.y, tile_.x) : std::pair(tile_.x, tile_.y);
+  const TileSideKey key{side.along_parallel, side.depth, across * parts + side.line,
+                        along * parts + side.k};
+  const bool on_border = side.line == 0 || side.line == parts;
+  return (on_border ? border_ : own_).vertices(key, [&] { return settle(side); });
 }
 
-std::vector<TileSideVertex> TileSides::around(const TileLeaf& leaf) {
-  const auto side = [&](bool along_parallel, std::uint32_t line, std::uint32_t k) {
-    return vertices({along_parallel, leaf.depth, line, k});
+std::vector<TileVertex> TileSides::around(const TileLeaf& leaf) {
+  std::vector<TileVertex> ring;
+  const auto add = [&](const Side& side, bool backward) {
+    const auto known = vertices(side);
+    const std::uint32_t across = leaf_unit(side.line, side.depth);
+    // The last vertex is the first of the next side.
+    for (std::size_t i = 0; i + 1 < known->size(); ++i) {
+      const SideVertex& vertex = (*known)[backward ? known->size() - 1 - i : i];
+      const auto at = static_cast<std::uint32_t>(vertex.at);
+      ring.push_back({side.along_parallel ? at : across, side.along_parallel ? across : at,
+                      std::llround(vertex.height / plan_.height_step)});
+    }
   };
-  std::vector<TileSideVertex> ring;
-  const auto add = [&](std::vector<TileSideVertex> part, bool backward) {
-    if (backward) std::reverse(part.begin(), part.end());
-    ring.insert(ring.end(), part.begin(), part.end() - 1);
-  };
-  add(side(true, leaf.y, leaf.x), false);
-  add(side(false, leaf.x + 1, leaf.y), false);
-  add(side(true, leaf.y + 1, leaf.x), true);
-  add(side(false, leaf.x, leaf.y), true);
+  add({true, leaf.depth, leaf.y, leaf.x}, false);
+  add({false, leaf.depth, leaf.x + 1, leaf.y}, false);
+  add({true, leaf.depth, leaf.y + 1, leaf.x}, true);
+  add({false, leaf.depth, leaf.x, leaf.y}, true);
   return ring;
 }
 

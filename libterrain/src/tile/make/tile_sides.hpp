@@ -5,14 +5,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <mutex>
+#include <memory>
 #include <optional>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <terrace/tri/point_tin.hpp>
 
+#include "surface/window_sides.hpp"
 #include "tile/format/tile_address.hpp"
 #include "tile/make/tile_surface.hpp"
 
@@ -51,36 +51,26 @@ GeographicBox box_of(const TileAddress& tile, const TileLeaf& leaf);
 std::vector<TileLeaf> leaves_of(const TileAddress& tile, const ZoomPlan& plan,
                                 TileSurface& surface);
 
-/// A vertex on the side of a leaf: units of the tile, and multiples of the height step.
-struct TileSideVertex {
+/// A vertex in units of a tile and multiples of the height step.
+struct TileVertex {
   std::uint32_t u = 0, v = 0;
   std::int64_t height = 0;
 };
 
-/// A cache of sides on the borders of a zoom's tiles, for the tile beyond: keeps the most recent.
-/// Thread-safe.
-class SharedSides {
- public:
-  /// A side: from part k to k + 1 of the 2^depth parts of each tile, along a line between two rows
-  /// or columns of tiles. The vertices' coordinate across the side is meaningless.
-  struct Key {
-    bool along_parallel = false;
-    unsigned depth = 0;
-    std::uint32_t line = 0;
-    std::uint64_t k = 0;
-    friend auto operator<=>(const Key&, const Key&) = default;
-  };
-
-  [[nodiscard]] std::optional<std::vector<TileSideVertex>> find(const Key& key) const;
-  void keep(const Key& key, const std::vector<TileSideVertex>& vertices);
-  void clear();
-
- private:
-  using Sides = std::map<Key, std::vector<TileSideVertex>>;
-  mutable std::mutex mutex_;
-  Sides recent_, older_;
-  std::size_t vertices_ = 0;  ///< in recent_
+/// A side of a leaf, the same for the tiles on both sides: from part k to k + 1 along a line. Lines
+/// and parts are 1 / 2^depth of a tile apart and are counted from -180, -90 degrees.
+struct TileSideKey {
+  bool along_parallel = false;  ///< from west to east; otherwise from south to north
+  unsigned depth = 0;
+  std::uint64_t line = 0, k = 0;
+  friend auto operator<=>(const TileSideKey&, const TileSideKey&) = default;
 };
+
+/// Sides on the borders of a zoom's tiles, for the tile beyond. Positions are in units of a tile,
+/// heights in metres.
+using SharedSides = WindowSides<TileSideKey>;
+/// Limit for SharedSides, at 16 bytes each.
+inline constexpr std::size_t kMostSharedVertices = std::size_t{1} << 16;
 
 /// Computes the vertices on the sides of a tile's leaves. They depend only on the zoom's plan and
 /// on the surface along the side, not on the tile or leaf that requests them. So shared sides are
@@ -93,7 +83,7 @@ class TileSides {
             SharedSides* shared = nullptr);
 
   /// Returns the vertices counter-clockwise from the south-west corner, each once.
-  std::vector<TileSideVertex> around(const TileLeaf& leaf);
+  std::vector<TileVertex> around(const TileLeaf& leaf);
 
  private:
   /// A side: from place k to k + 1 of 2^depth along `line` of 2^depth.
@@ -102,10 +92,8 @@ class TileSides {
     unsigned depth = 0;
     std::uint32_t line = 0, k = 0;
   };
-  const std::vector<TileSideVertex>& vertices(const Side& side);
-  /// Returns nullopt unless the side is on the tile's border.
-  [[nodiscard]] std::optional<SharedSides::Key> shared_key(const Side& side) const;
-  std::vector<TileSideVertex> settle(const Side& side);
+  std::shared_ptr<const SideVertices> vertices(const Side& side);
+  SideVertices settle(const Side& side);
   /// The lowest and highest samples within a unit of a place on a side; if any are within half a
   /// unit, only of those.
   struct Samples {
@@ -137,11 +125,10 @@ class TileSides {
   TileAddress tile_;
   const ZoomPlan& plan_;
   TileSurface& surface_;
-  SharedSides* shared_;
+  WindowSides<TileSideKey> own_;  ///< within the tile
+  WindowSides<TileSideKey>& border_;
   GeographicBox data_;
   std::map<std::pair<double, double>, std::optional<Samples>> corners_;
-  std::map<std::tuple<bool, unsigned, std::uint32_t, std::uint32_t>, std::vector<TileSideVertex>>
-      known_;
 };
 
 }  // namespace terrace::terrain
