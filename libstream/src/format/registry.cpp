@@ -31,9 +31,11 @@ constexpr std::size_t kHeadBytes = 4096;
 constexpr std::array<std::string_view, 4> kEntityNames{"points", "triangles", "segments",
                                                        "polylines"};
 
-std::string known_formats() {
+/// The names of all formats, or of those with a capability.
+std::string names_of_formats(bool Format::*capability = nullptr) {
   std::string out;
   for (const Format& format : formats()) {
+    if (capability != nullptr && !(format.*capability)) continue;
     if (!out.empty()) out += ", ";
     out += format.name;
   }
@@ -79,7 +81,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
       if (format.name == options.format) return format;
     }
     throw std::invalid_argument(
-        fmt::format("unknown input format '{}'; known are {}", options.format, known_formats()));
+        fmt::format("unknown input format '{}'; known are {}", options.format, names_of_formats()));
   }
   const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
   const auto bytes = std::as_bytes(std::span(head));
@@ -101,7 +103,7 @@ const Format& format_of(const std::string& file, const SourceOptions& options) {
       .remedy(head.empty() ? "download or export the file again"
                            : "convert a raster (gdal_translate FILE out.tif), or name the "
                              "format: " +
-                                 known_formats());
+                                 names_of_formats());
 }
 
 /// Releases pipes that were peeked at but not opened.
@@ -112,57 +114,87 @@ struct HeadScope {
   HeadScope& operator=(const HeadScope&) = delete;
 };
 
-/// open_source() without reading ahead.
-std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
-                                       const SourceOptions& options) {
-  const HeadScope scope;
-  const Format& format = format_of(files.front(), options);
-  bool spooled = false;
-  for (const std::string& file : files) {
-    const Format& other = format_of(file, options);
-    if (&other != &format) {
-      throw Error(shown_name(file), fmt::format("is {}, but {} is {}", other.name,
-                                                shown_name(files.front()), format.name))
-          .remedy("name files of one format, or select files of a folder by `format`");
-    }
-    if (is_seekable(file) || packed_format_of(file) == &format) continue;
-    if (!format.streams && !format.self_contained) {
-      throw Error(shown_name(file), format.name + " cannot be read from a pipe or from gzip")
-          .remedy("name an unpacked file");
-    }
-    spooled = spooled || !format.streams;
+/// An option that only formats with a capability support.
+struct Requirement {
+  bool Format::*capability;
+  bool (*is_set)(const SourceOptions& options);
+  std::string_view option;   ///< in the terms of SourceOptions
+  std::string_view lack;     ///< follows the name of a format without the capability
+  std::string_view example;  ///< of what has the capability
+};
+
+constexpr std::array<Requirement, 6> kRequirements{{
+    {&Format::height_colours,
+     [](const SourceOptions& o) { return o.heights_of_colour != HeightsOfColour::none; },
+     "heights_of_colour", "does not encode heights as colours", "an image"},
+    {&Format::octree, [](const SourceOptions& o) { return o.selection.resolution > 0; },
+     "resolution", "has no octree", "a COPC file or EPT"},
+    {&Format::triangles, [](const SourceOptions& o) { return o.entities == Entities::triangles; },
+     "entities", "has no triangles", "a mesh"},
+    {&Format::lines,
+     [](const SourceOptions& o) {
+       return o.entities == Entities::segments || o.entities == Entities::polylines;
+     },
+     "entities", "has no lines", "a file of lines"},
+    {&Format::raster, [](const SourceOptions& o) { return o.cell > 0; }, "cell",
+     "is not a raster format", "a raster"},
+    {&Format::raster, [](const SourceOptions& o) { return o.band != 1; }, "band", "has no bands",
+     "a raster"},
+}};
+
+/// Throws: Error if an option needs a capability that the format lacks.
+void check_capabilities(const Format& format, const std::string& file,
+                        const SourceOptions& options) {
+  for (const Requirement& requirement : kRequirements) {
+    if (format.*requirement.capability || !requirement.is_set(options)) continue;
+    throw Error(shown_name(file), fmt::format("{} {}", format.name, requirement.lack))
+        .remedy(fmt::format("name {} ({}), or leave `{}` out", requirement.example,
+                            names_of_formats(requirement.capability), requirement.option));
   }
+}
+
+/// Determines the format that all files have. Throws: Error if they differ.
+const Format& common_format(std::span<const std::string> files, const SourceOptions& options) {
+  const Format& format = format_of(files.front(), options);
+  for (const std::string& file : files.subspan(1)) {
+    const Format& other = format_of(file, options);
+    if (&other == &format) continue;
+    throw Error(shown_name(file), fmt::format("is {}, but {} is {}", other.name,
+                                              shown_name(files.front()), format.name))
+        .remedy("name files of one format, or select files of a folder by `format`");
+  }
+  return format;
+}
+
+/// Whether files from pipes or gzip must be copied before the format can read them. Throws: Error
+/// if copies would not help.
+bool needs_copies(const Format& format, std::span<const std::string> files) {
   if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
     throw Error("standard input", "is named twice")
         .remedy("name it once: it can be read only once");
   }
-  if (options.heights_of_colour != HeightsOfColour::none && format.name != png_format().name) {
-    throw Error(shown_name(files.front()), format.name + " does not encode heights as colours")
-        .remedy("leave `heights_of_colour` out");
+  if (format.streams) return false;
+  bool copies = false;
+  for (const std::string& file : files) {
+    if (is_seekable(file) || packed_format_of(file) == &format) continue;
+    if (!format.self_contained) {
+      throw Error(shown_name(file), format.name + " cannot be read from a pipe or from gzip")
+          .remedy("name an unpacked file");
+    }
+    copies = true;
   }
-  if (options.selection.resolution > 0 && format.name != las_format().name &&
-      format.name != ept_format().name) {
-    throw Error(shown_name(files.front()),
-                format.name + " has no octree, so `resolution` does not apply")
-        .remedy("name a COPC file or EPT, or leave `resolution` out");
-  }
-  const bool triangles = options.entities == Entities::triangles;
-  if (options.entities != Entities::points && !(triangles ? format.triangles : format.lines)) {
-    throw Error(shown_name(files.front()),
-                format.name + " has no " + (triangles ? "triangles" : "lines"))
-        .remedy(std::string(triangles ? "name a mesh (GLB, OBJ, OFF, PLY, STL)" : "name GeoJSON") +
-                ", or leave `entities` out");
-  }
-  auto source = spooled ? open_spooled(format, files, options) : format.open(files, options);
-  if (options.cell > 0 && !source->info().grid) {
-    throw Error(shown_name(files.front()), format.name + " is not a raster format")
-        .remedy("leave `cell` out");
-  }
-  if (options.band != 1 && !source->info().grid) {
-    throw Error(shown_name(files.front()), format.name + " has no bands")
-        .remedy("leave `band` out");
-  }
-  return selection_of(std::move(source), options);
+  return copies;
+}
+
+/// open_source() without reading ahead.
+std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
+                                       const SourceOptions& options) {
+  const HeadScope scope;
+  const Format& format = common_format(files, options);
+  const bool copies = needs_copies(format, files);
+  check_capabilities(format, files.front(), options);
+  return selection_of(copies ? open_spooled(format, files, options) : format.open(files, options),
+                      options);
 }
 
 }  // namespace

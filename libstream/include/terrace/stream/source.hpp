@@ -215,7 +215,7 @@ std::unique_ptr<PointSource> read_ahead(
     const std::stop_source& reading = std::stop_source(std::nostopstate),
     const std::stop_token& stop = {});
 
-/// A format in the registry. `recognise` gets the first bytes of a file, up to 4096.
+/// A format in the registry and what its reader can do besides delivering points.
 struct Format {
   std::string name;
   std::vector<std::string> endings;  ///< in lower case, with the dot: ".tif"
@@ -223,11 +223,15 @@ struct Format {
   /// A format that does not stream can be read from a copy of the file, because neither the file's
   /// name nor files next to it matter.
   bool self_contained = false;
+  /// Gets the first bytes of a file, up to 4096.
   bool (*recognise)(std::span<const std::byte> head) = nullptr;
   std::unique_ptr<PointSource> (*open)(std::span<const std::string> files,
                                        const SourceOptions& options) = nullptr;
-  bool triangles = false;  ///< can be opened as Entities::triangles too
-  bool lines = false;      ///< can be opened as Entities::segments and polylines too
+  bool raster = false;          ///< has cells: SourceOptions::cell and band apply
+  bool height_colours = false;  ///< SourceOptions::heights_of_colour applies
+  bool octree = false;          ///< files may have an octree: Selection::resolution applies
+  bool triangles = false;       ///< can be opened as Entities::triangles too
+  bool lines = false;           ///< can be opened as Entities::segments and polylines too
 };
 
 /// Returns all readable formats.

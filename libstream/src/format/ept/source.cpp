@@ -101,9 +101,9 @@ bool recognise_ept(std::span<const std::byte> head) {
 const Format& ept_format() {
   static const Format format{.name = "ept",
                              .endings = {},
-                             .streams = false,
                              .recognise = &recognise_ept,
-                             .open = &open_ept};
+                             .open = &open_ept,
+                             .octree = true};
   return format;
 }
 

@@ -171,7 +171,8 @@ const Format& geotiff_format() {
                              .endings = {".tif", ".tiff", ".gtiff", ".btf", ".tf8"},
                              .self_contained = true,
                              .recognise = looks_like_tiff,
-                             .open = open_points};
+                             .open = open_points,
+                             .raster = true};
   return format;
 }
 

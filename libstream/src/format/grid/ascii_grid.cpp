@@ -424,7 +424,8 @@ const Format& ascii_grid_format() {
                              .endings = {".asc", ".agr"},
                              .streams = true,
                              .recognise = &recognise_ascii_grid,
-                             .open = &open_ascii_points};
+                             .open = &open_ascii_points,
+                             .raster = true};
   return format;
 }
 

@@ -165,7 +165,8 @@ const Format& binary_grid_format() {
   static const Format format{.name = "binary-grid",
                              .endings = {".flt", ".bil", ".bip", ".bsq"},
                              .recognise = &recognise_nothing,
-                             .open = &open_binary_points};
+                             .open = &open_binary_points,
+                             .raster = true};
   return format;
 }
 

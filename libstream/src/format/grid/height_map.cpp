@@ -284,7 +284,9 @@ const Format& png_format() {
                              .endings = {".png"},
                              .self_contained = true,
                              .recognise = &recognise_png,
-                             .open = &open_png_points};
+                             .open = &open_png_points,
+                             .raster = true,
+                             .height_colours = true};
   return format;
 }
 

@@ -198,7 +198,8 @@ const Format& hgt_format() {
   static const Format format{.name = "hgt",
                              .endings = {".hgt", ".hgt.zip", ".hgt.gz"},
                              .recognise = &recognise_hgt,
-                             .open = &open_hgt_points};
+                             .open = &open_hgt_points,
+                             .raster = true};
   return format;
 }
 

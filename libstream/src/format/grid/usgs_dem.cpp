@@ -364,7 +364,8 @@ const Format& usgs_dem_format() {
                              .endings = {".dem"},
                              .streams = true,
                              .recognise = &recognise_usgs,
-                             .open = &open_usgs_points};
+                             .open = &open_usgs_points,
+                             .raster = true};
   return format;
 }
 

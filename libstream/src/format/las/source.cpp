@@ -164,7 +164,8 @@ const Format& las_format() {
                              .endings = {".las", ".laz"},
                              .streams = true,
                              .recognise = &recognise_las,
-                             .open = &open_las};
+                             .open = &open_las,
+                             .octree = true};
   return format;
 }
 

@@ -383,8 +383,11 @@ std::unique_ptr<PointSource> open_vrt_points(std::span<const std::string> files,
 }  // namespace
 
 const Format& vrt_format() {
-  static const Format format{
-      .name = "vrt", .endings = {".vrt"}, .recognise = &recognise_vrt, .open = &open_vrt_points};
+  static const Format format{.name = "vrt",
+                             .endings = {".vrt"},
+                             .recognise = &recognise_vrt,
+                             .open = &open_vrt_points,
+                             .raster = true};
   return format;
 }
 
