@@ -8,6 +8,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <initializer_list>
 #include <limits>
 #include <optional>
@@ -110,9 +111,9 @@ class Where::Parser {
     return true;
   }
 
-  void emit(const Step& step, int operands) {
+  void emit(const Step& step) {
     where_->steps_.push_back(step);
-    held_ = static_cast<std::size_t>(static_cast<int>(held_) + 1 - operands);
+    held_ = held_ + 1 - step.operands;
     where_->depth_ = std::max(where_->depth_, held_);
   }
 
@@ -133,7 +134,7 @@ class Where::Parser {
       }
       if (found->precedence == 3 || found->precedence == 4) compared = found->precedence;
       expression(found->precedence + 1);
-      emit({.operation = found->operation}, 2);
+      emit({.operation = found->operation, .operands = 2});
     }
   }
 
@@ -144,10 +145,10 @@ class Where::Parser {
     if (at_ == text_.size()) throw fault("ends where a number or a name is expected");
     if (take("-")) {
       operand();
-      emit({.operation = Operation::negate}, 1);
+      emit({.operation = Operation::negate, .operands = 1});
     } else if (take("!") || take("not")) {
       operand();
-      emit({.operation = Operation::invert}, 1);
+      emit({.operation = Operation::invert, .operands = 1});
     } else if (take("(")) {
       expression(0);
       if (!take(")")) throw fault("a ')' is missing");
@@ -172,8 +173,7 @@ class Where::Parser {
     const auto [end, error] = std::from_chars(begin, rest, whole);
     const bool is_whole = error == std::errc{} && end == rest;
     emit({.operation = Operation::constant,
-          .number = is_whole ? static_cast<long double>(whole) : value},
-         0);
+          .number = is_whole ? static_cast<long double>(whole) : value});
   }
 
   void name() {
@@ -189,16 +189,15 @@ class Where::Parser {
       word = text_.substr(begin, at_ - begin);
     }
     if (const auto attribute = attribute_named(word)) {
-      return emit({.operation = Operation::attribute, .index = *attribute}, 0);
+      return emit({.operation = Operation::attribute, .index = *attribute});
     }
     if (word == "x" || word == "y" || word == "z") {
-      return emit({.operation = Operation::axis, .index = static_cast<std::size_t>(word[0] - 'x')},
-                  0);
+      return emit({.operation = Operation::axis, .index = static_cast<std::size_t>(word[0] - 'x')});
     }
-    if (word == "first") return emit({.operation = Operation::constant, .number = 1.0}, 0);
+    if (word == "first") return emit({.operation = Operation::constant, .number = 1.0});
     if (word == "last") {
       if (const auto returns = attribute_named("number_of_returns")) {
-        return emit({.operation = Operation::attribute, .index = *returns}, 0);
+        return emit({.operation = Operation::attribute, .index = *returns});
       }
     }
     at_ = begin;
@@ -223,70 +222,184 @@ class Where::Parser {
 
 namespace {
 
-/// Points that are evaluated together; few enough that the operands stay in the first-level cache.
-constexpr std::size_t kLanes = 256;
-template <class Number>
-using Lanes = std::array<Number, kLanes>;
-
-template <class Number>
-bool holds(Number value) {
-  return value < 0 || value > 0;
-}
-
 bool is_wide(const Channel& channel) {
   return channel.type == ScalarType::i64 || channel.type == ScalarType::u64;
 }
 
-/// Loads the values of an attribute of `count` records from `first` on.
+/// Points that are evaluated together; few enough that the operands stay in the first-level cache.
+constexpr std::size_t kLanes = 256;
+
+/// The operations on the values of up to kLanes points. Those of two operands replace the first.
 template <class Number>
-void load(const Channel& channel, const std::byte* first, std::size_t stride, std::size_t count,
-          Lanes<Number>& out) {
-  with_type(channel.type, [&](auto tag) {
-    for (std::size_t i = 0; i < count; ++i) {
-      decltype(tag) value;
-      std::memcpy(&value, first + i * stride, sizeof value);
-      out[i] = static_cast<Number>(value);
+class Values {
+ public:
+  using Operand = std::array<Number, kLanes>;
+
+  /// records: the packed records of these points.
+  Values(const Schema& schema, std::span<const Point3> positions,
+         std::span<const std::byte> records)
+      : schema_(schema), positions_(positions), records_(records) {}
+
+  void constant(Operand& out, long double number) const { out.fill(static_cast<Number>(number)); }
+  void axis(Operand& out, std::size_t index) const {
+    for (std::size_t i = 0; i < positions_.size(); ++i) {
+      out[i] = world_point(schema_, positions_[i])[index];
     }
-  });
-  if (channel.scale == 1.0 && channel.offset == 0.0) return;
-  for (std::size_t i = 0; i < count; ++i) out[i] = out[i] * channel.scale + channel.offset;
-}
-
-template <class Number, class Function>
-void combine(Lanes<Number>& a, const Lanes<Number>& b, const Function& function) {
-  for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<Number>(function(a[i], b[i]));
-}
-
-/// Widens a range of 64-bit integers whose ends were rounded to doubles, so that it contains the
-/// exact values.
-ValueRange before_rounding(ValueRange range) {
-  constexpr double kExact = 0x1p53, kInfinity = std::numeric_limits<double>::infinity();
-  if (std::abs(range.low) >= kExact) range.low = std::nextafter(range.low, -kInfinity);
-  if (std::abs(range.high) >= kExact) range.high = std::nextafter(range.high, kInfinity);
-  return range;
-}
-
-/// Interval arithmetic. Every operation on doubles, including its rounding, is monotonic in each
-/// operand, so the ends of the result come from ends of the operands. If one is not finite, any
-/// result is possible.
-ValueRange hull(std::initializer_list<double> ends, bool nan) {
-  ValueRange range{std::min(ends), std::max(ends), nan};
-  for (const double end : ends) {
-    if (!(end - end == 0.0)) return {};
   }
-  return range;
-}
-constexpr ValueRange truth(bool may_be_false, bool may_be_true) {
-  return {may_be_false ? 0.0 : 1.0, may_be_true ? 1.0 : 0.0, false};
-}
-bool may_hold(const ValueRange& v) { return v.low != 0.0 || v.high != 0.0; }
-bool may_fail(const ValueRange& v) { return v.nan || (v.low <= 0.0 && v.high >= 0.0); }
-bool is_one(const ValueRange& v) { return !v.nan && v.low == v.high; }
+  void attribute(Operand& out, std::size_t index) const {
+    const Channel& channel = schema_.attributes[index];
+    const std::byte* const first = records_.data() + schema_.attribute_offset(index);
+    const std::size_t count = positions_.size(), stride = records_.size() / count;
+    with_type(channel.type, [&](auto tag) {
+      for (std::size_t i = 0; i < count; ++i) {
+        decltype(tag) value;
+        std::memcpy(&value, first + i * stride, sizeof value);
+        out[i] = static_cast<Number>(value);
+      }
+    });
+    if (channel.scale == 1.0 && channel.offset == 0.0) return;
+    for (std::size_t i = 0; i < count; ++i) out[i] = out[i] * channel.scale + channel.offset;
+  }
 
-/// sure: the comparison is true for all pairs of values; never: for none. A NaN compares false.
-ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool never) {
-  return truth(!sure || a.nan || b.nan, !never);
-}
+  static void negate(Operand& a) {
+    for (Number& value : a) value = -value;
+  }
+  static void invert(Operand& a) {
+    for (Number& value : a) value = holds(value) ? 0 : 1;
+  }
+  static void multiply(Operand& a, const Operand& b) { combine(a, b, std::multiplies<>()); }
+  static void divide(Operand& a, const Operand& b) { combine(a, b, std::divides<>()); }
+  static void add(Operand& a, const Operand& b) { combine(a, b, std::plus<>()); }
+  static void subtract(Operand& a, const Operand& b) { combine(a, b, std::minus<>()); }
+  static void less(Operand& a, const Operand& b) { combine(a, b, std::less<>()); }
+  static void less_equal(Operand& a, const Operand& b) { combine(a, b, std::less_equal<>()); }
+  static void greater(Operand& a, const Operand& b) { combine(a, b, std::greater<>()); }
+  static void greater_equal(Operand& a, const Operand& b) { combine(a, b, std::greater_equal<>()); }
+  static void equal(Operand& a, const Operand& b) { combine(a, b, std::equal_to<>()); }
+  static void not_equal(Operand& a, const Operand& b) { combine(a, b, std::not_equal_to<>()); }
+  static void both(Operand& a, const Operand& b) {
+    combine(a, b, [](Number p, Number q) { return holds(p) && holds(q); });
+  }
+  static void either(Operand& a, const Operand& b) {
+    combine(a, b, [](Number p, Number q) { return holds(p) || holds(q); });
+  }
+
+  static bool holds(Number value) { return value < 0 || value > 0; }
+
+ private:
+  template <class Function>
+  static void combine(Operand& a, const Operand& b, const Function& function) {
+    for (std::size_t i = 0; i < kLanes; ++i) a[i] = static_cast<Number>(function(a[i], b[i]));
+  }
+
+  const Schema& schema_;
+  std::span<const Point3> positions_;
+  std::span<const std::byte> records_;
+};
+
+/// The same operations on ranges of values, by interval arithmetic. Every operation on doubles,
+/// including its rounding, is monotonic in each operand, so the ends of the result come from ends
+/// of the operands.
+class Ranges {
+ public:
+  using Operand = ValueRange;
+
+  Ranges(const Schema& schema, const Box3& box, std::span<const ValueRange> attributes)
+      : schema_(schema), box_(box), attributes_(attributes) {}
+
+  static void constant(Operand& out, long double number) {
+    out = {static_cast<double>(number), static_cast<double>(number), false};
+  }
+  void axis(Operand& out, std::size_t index) const {
+    out = hull({box_.min[index], box_.max[index]}, false);
+  }
+  void attribute(Operand& out, std::size_t index) const {
+    out = attributes_.empty() ? ValueRange{} : attributes_[index];
+    if (is_wide(schema_.attributes[index])) out = before_rounding(out);
+  }
+
+  static void negate(Operand& a) { a = {-a.high, -a.low, a.nan}; }
+  static void invert(Operand& a) { a = truth(may_hold(a), may_fail(a)); }
+  static void multiply(Operand& a, const Operand& b) {
+    a = hull({a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high}, a.nan || b.nan);
+  }
+  static void divide(Operand& a, const Operand& b) {
+    const bool by_zero = b.low <= 0.0 && b.high >= 0.0;
+    a = by_zero ? ValueRange{}
+                : hull({a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high},
+                       a.nan || b.nan);
+  }
+  static void add(Operand& a, const Operand& b) {
+    a = hull({a.low + b.low, a.high + b.high}, a.nan || b.nan);
+  }
+  static void subtract(Operand& a, const Operand& b) {
+    a = hull({a.low - b.high, a.high - b.low}, a.nan || b.nan);
+  }
+  static void less(Operand& a, const Operand& b) {
+    a = comparison(a, b, a.high < b.low, a.low >= b.high);
+  }
+  static void less_equal(Operand& a, const Operand& b) {
+    a = comparison(a, b, a.high <= b.low, a.low > b.high);
+  }
+  static void greater(Operand& a, const Operand& b) {
+    a = comparison(a, b, a.low > b.high, a.high <= b.low);
+  }
+  static void greater_equal(Operand& a, const Operand& b) {
+    a = comparison(a, b, a.low >= b.high, a.high < b.low);
+  }
+  static void equal(Operand& a, const Operand& b) {
+    a = comparison(a, b, are_same(a, b), are_apart(a, b));
+  }
+  static void not_equal(Operand& a, const Operand& b) {
+    a = truth(!are_apart(a, b), !are_same(a, b));
+  }
+  static void both(Operand& a, const Operand& b) {
+    a = truth(may_fail(a) || may_fail(b), may_hold(a) && may_hold(b));
+  }
+  static void either(Operand& a, const Operand& b) {
+    a = truth(may_fail(a) && may_fail(b), may_hold(a) || may_hold(b));
+  }
+
+  static bool may_hold(const ValueRange& v) { return v.low != 0.0 || v.high != 0.0; }
+
+ private:
+  static bool may_fail(const ValueRange& v) { return v.nan || (v.low <= 0.0 && v.high >= 0.0); }
+  static bool is_one(const ValueRange& v) { return !v.nan && v.low == v.high; }
+  static bool are_same(const ValueRange& a, const ValueRange& b) {
+    return is_one(a) && is_one(b) && a.low == b.low;
+  }
+  static bool are_apart(const ValueRange& a, const ValueRange& b) {
+    return a.high < b.low || a.low > b.high;
+  }
+
+  static constexpr ValueRange truth(bool may_be_false, bool may_be_true) {
+    return {may_be_false ? 0.0 : 1.0, may_be_true ? 1.0 : 0.0, false};
+  }
+  /// sure: the comparison is true for all pairs of values; never: for none. A NaN compares false.
+  static ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool never) {
+    return truth(!sure || a.nan || b.nan, !never);
+  }
+  /// The smallest range with these ends; any value if one of them is not finite.
+  static ValueRange hull(std::initializer_list<double> ends, bool nan) {
+    ValueRange range{std::min(ends), std::max(ends), nan};
+    for (const double end : ends) {
+      if (!(end - end == 0.0)) return {};
+    }
+    return range;
+  }
+  /// Widens a range of 64-bit integers whose ends were rounded to doubles, so that it contains the
+  /// exact values.
+  static ValueRange before_rounding(ValueRange range) {
+    constexpr double kExact = 0x1p53, kInfinity = std::numeric_limits<double>::infinity();
+    if (std::abs(range.low) >= kExact) range.low = std::nextafter(range.low, -kInfinity);
+    if (std::abs(range.high) >= kExact) range.high = std::nextafter(range.high, kInfinity);
+    return range;
+  }
+
+  const Schema& schema_;
+  const Box3& box_;
+  std::span<const ValueRange> attributes_;
+};
 
 }  // namespace
 
@@ -309,162 +422,92 @@ void Where::test(std::span<const Point3> positions, std::span<const std::byte> r
             : test_in<double>(positions, records, matches);
 }
 
+template <class Domain>
+void Where::evaluate(const Domain& domain, std::span<typename Domain::Operand> stack) const {
+  std::size_t held = 0;
+  for (const Step& step : steps_) {
+    held = held + 1 - step.operands;
+    typename Domain::Operand* const a = &stack[held - 1];  // the first operand, then the result
+    const typename Domain::Operand* const b = a + 1;
+    switch (step.operation) {
+      case Operation::constant:
+        domain.constant(*a, step.number);
+        break;
+      case Operation::axis:
+        domain.axis(*a, step.index);
+        break;
+      case Operation::attribute:
+        domain.attribute(*a, step.index);
+        break;
+      case Operation::negate:
+        domain.negate(*a);
+        break;
+      case Operation::invert:
+        domain.invert(*a);
+        break;
+      case Operation::multiply:
+        domain.multiply(*a, *b);
+        break;
+      case Operation::divide:
+        domain.divide(*a, *b);
+        break;
+      case Operation::add:
+        domain.add(*a, *b);
+        break;
+      case Operation::subtract:
+        domain.subtract(*a, *b);
+        break;
+      case Operation::less:
+        domain.less(*a, *b);
+        break;
+      case Operation::less_equal:
+        domain.less_equal(*a, *b);
+        break;
+      case Operation::greater:
+        domain.greater(*a, *b);
+        break;
+      case Operation::greater_equal:
+        domain.greater_equal(*a, *b);
+        break;
+      case Operation::equal:
+        domain.equal(*a, *b);
+        break;
+      case Operation::not_equal:
+        domain.not_equal(*a, *b);
+        break;
+      case Operation::both:
+        domain.both(*a, *b);
+        break;
+      case Operation::either:
+        domain.either(*a, *b);
+        break;
+    }
+  }
+}
+
 template <class Number>
 void Where::test_in(std::span<const Point3> positions, std::span<const std::byte> records,
                     std::span<std::uint8_t> matches) const {
   assert(matches.size() == positions.size());
   const std::size_t stride = schema_.payload_size();
   assert(records.size() == positions.size() * stride);
-  std::vector<Lanes<Number>> stack(depth_);
+  std::vector<typename Values<Number>::Operand> stack(depth_);
   for (std::size_t begin = 0; begin < positions.size(); begin += kLanes) {
     const std::size_t count = std::min(kLanes, positions.size() - begin);
-    std::size_t held = 0;
-    for (const Step& step : steps_) {
-      switch (step.operation) {
-        case Operation::constant:
-          stack[held++].fill(static_cast<Number>(step.number));
-          continue;
-        case Operation::axis:
-          for (std::size_t i = 0; i < count; ++i) {
-            stack[held][i] = world_point(schema_, positions[begin + i])[step.index];
-          }
-          ++held;
-          continue;
-        case Operation::attribute:
-          load(schema_.attributes[step.index],
-               records.data() + begin * stride + schema_.attribute_offset(step.index), stride,
-               count, stack[held++]);
-          continue;
-        case Operation::negate:
-          for (Number& value : stack[held - 1]) value = -value;
-          continue;
-        case Operation::invert:
-          for (Number& value : stack[held - 1]) value = holds(value) ? 0 : 1;
-          continue;
-        default:
-          break;
-      }
-      Lanes<Number>& a = stack[held - 2];
-      const Lanes<Number>& b = stack[held - 1];
-      --held;
-      switch (step.operation) {
-        case Operation::multiply:
-          combine(a, b, [](Number p, Number q) { return p * q; });
-          break;
-        case Operation::divide:
-          combine(a, b, [](Number p, Number q) { return p / q; });
-          break;
-        case Operation::add:
-          combine(a, b, [](Number p, Number q) { return p + q; });
-          break;
-        case Operation::subtract:
-          combine(a, b, [](Number p, Number q) { return p - q; });
-          break;
-        case Operation::less:
-          combine(a, b, [](Number p, Number q) { return p < q; });
-          break;
-        case Operation::less_equal:
-          combine(a, b, [](Number p, Number q) { return p <= q; });
-          break;
-        case Operation::greater:
-          combine(a, b, [](Number p, Number q) { return p > q; });
-          break;
-        case Operation::greater_equal:
-          combine(a, b, [](Number p, Number q) { return p >= q; });
-          break;
-        case Operation::equal:
-          combine(a, b, [](Number p, Number q) { return p == q; });
-          break;
-        case Operation::not_equal:
-          combine(a, b, [](Number p, Number q) { return p != q; });
-          break;
-        case Operation::both:
-          combine(a, b, [](Number p, Number q) { return holds(p) && holds(q); });
-          break;
-        default:
-          combine(a, b, [](Number p, Number q) { return holds(p) || holds(q); });
-          break;
-      }
+    const Values<Number> values(schema_, positions.subspan(begin, count),
+                                records.subspan(begin * stride, count * stride));
+    evaluate(values, stack);
+    for (std::size_t i = 0; i < count; ++i) {
+      matches[begin + i] = Values<Number>::holds(stack[0][i]) ? 1 : 0;
     }
-    for (std::size_t i = 0; i < count; ++i) matches[begin + i] = holds(stack[0][i]) ? 1 : 0;
   }
 }
 
 bool Where::possible(const Box3& box, std::span<const ValueRange> attributes) const {
   assert(attributes.empty() || attributes.size() == schema_.attributes.size());
-  std::vector<ValueRange> stack;
-  for (const Step& step : steps_) {
-    switch (step.operation) {
-      case Operation::constant:
-        stack.push_back(
-            {static_cast<double>(step.number), static_cast<double>(step.number), false});
-        continue;
-      case Operation::axis:
-        stack.push_back(hull({box.min[step.index], box.max[step.index]}, false));
-        continue;
-      case Operation::attribute:
-        stack.push_back(attributes.empty() ? ValueRange{} : attributes[step.index]);
-        if (is_wide(schema_.attributes[step.index])) stack.back() = before_rounding(stack.back());
-        continue;
-      case Operation::negate:
-        stack.back() = {-stack.back().high, -stack.back().low, stack.back().nan};
-        continue;
-      case Operation::invert:
-        stack.back() = truth(may_hold(stack.back()), may_fail(stack.back()));
-        continue;
-      default:
-        break;
-    }
-    const ValueRange b = stack.back();
-    stack.pop_back();
-    const ValueRange a = stack.back();
-    const bool nan = a.nan || b.nan;
-    switch (step.operation) {
-      case Operation::multiply:
-        stack.back() = hull({a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high}, nan);
-        break;
-      case Operation::divide:
-        stack.back() =
-            b.low <= 0.0 && b.high >= 0.0
-                ? ValueRange{}
-                : hull({a.low / b.low, a.low / b.high, a.high / b.low, a.high / b.high}, nan);
-        break;
-      case Operation::add:
-        stack.back() = hull({a.low + b.low, a.high + b.high}, nan);
-        break;
-      case Operation::subtract:
-        stack.back() = hull({a.low - b.high, a.high - b.low}, nan);
-        break;
-      case Operation::less:
-        stack.back() = comparison(a, b, a.high < b.low, a.low >= b.high);
-        break;
-      case Operation::less_equal:
-        stack.back() = comparison(a, b, a.high <= b.low, a.low > b.high);
-        break;
-      case Operation::greater:
-        stack.back() = comparison(a, b, a.low > b.high, a.high <= b.low);
-        break;
-      case Operation::greater_equal:
-        stack.back() = comparison(a, b, a.low >= b.high, a.high < b.low);
-        break;
-      case Operation::equal:
-        stack.back() = comparison(a, b, is_one(a) && is_one(b) && a.low == b.low,
-                                  a.high < b.low || a.low > b.high);
-        break;
-      case Operation::not_equal: {
-        const bool apart = a.high < b.low || a.low > b.high;
-        stack.back() = truth(!apart, !(is_one(a) && is_one(b) && a.low == b.low));
-        break;
-      }
-      case Operation::both:
-        stack.back() = truth(may_fail(a) || may_fail(b), may_hold(a) && may_hold(b));
-        break;
-      default:
-        stack.back() = truth(may_fail(a) && may_fail(b), may_hold(a) || may_hold(b));
-        break;
-    }
-  }
-  return may_hold(stack.back());
+  std::vector<ValueRange> stack(depth_);
+  evaluate(Ranges(schema_, box, attributes), stack);
+  return Ranges::may_hold(stack[0]);
 }
 
 }  // namespace terrace::stream

@@ -45,10 +45,14 @@ class Where {
   enum class Operation : std::uint8_t;
   struct Step {
     Operation operation{};
-    long double number = 0.0;  ///< for a constant
-    std::size_t index = 0;     ///< for an axis or an attribute
+    std::uint8_t operands = 0;  ///< taken from the stack
+    long double number = 0.0;   ///< for a constant
+    std::size_t index = 0;      ///< for an axis or an attribute
   };
   class Parser;
+  /// Leaves the value of the condition in stack[0]. Domain: the operands' type and the operations.
+  template <class Domain>
+  void evaluate(const Domain& domain, std::span<typename Domain::Operand> stack) const;
   template <class Number>
   void test_in(std::span<const Point3> positions, std::span<const std::byte> records,
                std::span<std::uint8_t> matches) const;
