@@ -99,9 +99,13 @@ inline double limit_low(ScalarType type) {
       return -std::numeric_limits<float>::max();
     case ScalarType::f64:
       return -std::numeric_limits<double>::max();
-    default:
-      return 0;
+    case ScalarType::u8:
+    case ScalarType::u16:
+    case ScalarType::u32:
+    case ScalarType::u64:
+      break;
   }
+  return 0;
 }
 inline double limit_high(ScalarType type) {
   switch (type) {
@@ -200,9 +204,12 @@ inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
           return static_cast<double>(static_cast<float>(u - 150));
         case Numbers::doubles:
           return (u - 150) * uniform(random);
-        default:
-          return std::array{-0.0, 0.0, 1e308, -1e308, 5e-324, 1.0, 0.1}[random() % 7];
+        case Numbers::extremes:
+        case Numbers::mixed:
+        case Numbers::lines:
+          break;
       }
+      return std::array{-0.0, 0.0, 1e308, -1e308, 5e-324, 1.0, 0.1}[random() % 7];
     };
     for (std::size_t i = 0; i < std::min(block_points, points - start); ++i) {
       if (numbers == Numbers::lines) {

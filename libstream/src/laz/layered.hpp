@@ -250,15 +250,17 @@ class Layered {
     if constexpr (!Coder::kDecoding) coders[layer].used |= changed;
   }
 
+  /// What the first layer says of a point, as bits.
+  enum Change : unsigned {
+    kReturnBits = 3,  // 1: next number, 2: previous, 3: another
+    kReturnCountBit = 4,
+    kScanAngleBit = 8,
+    kTimeBit = 16,
+    kSourceBit = 32,
+    kChannelBit = 64
+  };
+
   void code_xy(Record records, std::size_t count) {
-    enum : unsigned {
-      kReturnBits = 3,  // 1: next number, 2: previous, 3: another
-      kReturnCountBit = 4,
-      kScanAngleBit = 8,
-      kTimeBit = 16,
-      kSourceBit = 32,
-      kChannelBit = 64
-    };
     Coder coder = coders[kXyLayer].coder;
     for (std::size_t i = 0; i < count; ++i) {
       const Record now = records + i * layout_.length;
@@ -266,69 +268,20 @@ class Layered {
       const std::uint8_t* last = predecessors_[current_];
       Channel14* models = &channels_[current_];
       coder.reserve();
-      unsigned mask = 0;
-      unsigned given_returns = 0;
-      if constexpr (!Coder::kDecoding) {
-        const unsigned channel = channel_of(now);
-        if (channel != current_) mask |= kChannelBit;
-        const std::uint8_t* before = known_[channel] ? predecessors_[channel] : last;
-        given_returns = now[kReturns];
-        const unsigned step = (given_returns - before[kReturns]) & 15;
-        mask |= step == 0 ? 0 : step == 1 ? 1 : step == 15 ? 2 : 3;
-        if (given_returns >> 4 != before[kReturns] >> 4) mask |= kReturnCountBit;
-        const auto differs = [&](std::size_t at, std::size_t size) {
-          return std::memcmp(now + at, before + at, size) != 0;
-        };
-        if (differs(kScanAngle, 2)) mask |= kScanAngleBit;
-        if (differs(kTime, 8)) mask |= kTimeBit;
-        if (differs(kSource, 2)) mask |= kSourceBit;
-      }
-      {
-        const unsigned number = last[kReturns] & 15, of = last[kReturns] >> 4;
-        const unsigned context =
-            (number == 1 ? 1 : 0) + (number >= of ? 2 : 0) + (models->time_changed ? 4 : 0);
-        mask = coder.symbol(models->changed[context], mask);
-      }
+      const unsigned mask =
+          coder.symbol(models->changed[change_context(*models, last)], given_changes(now, last));
       point.new_channel = false;
       if ((mask & kChannelBit) != 0) {
-        const unsigned further = given_channel(now) - current_ - 1;
-        current_ = (current_ + coder.symbol(models->channel, further & 3) + 1) & 3;
+        last = change_channel(coder, now, last, point);
         models = &channels_[current_];
-        if (!known_[current_]) {
-          point.new_channel = true;
-          predecessors_[current_] = last;
-          begin_channel(current_);
-        }
-        last = predecessors_[current_];
       }
       if constexpr (Coder::kDecoding) {
         std::memcpy(now, last, kSize);
         if (layout_.length > kSize) std::memcpy(now + kSize, last + kSize, layout_.length - kSize);
       }
-      const bool time_changed = (mask & kTimeBit) != 0;
-      unsigned returns = last[kReturns] >> 4, number = last[kReturns] & 15;
-      if ((mask & kReturnCountBit) != 0) {
-        returns = coder.symbol(models->return_count[returns], given_returns >> 4);
-      }
-      switch (mask & kReturnBits) {
-        case 0:
-          break;
-        case 1:
-          number = (number + 1) & 15;
-          break;
-        case 2:
-          number = (number + 15) & 15;
-          break;
-        default:
-          if (time_changed) {
-            number = coder.symbol(models->return_number[number], given_returns & 15);
-          } else {
-            const unsigned step = (given_returns - number) & 15;
-            number = (number + coder.symbol(models->return_step, step - 2) + 2) & 15;
-          }
-      }
-      const unsigned both = returns << 4 | number;
-      const bool single = returns == 1;
+      const unsigned both = code_returns(coder, *models, mask, last, now);
+      const unsigned returns = both >> 4, number = both & 15;
+      const bool single = returns == 1, time_changed = (mask & kTimeBit) != 0;
       put<Coder>(now + kReturns, low_byte(both));
       put<Coder>(now + kFlags, low_byte((last[kFlags] & 0xcfu) | current_ << 4));
       const unsigned steps = 2u * kReturns14.map[both] + (time_changed ? 1 : 0);
@@ -352,6 +305,80 @@ class Layered {
     coders[kXyLayer].coder = coder;
   }
 
+  static unsigned change_context(const Channel14& models, const std::uint8_t* last) {
+    const unsigned number = last[kReturns] & 15, of = last[kReturns] >> 4;
+    return (number == 1 ? 1 : 0) + (number >= of ? 2 : 0) + (models.time_changed ? 4 : 0);
+  }
+
+  /// The changes of a record to encode; 0 in decoding. last: the previous record of any channel.
+  TERRACE_LAZ_INLINE unsigned given_changes(Record now, const std::uint8_t* last) const {
+    if constexpr (Coder::kDecoding) return 0;
+    unsigned mask = 0;
+    const unsigned channel = channel_of(now);
+    if (channel != current_) mask |= kChannelBit;
+    const std::uint8_t* before = known_[channel] ? predecessors_[channel] : last;
+    const unsigned step = (now[kReturns] - before[kReturns]) & 15;
+    mask |= step == 0 ? 0 : step == 1 ? 1 : step == 15 ? 2 : 3;
+    if (now[kReturns] >> 4 != before[kReturns] >> 4) mask |= kReturnCountBit;
+    const auto differs = [&](std::size_t at, std::size_t size) {
+      return std::memcmp(now + at, before + at, size) != 0;
+    };
+    if (differs(kScanAngle, 2)) mask |= kScanAngleBit;
+    if (differs(kTime, 8)) mask |= kTimeBit;
+    if (differs(kSource, 2)) mask |= kSourceBit;
+    return mask;
+  }
+
+  /// Codes the number of the point's channel, which becomes current. Returns the record from which
+  /// the point is predicted: `last` if the channel is new.
+  TERRACE_LAZ_INLINE const std::uint8_t* change_channel(Coder& coder, Record now,
+                                                        const std::uint8_t* last, Point& point) {
+    const unsigned further = given_channel(now) - current_ - 1;
+    current_ = (current_ + coder.symbol(channels_[current_].channel, further & 3) + 1) & 3;
+    if (!known_[current_]) {
+      point.new_channel = true;
+      predecessors_[current_] = last;
+      begin_channel(current_);
+    }
+    return predecessors_[current_];
+  }
+
+  /// Codes number and count of returns. Returns them as one byte, like the record.
+  TERRACE_LAZ_INLINE static unsigned code_returns(Coder& coder, Channel14& models, unsigned mask,
+                                                  const std::uint8_t* last, Record now) {
+    const unsigned given = given_returns(now);
+    unsigned returns = last[kReturns] >> 4, number = last[kReturns] & 15;
+    if ((mask & kReturnCountBit) != 0) {
+      returns = coder.symbol(models.return_count[returns], given >> 4);
+    }
+    switch (mask & kReturnBits) {
+      case 0:
+        break;
+      case 1:
+        number = (number + 1) & 15;
+        break;
+      case 2:
+        number = (number + 15) & 15;
+        break;
+      default:
+        if ((mask & kTimeBit) != 0) {
+          number = coder.symbol(models.return_number[number], given & 15);
+        } else {
+          const unsigned step = (given - number) & 15;
+          number = (number + coder.symbol(models.return_step, step - 2) + 2) & 15;
+        }
+    }
+    return returns << 4 | number;
+  }
+
+  /// Fields of a record to encode; 0 in decoding.
+  static unsigned given_returns(Record now) {
+    if constexpr (Coder::kDecoding) {
+      return 0;
+    } else {
+      return now[kReturns];
+    }
+  }
   static unsigned given_channel(Record now) {
     if constexpr (Coder::kDecoding) {
       return 0;

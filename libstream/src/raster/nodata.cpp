@@ -70,6 +70,45 @@ std::int64_t lowest_integer(ScalarType type) {
   return is_unsigned ? 0 : -highest_integer(type) - 1;
 }
 
+void set_float_rule(NodataRule& rule, double value) {
+  constexpr double kMost = std::numeric_limits<float>::max();
+  if (!std::isfinite(value)) return;
+  set_float_range(rule, value, std::numeric_limits<float>::epsilon(), kMost);
+  if (rule.unmatched) return;
+  // Subnormal floats have larger steps.
+  const double rounded = static_cast<float>(std::clamp(value, -kMost, kMost));
+  rule.low = std::min(rule.low, rounded);
+  rule.high = std::max(rule.high, rounded);
+}
+
+void set_double_rule(NodataRule& rule, double value) {
+  if (!std::isfinite(value)) return;
+  set_float_range(rule, value, std::numeric_limits<double>::epsilon(),
+                  std::numeric_limits<double>::max());
+}
+
+/// Doubles cannot represent all large integers, so an integer is parsed from the text.
+void set_unsigned_rule(NodataRule& rule, std::string_view text, double value) {
+  if (const auto exact = whole_number<std::uint64_t>(text)) {
+    rule.low_unsigned = rule.high_unsigned = *exact;
+  } else if (value >= 0 && value < 0x1p64 && value == std::floor(value)) {
+    rule.low_unsigned = rule.high_unsigned = static_cast<std::uint64_t>(value);
+  } else {
+    rule.unmatched = true;
+  }
+}
+
+void set_integer_rule(NodataRule& rule, std::string_view text, double value, ScalarType type) {
+  if (const auto exact = whole_number<std::int64_t>(text)) {
+    rule.low_integer = rule.high_integer = *exact;
+  } else if (value >= -0x1p63 && value < 0x1p63 && value == std::floor(value)) {
+    rule.low_integer = rule.high_integer = static_cast<std::int64_t>(value);
+  }
+  rule.unmatched = rule.low_integer > rule.high_integer ||
+                   rule.low_integer < lowest_integer(type) ||
+                   rule.low_integer > highest_integer(type);
+}
+
 }  // namespace
 
 NodataRule NodataRule::parse(const std::string& text, ScalarType type) {
@@ -85,47 +124,27 @@ NodataRule NodataRule::parse(const std::string& text, ScalarType type) {
   if (trimmed.empty()) return rule;
   rule.value = leading_number(trimmed);
   if (!rule.value) return rule;
-  const double value = *rule.value;
   switch (type) {
     case ScalarType::f32:
-      if (std::isfinite(value)) {
-        set_float_range(rule, value, std::numeric_limits<float>::epsilon(),
-                        std::numeric_limits<float>::max());
-        if (!rule.unmatched) {  // subnormal floats have larger steps
-          constexpr double kMost = std::numeric_limits<float>::max();
-          const double rounded = static_cast<float>(std::clamp(value, -kMost, kMost));
-          rule.low = std::min(rule.low, rounded);
-          rule.high = std::max(rule.high, rounded);
-        }
-      }
-      return rule;
+      set_float_rule(rule, *rule.value);
+      break;
     case ScalarType::f64:
-      if (std::isfinite(value)) {
-        set_float_range(rule, value, std::numeric_limits<double>::epsilon(),
-                        std::numeric_limits<double>::max());
-      }
-      return rule;
+      set_double_rule(rule, *rule.value);
+      break;
     case ScalarType::u64:
-      // Doubles cannot represent all large integers, so an integer is parsed from the text.
-      if (const auto exact = whole_number<std::uint64_t>(trimmed)) {
-        rule.low_unsigned = rule.high_unsigned = *exact;
-      } else if (value >= 0 && value < 0x1p64 && value == std::floor(value)) {
-        rule.low_unsigned = rule.high_unsigned = static_cast<std::uint64_t>(value);
-      } else {
-        rule.unmatched = true;
-      }
-      return rule;
-    default:
-      if (const auto exact = whole_number<std::int64_t>(trimmed)) {
-        rule.low_integer = rule.high_integer = *exact;
-      } else if (value >= -0x1p63 && value < 0x1p63 && value == std::floor(value)) {
-        rule.low_integer = rule.high_integer = static_cast<std::int64_t>(value);
-      }
-      rule.unmatched = rule.low_integer > rule.high_integer ||
-                       rule.low_integer < lowest_integer(type) ||
-                       rule.low_integer > highest_integer(type);
-      return rule;
+      set_unsigned_rule(rule, trimmed, *rule.value);
+      break;
+    case ScalarType::i8:
+    case ScalarType::u8:
+    case ScalarType::i16:
+    case ScalarType::u16:
+    case ScalarType::i32:
+    case ScalarType::u32:
+    case ScalarType::i64:
+      set_integer_rule(rule, trimmed, *rule.value, type);
+      break;
   }
+  return rule;
 }
 
 }  // namespace terrace::stream

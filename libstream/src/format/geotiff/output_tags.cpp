@@ -96,9 +96,13 @@ std::uint16_t format_of(ScalarType type) {
     case ScalarType::i32:
     case ScalarType::i64:
       return SAMPLEFORMAT_INT;
-    default:
-      return SAMPLEFORMAT_UINT;
+    case ScalarType::u8:
+    case ScalarType::u16:
+    case ScalarType::u32:
+    case ScalarType::u64:
+      break;
   }
+  return SAMPLEFORMAT_UINT;
 }
 
 std::uint16_t code_of(GeoTiffCompression compression) {
@@ -107,9 +111,10 @@ std::uint16_t code_of(GeoTiffCompression compression) {
       return COMPRESSION_NONE;
     case GeoTiffCompression::deflate:
       return COMPRESSION_ADOBE_DEFLATE;
-    default:
-      return COMPRESSION_ZSTD;
+    case GeoTiffCompression::zstd:
+      break;
   }
+  return COMPRESSION_ZSTD;
 }
 
 }  // namespace

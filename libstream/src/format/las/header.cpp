@@ -227,61 +227,68 @@ Crs recorded_crs(const LasHeader& header, std::vector<std::string>& comments) {
   return names_something(by_keys) ? by_keys : by_wkt;
 }
 
-}  // namespace
-
-LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
-                          const OnDamage& on_damage) {
-  std::string_view head = input.fill(kLasFirstBytes);
-  if (!head.starts_with("LASF")) {
+/// The header's bytes, after checks of signature, version and size; sets the version.
+std::string_view read_bytes(Input& input, LasHeader& header) {
+  const std::string_view first = input.fill(kLasFirstBytes);
+  if (!first.starts_with("LASF")) {
     throw header_fault(input, "does not begin with 'LASF'").remedy("this is not a LAS file");
   }
-  if (head.size() < kLasFirstBytes) throw header_fault(input, "the file ends in its header");
-  LasHeader header;
-  const auto major = static_cast<unsigned char>(head[24]);
-  header.minor = static_cast<unsigned char>(head[25]);
+  if (first.size() < kLasFirstBytes) throw header_fault(input, "the file ends in its header");
+  const auto major = static_cast<unsigned char>(first[24]);
+  header.minor = static_cast<unsigned char>(first[25]);
   if (major != 1 || header.minor > 4) {
     throw header_fault(
         input, fmt::format("is LAS {}.{}; versions 1.0 to 1.4 are read", major, header.minor))
         .remedy("convert it, e.g. 'pdal translate FILE out.las'");
   }
-  const std::size_t header_bytes = load_little_endian<std::uint16_t>(head.data() + 94);
+  const std::size_t bytes = load_little_endian<std::uint16_t>(first.data() + 94);
   const std::size_t least = header.minor == 4   ? kLas14HeaderBytes
                             : header.minor == 3 ? std::size_t{235}
                                                 : kLasFirstBytes;
-  if (header_bytes < least) {
+  if (bytes < least) {
     throw header_fault(input, fmt::format("says that it has {}; LAS 1.{} has {}",
-                                          counted(header_bytes, "byte"), header.minor, least));
+                                          counted(bytes, "byte"), header.minor, least));
   }
-  head = input.fill(header_bytes);
-  if (head.size() < header_bytes) throw header_fault(input, "the file ends in its header");
-  const char* const at = head.data();
+  const std::string_view all = input.fill(bytes);
+  if (all.size() < bytes) throw header_fault(input, "the file ends in its header");
+  return all.substr(0, bytes);
+}
 
+/// Fields of the header that only the reading of the header needs.
+struct RecordFields {
+  std::uint32_t vlrs = 0, evlrs = 0;
+  std::uint64_t evlr_offset = 0;
+  bool waveforms = false;  ///< their packets may follow the points
+};
+
+RecordFields read_fields(const char* at, LasHeader& header, std::vector<std::string>& comments) {
+  RecordFields fields;
   const unsigned encoding = load_little_endian<std::uint16_t>(at + 6);
   header.adjusted_time = (encoding & 1U) != 0;
   header.wkt = (encoding & 16U) != 0;
+  fields.waveforms = header.minor == 3 || (encoding & 2U) != 0;
   header.points_offset = load_little_endian<std::uint32_t>(at + 96);
-  const auto vlrs = load_little_endian<std::uint32_t>(at + 100);
+  fields.vlrs = load_little_endian<std::uint32_t>(at + 100);
   const auto type = static_cast<unsigned char>(at[104]);
   header.compressed = (type & 0xC0U) != 0;
   header.point_format = type & 0x3FU;
   header.record_bytes = load_little_endian<std::uint16_t>(at + 105);
   header.points = load_little_endian<std::uint32_t>(at + 107);
   read_lattice(at, header);
-  std::uint64_t evlr_offset = 0;
-  std::uint32_t evlrs = 0;
-  if (header.minor == 4) {
-    evlr_offset = load_little_endian<std::uint64_t>(at + 235);
-    evlrs = load_little_endian<std::uint32_t>(at + 243);
-    const auto points = load_little_endian<std::uint64_t>(at + 247);
-    if (header.points != 0 && points != 0 && points != header.points) {
-      comments.push_back(
-          fmt::format("the header counts {} and, for old readers, {}: the former is used",
-                      counted(points, "point"), header.points));
-    }
-    if (points != 0) header.points = points;
+  if (header.minor < 4) return fields;
+  fields.evlr_offset = load_little_endian<std::uint64_t>(at + 235);
+  fields.evlrs = load_little_endian<std::uint32_t>(at + 243);
+  const auto points = load_little_endian<std::uint64_t>(at + 247);
+  if (header.points != 0 && points != 0 && points != header.points) {
+    comments.push_back(
+        fmt::format("the header counts {} and, for old readers, {}: the former is used",
+                    counted(points, "point"), header.points));
   }
-  input.consume(header_bytes);
+  if (points != 0) header.points = points;
+  return fields;
+}
 
+void check_fields(const Input& input, const LasHeader& header, std::size_t header_bytes) {
   if (header.point_format > kLastLasPointFormat) {
     throw header_fault(
         input, fmt::format("point format {} is not known; 0 to 10 are", header.point_format));
@@ -298,38 +305,54 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
   if (!has_lattice(header)) {
     throw header_fault(input, "the scale is not positive, or scale or offset are not finite");
   }
+}
+
+/// Compares the number of points with the size of an uncompressed file.
+void count_records(const Input& input, std::uint64_t file_bytes, const RecordFields& fields,
+                   LasHeader& header) {
+  const std::uint64_t left = file_bytes - std::min(file_bytes, header.points_offset);
+  if (header.points > left / header.record_bytes) {
+    throw header_fault(
+        input, fmt::format("the header promises {} of {}, but only {}{} left",
+                           counted(header.points, "point"), counted(header.record_bytes, "byte"),
+                           counted(left, "byte"), left == 1 ? " is" : " are"))
+        .at_byte(header.points_offset)
+        .remedy("the file is truncated or its header is wrong: download it again");
+  }
+  const std::uint64_t end = fields.evlrs > 0 ? fields.evlr_offset : file_bytes;
+  if (!fields.waveforms && end <= file_bytes && end > header.points_offset) {
+    const std::uint64_t whole = (end - header.points_offset) / header.record_bytes;
+    header.uncounted = whole - std::min(whole, header.points);
+  }
+}
+
+}  // namespace
+
+LasHeader read_las_header(Input& input, const std::string& file, std::vector<std::string>& comments,
+                          const OnDamage& on_damage) {
+  LasHeader header;
+  const std::string_view bytes = read_bytes(input, header);
+  const std::size_t header_bytes = bytes.size();
+  const RecordFields fields = read_fields(bytes.data(), header, comments);
+  input.consume(header_bytes);
+  check_fields(input, header, header_bytes);
   if (header.scale[0] != header.scale[1]) {
     comments.emplace_back(
         "x and y have steps of different sizes; triangulations are Delaunay in units of steps");
   }
   if (const auto size = input.size(); size && !header.compressed && !on_damage) {
-    const std::uint64_t left = *size - std::min(*size, header.points_offset);
-    if (header.points > left / header.record_bytes) {
-      throw header_fault(
-          input, fmt::format("the header promises {} of {}, but only {}{} left",
-                             counted(header.points, "point"), counted(header.record_bytes, "byte"),
-                             counted(left, "byte"), left == 1 ? " is" : " are"))
-          .at_byte(header.points_offset)
-          .remedy("the file is truncated or its header is wrong: download it again");
-    }
-    // EVLRs or packets of waveforms may follow the points.
-    const std::uint64_t others = evlrs > 0 ? evlr_offset : *size;
-    const bool waveforms = header.minor == 3 || (encoding & 2U) != 0;
-    if (!waveforms && others <= *size && others > header.points_offset) {
-      const std::uint64_t whole = (others - header.points_offset) / header.record_bytes;
-      header.uncounted = whole - std::min(whole, header.points);
-    }
+    count_records(input, *size, fields, header);
   }
-  read_vlrs(input, vlrs, header, comments);
-  if (evlrs > 0 && is_seekable(file)) {
+  read_vlrs(input, fields.vlrs, header, comments);
+  if (fields.evlrs > 0 && is_seekable(file)) {
     try {
-      read_evlrs(*open_file(file), evlr_offset, evlrs, header, comments);
+      read_evlrs(*open_file(file), fields.evlr_offset, fields.evlrs, header, comments);
     } catch (const Error& damage) {
       if (!on_damage) throw;
       on_damage(damage, 0);
     }
   } else {
-    header.unread_evlrs = evlrs > 0;
+    header.unread_evlrs = fields.evlrs > 0;
   }
   if (!input.skip(header.points_offset - input.offset())) {
     throw header_fault(input, "the file ends before its points").at_byte(input.offset());
