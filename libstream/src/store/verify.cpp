@@ -306,6 +306,14 @@ class Verification {
       if (points.has_representative) page.enter_height(points.representative);
       return;
     }
+    check_children(l, record, points, problem);
+  }
+
+  /// Checks the clusters below one of level l > 0, and enters them into the sums of their levels.
+  template <class OnProblem>
+  void check_children(unsigned l, const ClusterRecord& record, const ClusterPoints& points,
+                      const OnProblem& problem) {
+    const auto& summary = record.summary;
     const std::size_t stride = levels_[l]->layout().payload_size;
     std::uint64_t descendants = 0;
     std::vector<std::uint64_t> uncertain;  // clusters below whose boxes exceed this one's

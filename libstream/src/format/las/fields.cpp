@@ -58,6 +58,68 @@ std::string plain_text(std::string_view text) {
   return out;
 }
 
+/// A description of extra bytes: a row of the VLR.
+class ExtraBytes {
+ public:
+  explicit ExtraBytes(const char* row) : row_(row) {
+    const std::size_t type = static_cast<unsigned char>(row[2]);
+    options_ = static_cast<unsigned char>(row[3]);
+    name_ = plain_text({row + 4, 32});
+    // Types above 10 are the deprecated arrays of two or three; type 0 is undocumented bytes.
+    opaque_ = type == 0 || type > 3 * kExtraTypes.size();
+    count_ = opaque_ ? options_ : 1 + (type - 1) / kExtraTypes.size();
+    if (!opaque_) type_ = kExtraTypes[(type - 1) % kExtraTypes.size()];
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] std::size_t count() const { return count_; }
+  [[nodiscard]] std::size_t bytes() const { return count_ * size_of(type_); }
+
+  /// The i-th of count() channels.
+  [[nodiscard]] Channel channel(std::size_t i, std::vector<std::string>& comments) const {
+    Channel channel{.name = opaque_ || count_ > 1 ? fmt::format("{}_{}", name_, i) : name_,
+                    .type = type_};
+    if (has(kScale)) channel.scale = load_little_endian<double>(row_ + 112 + 8 * i);
+    if (has(kOffset)) channel.offset = load_little_endian<double>(row_ + 136 + 8 * i);
+    if (!std::isfinite(channel.scale) || channel.scale == 0 || !std::isfinite(channel.offset)) {
+      comments.push_back("extra bytes " + name_ + ": an impossible scale or offset is ignored");
+      channel.scale = 1.0;
+      channel.offset = 0.0;
+    }
+    if (has(kNodata)) {
+      comments.push_back(fmt::format("extra bytes {}: {} means no data", name_, nodata(i)));
+    }
+    return channel;
+  }
+
+ private:
+  enum Option : unsigned { kNodata = 1, kScale = 8, kOffset = 16 };
+
+  /// Undocumented bytes have a count in place of options.
+  [[nodiscard]] bool has(Option option) const { return !opaque_ && (options_ & option) != 0; }
+
+  /// The value is widened to eight bytes, as an integer of the same signedness or a double.
+  [[nodiscard]] std::string nodata(std::size_t i) const {
+    std::string value;
+    const char* const at = row_ + 40 + 8 * i;
+    if (type_ == ScalarType::f32 || type_ == ScalarType::f64) {
+      append_number(value, load_little_endian<double>(at));
+    } else if (type_ == ScalarType::u64) {
+      append_number(value, load_little_endian<std::uint64_t>(at));
+    } else {
+      append_number(value, load_little_endian<std::int64_t>(at));
+    }
+    return value;
+  }
+
+  const char* row_;
+  std::string name_;
+  unsigned options_ = 0;
+  bool opaque_ = false;
+  std::size_t count_ = 0;
+  ScalarType type_ = ScalarType::u8;
+};
+
 }  // namespace
 
 std::size_t las_record_bytes(unsigned point_format) { return kRecordBytes[point_format]; }
@@ -122,48 +184,12 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
   };
   for (std::size_t at = 0; at + kLasExtraBytesDescription <= descriptions.size();
        at += kLasExtraBytesDescription) {
-    const char* const row = descriptions.data() + at;
-    const std::size_t type = static_cast<unsigned char>(row[2]);
-    const unsigned options = static_cast<unsigned char>(row[3]);
-    const std::string name = plain_text({row + 4, 32});
-    // Types above 10 are the deprecated arrays of two or three; type 0 is undocumented bytes.
-    const bool opaque = type == 0 || type > 3 * kExtraTypes.size();
-    const std::size_t count = opaque ? options : 1 + (type - 1) / kExtraTypes.size();
-    const ScalarType scalar =
-        opaque ? ScalarType::u8 : kExtraTypes[(type - 1) % kExtraTypes.size()];
-    if (count * size_of(scalar) > record_bytes - list.offset) {
-      comments.push_back("extra bytes " + name + " do not fit into the records");
+    const ExtraBytes extra(descriptions.data() + at);
+    if (extra.bytes() > record_bytes - list.offset) {
+      comments.push_back("extra bytes " + extra.name() + " do not fit into the records");
       break;
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      Channel channel{.name = opaque || count > 1 ? fmt::format("{}_{}", name, i) : name,
-                      .type = scalar};
-      if (!opaque && (options & 8U) != 0) {
-        channel.scale = load_little_endian<double>(row + 112 + 8 * i);
-      }
-      if (!opaque && (options & 16U) != 0) {
-        channel.offset = load_little_endian<double>(row + 136 + 8 * i);
-      }
-      if (!std::isfinite(channel.scale) || channel.scale == 0 || !std::isfinite(channel.offset)) {
-        comments.push_back("extra bytes " + name + ": an impossible scale or offset is ignored");
-        channel.scale = 1.0;
-        channel.offset = 0.0;
-      }
-      if (!opaque && (options & 1U) != 0) {
-        // The value is widened to eight bytes, as an integer of the same signedness or a double.
-        std::string value;
-        const char* const no_data = row + 40 + 8 * i;
-        if (scalar == ScalarType::f32 || scalar == ScalarType::f64) {
-          append_number(value, load_little_endian<double>(no_data));
-        } else if (scalar == ScalarType::u64) {
-          append_number(value, load_little_endian<std::uint64_t>(no_data));
-        } else {
-          append_number(value, load_little_endian<std::int64_t>(no_data));
-        }
-        comments.push_back(fmt::format("extra bytes {}: {} means no data", name, value));
-      }
-      add(std::move(channel));
-    }
+    for (std::size_t i = 0; i < extra.count(); ++i) add(extra.channel(i, comments));
   }
   const std::size_t left = record_bytes - list.offset;
   for (std::size_t i = 0; i < left; ++i) {

@@ -157,15 +157,7 @@ class GlbWriter final : public MeshWriter {
                                  const std::array<double, 3>& max) const {
     Json out;
     out["asset"] = {{"version", "2.0"}, {"generator", "terrace"}};
-    if (header_.frame) {
-      Json& extras = out["asset"]["extras"];
-      extras["crs"] = frame_.crs;
-      extras["origin"] = origin;
-      extras["metres_per_unit"] = frame_.metres;
-      extras["coordinates"] =
-          "x = origin[0] + X / metres_per_unit[0], y = origin[1] - Z / metres_per_unit[1], "
-          "z = Y / metres_per_unit[2] of a vertex at X, Y, Z in the scene";
-    }
+    if (header_.frame) out["asset"]["extras"] = placement(origin);
     out["scene"] = 0;
     if (header_.vertices == 0) {
       out["scenes"] = Json::array({Json::object()});
@@ -173,52 +165,82 @@ class GlbWriter final : public MeshWriter {
     }
     out["scenes"] = Json::array({{{"nodes", {0}}}});
     out["nodes"] = Json::array({{{"mesh", 0}, {"translation", translation}}});
-    Json primitive;
-    primitive["attributes"]["POSITION"] = 0;
-    Json accessors = Json::array();
-    accessors.push_back({{"bufferView", 0},
-                         {"componentType", glb::kFloat},
-                         {"count", header_.vertices},
-                         {"type", "VEC3"},
-                         {"min", min},
-                         {"max", max}});
-    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
-      primitive["attributes"][attribute_name(header_.attributes[i])] = accessors.size();
-      accessors.push_back({{"bufferView", 0},
-                           {"byteOffset", 12 + 4 * i},
-                           {"componentType", glb::kFloat},
-                           {"count", header_.vertices},
-                           {"type", "SCALAR"}});
-    }
-    const std::uint64_t vertex_bytes = header_.vertices * stride_;
-    Json views = Json::array();
-    views.push_back({{"buffer", 0},
-                     {"byteLength", vertex_bytes},
-                     {"byteStride", stride_},
-                     {"target", glb::kArrayBuffer}});
-    if (header_.triangles > 0) {
-      primitive["indices"] = accessors.size();
-      accessors.push_back({{"bufferView", 1},
-                           {"componentType", glb::kUnsignedInt},
-                           {"count", header_.triangles * 3},
-                           {"type", "SCALAR"}});
-      views.push_back({{"buffer", 0},
-                       {"byteOffset", vertex_bytes},
-                       {"byteLength", header_.triangles * 12},
-                       {"target", glb::kElementArrayBuffer}});
-    }
-    primitive["mode"] = header_.triangles > 0 ? glb::kTriangles : glb::kPoints;
-    primitive["material"] = 0;
-    out["meshes"] = Json::array({{{"primitives", Json::array({primitive})}}});
+    out["meshes"] = Json::array({{{"primitives", Json::array({primitive()})}}});
     // The default material of glTF is shiny metal, which is dark in most viewers.
     out["materials"] =
         Json::array({{{"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}},
                       {"doubleSided", true}}});
-    out["accessors"] = accessors;
-    out["bufferViews"] = views;
+    out["accessors"] = accessors(min, max);
+    out["bufferViews"] = buffer_views();
     out["buffers"] = Json::array({{{"byteLength", binary_bytes()}}});
     return text_of(out);
   }
+
+  [[nodiscard]] Json placement(const Point3& origin) const {
+    Json extras;
+    extras["crs"] = frame_.crs;
+    extras["origin"] = origin;
+    extras["metres_per_unit"] = frame_.metres;
+    extras["coordinates"] =
+        "x = origin[0] + X / metres_per_unit[0], y = origin[1] - Z / metres_per_unit[1], "
+        "z = Y / metres_per_unit[2] of a vertex at X, Y, Z in the scene";
+    return extras;
+  }
+
+  /// Names accessors by their numbers: 0 for positions, then the attributes, then the corners of
+  /// triangles.
+  [[nodiscard]] Json primitive() const {
+    Json out;
+    out["attributes"]["POSITION"] = 0;
+    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
+      out["attributes"][attribute_name(header_.attributes[i])] = 1 + i;
+    }
+    if (header_.triangles > 0) out["indices"] = 1 + header_.attributes.size();
+    out["mode"] = header_.triangles > 0 ? glb::kTriangles : glb::kPoints;
+    out["material"] = 0;
+    return out;
+  }
+
+  [[nodiscard]] Json accessors(const std::array<double, 3>& min,
+                               const std::array<double, 3>& max) const {
+    Json out = Json::array();
+    out.push_back({{"bufferView", 0},
+                   {"componentType", glb::kFloat},
+                   {"count", header_.vertices},
+                   {"type", "VEC3"},
+                   {"min", min},
+                   {"max", max}});
+    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
+      out.push_back({{"bufferView", 0},
+                     {"byteOffset", 12 + 4 * i},
+                     {"componentType", glb::kFloat},
+                     {"count", header_.vertices},
+                     {"type", "SCALAR"}});
+    }
+    if (header_.triangles == 0) return out;
+    out.push_back({{"bufferView", 1},
+                   {"componentType", glb::kUnsignedInt},
+                   {"count", header_.triangles * 3},
+                   {"type", "SCALAR"}});
+    return out;
+  }
+
+  /// The vertices, then the corners of triangles.
+  [[nodiscard]] Json buffer_views() const {
+    const std::uint64_t vertex_bytes = header_.vertices * stride_;
+    Json out = Json::array();
+    out.push_back({{"buffer", 0},
+                   {"byteLength", vertex_bytes},
+                   {"byteStride", stride_},
+                   {"target", glb::kArrayBuffer}});
+    if (header_.triangles == 0) return out;
+    out.push_back({{"buffer", 0},
+                   {"byteOffset", vertex_bytes},
+                   {"byteLength", header_.triangles * 12},
+                   {"target", glb::kElementArrayBuffer}});
+    return out;
+  }
+
   /// The JSON as text. Names of reference systems may have bytes that are not UTF-8.
   static std::string text_of(const Json& json) {
     return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -169,6 +169,63 @@ std::string_view comment_text(std::string_view comment) {
   return trim(comment);
 }
 
+/// The lines before the first row of numbers.
+struct Preamble {
+  std::string header, last_comment;
+  std::uint64_t header_line = 0;  ///< 0: there is no header
+
+  [[nodiscard]] bool has_header() const { return header_line != 0; }
+  /// The line that may name the columns.
+  [[nodiscard]] const std::string& title() const { return has_header() ? header : last_comment; }
+};
+
+/// Reads to the first row of numbers, which `line` then is.
+Preamble read_preamble(LineReader& lines, const std::string& file, std::string_view& line,
+                       std::vector<std::string>& comments) {
+  Preamble found;
+  while (lines.next(line)) {
+    const std::string_view text = trim(line);
+    if (text.empty()) continue;
+    if (is_comment(text)) {
+      found.last_comment = comment_text(text);
+      if (comments.size() < kMaxComments) comments.push_back(found.last_comment);
+    } else if (!found.has_header() && is_header(split_fields(line, separator_of(line)))) {
+      found.header = line;
+      found.header_line = lines.number();
+    } else {
+      return found;
+    }
+  }
+  throw Error(file, lines.number() == 0 ? "the file is empty" : "it has no points")
+      .remedy("each line needs three numbers: x, y and z");
+}
+
+/// The separator of the first row of numbers.
+char row_separator(std::string_view line, const Preamble& preamble) {
+  const char separator = separator_of(line);
+  const std::string& title = preamble.title();
+  if (separator == ' ' && separator_of(title) == ' ' &&
+      (is_separated_by_tabs(title, line) ||
+       (!preamble.has_header() && is_separated_by_tabs({}, line)))) {
+    return '\t';
+  }
+  return separator;
+}
+
+/// Throws: Error if a row of that many columns is not a point.
+void check_columns(std::size_t columns, const std::string& file, const std::string& where) {
+  if (columns < 3) {
+    throw Error(file, "has " + counted(columns, "column") + ", but a point needs x, y and z")
+        .at(where)
+        .remedy("add the missing column (0 as z for points in the plane)");
+  }
+  if (columns > TextLayout::kMaxColumns) {
+    throw Error(file, "has " + counted(columns, "column"))
+        .at(where)
+        .remedy(fmt::format("at most {} are read", TextLayout::kMaxColumns));
+  }
+}
+
 }  // namespace
 
 bool is_comment(std::string_view line) { return line.starts_with('#') || line.starts_with("//"); }
@@ -202,65 +259,34 @@ bool is_header(const std::vector<std::string_view>& fields) {
 
 TextLayout read_text_layout(LineReader& lines, const std::string& file) {
   TextLayout layout;
-  std::string header, last_comment;
-  std::uint64_t header_line = 0;
   std::string_view line;
-  for (;;) {
-    if (!lines.next(line)) {
-      throw Error(file, lines.number() == 0 ? "the file is empty" : "it has no points")
-          .remedy("each line needs three numbers: x, y and z");
-    }
-    const std::string_view text = trim(line);
-    if (text.empty()) continue;
-    if (is_comment(text)) {
-      last_comment = comment_text(text);
-      if (layout.comments.size() < kMaxComments) layout.comments.push_back(last_comment);
-      continue;
-    }
-    if (header_line == 0 && is_header(split_fields(line, separator_of(line)))) {
-      header = line;
-      header_line = lines.number();
-      continue;
-    }
-    break;
-  }
-  layout.separator = separator_of(line);
-  if (layout.separator == ',' && has_decimal_commas(line)) {
+  Preamble preamble = read_preamble(lines, file, line, layout.comments);
+  if (separator_of(line) == ',' && has_decimal_commas(line)) {
     throw Error(file, "has numbers with a decimal comma")
         .at_line(lines.number())
         .remedy("write numbers with a decimal point");
   }
-  const std::string& title = header_line != 0 ? header : last_comment;
-  if (layout.separator == ' ' && separator_of(title) == ' ' &&
-      (is_separated_by_tabs(title, line) || (header_line == 0 && is_separated_by_tabs({}, line)))) {
-    layout.separator = '\t';
-  }
-  const char between_names = layout.separator == '\t' ? '\t' : separator_of(title);
+  layout.separator = row_separator(line, preamble);
   layout.columns = split_fields(line, layout.separator).size();
   const std::string where = fmt::format("line {}", lines.number());
-  if (layout.columns < 3) {
-    throw Error(file, "has " + counted(layout.columns, "column") + ", but a point needs x, y and z")
-        .at(where)
-        .remedy("add the missing column (0 as z for points in the plane)");
-  }
-  if (layout.columns > TextLayout::kMaxColumns) {
-    throw Error(file, "has " + counted(layout.columns, "column"))
-        .at(where)
-        .remedy(fmt::format("at most {} are read", TextLayout::kMaxColumns));
-  }
-  if (header_line == 0 &&
-      is_header_comment(header_names(last_comment, between_names), layout.columns)) {
-    header = last_comment;
+  check_columns(layout.columns, file, where);
+  const char between_names = layout.separator == '\t' ? '\t' : separator_of(preamble.title());
+  if (!preamble.has_header() &&
+      is_header_comment(header_names(preamble.last_comment, between_names), layout.columns)) {
+    preamble.header = preamble.last_comment;
     layout.comments.pop_back();
   }
-  const std::vector<std::string_view> names = header_names(header, between_names);
-  if (header_line != 0 && names.size() != layout.columns) {
-    throw Error(file, fmt::format("has {}, but the header in line {} names {}",
-                                  counted(layout.columns, "column"), header_line, names.size()))
+  const std::vector<std::string_view> names = header_names(preamble.header, between_names);
+  if (preamble.has_header() && names.size() != layout.columns) {
+    throw Error(file,
+                fmt::format("has {}, but the header in line {} names {}",
+                            counted(layout.columns, "column"), preamble.header_line, names.size()))
         .at(where)
         .remedy("one of them is wrong");
   }
-  if (!header.empty()) find_axes(names, layout, file, fmt::format("line {}", header_line));
+  if (!preamble.header.empty()) {
+    find_axes(names, layout, file, fmt::format("line {}", preamble.header_line));
+  }
   name_attributes(names, layout);
   lines.hold();
   return layout;

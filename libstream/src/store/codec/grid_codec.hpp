@@ -86,14 +86,7 @@ class GridCodec {
           }
           row_above = true;
         } else {
-          std::uint64_t gap = begin - column - 1, length = end - begin - 1;
-          code_number(coder, context::kRunGap, gap);
-          code_number(coder, context::kRunLength, length);
-          if constexpr (Coder::kDecoding) {
-            if (gap >= width || length >= width) throw Damage("a run is outside its cluster");
-            begin = column + 1 + gap;
-            end = begin + 1 + length;
-          }
+          code_later_run(coder, width, column, begin, end);
         }
         if constexpr (Coder::kDecoding) {
           if (begin >= end || end > width || end - begin > n - found) {
@@ -230,6 +223,21 @@ class GridCodec {
   };
   static const std::array<Step, kPatterns> kStep;
   static const std::array<std::uint8_t, kSymbols> kMagnitude;
+
+  /// Codes a run [begin, end) after another in its row, which ends before `column`.
+  template <class Coder>
+  TERRACE_STORE_INLINE static void code_later_run(Coder& coder, std::uint32_t width,
+                                                  std::uint64_t column, std::uint64_t& begin,
+                                                  std::uint64_t& end) {
+    std::uint64_t gap = begin - column - 1, length = end - begin - 1;
+    code_number(coder, context::kRunGap, gap);
+    code_number(coder, context::kRunLength, length);
+    if constexpr (Coder::kDecoding) {
+      if (gap >= width || length >= width) throw Damage("a run is outside its cluster");
+      begin = column + 1 + gap;
+      end = begin + 1 + length;
+    }
+  }
 
   [[nodiscard]] std::size_t cell_of(std::uint32_t column, std::uint32_t row) const {
     return static_cast<std::size_t>(row + kPadY) * static_cast<std::size_t>(stride_) + column + 2;

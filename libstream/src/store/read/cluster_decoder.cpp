@@ -94,34 +94,40 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
   const std::uint32_t coded = coder.finish() | static_cast<std::uint32_t>(upper) << 16;
   if (root ? coded != 0 : coded >= n)
     throw Damage("a cluster's representative is not one of its points");
-  const std::uint32_t last = root ? coded : uncentred(coded, n);
-  out.before_representative = last;
-  deliver(entry, root ? n : last, out);
+  const std::uint32_t representative = root ? n : uncentred(coded, n);
+  out.before_representative = root ? 0 : representative;
+  deliver(entry, representative, out);
+  deliver_payload(layout.payload_size, n, representative, out);
+  deliver_children(layout.level, n, representative, out);
+}
 
-  // All points except the representative, in the order of coding.
-  const std::size_t stride = layout.payload_size;
-  const std::uint32_t members = root ? n : n - 1;
-  out.payload.resize(members * stride);
+void ClusterDecoder::deliver_payload(std::size_t stride, std::uint32_t n,
+                                     std::uint32_t representative, ClusterPoints& out) const {
+  const bool root = representative == n;
+  out.payload.resize((root ? n : n - 1) * stride);
   out.representative_payload.resize(root ? 0 : stride);
-  if (stride > 0) {
-    const std::byte* const from = payload_.data();
-    const std::size_t before = root ? n * stride : last * stride;
-    std::copy(from, from + before, out.payload.begin());
-    if (!root) {
-      std::copy(from + before, from + before + stride, out.representative_payload.begin());
-      std::copy(from + before + stride, from + n * stride,
-                out.payload.begin() + static_cast<std::ptrdiff_t>(before));
-    }
-  }
-  out.children.resize(std::size_t{members} * layout.level);
-  out.representative_children.resize(root ? 0 : layout.level);
+  if (stride == 0) return;
+  const std::byte* const from = payload_.data();
+  const std::size_t before = representative * stride;
+  std::copy(from, from + before, out.payload.begin());
+  if (root) return;
+  std::copy(from + before, from + before + stride, out.representative_payload.begin());
+  std::copy(from + before + stride, from + n * stride,
+            out.payload.begin() + static_cast<std::ptrdiff_t>(before));
+}
+
+void ClusterDecoder::deliver_children(unsigned level, std::uint32_t n, std::uint32_t representative,
+                                      ClusterPoints& out) const {
+  const bool root = representative == n;
+  out.children.resize(std::size_t{root ? n : n - 1} * level);
+  out.representative_children.resize(root ? 0 : level);
   std::uint64_t* to = out.children.data();
-  for (std::uint32_t i = 0; i < n && layout.level > 0; ++i) {
-    std::uint64_t* const at = !root && i == last ? out.representative_children.data() : to;
-    for (unsigned j = 0; j < layout.level; ++j) {
+  for (std::uint32_t i = 0; i < n && level > 0; ++i) {
+    std::uint64_t* const at = i == representative ? out.representative_children.data() : to;
+    for (unsigned j = 0; j < level; ++j) {
       at[j] = static_cast<std::uint64_t>(children_[i + std::size_t{n} * j]);
     }
-    if (at == to) to += layout.level;
+    if (at == to) to += level;
   }
 }
 

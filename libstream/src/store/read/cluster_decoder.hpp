@@ -31,7 +31,13 @@ class ClusterDecoder {
   /// Decodes an attribute into column_, or the guide into guide_.
   void attribute(SymbolDecoder& coder, const Layout& layout, const DecodingTables& tables,
                  unsigned number, std::uint32_t n);
+  /// Deliver the points in the order of coding, except the representative, which has its own
+  /// fields. representative: n if there is none.
   void deliver(const Entry& entry, std::uint32_t representative, ClusterPoints& out) const;
+  void deliver_payload(std::size_t stride, std::uint32_t n, std::uint32_t representative,
+                       ClusterPoints& out) const;
+  void deliver_children(unsigned level, std::uint32_t n, std::uint32_t representative,
+                        ClusterPoints& out) const;
 
   IntegerBox box_;
   std::array<std::vector<std::uint64_t>, 3> relative_;
