@@ -4,11 +4,8 @@
 #include <string_view>
 #include <vector>
 
-#include "format/grid/ascii_grid.hpp"
-#include "format/grid/binary_grid.hpp"
-#include "format/grid/height_map.hpp"
-#include "format/grid/hgt.hpp"
-#include "format/grid/usgs_dem.hpp"
+#include "format/grid/binary.hpp"
+#include "format/grid/rasters.hpp"
 #include "fuzz_points.hpp"
 #include "terrace/stream/raster.hpp"
 

@@ -10,7 +10,7 @@
 
 #include <gtest/gtest.h>
 
-#include "format/geotiff/unpack.hpp"
+#include "format/geotiff/layout.hpp"
 #include "gdal_tools.hpp"
 #include "raster_testing.hpp"
 #include "temp_folder.hpp"

@@ -20,11 +20,8 @@
 #include <gtest/gtest.h>
 #include <png.h>
 
-#include "format/grid/ascii_grid.hpp"
-#include "format/grid/binary_grid.hpp"
-#include "format/grid/height_map.hpp"
-#include "format/grid/hgt.hpp"
-#include "format/grid/usgs_dem.hpp"
+#include "format/grid/binary.hpp"
+#include "format/grid/rasters.hpp"
 #include "gdal_tools.hpp"
 #include "raster_testing.hpp"
 #include "temp_folder.hpp"

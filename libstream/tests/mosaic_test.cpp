@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "format/formats.hpp"
+#include "format/registry.hpp"
 #include "raster_testing.hpp"
 #include "temp_folder.hpp"
 #include "terrace/stream/error.hpp"

@@ -10,7 +10,6 @@
 #include <gtest/gtest.h>
 
 #include "raster/nodata.hpp"
-#include "raster/overlay.hpp"
 #include "raster_testing.hpp"
 
 namespace terrace::stream {

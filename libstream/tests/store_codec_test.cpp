@@ -18,8 +18,8 @@
 #include <gtest/gtest.h>
 
 #include "stand_in_hierarchy.hpp"
-#include "store/codec/column_codec.hpp"
-#include "store/codec/split_codec.hpp"
+#include "store/codec/column.hpp"
+#include "store/codec/split.hpp"
 #include "store/codec/tables.hpp"
 #include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"

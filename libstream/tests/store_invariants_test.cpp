@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "store/codec/column_codec.hpp"
+#include "store/codec/column.hpp"
 #include "store/codec/form.hpp"
 #include "store/read/cluster_decoder.hpp"
 #include "store_inputs.hpp"

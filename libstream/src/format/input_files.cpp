@@ -11,7 +11,7 @@
 #include <glob.h>
 
 #include "format/ept/metadata.hpp"
-#include "format/formats.hpp"
+#include "format/registry.hpp"
 #include "io/line_reader.hpp"
 #include "io/temporary.hpp"
 #include "io/text.hpp"

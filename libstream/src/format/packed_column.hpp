@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "terrace/stream/point.hpp"
 #include "terrace/stream/schema.hpp"
@@ -22,5 +23,13 @@ void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t a
 /// Copies the column's values to `to`, `to_stride` bytes apart, in native byte order. `to` may be
 /// the rows themselves.
 void decode_values(const PackedColumn& column, std::byte* to, std::size_t to_stride);
+
+/// The value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to negative.
+std::int64_t to_integer(const std::byte* raw, ScalarType type);
+
+/// Reads the number that starts at `at` as `type` and stores it at `raw`. Integers may be written
+/// like "3.0". Returns the position after it, or null if the text up to the next blank or `end` is
+/// not a number in that type's range.
+const char* parse_scalar(const char* at, const char* end, ScalarType type, std::byte* raw);
 
 }  // namespace terrace::stream

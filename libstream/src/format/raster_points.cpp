@@ -8,9 +8,8 @@
 #include <string>
 #include <utility>
 
-#include "format/aux_xml.hpp"
+#include "format/sidecars.hpp"
 #include "raster/order.hpp"
-#include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {

@@ -1,22 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "format/registry.hpp"
+
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
 
 #include "format/ept/metadata.hpp"
-#include "format/foreign_format.hpp"
-#include "format/formats.hpp"
-#include "format/grid/binary_grid.hpp"
-#include "format/input_files.hpp"
-#include "format/selection.hpp"
-#include "format/spooled_source.hpp"
+#include "format/grid/binary.hpp"
 #include "io/peek.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
@@ -26,20 +23,146 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kHeadBytes = 4096;
-/// In the order of Entities.
-constexpr std::array<std::string_view, 4> kEntityNames{"points", "triangles", "segments",
-                                                       "polylines"};
+using std::string_view_literals::operator""sv;
 
-/// The names of all formats, or of those with a capability.
-std::string names_of_formats(bool Format::*capability = nullptr) {
-  std::string out;
-  for (const Format& format : formats()) {
-    if (capability != nullptr && !(format.*capability)) continue;
-    if (!out.empty()) out += ", ";
-    out += format.name;
+/// A format that is not supported but common for points, rasters and meshes.
+struct ForeignFormat {
+  std::string_view name;    ///< with a description, to follow "is"
+  std::string_view remedy;  ///< how to convert such a file into a readable one
+};
+
+/// Bytes near the beginning of a file that identify a format.
+struct Mark {
+  std::size_t at = 0;
+  std::string_view bytes;
+  bool any_case = false;
+};
+
+/// How to recognise a foreign format.
+struct ForeignRow {
+  ForeignFormat format;
+  std::string_view endings;  ///< ".a .b"
+  Mark first, second{};      ///< both must match, if there are two; `first` may be indented text
+};
+
+constexpr std::string_view kRaster = "convert it, e.g. 'gdal_translate FILE out.tif'";
+constexpr std::string_view kVector =
+    "convert its points to text, e.g. 'ogr2ogr -f CSV -lco GEOMETRY=AS_XYZ out.csv FILE'";
+
+// More specific rows come first.
+constexpr ForeignRow kForeignFormats[] = {
+    // Points.
+    {{"E57", "convert it to PLY, e.g. with CloudCompare or 'pdal translate FILE out.ply'"},
+     ".e57",
+     {0, "ASTM-E57"}},
+    {{"PCD (a cloud of the Point Cloud Library)",
+      "convert it, e.g. 'pcl_pcd2ply FILE out.ply' or 'pdal translate FILE out.ply'"},
+     ".pcd",
+     {0, "# .PCD"}},
+    // Rasters.
+    {{"an ESRI binary grid", kRaster}, ".adf", {0, "HDR1.2\0\0"sv}},
+    {{"the header of a binary grid", "name the .bil or .flt file next to it"}, ".hdr", {}},
+    {{"HDF5 or NetCDF 4",
+      "convert one of its variables ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
+      "NETCDF:FILE:VARIABLE out.tif'"},
+     ".h5 .hdf5 .he5",
+     {0, "\x89HDF\r\n\x1a\n"sv}},
+    {{"NetCDF",
+      "convert one of its variables ('gdalinfo FILE' lists them), e.g. 'gdal_translate "
+      "NETCDF:FILE:VARIABLE out.tif'"},
+     ".nc .nc4 .cdf",
+     {0, "CDF"}},
+    {{"HDF4", kRaster}, ".hdf", {0, "\x0e\x03\x13\x01"sv}},
+    {{"GRIB", kRaster}, ".grib .grib2 .grb .grb2", {0, "GRIB"}},
+    {{"JPEG 2000", kRaster}, ".jp2 .j2k", {4, "jP  "}},
+    {{"JPEG 2000", kRaster}, "", {0, "\xff\x4f\xff\x51"sv}},
+    {{"an ERDAS Imagine raster", kRaster}, ".img", {0, "EHFA_HEADER_TAG"}},
+    {{"DTED", kRaster}, ".dt0 .dt1 .dt2", {0, "UHL1"}},
+    {{"NITF", kRaster}, ".ntf .nitf", {0, "NITF0"}},
+    {{"a VTP binary terrain", kRaster}, ".bt", {0, "binterr1"}},
+    {{"a SAGA grid", kRaster}, ".sdat .sgrd", {}},
+    {{"an ER Mapper raster", kRaster}, ".ers", {}},
+    {{"a Surfer grid", kRaster}, "", {0, "DSBB"}},
+    {{"a Surfer grid", kRaster}, "", {0, "DSRB"}},
+    {{"a Surfer grid", kRaster}, ".grd", {0, "DSAA"}},
+    {{"a JPEG picture", "its numbers are colours, not heights: look for the GeoTIFF"},
+     ".jpg .jpeg",
+     {0, "\xff\xd8\xff"sv}},
+    // Vectors.
+    {{"a shapefile", kVector}, ".shp", {0, "\0\0\x27\x0a"sv}},
+    {{"a GeoPackage",
+      "convert it, e.g. 'gdal_translate FILE out.tif' (a raster) or 'ogr2ogr -f CSV -lco "
+      "GEOMETRY=AS_XYZ out.csv FILE' (points)"},
+     ".gpkg",
+     {0, "SQLite format 3"},
+     {68, "GPKG"}},
+    {{"an SQLite database (MBTiles?)", kRaster}, ".mbtiles .sqlite", {0, "SQLite format 3"}},
+    {{"an HTML page", "a server may have sent it instead of the file: download that again"},
+     ".html .htm",
+     {0, "<!doctype html", true}},
+    {{"an HTML page", "a server may have sent it instead of the file: download that again"},
+     "",
+     {0, "<html", true}},
+    {{"XML (GML, KML, LandXML?)", kVector}, ".kml .gml .xml", {}},
+    // Meshes.
+    {{"glTF as text", "export it in the binary form, GLB"}, ".gltf", {}},
+    {{"JSON, but not GeoJSON", kVector}, ".json", {}},
+    {{"VTK", "convert it to PLY, e.g. with ParaView"}, ".vtk .vtp .vtu", {0, "# vtk DataFile"}},
+    // Containers of any of them.
+    {{"compressed by bzip2", "unpack it: 'bzip2 -dk FILE'"}, ".bz2", {0, "BZh"}},
+    {{"compressed by xz", "unpack it: 'xz -dk FILE'"},
+     ".xz",
+     {0,
+      "\xfd"
+      "7zXZ\0"sv}},
+    {{"compressed by zstd", "unpack it: 'zstd -d FILE'"}, ".zst", {0, "\x28\xb5\x2f\xfd"sv}},
+    {{"a zip archive", "unpack it: 'unzip FILE'"}, ".zip .kmz", {0, "PK\x03\x04"sv}},
+    {{"a 7z archive", "unpack it: '7z x FILE'"}, ".7z", {0, "7z\xbc\xaf\x27\x1c"sv}},
+    {{"a RAR archive", "unpack it: 'unrar x FILE'"}, ".rar", {0, "Rar!\x1a\x07"sv}},
+    {{"a tar archive", "unpack it: 'tar xf FILE'"}, ".tar .tgz", {257, "ustar"}},
+    {{"a Git LFS pointer, not the file", "fetch the file: 'git lfs pull'"},
+     "",
+     {0, "version https://git-lfs"}},
+};
+
+bool shows(const Mark& mark, std::string_view head) {
+  if (mark.bytes.empty() || head.size() < mark.at + mark.bytes.size()) return false;
+  const std::string_view found = head.substr(mark.at, mark.bytes.size());
+  const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
+  return std::equal(found.begin(), found.end(), mark.bytes.begin(),
+                    [&](char a, char b) { return a == b || (mark.any_case && lower(a) == b); });
+}
+
+bool has_word(std::string_view words, std::string_view word) {
+  for (std::size_t at = 0; at < words.size();) {
+    const std::size_t end = std::min(words.find(' ', at), words.size());
+    if (words.substr(at, end - at) == word) return true;
+    at = end + 1;
   }
-  return out;
+  return false;
+}
+
+/// The format recognised by the first bytes of a file (4,096 or all); nullptr if none.
+const ForeignFormat* foreign_format_of_content(std::string_view head) {
+  // Text may begin with the byte order mark of UTF-8 and may be indented.
+  std::string_view text = head;
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  text.remove_prefix(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  for (const ForeignRow& row : kForeignFormats) {
+    if (!shows(row.first, row.first.at == 0 ? text : head)) continue;
+    if (!row.second.bytes.empty() && !shows(row.second, head)) continue;
+    return &row.format;
+  }
+  return nullptr;
+}
+
+/// The format of an ending in lower case such as ".laz"; nullptr if none.
+const ForeignFormat* foreign_format_of_ending(std::string_view ending) {
+  if (ending.empty()) return nullptr;
+  for (const ForeignRow& row : kForeignFormats) {
+    if (has_word(row.endings, ending)) return &row.format;
+  }
+  return nullptr;
 }
 
 std::string ending_of(const std::filesystem::path& file) {
@@ -55,13 +178,6 @@ const Format* format_of_ending(const std::string& ending) {
   return nullptr;
 }
 
-/// The format that unpacks files itself and has this file's double ending, such as ".hgt.zip".
-const Format* packed_format_of(const std::string& file) {
-  const std::string ending = ending_of(file);
-  if (ending != ".zip" && ending != ".gz") return nullptr;
-  return format_of_ending(ending_of(std::filesystem::path(file).stem()) + ending);
-}
-
 bool is_ept_name(const std::string& file) {
   return std::filesystem::path(file).filename() == kEptName;
 }
@@ -71,143 +187,7 @@ Error unsupported(const std::string& file, const ForeignFormat& format) {
       .remedy(std::string(format.remedy));
 }
 
-/// Determines the format by options.format, else by content, else by ending. A file with a known
-/// ending but unknown content goes to that ending's reader, which can best report what is wrong.
-/// Known formats that cannot be read are refused before text, the last of formats(), is tried,
-/// because some of them look like text.
-const Format& format_of(const std::string& file, const SourceOptions& options) {
-  if (!options.format.empty()) {
-    for (const Format& format : formats()) {
-      if (format.name == options.format) return format;
-    }
-    throw std::invalid_argument(
-        fmt::format("unknown input format '{}'; known are {}", options.format, names_of_formats()));
-  }
-  const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
-  const auto bytes = std::as_bytes(std::span(head));
-  const std::span<const Format> distinctive = formats().first(formats().size() - 1);
-  for (const Format& format : distinctive) {
-    if (format.recognise(bytes)) return format;
-  }
-  if (is_ept_name(file)) return ept_format();
-  if (const Format* const packed = packed_format_of(file)) return *packed;
-  if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
-    throw unsupported(file, *foreign);
-  }
-  if (formats().back().recognise(bytes)) return formats().back();
-  if (const Format* const format = format_of_name(file)) return *format;
-  const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
-  if (foreign != nullptr && !head.empty()) throw unsupported(file, *foreign);
-  throw Error(shown_name(file),
-              head.empty() ? "the file is empty" : "neither content nor name shows its format")
-      .remedy(head.empty() ? "download or export the file again"
-                           : "convert a raster (gdal_translate FILE out.tif), or name the "
-                             "format: " +
-                                 names_of_formats());
-}
-
-/// Releases pipes that were peeked at but not opened.
-struct HeadScope {
-  HeadScope() = default;
-  ~HeadScope() { drop_heads(); }
-  HeadScope(const HeadScope&) = delete;
-  HeadScope& operator=(const HeadScope&) = delete;
-};
-
-/// An option that only formats with a capability support.
-struct Requirement {
-  bool Format::*capability;
-  bool (*is_set)(const SourceOptions& options);
-  std::string_view option;   ///< in the terms of SourceOptions
-  std::string_view lack;     ///< follows the name of a format without the capability
-  std::string_view example;  ///< of what has the capability
-};
-
-constexpr std::array<Requirement, 6> kRequirements{{
-    {&Format::height_colours,
-     [](const SourceOptions& o) { return o.heights_of_colour != HeightsOfColour::none; },
-     "heights_of_colour", "does not encode heights as colours", "an image"},
-    {&Format::octree, [](const SourceOptions& o) { return o.selection.resolution > 0; },
-     "resolution", "has no octree", "a COPC file or EPT"},
-    {&Format::triangles, [](const SourceOptions& o) { return o.entities == Entities::triangles; },
-     "entities", "has no triangles", "a mesh"},
-    {&Format::lines,
-     [](const SourceOptions& o) {
-       return o.entities == Entities::segments || o.entities == Entities::polylines;
-     },
-     "entities", "has no lines", "a file of lines"},
-    {&Format::raster, [](const SourceOptions& o) { return o.cell > 0; }, "cell",
-     "is not a raster format", "a raster"},
-    {&Format::raster, [](const SourceOptions& o) { return o.band != 1; }, "band", "has no bands",
-     "a raster"},
-}};
-
-/// Throws: Error if an option needs a capability that the format lacks.
-void check_capabilities(const Format& format, const std::string& file,
-                        const SourceOptions& options) {
-  for (const Requirement& requirement : kRequirements) {
-    if (format.*requirement.capability || !requirement.is_set(options)) continue;
-    throw Error(shown_name(file), fmt::format("{} {}", format.name, requirement.lack))
-        .remedy(fmt::format("name {} ({}), or leave `{}` out", requirement.example,
-                            names_of_formats(requirement.capability), requirement.option));
-  }
-}
-
-/// Determines the format that all files have. Throws: Error if they differ.
-const Format& common_format(std::span<const std::string> files, const SourceOptions& options) {
-  const Format& format = format_of(files.front(), options);
-  for (const std::string& file : files.subspan(1)) {
-    const Format& other = format_of(file, options);
-    if (&other == &format) continue;
-    throw Error(shown_name(file), fmt::format("is {}, but {} is {}", other.name,
-                                              shown_name(files.front()), format.name))
-        .remedy("name files of one format, or select files of a folder by `format`");
-  }
-  return format;
-}
-
-/// Whether files from pipes or gzip must be copied before the format can read them. Throws: Error
-/// if copies would not help.
-bool needs_copies(const Format& format, std::span<const std::string> files) {
-  if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
-    throw Error("standard input", "is named twice")
-        .remedy("name it once: it can be read only once");
-  }
-  if (format.streams) return false;
-  bool copies = false;
-  for (const std::string& file : files) {
-    if (is_seekable(file) || packed_format_of(file) == &format) continue;
-    if (!format.self_contained) {
-      throw Error(shown_name(file), format.name + " cannot be read from a pipe or from gzip")
-          .remedy("name an unpacked file");
-    }
-    copies = true;
-  }
-  return copies;
-}
-
-/// open_source() without reading ahead.
-std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
-                                       const SourceOptions& options) {
-  const HeadScope scope;
-  const Format& format = common_format(files, options);
-  const bool copies = needs_copies(format, files);
-  check_capabilities(format, files.front(), options);
-  return selection_of(copies ? open_spooled(format, files, options) : format.open(files, options),
-                      options);
-}
-
 }  // namespace
-
-std::string_view name_of(Entities entities) {
-  return kEntityNames[static_cast<std::size_t>(entities)];
-}
-
-std::optional<Entities> entities_named(std::string_view name) {
-  const auto found = std::find(kEntityNames.begin(), kEntityNames.end(), name);
-  if (found == kEntityNames.end()) return std::nullopt;
-  return static_cast<Entities>(found - kEntityNames.begin());
-}
 
 std::span<const Format> formats() {
   // The most distinctive content first. Text comes last: anything like a table of numbers counts.
@@ -228,18 +208,53 @@ const Format* format_of_name(const std::string& file) {
   return format_of_ending(ending == ".gz" ? ending_of(std::filesystem::path(file).stem()) : ending);
 }
 
-std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
-                                         const SourceOptions& options) {
-  if (names.empty()) throw std::invalid_argument("there is no file to open");
-  if (options.block_points == 0) throw std::invalid_argument("block_points must be positive");
-  const std::vector<std::string> files = input_files(names, options.format);
-  if (options.blocks_ahead == 0) return open_here(files, options);
-  // Reading ends when the source is destroyed, not only when the caller requests a stop.
-  std::stop_source reading;
-  SourceOptions inner = options;
-  inner.stop = reading.get_token();
-  const std::stop_callback on_stop(options.stop, [&reading] { reading.request_stop(); });
-  return read_ahead(open_here(files, inner), options.blocks_ahead, reading, options.stop);
+std::string names_of_formats(bool Format::*capability) {
+  std::string out;
+  for (const Format& format : formats()) {
+    if (capability != nullptr && !(format.*capability)) continue;
+    if (!out.empty()) out += ", ";
+    out += format.name;
+  }
+  return out;
+}
+
+const Format* packed_format_of(const std::string& file) {
+  const std::string ending = ending_of(file);
+  if (ending != ".zip" && ending != ".gz") return nullptr;
+  return format_of_ending(ending_of(std::filesystem::path(file).stem()) + ending);
+}
+
+const Format& format_of(const std::string& file, const SourceOptions& options) {
+  if (!options.format.empty()) {
+    for (const Format& format : formats()) {
+      if (format.name == options.format) return format;
+    }
+    throw std::invalid_argument(
+        fmt::format("unknown input format '{}'; known are {}", options.format, names_of_formats()));
+  }
+  constexpr std::size_t kHeadBytes = 4096;
+  const std::vector<char> head = peek_head(file, kHeadBytes, options.stop);
+  const auto bytes = std::as_bytes(std::span(head));
+  const std::span<const Format> distinctive = formats().first(formats().size() - 1);
+  for (const Format& format : distinctive) {
+    if (format.recognise(bytes)) return format;
+  }
+  if (is_ept_name(file)) return ept_format();
+  if (const Format* const packed = packed_format_of(file)) return *packed;
+  // Before text, the last format, because some of these look like text.
+  if (const auto* foreign = foreign_format_of_content({head.data(), head.size()})) {
+    throw unsupported(file, *foreign);
+  }
+  if (formats().back().recognise(bytes)) return formats().back();
+  if (const Format* const format = format_of_name(file)) return *format;
+  const ForeignFormat* const foreign = foreign_format_of_ending(ending_of(file));
+  if (foreign != nullptr && !head.empty()) throw unsupported(file, *foreign);
+  throw Error(shown_name(file),
+              head.empty() ? "the file is empty" : "neither content nor name shows its format")
+      .remedy(head.empty() ? "download or export the file again"
+                           : "convert a raster (gdal_translate FILE out.tif), or name the "
+                             "format: " +
+                                 names_of_formats());
 }
 
 }  // namespace terrace::stream

@@ -250,7 +250,7 @@ class Layered {
     if constexpr (!Coder::kDecoding) coders[layer].used |= changed;
   }
 
-  /// What the first layer says of a point, as bits.
+  /// The changes of a point that the first layer codes, as bits.
   enum Change : unsigned {
     kReturnBits = 3,  // 1: next number, 2: previous, 3: another
     kReturnCountBit = 4,

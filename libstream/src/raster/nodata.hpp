@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -24,5 +25,17 @@ struct NodataRule {
   /// units in the last place. Returns an empty range for an empty or unreadable text.
   static NodataRule parse(const std::string& text, ScalarType type);
 };
+
+/// A row of samples in native byte order, to be copied into a window.
+struct SampleRow {
+  const std::byte* samples = nullptr;
+  std::size_t step = 1;  ///< samples from one cell to the next (interleaved bands)
+  std::size_t cells = 0;
+};
+
+/// Copies the valid samples of `row` over `out` and sets their `valid` (see Raster::read_over).
+/// Returns whether any were valid. `out` need not be aligned.
+bool overlay_row(ScalarType type, const SampleRow& row, const NodataRule& rule, std::byte* out,
+                 std::uint8_t* valid);
 
 }  // namespace terrace::stream

@@ -10,6 +10,7 @@
 #include <terrace/base/thread_team.hpp>
 
 #include "store/codec/bytes.hpp"
+#include "store/read/level_reader.hpp"
 #include "store/read/store_impl.hpp"
 #include "with_type.hpp"
 

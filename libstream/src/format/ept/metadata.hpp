@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "format/octree.hpp"
 #include "format/record_source.hpp"
@@ -38,5 +40,11 @@ Error ept_fault(std::string file, std::string cause);
 /// Reads ept.json. Attributes that LAS also has get the names that we use for LAS. Throws: Error
 /// unless the file has version 1 and X, Y and Z of known types.
 EptMetadata read_ept_metadata(const std::string& file);
+
+/// Reads all files of ept-hierarchy/ that are reachable from the root's file. points: the number in
+/// ept.json. Memory: 56 bytes per node. Throws: Error unless the files exist, each is referenced
+/// once, their entries are nodes of an octree, and these have exactly that many points.
+std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
+                                           std::uint64_t points);
 
 }  // namespace terrace::stream

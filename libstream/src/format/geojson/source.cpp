@@ -19,9 +19,9 @@
 #include <fmt/core.h>
 
 #include "format/chain.hpp"
-#include "format/formats.hpp"
 #include "format/geojson/geometry.hpp"
 #include "format/geojson/items.hpp"
+#include "format/registry.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 

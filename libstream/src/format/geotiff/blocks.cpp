@@ -8,8 +8,8 @@
 
 #include <fmt/core.h>
 
+#include "format/geotiff/layout.hpp"
 #include "format/geotiff/tags.hpp"
-#include "format/geotiff/unpack.hpp"
 #include "io/text.hpp"
 
 namespace terrace::stream {

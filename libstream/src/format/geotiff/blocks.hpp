@@ -12,7 +12,6 @@
 #include "format/geotiff/handle.hpp"
 #include "format/geotiff/layout.hpp"
 #include "raster/nodata.hpp"
-#include "raster/overlay.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/raster.hpp"
 

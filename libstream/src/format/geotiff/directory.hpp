@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "terrace/stream/geotiff_writer.hpp"
+
 /// Writes TIFF 6.0 and BigTIFF, which has 64-bit offsets, in the byte order of the machine.
 
 namespace terrace::stream {
@@ -39,5 +41,10 @@ class TiffDirectory {
 
 /// The header of a TIFF whose first directory is at offset `first`: 8 bytes, or 16 if `big`.
 std::string tiff_head(bool big, std::uint64_t first);
+
+/// The tags of the raster (level 0) or of an overview of that size, without those that say where
+/// its tiles are.
+TiffDirectory tags_of(const GeoTiffOptions& options, unsigned level, std::uint32_t columns,
+                      std::uint32_t rows);
 
 }  // namespace terrace::stream

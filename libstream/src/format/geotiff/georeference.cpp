@@ -9,8 +9,7 @@
 #include <fmt/core.h>
 
 #include "format/geotiff/tags.hpp"
-#include "format/world_file.hpp"
-#include "raster/plain_world.hpp"
+#include "format/sidecars.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/unit_words.hpp"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/height_map.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <csetjmp>
@@ -17,13 +15,13 @@
 #include <fmt/core.h>
 #include <png.h>
 
-#include "format/formats.hpp"
-#include "format/grid/plain_grid.hpp"
+#include "format/grid/plain.hpp"
+#include "format/grid/rasters.hpp"
 #include "format/raster_points.hpp"
-#include "format/world_file.hpp"
+#include "format/registry.hpp"
+#include "format/sidecars.hpp"
 #include "io/spool.hpp"
 #include "io/text.hpp"
-#include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 

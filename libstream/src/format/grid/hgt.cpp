@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/hgt.hpp"
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -10,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <memory>
+#include <new>
 #include <optional>
 #include <span>
 #include <string>
@@ -18,15 +17,195 @@
 #include <utility>
 #include <vector>
 
-#include "format/formats.hpp"
-#include "format/grid/plain_grid.hpp"
-#include "format/grid/unpack.hpp"
+#include <fmt/core.h>
+#include <zip.h>
+#include <zlib.h>
+
+#include "format/grid/plain.hpp"
+#include "format/grid/rasters.hpp"
 #include "format/raster_points.hpp"
+#include "format/registry.hpp"
 #include "io/bytes.hpp"
+#include "io/spool.hpp"
 #include "io/text.hpp"
+#include "terrace/stream/byte_source.hpp"
 
 namespace terrace::stream {
 namespace {
+
+/// A file in an archive.
+struct PackedFile {
+  std::string name{};        ///< in the archive; empty if that has no names
+  std::uint64_t size = 0;    ///< unpacked, as the archive states
+  std::uint64_t number = 0;  ///< among a zip archive's files
+};
+
+/// An open zip archive.
+class ZipArchive {
+ public:
+  /// Throws: Error if the file is not a zip archive.
+  explicit ZipArchive(const std::string& file);
+  ~ZipArchive();
+  ZipArchive(const ZipArchive&) = delete;
+  ZipArchive& operator=(const ZipArchive&) = delete;
+
+  /// The files with that ending, in lower or upper case, in the order of the archive. Throws: Error
+  /// if there is none, or if one states more bytes than its packed bytes could ever unpack to.
+  [[nodiscard]] std::vector<PackedFile> find(std::string_view ending) const;
+  /// Unpacks a file to a temporary file. Throws: Error if it is damaged or encrypted, or if it does
+  /// not have its stated size.
+  [[nodiscard]] std::unique_ptr<ByteSource> unpack(const PackedFile& packed) const;
+
+ private:
+  std::string file_;
+  zip* archive_ = nullptr;
+};
+
+constexpr std::size_t kUnpackBytes = 256u << 10;
+/// Throws: Error beyond the growth of Deflate. Other methods of zip archives compress flat ground
+/// even better, but no elevation grid needs that.
+void check_growth(const std::string& file, const std::string& where, std::uint64_t packed,
+                  std::uint64_t unpacked) {
+  if (unpacked / kDeflateGrowth <= packed) return;
+  throw grid_fault(file, fmt::format("states {}, too many for {}", counted(unpacked, "byte"),
+                                     counted(packed, "packed byte")))
+      .at(where);
+}
+
+/// Collects unpacked bytes, never more than stated.
+class Unpacked {
+ public:
+  Unpacked(const std::string& file, const PackedFile& packed)
+      : file_(file), packed_(packed), spool_(std::make_unique<Spool>(file)) {}
+
+  void append(std::span<const std::byte> bytes) {
+    if (bytes.size() > packed_.size - spool_->size()) throw differs("more");
+    spool_->append(bytes);
+  }
+  std::unique_ptr<ByteSource> take() {
+    if (spool_->size() != packed_.size) throw differs("fewer");
+    return std::move(spool_);
+  }
+
+ private:
+  [[nodiscard]] Error differs(const char* relation) const {
+    return grid_fault(file_, fmt::format("unpacks to {} than the {} that it states", relation,
+                                         counted(packed_.size, "byte")))
+        .at(packed_.name);
+  }
+
+  const std::string& file_;
+  const PackedFile& packed_;
+  std::unique_ptr<Spool> spool_;
+};
+
+ZipArchive::ZipArchive(const std::string& file) : file_(file) {
+  int error = 0;
+  archive_ = zip_open(file.c_str(), ZIP_RDONLY, &error);
+  if (archive_ == nullptr) {
+    zip_error_t reason;
+    zip_error_init_with_code(&reason, error);
+    const std::string text = zip_error_strerror(&reason);
+    zip_error_fini(&reason);
+    throw grid_fault(file, text).at("zip");
+  }
+}
+
+ZipArchive::~ZipArchive() { zip_discard(archive_); }
+
+std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
+  std::vector<PackedFile> found;
+  const auto files =
+      static_cast<std::uint64_t>(std::max<zip_int64_t>(0, zip_get_num_entries(archive_, 0)));
+  for (std::uint64_t number = 0; number < files; ++number) {
+    zip_stat_t status;
+    if (zip_stat_index(archive_, number, 0, &status) != 0) continue;
+    constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE;
+    if ((status.valid & kNeeded) != kNeeded || !lower_case(status.name).ends_with(ending)) continue;
+    // macOS packs a companion file with each file.
+    if (std::string_view(status.name).starts_with("__MACOSX/")) continue;
+    check_growth(file_, status.name, status.comp_size, status.size);
+    found.push_back({.name = status.name, .size = status.size, .number = number});
+  }
+  if (found.empty()) {
+    throw grid_fault(file_, fmt::format("has no {} file", ending))
+        .remedy("unpack it: 'unzip FILE'");
+  }
+  return found;
+}
+
+std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
+  zip_file_t* const member = zip_fopen_index(archive_, packed.number, 0);
+  if (member == nullptr) {
+    throw grid_fault(file_, zip_strerror(archive_)).at(packed.name).remedy("unpack it yourself");
+  }
+  struct Close {
+    void operator()(zip_file_t* open) const { zip_fclose(open); }
+  };
+  const std::unique_ptr<zip_file_t, Close> close(member);
+  Unpacked unpacked(file_, packed);
+  std::vector<std::byte> piece(kUnpackBytes);
+  for (;;) {
+    const zip_int64_t got = zip_fread(member, piece.data(), piece.size());
+    if (got < 0) {
+      throw grid_fault(file_, zip_error_strerror(zip_file_get_error(member))).at(packed.name);
+    }
+    if (got == 0) return unpacked.take();
+    unpacked.append({piece.data(), static_cast<std::size_t>(got)});
+  }
+}
+
+/// The file in a gzip file with one member. Its stated size is modulo 2^32.
+/// Throws: Error if it states more bytes than its packed bytes could ever unpack to.
+PackedFile find_in_gzip(const std::string& file) {
+  const std::unique_ptr<ByteSource> bytes = open_file(file);
+  constexpr std::uint64_t kLeast = 18;  // a header of 10 bytes and a trailer of 8
+  if (bytes->size() < kLeast) throw grid_fault(file, "is truncated").at("gzip");
+  std::array<std::byte, 4> trailer{};
+  bytes->read(bytes->size() - trailer.size(), trailer);
+  PackedFile packed;
+  for (std::size_t i = 0; i < trailer.size(); ++i) {
+    packed.size |= std::to_integer<std::uint64_t>(trailer[i]) << (8 * i);
+  }
+  check_growth(file, "gzip", bytes->size(), packed.size);
+  return packed;
+}
+
+/// Unpacks that file. Throws: Error as ZipArchive::unpack().
+std::unique_ptr<ByteSource> unpack_gzip(const std::string& file, const PackedFile& packed) {
+  const std::unique_ptr<ByteSource> bytes = open_file(file);
+  z_stream stream{};
+  constexpr int kGzip = 16 + MAX_WBITS;
+  if (inflateInit2(&stream, kGzip) != Z_OK) throw std::bad_alloc();
+  struct End {
+    void operator()(z_stream* open) const { inflateEnd(open); }
+  };
+  const std::unique_ptr<z_stream, End> end(&stream);
+  Unpacked unpacked(file, packed);
+  std::vector<std::byte> in(kUnpackBytes), out(kUnpackBytes);
+  int state = Z_OK;
+  for (std::uint64_t at = 0; state != Z_STREAM_END;) {
+    if (stream.avail_in == 0) {
+      const auto more =
+          static_cast<std::size_t>(std::min<std::uint64_t>(in.size(), bytes->size() - at));
+      if (more == 0) throw grid_fault(file, "is truncated").at("gzip");
+      bytes->read(at, {in.data(), more});
+      at += more;
+      stream.next_in = reinterpret_cast<Bytef*>(in.data());
+      stream.avail_in = static_cast<uInt>(more);
+    }
+    stream.next_out = reinterpret_cast<Bytef*>(out.data());
+    stream.avail_out = static_cast<uInt>(out.size());
+    state = inflate(&stream, Z_NO_FLUSH);
+    if (state != Z_OK && state != Z_STREAM_END && state != Z_BUF_ERROR) {
+      throw grid_fault(file,
+                       fmt::format("is damaged: {}", stream.msg == nullptr ? "zlib" : stream.msg))
+          .at("gzip");
+    }
+    unpacked.append({out.data(), out.size() - stream.avail_out});
+  }
+  return unpacked.take();
+}
 
 constexpr std::string_view kEnding = ".hgt";
 

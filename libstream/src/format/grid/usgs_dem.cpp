@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/usgs_dem.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,9 +15,10 @@
 
 #include <fmt/core.h>
 
-#include "format/formats.hpp"
-#include "format/grid/plain_grid.hpp"
+#include "format/grid/plain.hpp"
+#include "format/grid/rasters.hpp"
 #include "format/raster_points.hpp"
+#include "format/registry.hpp"
 #include "io/number.hpp"
 #include "io/spool.hpp"
 #include "io/text.hpp"

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "format/record_source.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 
@@ -72,5 +73,14 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
 Crs with_own_height_unit(Crs given, const Crs& own);
 /// The same for a LAS file.
 Crs las_crs_given(const LasHeader& header, const Crs& given);
+
+/// The placement of the records' coordinates, without a CRS.
+Placement las_placement(const LasHeader& header);
+
+/// The header's description of the points: their lattice, attributes and the positions of these in
+/// the records. Adds `comments` to the stream's. Throws: Error naming `name` for too many extra
+/// bytes.
+RecordStream las_stream(const LasHeader& header, const std::string& name,
+                        std::vector<std::string> comments);
 
 }  // namespace terrace::stream

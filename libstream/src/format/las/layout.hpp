@@ -3,11 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "format/las/fields.hpp"
+#include "terrace/stream/point.hpp"
 #include "terrace/stream/schema.hpp"
 
 namespace terrace::stream {
@@ -30,5 +32,13 @@ enum class LasFormats : std::uint8_t { all, newer };
 /// waveforms are not copied. Throws: Error naming `file` for more attributes than fit.
 LasLayout las_layout(std::span<const Channel> attributes, const std::string& file,
                      LasFormats formats = LasFormats::all);
+
+/// Chooses a lattice for coordinates that have none. Its steps are powers of ten, at least 1e-9,
+/// and the same for x and y. They are 0.001 (1e-7 for degrees) or smaller if `points` need it;
+/// points with fewer decimals do not make them larger, because later ones may have more. Steps are
+/// larger where 32 bits would not cover `bounds`. Without bounds, 32 bits must cover twenty times
+/// the extent of the points, or a thousand times if the steps are smaller than usual.
+Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3>& bounds,
+                        bool degrees);
 
 }  // namespace terrace::stream

@@ -14,7 +14,7 @@
 #include "format/geotiff/keys.hpp"
 #include "format/geotiff/tags.hpp"
 #include "format/las/header.hpp"
-#include "format/las/lattice.hpp"
+#include "format/las/layout.hpp"
 #include "io/bytes.hpp"
 #include "io/number.hpp"
 #include "terrace/stream/error.hpp"

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "terrace/stream/input.hpp"
+#include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/schema.hpp"
 
 /// Parsers that read meshes from front to back. GLB, OBJ, OFF and STL have one each, for
@@ -68,5 +69,8 @@ bool recognise_obj(std::span<const std::byte> head);
 bool recognise_off(std::span<const std::byte> head);
 /// Recognises only the text form: the binary one has no signature.
 bool recognise_stl(std::span<const std::byte> head);
+
+/// Like read_mesh() for PLY, whose vertices may have attributes.
+std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptions& options);
 
 }  // namespace terrace::stream

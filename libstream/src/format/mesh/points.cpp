@@ -9,10 +9,10 @@
 #include <utility>
 
 #include "format/chain.hpp"
-#include "format/formats.hpp"
 #include "format/mesh/parser.hpp"
 #include "format/mesh/triangles.hpp"
 #include "format/missing.hpp"
+#include "format/registry.hpp"
 #include "terrace/stream/input.hpp"
 #include "terrace/stream/source.hpp"
 

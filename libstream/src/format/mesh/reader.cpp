@@ -10,10 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "format/formats.hpp"
 #include "format/mesh/parser.hpp"
 #include "format/missing.hpp"
-#include "format/ply/mesh.hpp"
+#include "format/registry.hpp"
 #include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"

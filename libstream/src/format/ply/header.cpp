@@ -197,4 +197,40 @@ PlyHeader read_ply_header(Input& input) {
   return header;
 }
 
+std::string ply_type_name(ScalarType type) {
+  switch (type) {
+    case ScalarType::i8:
+      return "char";
+    case ScalarType::u8:
+      return "uchar";
+    case ScalarType::i16:
+      return "short";
+    case ScalarType::u16:
+      return "ushort";
+    case ScalarType::i32:
+      return "int";
+    case ScalarType::u32:
+      return "uint";
+    case ScalarType::f32:
+      return "float";
+    case ScalarType::f64:
+      return "double";
+    case ScalarType::i64:
+    case ScalarType::u64:
+      break;
+  }
+  return std::string(name_of(type));
+}
+
+std::string ply_preamble(bool ascii, std::span<const std::string> comments) {
+  std::string text = "ply\nformat ";
+  text += ascii ? "ascii 1.0\n" : "binary_little_endian 1.0\n";
+  for (const std::string& comment : comments) {
+    text += "comment ";
+    for (const char c : comment) text += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    text += '\n';
+  }
+  return text;
+}
+
 }  // namespace terrace::stream

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -41,5 +42,12 @@ struct PlyHeader {
 /// it is not PLY 1.0, and if the elements promise more items than the rest of a regular file can
 /// hold.
 PlyHeader read_ply_header(Input& input);
+
+/// The name of a type in the header of a PLY file: the old names, which every reader supports. PLY
+/// has no names for 64-bit integers; we write "int64" and "uint64".
+std::string ply_type_name(ScalarType type);
+
+/// "ply", the format and the comments: the first lines of a header.
+std::string ply_preamble(bool ascii, std::span<const std::string> comments);
 
 }  // namespace terrace::stream

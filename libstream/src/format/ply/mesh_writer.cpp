@@ -6,7 +6,7 @@
 #include <fmt/core.h>
 
 #include "format/output_columns.hpp"
-#include "format/ply/writer.hpp"
+#include "format/ply/header.hpp"
 #include "format/writers.hpp"
 #include "io/bytes.hpp"
 #include "io/number.hpp"

@@ -17,13 +17,12 @@
 #include <fmt/core.h>
 
 #include "format/chain.hpp"
-#include "format/formats.hpp"
+#include "format/mesh/parser.hpp"
 #include "format/mesh/triangles.hpp"
 #include "format/missing.hpp"
 #include "format/packed_column.hpp"
-#include "format/ply/decode.hpp"
 #include "format/ply/header.hpp"
-#include "format/ply/mesh.hpp"
+#include "format/registry.hpp"
 #include "io/line_reader.hpp"
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"

@@ -17,8 +17,8 @@
 #include <fmt/core.h>
 
 #include "format/chain.hpp"
-#include "format/formats.hpp"
 #include "format/missing.hpp"
+#include "format/registry.hpp"
 #include "format/selection.hpp"
 #include "format/text/xyz_layout.hpp"
 #include "io/line_reader.hpp"

@@ -16,10 +16,10 @@
 
 #include <fmt/core.h>
 
+#include "format/sidecars.hpp"
 #include "format/vrt/xml.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
-#include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/unit_words.hpp"
 

@@ -19,18 +19,14 @@
 
 #include <fmt/core.h>
 
-#include "format/formats.hpp"
-#include "format/grid/ascii_grid.hpp"
-#include "format/grid/binary_grid.hpp"
-#include "format/grid/height_map.hpp"
-#include "format/grid/hgt.hpp"
-#include "format/grid/usgs_dem.hpp"
+#include "format/grid/binary.hpp"
+#include "format/grid/rasters.hpp"
 #include "format/raster_points.hpp"
+#include "format/registry.hpp"
 #include "format/vrt/document.hpp"
 #include "io/number.hpp"
 #include "io/peek.hpp"
 #include "raster/nodata.hpp"
-#include "raster/overlay.hpp"
 #include "terrace/stream/error.hpp"
 #include "with_type.hpp"
 

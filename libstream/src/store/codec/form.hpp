@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "store/codec/coding.hpp"
-#include "store/codec/split_codec.hpp"
+#include "store/codec/split.hpp"
 
 /// The head of a cluster's byte string, which says how its positions are coded and in which box.
 

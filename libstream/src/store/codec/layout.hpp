@@ -10,7 +10,7 @@
 
 #include "store/codec/bytes.hpp"
 #include "store/codec/numbers.hpp"
-#include "store/codec/split_codec.hpp"
+#include "store/codec/split.hpp"
 #include "store/codec/symbols.hpp"
 #include "terrace/stream/store.hpp"
 

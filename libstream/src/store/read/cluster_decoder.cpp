@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "store/codec/column_codec.hpp"
+#include "store/codec/column.hpp"
 #include "store/codec/form.hpp"
 
 namespace terrace::stream::store {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "store/codec/coding.hpp"
-#include "store/codec/column_codec.hpp"
+#include "store/codec/column.hpp"
 
 namespace terrace::stream::store {
 namespace {

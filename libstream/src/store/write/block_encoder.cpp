@@ -13,7 +13,7 @@
 
 #include "differing_bits.hpp"
 #include "io/text.hpp"
-#include "store/codec/column_codec.hpp"
+#include "store/codec/column.hpp"
 #include "store/codec/form.hpp"
 #include "terrace/stream/error.hpp"
 

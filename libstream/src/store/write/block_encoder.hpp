@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "store/codec/column_codec.hpp"
-#include "store/codec/grid_codec.hpp"
+#include "store/codec/column.hpp"
+#include "store/codec/grid.hpp"
 #include "store/codec/layout.hpp"
 #include "store/codec/tables.hpp"
 

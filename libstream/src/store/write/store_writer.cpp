@@ -6,6 +6,7 @@
 #include <terrace/base/thread_team.hpp>
 
 #include "spares.hpp"
+#include "store/write/block_encoder.hpp"
 #include "store/write/level_writer.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"

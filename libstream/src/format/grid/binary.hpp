@@ -5,8 +5,8 @@
 #include <memory>
 #include <string>
 
-#include "format/grid/grid_header.hpp"
-#include "format/grid/plain_grid.hpp"
+#include "format/grid/header.hpp"
+#include "format/grid/plain.hpp"
 
 namespace terrace::stream {
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "terrace/stream/raster.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,7 +11,6 @@
 
 #include <fmt/core.h>
 
-#include "format/formats.hpp"
 #include "format/geotiff/blocks.hpp"
 #include "format/geotiff/georeference.hpp"
 #include "format/geotiff/handle.hpp"
@@ -17,8 +18,8 @@
 #include "format/geotiff/layout.hpp"
 #include "format/geotiff/tags.hpp"
 #include "format/raster_points.hpp"
+#include "format/registry.hpp"
 #include "raster/nodata.hpp"
-#include "terrace/stream/raster.hpp"
 
 namespace terrace::stream {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "terrace/stream/source.hpp"
 
-/// The registry's entries, each defined in the source file of its format.
+/// The registry of formats. Its entries are each defined in the source file of their format.
 
 namespace terrace::stream {
 
@@ -42,5 +42,16 @@ const Format& xyz_format();
 
 /// The format of a file's ending (".csv.gz" counts as ".csv"); nullptr if none.
 const Format* format_of_name(const std::string& file);
+
+/// Determines the format by options.format, else by content, else by ending. A file with a known
+/// ending but unknown content goes to that ending's reader, which can best report what is wrong.
+/// Throws: Error for other formats, with a remedy for common ones; std::invalid_argument for an
+/// unknown options.format; Stopped.
+const Format& format_of(const std::string& file, const SourceOptions& options);
+/// The format that unpacks files itself and has this file's double ending, such as ".hgt.zip";
+/// nullptr if none.
+const Format* packed_format_of(const std::string& file);
+/// The names of all formats, or of those with a capability, with commas.
+std::string names_of_formats(bool Format::*capability = nullptr);
 
 }  // namespace terrace::stream

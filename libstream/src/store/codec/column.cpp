@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "store/codec/column_passes.hpp"
+#include "store/codec/column.hpp"
 
 #include <bit>
 

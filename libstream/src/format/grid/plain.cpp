@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/plain_grid.hpp"
+#include "format/grid/plain.hpp"
 
 #include <algorithm>
 #include <span>
@@ -10,7 +10,7 @@
 
 #include "format/packed_column.hpp"
 #include "io/text.hpp"
-#include "raster/overlay.hpp"
+#include "raster/nodata.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {

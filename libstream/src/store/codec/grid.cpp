@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "store/codec/grid_codec.hpp"
+#include "store/codec/grid.hpp"
 
 namespace terrace::stream::store {
 namespace {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/grid_header.hpp"
+#include "format/grid/header.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "format/sidecars.hpp"
 #include "io/number.hpp"
 #include "io/text.hpp"
-#include "raster/plain_world.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::stream {

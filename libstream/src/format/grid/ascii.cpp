@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/ascii_grid.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,11 +13,12 @@
 
 #include <fmt/core.h>
 
-#include "format/formats.hpp"
-#include "format/grid/grid_header.hpp"
-#include "format/grid/plain_grid.hpp"
+#include "format/grid/header.hpp"
+#include "format/grid/plain.hpp"
+#include "format/grid/rasters.hpp"
 #include "format/raster_points.hpp"
-#include "format/world_file.hpp"
+#include "format/registry.hpp"
+#include "format/sidecars.hpp"
 #include "io/line_reader.hpp"
 #include "io/number.hpp"
 #include "io/spool.hpp"

@@ -5,11 +5,11 @@
 #include <array>
 #include <cstdint>
 #include <numeric>
+#include <span>
 #include <type_traits>
 #include <vector>
 
 #include "store/codec/coding.hpp"
-#include "store/codec/column_passes.hpp"
 #include "store/codec/numbers.hpp"
 
 /// Codes the attributes of a cluster's points, column by column, in the order in which their
@@ -18,6 +18,24 @@
 /// points are in the order in which they were read.
 
 namespace terrace::stream::store {
+
+// Passes over the values of a column before they are coded. They are vectorised.
+
+/// Sets differences[i] to values[i] - values[i - 1] for 1 <= i < n. Also subtracts the same
+/// difference of the preceding column, `beside`, unless that is null. Returns false if all values
+/// are equal.
+bool find_differences(const std::int64_t* values, const std::int64_t* beside,
+                      std::int64_t* differences, std::uint32_t n);
+
+/// Zigzag-encodes n differences into `numbers`, and sets the size class of each in `classes`.
+void classify(const std::int64_t* differences, std::uint64_t* numbers, std::uint8_t* classes,
+              std::uint32_t n);
+
+/// Lowest and highest value; low > high if there are no values.
+struct Extent {
+  std::int64_t low = INT64_MAX, high = INT64_MIN;
+};
+Extent extent_of(std::span<const std::int64_t> values);
 
 /// The last class of each step except the highest.
 inline constexpr std::array<unsigned, 7> kStepEnds{0, 2, 4, 8, 15, 21, 29};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "format/grid/binary_grid.hpp"
+#include "format/grid/binary.hpp"
 
 #include <algorithm>
 #include <bit>
@@ -14,9 +14,9 @@
 
 #include <fmt/core.h>
 
-#include "format/formats.hpp"
 #include "format/raster_points.hpp"
-#include "format/world_file.hpp"
+#include "format/registry.hpp"
+#include "format/sidecars.hpp"
 #include "io/text.hpp"
 
 namespace terrace::stream {
