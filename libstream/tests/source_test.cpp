@@ -174,6 +174,24 @@ TEST_F(Source, NamesUnsupportedFormatsAndARemedy) {
   EXPECT_EQ(read_all({put("h.laz", "1 2 3\n")}).info.format, "xyz");
 }
 
+TEST_F(Source, RefusesOptionsThatTheFormatDoesNotSupport) {
+  const std::string file = put("a.xyz", "1 2 3\n");
+  const auto expect_refusal = [&](const SourceOptions& options, const std::string& text) {
+    EXPECT_NE(refusal({file}, options).find(text), std::string::npos) << refusal({file}, options);
+  };
+  expect_refusal({.cell = 1}, "xyz is not a raster format");
+  expect_refusal({.band = 2},
+                 "name a raster (geotiff, vrt, hgt, ascii-grid, usgs-dem, png, binary-grid)");
+  expect_refusal({.heights_of_colour = HeightsOfColour::mapbox},
+                 "name an image (png), or leave `heights_of_colour` out");
+  expect_refusal({.selection = {.resolution = 1}},
+                 "name a COPC file or EPT (las, ept), or leave `resolution` out");
+  expect_refusal({.entities = Entities::triangles},
+                 "name a mesh (ply, glb, obj, off, stl), or leave `entities` out");
+  expect_refusal({.entities = Entities::polylines},
+                 "name a file of lines (geojson), or leave `entities` out");
+}
+
 TEST_F(Source, ChainsFilesOfOneFormat) {
   const std::vector<std::string> files{put("1.xyz", "1 2 3 4\n5 6 7 8\n"), put("2.xyz", "9 9 9 9"),
                                        put("3.xyz", "# c\n0 0 0 0\n")};
