@@ -256,36 +256,33 @@ std::string padded(const std::string& text, std::size_t width) {
   return std::string(width - std::min(width, text.size()), ' ') + text;
 }
 
-/// Describes files of points or cells by streaming them once. Throws stream::Error.
-Summary info_of_files(std::span<const std::string> files, const std::string& format,
-                      stream::HeightsOfColour colours, const CommonOptions& common) {
-  const std::unique_ptr<stream::PointSource> source =
-      stream::open_source(files, {.format = format,
-                                  .memory_bytes = common.reading_memory(),
-                                  .heights_of_colour = colours,
-                                  .same_crs = &terrain::same_crs,
-                                  .stop = stop_token(),
-                                  .blocks_ahead = 8,
-                                  .threads = common.threads});
-  reading_within_memory(*source, common.memory_or(0));
-  const Contents contents = stream_through(*source, common);
-  const stream::SourceInfo& info = source->info();
-  SourceCrs crs;
+/// The CRS, or the error that would make a build fail as its note.
+SourceCrs crs_with_note(const stream::SourceInfo& info) {
   try {
-    crs = crs_of_source(info);
+    return crs_of_source(info);
   } catch (const CrsDatabaseError&) {
     throw;
   } catch (const stream::Error& error) {
-    // Report an error that would make a build fail along with the rest of the file.
+    SourceCrs crs;
     crs.crs = info.crs;
     crs.note = error.what();
+    return crs;
   }
-  const stream::Channel& z = info.coordinates[2];
-  const auto real = [&z](double raw) { return raw * z.scale + z.offset; };
+}
 
-  Summary summary;
-  summary.text_is_result = true;
-  Json& json = summary.json;
+/// Empty if unknown.
+std::string vertical_of(const SourceCrs& crs) {
+  return crs.heights == Heights::unknown ? "" : name_of(crs.heights);
+}
+
+std::vector<std::string> comments_of(const stream::SourceInfo& info, const Contents& contents) {
+  std::vector<std::string> comments = info.comments;
+  if (!contents.comment.empty()) comments.push_back(contents.comment);
+  return comments;
+}
+
+Json json_of_files(const stream::SourceInfo& info, const Contents& contents, const SourceCrs& crs) {
+  Json json;
   json["format"] = info.format;
   json["files"] = info.files.size();
   json["version"] = nullptr;
@@ -299,27 +296,31 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
                       {"nodes", info.octree->nodes}};
   }
   json["levels"] = Json::array();
-  const std::string vertical = crs.heights == Heights::unknown ? "" : name_of(crs.heights);
-  add_placement(info, contents.world, crs.crs, vertical, json);
+  add_placement(info, contents.world, crs.crs, vertical_of(crs), json);
   if (info.grid) json["nodata_value"] = or_null(info.nodata);
   json["height"] = nullptr;
   if (contents.points > 0) {
+    const stream::Channel& z = info.coordinates[2];
+    const auto real = [&z](double raw) { return raw * z.scale + z.offset; };
     const auto [low, high] =
         std::minmax({real(contents.stored.min[2]), real(contents.stored.max[2])});
     json["height"] = {{"min", low}, {"max", high}, {"mean", real(contents.mean)}};
   }
   json["channels"] = channels_of(info);
   json["parameters"] = Json::object();
-  std::vector<std::string> comments = info.comments;
-  if (!contents.comment.empty()) comments.push_back(contents.comment);
-  json["comments"] = comments;
+  json["comments"] = comments_of(info, contents);
   const std::optional<std::uint64_t> bytes = bytes_of(info);
   json["bytes"] = bytes ? Json(*bytes) : Json(nullptr);
+  return json;
+}
 
-  std::string& text = summary.text;
+/// height: as in the JSON.
+std::string text_of_files(const stream::SourceInfo& info, const Contents& contents,
+                          const SourceCrs& crs, const Json& height) {
+  std::string text;
   text += "format:    " + info.format;
   if (info.files.size() > 1) text += ", " + counted(info.files.size(), "file");
-  if (bytes) text += ", " + readable_bytes(*bytes);
+  if (const auto bytes = bytes_of(info)) text += ", " + readable_bytes(*bytes);
   text += '\n';
   if (info.grid) {
     text += raster_line(info);
@@ -346,14 +347,38 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
   }
   text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
   if (!crs.note.empty()) text += "note:      " + printable_line(with_option_names(crs.note)) + '\n';
-  if (!vertical.empty()) text += "vertical:  " + vertical + '\n';
+  if (const std::string vertical = vertical_of(crs); !vertical.empty()) {
+    text += "vertical:  " + vertical + '\n';
+  }
   text += "bounds:    " + text_of(contents.world) + '\n';
   if (contents.points > 0) {
-    text += heights_line(json["height"]["min"], json["height"]["max"], json["height"]["mean"]);
+    text += heights_line(height["min"], height["max"], height["mean"]);
   }
   text += channels_line(info);
-  for (const std::string& comment : comments)
+  for (const std::string& comment : comments_of(info, contents))
     text += "comment:   " + printable_line(comment) + '\n';
+  return text;
+}
+
+/// Describes files of points or cells by streaming them once. Throws stream::Error.
+Summary info_of_files(std::span<const std::string> files, const std::string& format,
+                      stream::HeightsOfColour colours, const CommonOptions& common) {
+  const std::unique_ptr<stream::PointSource> source =
+      stream::open_source(files, {.format = format,
+                                  .memory_bytes = common.reading_memory(),
+                                  .heights_of_colour = colours,
+                                  .same_crs = &terrain::same_crs,
+                                  .stop = stop_token(),
+                                  .blocks_ahead = 8,
+                                  .threads = common.threads});
+  reading_within_memory(*source, common.memory_or(0));
+  const Contents contents = stream_through(*source, common);
+  const stream::SourceInfo& info = source->info();
+  const SourceCrs crs = crs_with_note(info);
+  Summary summary;
+  summary.text_is_result = true;
+  summary.json = json_of_files(info, contents, crs);
+  summary.text = text_of_files(info, contents, crs, summary.json["height"]);
   return summary;
 }
 
