@@ -24,9 +24,9 @@ bool small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 
 class NullSink : public HierarchySink {
  public:
-  std::unique_ptr<Prepared> prepare(const FinishedBlock&) override { return nullptr; }
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock&) override { return nullptr; }
   void commit(unsigned, std::unique_ptr<Prepared>) override {}
-  void root(const FinishedBlock&) override {}
+  void root(const ClusteredBlock&) override {}
 };
 
 constexpr std::size_t kTile = 100;  // a tile is a block

@@ -22,10 +22,10 @@ class MemorySink : public HierarchySink {
   struct Cluster {
     std::vector<Point3> points;
     std::vector<std::uint64_t> children;  ///< one level below, per point; empty on level 0
-    Summary summary;
+    ClusterSummary summary;
   };
 
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     auto clusters = std::make_unique<Clusters>();
     for (std::size_t c = 0; c < block.summaries.size(); ++c) {
       clusters->list.push_back(extract(block, c));
@@ -39,7 +39,7 @@ class MemorySink : public HierarchySink {
     }
   }
 
-  void root(const FinishedBlock& block) override { top = extract(block, 0); }
+  void root(const ClusteredBlock& block) override { top = extract(block, 0); }
 
   std::map<unsigned, std::vector<Cluster>> levels;  ///< by level and ordinal
   Cluster top;
@@ -49,7 +49,7 @@ class MemorySink : public HierarchySink {
     std::vector<Cluster> list;
   };
 
-  static Cluster extract(const FinishedBlock& block, std::size_t c) {
+  static Cluster extract(const ClusteredBlock& block, std::size_t c) {
     Cluster cluster;
     cluster.summary = block.summaries[c];
     for (std::size_t k = block.first[c]; k < block.first[c + 1]; ++k) {

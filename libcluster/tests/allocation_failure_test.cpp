@@ -55,11 +55,11 @@ int fail_in_turn(int times, const Work& work) {
 }
 
 struct Nowhere final : HierarchySink {
-  std::unique_ptr<Prepared> prepare(const FinishedBlock&) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock&) override {
     return std::make_unique<Prepared>();
   }
   void commit(unsigned, std::unique_ptr<Prepared>) override {}
-  void root(const FinishedBlock&) override {}
+  void root(const ClusteredBlock&) override {}
 };
 
 TEST(AllocationFailure, InTheHierarchyIsRethrown) {

@@ -355,7 +355,7 @@ struct Trap {
 class TrappedSink : public RecordingSink {
  public:
   explicit TrappedSink(Trap& trap) : trap_(trap) {}
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     trap_.visit(Where::prepare);
     return RecordingSink::prepare(block);
   }
@@ -363,7 +363,7 @@ class TrappedSink : public RecordingSink {
     trap_.visit(Where::commit);
     RecordingSink::commit(level, std::move(prepared));
   }
-  void root(const FinishedBlock& block) override {
+  void root(const ClusteredBlock& block) override {
     trap_.visit(Where::root);
     RecordingSink::root(block);
   }
@@ -413,7 +413,7 @@ TEST(HierarchyEngine, ExceptionsAreRethrownOnce) {
 /// lingers until all other threads wait for it, or the failure has been thrown.
 class LingeringSink : public RecordingSink {
  public:
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     if (block.block == 0) {
       while (!lingers) std::this_thread::yield();
       failed = true;
@@ -495,7 +495,7 @@ TEST(HierarchyEngine, DestructorStopsQuietly) {
 /// Its first block is prepared only when all other threads wait for it.
 class SlowStartSink : public RecordingSink {
  public:
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     if (block.level == 0) {
       if (block.block == 0) wait_until_others_wait();
       const int waiting = ++waiting_;

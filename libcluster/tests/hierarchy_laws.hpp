@@ -73,7 +73,7 @@ struct Expanded {
 /// Compares a summary with its descendants. The map must be the same for all blocks.
 inline void check_summary(const Expanded& cluster, std::span<const Point3> input,
                           const GroundMap& map) {
-  const Summary& summary = cluster.block->summaries[cluster.c];
+  const ClusterSummary& summary = cluster.block->summaries[cluster.c];
   const Point3& from = cluster.block->positions[cluster.representative()];
   EXPECT_EQ(summary.descendants, cluster.descendants.size());
   Box3 box{from, from};

@@ -17,7 +17,7 @@
 
 namespace terrace::cluster {
 
-/// A FinishedBlock that owns its data.
+/// A ClusteredBlock that owns its data.
 struct RecordedBlock {
   unsigned level = 0;
   std::uint64_t block = 0;
@@ -25,10 +25,10 @@ struct RecordedBlock {
   std::vector<std::byte> payload;
   std::vector<std::uint64_t> children;
   std::vector<std::uint32_t> first, order, representatives;
-  std::vector<Summary> summaries;
+  std::vector<ClusterSummary> summaries;
 
   RecordedBlock() = default;
-  explicit RecordedBlock(const FinishedBlock& b)
+  explicit RecordedBlock(const ClusteredBlock& b)
       : level(b.level),
         block(b.block),
         positions(b.positions.begin(), b.positions.end()),
@@ -63,7 +63,7 @@ inline std::vector<std::byte> numbered_payload(std::size_t begin, std::size_t en
 
 class RecordingSink : public HierarchySink {
  public:
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     ++calls;
     auto copy = std::make_unique<Copy>();
     copy->block = RecordedBlock(block);
@@ -81,7 +81,7 @@ class RecordingSink : public HierarchySink {
     committing_ = false;
   }
 
-  void root(const FinishedBlock& block) override {
+  void root(const ClusteredBlock& block) override {
     ++calls;
     EXPECT_FALSE(has_root) << "root() was called twice";
     has_root = true;

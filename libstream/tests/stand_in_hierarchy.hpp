@@ -31,7 +31,7 @@ class StandInHierarchy {
   StandInHierarchy(StoreWriter& writer, Options options)
       : StandInHierarchy(writer.schema().payload_size(), options,
                          [&writer, this](const ClusteredBlock& block) {
-                           if (block.representatives[0] == UINT32_MAX) {
+                           if (block.representatives[0] == kNoRepresentative) {
                              bytes_ = writer.finish(block);
                            } else {
                              writer.append(writer.encode(block));
@@ -59,7 +59,7 @@ class StandInHierarchy {
     const auto n = static_cast<std::uint32_t>(points.positions.size());
     std::vector<std::uint32_t> order(n);
     for (std::uint32_t i = 0; i < n; ++i) order[i] = i;
-    const std::uint32_t none = UINT32_MAX;
+    const std::uint32_t none = kNoRepresentative;
     const std::vector<std::uint32_t> first{0, n};
     ClusterSummary all;
     for (const ClusterSummary& s : points.below) {

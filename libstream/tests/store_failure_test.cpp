@@ -336,7 +336,7 @@ TEST(StoreWriting, TrialsLeaveNothing) {
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", testing::cloud_schema());
   const std::vector<Point3> points{{1, 2, 3}};
-  const std::vector<std::uint32_t> first{0, 1}, order{0}, representatives{UINT32_MAX};
+  const std::vector<std::uint32_t> first{0, 1}, order{0}, representatives{kNoRepresentative};
   EXPECT_GT(writer.finish({.level = 0,
                            .positions = points,
                            .payload = {},
@@ -441,7 +441,7 @@ std::map<std::string, std::string> files_for_threads(const StoreSchema& schema,
     for (unsigned t = 0; t < std::min(ahead, 4u); ++t) {
       threads.emplace_back([&, t] {
         for (std::size_t b = start + t; b < end; b += std::min(ahead, 4u)) {
-          if (blocks[b].representatives[0] != UINT32_MAX) {
+          if (blocks[b].representatives[0] != kNoRepresentative) {
             encoded[b - start] = writer.encode(blocks[b].view());
           }
         }

@@ -32,7 +32,14 @@ struct OwnedBlock {
         representatives(b.representatives.begin(), b.representatives.end()),
         summaries(b.summaries.begin(), b.summaries.end()) {}
   [[nodiscard]] ClusteredBlock view() const {
-    return {level, positions, payload, children, first, order, representatives, summaries};
+    return {.level = level,
+            .positions = positions,
+            .payload = payload,
+            .children = children,
+            .first = first,
+            .order = order,
+            .representatives = representatives,
+            .summaries = summaries};
   }
 };
 

@@ -744,7 +744,8 @@ TEST(StoreInvariants, RefusesClustersThatTakeMuchMemory) {
   std::vector<std::uint32_t> order(most + 1);
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const std::vector<std::byte> payload(positions.size() * schema.payload_size());
-  const std::vector<std::uint32_t> first{0, static_cast<std::uint32_t>(most + 1)}, none{UINT32_MAX};
+  const std::vector<std::uint32_t> first{0, static_cast<std::uint32_t>(most + 1)},
+      none{kNoRepresentative};
   EXPECT_THROW(writer.finish({.level = 0,
                               .positions = positions,
                               .payload = payload,
@@ -765,7 +766,7 @@ StoreFiles rewritten(const std::function<void(std::vector<OwnedBlock>&)>& edit) 
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", small_grid());
   for (const OwnedBlock& block : recorded) {
-    if (block.representatives[0] == UINT32_MAX) {
+    if (block.representatives[0] == kNoRepresentative) {
       writer.finish(block.view());
     } else {
       writer.append(writer.encode(block.view()));
@@ -841,7 +842,8 @@ TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
       positions.push_back({32.0 + i, 0, 0});
       order.push_back(i);
     }
-    const std::vector<std::uint32_t> first{0, 32, 64}, heads{31, 60}, all{0, 2}, none{UINT32_MAX};
+    const std::vector<std::uint32_t> first{0, 32, 64}, heads{31, 60}, all{0, 2},
+        none{kNoRepresentative};
     const std::vector<ClusterSummary> summaries{{{positions[0], positions[31]}, 40, 32},
                                                 {{positions[32], positions[63]}, 40, 32}};
     const std::vector<Point3> top{positions[31], positions[60]};

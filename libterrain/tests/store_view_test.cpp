@@ -84,7 +84,7 @@ template <class Coord>
 std::uint64_t points_expected(const StoreView<Coord>& view, const stream::Store& store) {
   std::uint64_t points = store.levels()[store.top()].members;
   for (const tri::ClusterId id : view.model().expanded()) {
-    points += store.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id))).points;
+    points += store.record(id).points;
   }
   return points;
 }
@@ -172,9 +172,7 @@ bool spans_gap_by_records(const StoreView<std::int32_t>& view, const stream::Sto
     model.children(cluster, children);
     for (const tri::ClusterId child : children) {
       if (model.is_expanded(child)) continue;
-      const stream::Box3 box =
-          store.record(stream::cluster_id(tri::level_of(child), tri::ordinal_of(child)))
-              .summary.box;
+      const stream::Box3 box = store.record(child).summary.box;
       bool near = true;
       for (std::size_t k = 0; k < 2; ++k) {
         near = near && box.min[k] <= centroid[k] + 1.001 && box.max[k] >= centroid[k] - 1.001;

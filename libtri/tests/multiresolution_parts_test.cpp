@@ -10,18 +10,6 @@
 namespace terrace::tri::test {
 namespace {
 
-TEST(ClusterId, HoldsLevelAndOrdinal) {
-  const std::uint64_t last = (std::uint64_t{1} << 56) - 1;
-  for (const unsigned level : {0u, 1u, 200u, 255u}) {
-    for (const std::uint64_t ordinal : {std::uint64_t{0}, std::uint64_t{77}, last}) {
-      const ClusterId id = cluster_id(level, ordinal);
-      EXPECT_EQ(level_of(id), level);
-      EXPECT_EQ(ordinal_of(id), ordinal);
-    }
-  }
-  EXPECT_EQ(to_string(cluster_id(3, 12)), "cluster 12 of level 3");
-}
-
 TEST(PointId, HigherLevelThenSmallerIdRepresents) {
   const PointId coarse{cluster_id(2, 9), 5}, fine{cluster_id(0, 1), 0};
   EXPECT_TRUE(stands_before(coarse, fine));

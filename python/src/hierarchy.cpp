@@ -26,20 +26,20 @@ class CallSink final : public cluster::HierarchySink {
  public:
   explicit CallSink(const py::function& take) : take_(take) {}
 
-  std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const cluster::ClusteredBlock& block) override {
     return std::make_unique<Copy>(block);
   }
   void commit(unsigned, std::unique_ptr<Prepared> prepared) override {
     call(static_cast<Copy&>(*prepared));
   }
-  void root(const cluster::FinishedBlock& block) override {
+  void root(const cluster::ClusteredBlock& block) override {
     Copy copy(block);
     call(copy);
   }
 
  private:
   struct Copy final : Prepared {
-    explicit Copy(const cluster::FinishedBlock& block)
+    explicit Copy(const cluster::ClusteredBlock& block)
         : level(block.level),
           number(block.block),
           points(copy_of(block.positions)),
@@ -48,7 +48,7 @@ class CallSink final : public cluster::HierarchySink {
           first(copy_of(block.first)),
           order(copy_of(block.order)),
           representatives(copy_of(block.representatives)) {
-      for (const cluster::Summary& of : block.summaries) {
+      for (const cluster::ClusterSummary& of : block.summaries) {
         boxes.push_back({of.box.min[0], of.box.min[1], of.box.min[2], of.box.max[0], of.box.max[1],
                          of.box.max[2]});
         errors.push_back(of.error);

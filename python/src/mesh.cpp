@@ -66,10 +66,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
                const py::tuple& settings) {
   const stream::Store store = open.get(where);
   terrain::Detail detail = detail_of(store, level, region, focuses);
-  if (cluster) {
-    const tri::ClusterId id = cluster_of(store, cluster->first, cluster->second);
-    detail.cluster = static_cast<stream::ClusterId>(id);
-  }
+  if (cluster) detail.cluster = cluster_of(store, cluster->first, cluster->second);
   terrain::DetailMeshOptions options;
   options.metric = terrain::MetricChoice::parse(metric);
   if (heights.contains("smoothing")) {

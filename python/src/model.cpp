@@ -94,7 +94,7 @@ class SharedModel {
       }
       return model.record(id);
     });
-    const stream::Box3 box = world_box(store_.schema(), {of.box.min, of.box.max});
+    const stream::Box3 box = world_box(store_.schema(), of.box);
     return py::make_tuple(
         py::make_tuple(box.min[0], box.min[1], box.min[2], box.max[0], box.max[1], box.max[2]),
         of.error, of.members);

@@ -62,7 +62,7 @@ struct Histogram {
   std::uint64_t clusters = 0;
 
   void add(const StreamBlock& block) {
-    const FinishedBlock& b = block.block;
+    const ClusteredBlock& b = block.block;
     clusters += b.representatives.size();
     for (std::size_t c = 0; c < b.representatives.size(); ++c) {
       const Point3& f = b.positions[b.representatives[c]];

@@ -22,14 +22,14 @@
 
 namespace {
 
-using terrace::cluster::FinishedBlock;
+using terrace::cluster::ClusteredBlock;
 using Clock = std::chrono::steady_clock;
 
 class NullSink : public terrace::cluster::HierarchySink {
  public:
-  std::unique_ptr<Prepared> prepare(const FinishedBlock&) override { return nullptr; }
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock&) override { return nullptr; }
   void commit(unsigned, std::unique_ptr<Prepared>) override {}
-  void root(const FinishedBlock&) override {}
+  void root(const ClusteredBlock&) override {}
 };
 
 // Number of points in memory at once (400 MB); the clock stops while the next part is read.

@@ -34,7 +34,7 @@ class StreamClustering::Weighing final : public HierarchySink {
   Weighing(double facility_cost, OnBlock on_block)
       : facility_cost_(facility_cost), on_block_(std::move(on_block)) {}
 
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     if (block.level > 0) return nullptr;
     StreamBlock weighed{.block = block};
     weighed.facility_cost = facility_cost_ * diagonal(Euclidean{}, base::box_of(block.positions));
@@ -50,7 +50,7 @@ class StreamClustering::Weighing final : public HierarchySink {
     return nullptr;
   }
   void commit(unsigned /*level*/, std::unique_ptr<Prepared> /*prepared*/) override {}
-  void root(const FinishedBlock& /*block*/) override {}
+  void root(const ClusteredBlock& /*block*/) override {}
 
   double cost = 0.0;
 

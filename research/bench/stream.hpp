@@ -29,7 +29,7 @@ struct StreamOptions {
 
 /// A clustered block of level 0.
 struct StreamBlock {
-  const cluster::FinishedBlock& block;
+  const cluster::ClusteredBlock& block;
   double facility_cost = 0.0;  ///< cost of one facility
   double cost = 0.0;           ///< cost of all facilities and connections
 };

@@ -106,7 +106,7 @@ std::string fault(const View& viewer, const stream::Store& store, int stop, doub
   if (worst > 1.0) return "the stopped view settled short of its target";
   std::uint64_t points = store.levels()[store.top()].members;
   for (const tri::ClusterId id : model.expanded()) {
-    points += store.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id))).points;
+    points += store.record(id).points;
   }
   // Points of a scan may coincide.
   const bool apart = store.schema().grid;

@@ -19,9 +19,9 @@ namespace terrace::cluster {
 namespace {
 
 // Returns counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
-void normalised_weights(std::span<const Summary> heads, std::vector<double>& weights) {
+void normalised_weights(std::span<const ClusterSummary> heads, std::vector<double>& weights) {
   std::uint64_t total = 0;
-  for (const Summary& head : heads) total += head.descendants;
+  for (const ClusterSummary& head : heads) total += head.descendants;
   const double scale = static_cast<double>(heads.size()) / static_cast<double>(total);
   weights.resize(heads.size());
   for (std::size_t i = 0; i < heads.size(); ++i) {
@@ -83,7 +83,7 @@ void HierarchyBlock::append_representative(const HierarchyBlock& below, std::siz
   heads.push_back(below.summaries[c]);
 }
 
-FinishedBlock HierarchyBlock::finished() const {
+ClusteredBlock HierarchyBlock::finished() const {
   return {level,    number, positions, payload, children, first, order, clustering.facilities,
           summaries};
 }

@@ -27,11 +27,12 @@ struct HierarchyBlock {
   std::vector<Point3> positions;
   std::vector<std::byte> payload;
   std::vector<std::uint64_t> children;  ///< `level` ordinals per point
-  std::vector<Summary> heads;  ///< above level 0, per point: summary of the cluster one level below
+  std::vector<ClusterSummary>
+      heads;  ///< above level 0, per point: summary of the cluster one level below
 
   BlockClustering clustering;
-  std::vector<std::uint32_t> first, order;  ///< as in FinishedBlock
-  std::vector<Summary> summaries;
+  std::vector<std::uint32_t> first, order;  ///< as in ClusteredBlock
+  std::vector<ClusterSummary> summaries;
   std::unique_ptr<HierarchySink::Prepared> prepared;
 
   [[nodiscard]] std::size_t size() const { return positions.size(); }
@@ -42,7 +43,7 @@ struct HierarchyBlock {
   /// now known.
   void append_representative(const HierarchyBlock& below, std::size_t c, std::uint64_t ordinal,
                              std::size_t payload_size);
-  [[nodiscard]] FinishedBlock finished() const;
+  [[nodiscard]] ClusteredBlock finished() const;
 };
 
 /// Clusters a block by Euclidean distances: BlockClusterer::run, or a stand-in in tests.

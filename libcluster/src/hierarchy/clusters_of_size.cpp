@@ -18,7 +18,7 @@ class ParentSink final : public HierarchySink {
  public:
   explicit ParentSink(std::size_t points) : parents_(1) { parents_[0].resize(points); }
 
-  std::unique_ptr<Prepared> prepare(const FinishedBlock& block) override {
+  std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
     auto clusters = std::make_unique<Clusters>();
     clusters->count = block.representatives.size();
     for (std::size_t c = 0; c < clusters->count; ++c) {
@@ -41,7 +41,7 @@ class ParentSink final : public HierarchySink {
     counts_[level] += clusters.count;
   }
 
-  void root(const FinishedBlock&) override {}
+  void root(const ClusteredBlock&) override {}
 
   /// Returns the number of clusters on each level below the root.
   [[nodiscard]] const std::vector<std::size_t>& counts() const { return counts_; }
@@ -57,7 +57,7 @@ class ParentSink final : public HierarchySink {
 
   // On level 0 the payload numbers the points. Above, a point represents the cluster that it heads
   // on the level below.
-  static std::size_t child(const FinishedBlock& block, std::uint32_t point) {
+  static std::size_t child(const ClusteredBlock& block, std::uint32_t point) {
     if (block.level > 0) {
       return block.children[point * std::size_t{block.level} + block.level - 1];
     }

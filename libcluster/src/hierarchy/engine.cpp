@@ -184,10 +184,10 @@ void HierarchyEngine::deliver_root(Level& level) {
   block.first = {0, static_cast<std::uint32_t>(block.size())};
   block.order.resize(block.size());
   std::iota(block.order.begin(), block.order.end(), 0u);
-  Summary summary{base::box_of(block.positions), 0.0, block.size()};
+  ClusterSummary summary{base::box_of(block.positions), 0.0, block.size()};
   if (block.level > 0) {
     summary.descendants = 0;
-    for (const Summary& head : block.heads) {
+    for (const ClusterSummary& head : block.heads) {
       summary.box.include(head.box);
       summary.descendants += head.descendants;
     }

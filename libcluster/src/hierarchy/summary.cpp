@@ -40,8 +40,8 @@ double farthest_corner(const Point3& from, const GroundMap& map, const Box3& box
 
 // ground: returns the ground length of a difference vector.
 template <class Ground>
-Summary summarise(std::span<const Point3> positions, std::span<const std::uint32_t> members,
-                  std::uint32_t representative, const GroundMap& map, Ground ground) {
+ClusterSummary summarise(std::span<const Point3> positions, std::span<const std::uint32_t> members,
+                         std::uint32_t representative, const GroundMap& map, Ground ground) {
   const Point3 from = positions[representative];
   Box3 box{from, from};
   double squared = 0.0;
@@ -56,8 +56,9 @@ Summary summarise(std::span<const Point3> positions, std::span<const std::uint32
 
 }  // namespace
 
-Summary summarise_points(std::span<const Point3> positions, std::span<const std::uint32_t> members,
-                         std::uint32_t representative, const GroundMap& map) {
+ClusterSummary summarise_points(std::span<const Point3> positions,
+                                std::span<const std::uint32_t> members,
+                                std::uint32_t representative, const GroundMap& map) {
   if (is_diagonal(map)) {
     const Point3 diagonal{map[0], map[4], map[8]};
     return summarise(positions, members, representative, map, [diagonal](const Point3& v) {
@@ -68,11 +69,12 @@ Summary summarise_points(std::span<const Point3> positions, std::span<const std:
                    [map](const Point3& v) { return mapped(map, v); });
 }
 
-Summary summarise_heads(std::span<const Point3> positions, std::span<const Summary> heads,
-                        std::span<const std::uint32_t> members, std::uint32_t representative,
-                        const GroundMap& map) {
+ClusterSummary summarise_heads(std::span<const Point3> positions,
+                               std::span<const ClusterSummary> heads,
+                               std::span<const std::uint32_t> members, std::uint32_t representative,
+                               const GroundMap& map) {
   const Point3& from = positions[representative];
-  Summary result{Box3{}, 0.0, 0};
+  ClusterSummary result{Box3{}, 0.0, 0};
   double by_triangle = 0.0;
   for (const std::uint32_t member : members) {
     const Point3& p = positions[member];

@@ -11,13 +11,15 @@
 namespace terrace::cluster {
 
 /// Summarises a cluster of level 0. members: point numbers, including `representative`.
-Summary summarise_points(std::span<const Point3> positions, std::span<const std::uint32_t> members,
-                         std::uint32_t representative, const GroundMap& map);
+ClusterSummary summarise_points(std::span<const Point3> positions,
+                                std::span<const std::uint32_t> members,
+                                std::uint32_t representative, const GroundMap& map);
 
 /// Summarises a cluster above level 0. heads[i] is the summary of the cluster one level below that
 /// is headed by point i.
-Summary summarise_heads(std::span<const Point3> positions, std::span<const Summary> heads,
-                        std::span<const std::uint32_t> members, std::uint32_t representative,
-                        const GroundMap& map);
+ClusterSummary summarise_heads(std::span<const Point3> positions,
+                               std::span<const ClusterSummary> heads,
+                               std::span<const std::uint32_t> members, std::uint32_t representative,
+                               const GroundMap& map);
 
 }  // namespace terrace::cluster

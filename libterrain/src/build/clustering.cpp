@@ -30,7 +30,7 @@ void set_metric(const BuildRequest& request, const stream::Placement& info, cons
   const std::array<double, 6>& xy = info.world.xy;
   const stream::Channel& height = info.coordinates[2];
   options.metric_of = [&choice, &ground, xy, height](const base::Box3& bounds) {
-    const GroundMap map = ground.map({bounds.min, bounds.max});
+    const GroundMap map = ground.map(bounds);
     const double area = xy[0] * xy[4] - xy[1] * xy[3];
     const auto across = [&](double a, double b) { return (a * xy[4] - b * xy[3]) / area; };
     const auto along = [&](double a, double b) { return (b * xy[0] - a * xy[1]) / area; };
@@ -175,9 +175,7 @@ cluster::HierarchyOptions clustering_of(const BuildRequest& request, const strea
   options.block.seed = request.seed;
   options.strategy = request.strategy;
   options.payload_size = schema.payload_size();
-  options.ground = [&ground](const base::Box3& bounds) {
-    return ground.map({bounds.min, bounds.max});
-  };
+  options.ground = [&ground](const base::Box3& bounds) { return ground.map(bounds); };
   set_metric(request, schema, ground, options);
   set_channels(request, schema, options);
   set_corners(request, schema, options);

@@ -26,12 +26,11 @@ class MatchingPoints {
     for_each_wanted(
         view, detail,
         [&](stream::ClusterId id, const stream::ClusterRecord&, const stream::ClusterPoints& of) {
-          const unsigned level = stream::level_of(id);
           for (std::uint32_t i = 0; i < of.size(); ++i) {
             if (!of.match(i)) continue;
             const stream::Point3& p = of.positions[i];
             places.push_back({static_cast<Coord>(p[0]), static_cast<Coord>(p[1])});
-            points.push_back({{tri::cluster_id(level, stream::ordinal_of(id)), i}, p[2]});
+            points.push_back({{id, i}, p[2]});
           }
         });
     triangulation_.set_check_stop([&] { view.check_stop(); });

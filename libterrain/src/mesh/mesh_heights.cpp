@@ -15,10 +15,6 @@ struct Named {
   tri::VertexId vertex = tri::kNoVertex;
 };
 
-stream::ClusterId stored_id(tri::ClusterId id) {
-  return stream::cluster_id(tri::level_of(id), tri::ordinal_of(id));
-}
-
 /// Returns all vertices in the order of overlays.
 template <class Model>
 std::vector<Named> by_point(const Model& model) {
@@ -40,7 +36,7 @@ void apply_changes(stream::Overlay& overlay, const std::vector<Named>& vertices,
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const tri::PointId& point = vertices[i].point;
     if (i == 0 || point.cluster != vertices[i - 1].point.cluster) {
-      values = overlay.find(stored_id(point.cluster));
+      values = overlay.find(point.cluster);
       next = 0;
     }
     while (next < values.size() && values[next].index < point.index) ++next;
@@ -139,7 +135,7 @@ std::vector<double> changed_heights(const Model& model, const stream::Placement&
     for (const auto& [point, vertex] : vertices) {
       const double height = heights[tri::slot(vertex)];
       if (height == real(model.height(vertex))) continue;
-      options.save->add(stored_id(point.cluster), point.index, height);
+      options.save->add(point.cluster, point.index, height);
     }
   }
   return heights;

@@ -127,16 +127,14 @@ tri::ClusterRecord FramedSource::record(tri::ClusterId id) {
       missing_.insert(missing_.end(), missing.ranges().begin(), missing.ranges().end());
     }
   }
-  const stream::Box3 box =
-      store_.coarse_box(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id)));
-  return {.box = frame_.box_of({box.min, box.max}),
+  const stream::Box3 box = store_.coarse_box(id);
+  return {.box = frame_.box_of(box),
           .error = std::numeric_limits<double>::infinity(),
           .members = tri::ClusterRecord::kUnread};
 }
 
 tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
-  const stream::ClusterRecord record =
-      store_.record(stream::cluster_id(tri::level_of(id), tri::ordinal_of(id)));
+  const stream::ClusterRecord record = store_.record(id);
   tri::ClusterMembers members = inner_.read(id);
   if (lattice_ != nullptr) {
     nodes_.clear();

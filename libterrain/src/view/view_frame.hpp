@@ -54,7 +54,7 @@ class ViewFrame {
                            (corner & 2 ? stored.max : stored.min)[1],
                            (corner & 4 ? stored.max : stored.min)[2]}));
     }
-    return {box.min, box.max};
+    return box;
   }
   [[nodiscard]] const stream::LinearMap& ground() const { return map_; }
 

@@ -159,7 +159,7 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
     const auto& mesh = model().triangulation();
     const auto corners = mesh.vertices(triangle);
     const auto far = [&](const stream::Box3& cells) {
-      tri::Box3 near = impl_->frame.box_of({cells.min, cells.max});
+      tri::Box3 near = impl_->frame.box_of(cells);
       near.min[2] = -std::numeric_limits<double>::infinity();
       near.max[2] = std::numeric_limits<double>::infinity();
       // It is usually one of the clusters that the corners represent.

@@ -9,13 +9,9 @@ namespace terrace::tri {
 namespace {
 
 // One less than 56 bits allow, because the table of clusters uses the last ordinal for "none".
-constexpr std::uint64_t kMaxClusters = (std::uint64_t{1} << 56) - 1;
+constexpr std::uint64_t kMaxClusters = base::kClusterOrdinalEnd - 1;
 
 }  // namespace
-
-std::string to_string(ClusterId id) {
-  return "cluster " + std::to_string(ordinal_of(id)) + " of level " + std::to_string(level_of(id));
-}
 
 void ClusterSource::announce(std::span<const ClusterId>) {}
 

@@ -11,6 +11,8 @@
 #include <stop_token>
 #include <vector>
 
+#include <terrace/base/cluster.hpp>
+
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/facility_location.hpp"
 #include "terrace/cluster/metric.hpp"
@@ -37,38 +39,17 @@ namespace terrace::cluster {
 /// be singular: a row of zeros excludes that direction from all distances.
 using GroundMap = LinearMap;
 
-/// Summary of all descendants of a cluster down to level 0, including the representative. `error`
-/// is an upper bound of the ground distance from the representative to a descendant. At level 0 it
-/// is the largest distance, rounded up; above, it is the smaller of the bounds from the triangle
-/// inequality and from the box. Distances use the map of the block. Distances within the levels
-/// below, which the triangle inequality adds up, use the maps of the blocks there.
-struct Summary {
-  Box3 box;                       ///< of the unmapped positions
-  double error = 0.0;             ///< ground units
-  std::uint64_t descendants = 0;  ///< level-0 points
-  friend bool operator==(const Summary&, const Summary&) = default;
-};
-
-/// Marks the missing representative of the root.
-inline constexpr std::uint32_t kNoRepresentative = 0xffffffff;
-
-/// A finished block as the sink receives it. Points are numbered within the block. Cluster c has
-/// the points order[first[c]] ... order[first[c + 1] - 1], including the representative, in
-/// ascending order. `children` has `level` ordinals per point: the clusters that the point heads on
-/// levels 0, 1, ... The spans are valid until the call returns.
-struct FinishedBlock {
-  unsigned level = 0;
-  std::uint64_t block = 0;  ///< ordinal of the block on its level
-  std::span<const Point3> positions;
-  std::span<const std::byte> payload;  ///< HierarchyOptions::payload_size bytes per point
-  std::span<const std::uint64_t> children;
-  std::span<const std::uint32_t> first;
-  std::span<const std::uint32_t> order;
-  std::span<const std::uint32_t> representatives;
-  std::span<const Summary> summaries;  ///< one per cluster
-};
+using base::ClusteredBlock;
+/// The box is that of the unmapped positions. At level 0 the error is the largest ground distance,
+/// rounded up; above, it is the smaller of the bounds from the triangle inequality and from the
+/// box. Distances use the map of the block. Distances within the levels below, which the triangle
+/// inequality adds up, use the maps of the blocks there.
+using base::ClusterSummary;
+using base::kNoRepresentative;
 
 /// Receives the hierarchy. Several threads call `prepare` at once, as soon as a block is clustered.
+/// Its points have HierarchyOptions::payload_size bytes of payload, and those of a cluster are in
+/// ascending order. Its spans are valid until the call returns.
 /// One thread at a time calls `commit` with what prepare returned, in the order of blocks within
 /// each level. Cluster ordinals follow that order: the first block's clusters are 0, 1, ... The
 /// commits of different levels have no fixed order relative to each other. An exception from either
@@ -81,12 +62,12 @@ class HierarchySink {
   };
 
   virtual ~HierarchySink() = default;
-  virtual std::unique_ptr<Prepared> prepare(const FinishedBlock& block) = 0;
+  virtual std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) = 0;
   virtual void commit(unsigned level, std::unique_ptr<Prepared> prepared) = 0;
   /// Receives the points of the top level once, at the end, from finish(), as one cluster without a
   /// representative: representatives[0] is kNoRepresentative, the error is 0, and order is 0, 1,
   /// ... Without input the cluster has no points and an empty box.
-  virtual void root(const FinishedBlock& block) = 0;
+  virtual void root(const ClusteredBlock& block) = 0;
 };
 
 /// Attributes (colour, intensity) in the payload of a point that become further axes of distances.
@@ -116,7 +97,7 @@ struct HierarchyOptions {
   /// the facility cost is too low for that, it is raised for that block.
   BlockOptions block;
   /// Distances on the ground, after `ground` is applied. The boxes of a field are in that frame.
-  /// Summary::error remains a Euclidean ground distance.
+  /// ClusterSummary::error remains a Euclidean ground distance.
   Metric metric = Euclidean{};
   /// How blocks are clustered. `automatic` uses BlockClusterer if the metric is linear in the
   /// bounding box of the block (Euclidean, elliptical, or a field with one region there) and there

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/cluster.hpp>
+
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/schema.hpp"
@@ -22,55 +24,19 @@
 /// A store is a folder that holds every input point exactly once in a hierarchy of clusters, each
 /// of which can be read separately. FORMAT.md describes the bytes.
 ///
-/// Level 0 is full resolution; levels grow coarser upward to the *top*. A cluster of level L has
-/// one *representative*, a point whose highest level is above L, and *members*, the points whose
-/// highest level is exactly L. A point of highest level h heads one cluster on every level below h
-/// and has their h ordinals (its *children*, level 0 first). The points of the top level, which no
-/// cluster represents, are the *root*: cluster 0 of the top level, without a representative.
+/// <terrace/base/cluster.hpp> defines levels, representatives, members, children and the root.
 
 namespace terrace::stream {
 
 struct Ownership;  // atomic_file.hpp
 
-/// Identifies a cluster for the lifetime of the store: the level in the upper 8 bits, the ordinal
-/// in the lower 56.
-enum class ClusterId : std::uint64_t {};
-
-constexpr ClusterId cluster_id(unsigned level, std::uint64_t ordinal) {
-  return ClusterId{(std::uint64_t{level} << 56) | ordinal};
-}
-constexpr unsigned level_of(ClusterId id) {
-  return static_cast<unsigned>(static_cast<std::uint64_t>(id) >> 56);
-}
-constexpr std::uint64_t ordinal_of(ClusterId id) {
-  return static_cast<std::uint64_t>(id) & ((std::uint64_t{1} << 56) - 1);
-}
-
-/// Summary of all points below a cluster, including its representative. `box` is in stored
-/// coordinates; `error` is an upper bound of the ground distance in metres from the representative
-/// to a descendant.
-struct ClusterSummary {
-  Box3 box;
-  double error = 0.0;
-  std::uint64_t descendants = 0;  ///< number of level-0 points below, including the representative
-
-  friend bool operator==(const ClusterSummary&, const ClusterSummary&) = default;
-};
-
-/// A clustered block to be written to a store. Points are numbered within the block. Cluster c has
-/// the points order[first[c]] ... order[first[c + 1] - 1], including its representative. `children`
-/// has `level` ordinals per point, level 0 first. `payload` has the attribute values of each point,
-/// packed in the order of the schema, Schema::payload_size() bytes per point.
-struct ClusteredBlock {
-  unsigned level = 0;
-  std::span<const Point3> positions;  ///< stored coordinates
-  std::span<const std::byte> payload;
-  std::span<const std::uint64_t> children;
-  std::span<const std::uint32_t> first;
-  std::span<const std::uint32_t> order;
-  std::span<const std::uint32_t> representatives;  ///< point number, one per cluster
-  std::span<const ClusterSummary> summaries;       ///< one per cluster
-};
+using base::cluster_id;
+using base::ClusteredBlock;
+using base::ClusterId;
+using base::ClusterSummary;
+using base::kNoRepresentative;
+using base::level_of;
+using base::ordinal_of;
 
 /// The description of a store's points and of how the store was made. Never contains a time, path
 /// or host.
@@ -103,7 +69,9 @@ class StoreWriter {
   StoreWriter(const StoreWriter&) = delete;
   StoreWriter& operator=(const StoreWriter&) = delete;
 
-  /// The expensive half of appending a block. May be called by several threads at once. The block
+  /// The expensive half of appending a block, whose positions are stored coordinates and whose
+  /// payload has Schema::payload_size() bytes per point, the attributes in the order of the schema.
+  /// Its ordinal on its level is not used. May be called by several threads at once. The block
   /// need not outlive the call.
   [[nodiscard]] EncodedPtr encode(const ClusteredBlock& block) const;
   /// The ordered half: one thread at a time. The order of a level's blocks defines the ordinals.
@@ -117,9 +85,9 @@ class StoreWriter {
   /// source's end, so it must be set before finish().
   void set_nodata(std::uint64_t cells);
 
-  /// Writes the points of the top level, passed as a block of one cluster whose representative is
-  /// UINT32_MAX, syncs and publishes the store. If `publish` is false it is a trial run and removes
-  /// the store. Returns the size of the store in bytes.
+  /// Writes the points of the top level, passed as a block of one cluster without a
+  /// representative, syncs and publishes the store. If `publish` is false it is a trial run and
+  /// removes the store. Returns the size of the store in bytes.
   std::uint64_t finish(const ClusteredBlock& root, bool publish = true);
 
  private:

@@ -31,7 +31,7 @@ void RawBlock::add(const ClusterPoints& cluster) {
     insert(payload, cluster.representative_payload);
     insert(children, cluster.representative_children);
   } else {
-    representatives.push_back(UINT32_MAX);
+    representatives.push_back(kNoRepresentative);
   }
   first.push_back(static_cast<std::uint32_t>(positions.size()));
   order.resize(positions.size());
@@ -39,7 +39,14 @@ void RawBlock::add(const ClusterPoints& cluster) {
 }
 
 ClusteredBlock RawBlock::view() const {
-  return {level, positions, payload, children, first, order, representatives, summaries};
+  return {.level = level,
+          .positions = positions,
+          .payload = payload,
+          .children = children,
+          .first = first,
+          .order = order,
+          .representatives = representatives,
+          .summaries = summaries};
 }
 
 RawBlock decoded_block(const Layout& layout, const Tables& tables, const Bytes& bytes,

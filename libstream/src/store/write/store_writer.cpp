@@ -173,7 +173,7 @@ void StoreWriter::set_nodata(std::uint64_t cells) { impl_->schema.nodata = cells
 
 std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   Impl& w = *impl_;
-  assert(root.representatives.size() == 1 && root.representatives[0] == UINT32_MAX);
+  assert(root.representatives.size() == 1 && root.representatives[0] == kNoRepresentative);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
   if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
     throw Error(

@@ -21,10 +21,10 @@ class StoreSink final : public cluster::HierarchySink {
   explicit StoreSink(stream::StoreWriter& writer, bool publish = true, std::stop_token stop = {})
       : writer_(writer), publish_(publish), stop_(std::move(stop)) {}
 
-  std::unique_ptr<Prepared> prepare(const cluster::FinishedBlock& block) override;
+  std::unique_ptr<Prepared> prepare(const cluster::ClusteredBlock& block) override;
   void commit(unsigned level, std::unique_ptr<Prepared> prepared) override;
   /// Finishes the store. On return it is published under its name, unless it is a trial.
-  void root(const cluster::FinishedBlock& block) override;
+  void root(const cluster::ClusteredBlock& block) override;
 
   /// Bytes of the finished store; 0 before root().
   [[nodiscard]] std::uint64_t store_bytes() const { return store_bytes_; }

@@ -12,6 +12,8 @@
 #include <string>
 #include <vector>
 
+#include <terrace/base/cluster.hpp>
+
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/dynamic_surface.hpp"
@@ -27,21 +29,11 @@
 
 namespace terrace::tri {
 
-/// Identifies a cluster for the lifetime of its source: the level in the upper 8 bits, the ordinal
-/// in the lower 56.
-enum class ClusterId : std::uint64_t {};
-
-constexpr ClusterId cluster_id(unsigned level, std::uint64_t ordinal) {
-  return ClusterId{(std::uint64_t{level} << 56) | ordinal};
-}
-constexpr unsigned level_of(ClusterId id) {
-  return static_cast<unsigned>(static_cast<std::uint64_t>(id) >> 56);
-}
-constexpr std::uint64_t ordinal_of(ClusterId id) {
-  return static_cast<std::uint64_t>(id) & ((std::uint64_t{1} << 56) - 1);
-}
-/// Text for messages, such as "cluster 12 of level 3".
-std::string to_string(ClusterId id);
+using base::cluster_id;
+using base::ClusterId;
+using base::level_of;
+using base::ordinal_of;
+using base::to_string;
 
 /// Identifies a point for the lifetime of its source: member `index` of `cluster`. Its highest
 /// level is level_of(cluster).
