@@ -16,7 +16,7 @@
 
 #include "facility/bounds/lagrangian.hpp"
 #include "facility/bounds/matrix_dual.hpp"
-#include "facility/points/box_tree.hpp"
+#include "facility/points/client_tree.hpp"
 #include "facility/points/fast_distances.hpp"
 #include "facility/points/point_space.hpp"
 #include "terrace/cluster/facility_location.hpp"
@@ -35,7 +35,7 @@ class PointDual final : public DualFunction {
  public:
   /// Space and weights are in the order of the tree's leaves. `price` is the most that a client of
   /// weight 1 pays; it may be infinite.
-  PointDual(const BoxTree& tree, const Space& space, std::span<const double> weights,
+  PointDual(const ClientTree& tree, const Space& space, std::span<const double> weights,
             double facility_cost, double price, const LowerBoundOptions& options)
       : tree_(&tree),
         space_(&space),
@@ -120,7 +120,7 @@ class PointDual final : public DualFunction {
   void read_longest() {
     const auto& nodes = tree_->nodes();
     for (std::size_t n = nodes.size(); n-- > 0;) {
-      const BoxTree::Node& node = nodes[n];
+      const ClientTree::Node& node = nodes[n];
       double longest = 0.0;
       if (node.child_count == 0) {
         for (std::uint32_t i = 0; i < node.count; ++i) {
@@ -157,7 +157,7 @@ class PointDual final : public DualFunction {
 
   // Returns whether some facility of the leaf may be closer to the node's box than a payment there.
   [[nodiscard]] bool is_near(std::uint32_t leaf, std::uint32_t node) const {
-    const BoxTree::Node& from = tree_->nodes()[leaf];
+    const ClientTree::Node& from = tree_->nodes()[leaf];
     const Box3& box = tree_->nodes()[node].box;
     if constexpr (std::is_same_v<Space, FieldSpace>) {
       for (std::uint32_t j = from.first; j < from.first + from.count; ++j) {
@@ -183,7 +183,7 @@ class PointDual final : public DualFunction {
     std::size_t looked = 0;
     work.near.clear();
     for (const std::uint32_t n : work.leaves) {
-      const BoxTree::Node& node = tree_->nodes()[n];
+      const ClientTree::Node& node = tree_->nodes()[n];
       if (!(space_->box_distance(facility, node.box) < longest_[n])) continue;
       from.add(node.first, node.count, payment_.data(), weights_.data());
       work.near.push_back(n);
@@ -198,14 +198,14 @@ class PointDual final : public DualFunction {
   void count_payers(std::uint32_t facility, const Work& work) {
     const auto from = space_->from(facility);
     for (const std::uint32_t n : work.near) {
-      const BoxTree::Node& node = tree_->nodes()[n];
+      const ClientTree::Node& node = tree_->nodes()[n];
       for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
         if (payment_[i] > from(i)) count_[i].fetch_add(1, std::memory_order_relaxed);
       }
     }
   }
 
-  const BoxTree* tree_;
+  const ClientTree* tree_;
   const Space* space_;
   FastDistances<Space> distances_;
   std::span<const double> weights_;
@@ -308,7 +308,7 @@ void permute(SearchFrame& frame, const std::vector<std::uint32_t>& order) {
 // Replaces the duals, given as payments per weight, by the best ones found. Returns L there.
 template <class Space>
 double ascend_from(const Start& start, const Space& space, const SearchFrame& frame,
-                   const BoxTree* tree, const LowerBoundOptions& options,
+                   const ClientTree* tree, const LowerBoundOptions& options,
                    std::vector<double>& duals) {
   duals = start.payments(frame);
   if constexpr (Space::kHasBoxes) {
@@ -352,9 +352,9 @@ LowerBound lower_bound(const FacilityPoints& problem, const FacilitySolution& st
   std::vector<std::uint32_t> order(problem.points.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<Point3> original(problem.points.begin(), problem.points.end());
-  std::optional<BoxTree> tree;
+  std::optional<ClientTree> tree;
   if (!frame.points.empty()) {
-    tree.emplace(BoxTree::Kind::kd_tree, frame.points);
+    tree.emplace(ClientTree::Kind::kd_tree, frame.points);
     order = tree->order();
     permute(frame, order);
     for (std::size_t k = 0; k < order.size(); ++k) original[k] = problem.points[order[k]];

@@ -14,7 +14,7 @@
 #include <terrace/base/random.hpp>
 #include <terrace/base/stop_check.hpp>
 
-#include "facility/points/box_tree.hpp"
+#include "facility/points/client_tree.hpp"
 #include "facility/points/search_engine.hpp"
 #include "facility/points/search_space.hpp"
 
@@ -29,9 +29,10 @@ class SpaceSearch final : public SearchEngine {
               const base::StopCheck& check_stop)
       : SearchEngine(frame, strategy, threads, check_stop), space_(std::move(space)) {
     if constexpr (Space::kHasBoxes) {
-      if (strategy == FacilityStrategy::quadtree) tree_.emplace(BoxTree::Kind::quadtree, points());
-      if (strategy == FacilityStrategy::octree) tree_.emplace(BoxTree::Kind::octree, points());
-      if (strategy == FacilityStrategy::kd_tree) tree_.emplace(BoxTree::Kind::kd_tree, points());
+      if (strategy == FacilityStrategy::quadtree)
+        tree_.emplace(ClientTree::Kind::quadtree, points());
+      if (strategy == FacilityStrategy::octree) tree_.emplace(ClientTree::Kind::octree, points());
+      if (strategy == FacilityStrategy::kd_tree) tree_.emplace(ClientTree::Kind::kd_tree, points());
     }
     std::vector<std::uint32_t> facility(state_.size(), 0);
     std::vector<double> distances(state_.size());
@@ -160,7 +161,7 @@ class SpaceSearch final : public SearchEngine {
   }
 
   Space space_;
-  std::optional<BoxTree> tree_;
+  std::optional<ClientTree> tree_;
   std::vector<std::uint32_t> changed_;  // clients changed by the last verdict
   std::vector<Verdict> parts_;          // parts of a gain, by piece of work
 };
@@ -241,11 +242,11 @@ template <class Space>
 void SpaceSearch<Space>::scan_tree(std::uint32_t candidate, const From& from,
                                    Verdict& verdict) const {
   if constexpr (Space::kHasBoxes) {
-    const std::vector<BoxTree::Node>& nodes = tree_->nodes();
+    const std::vector<ClientTree::Node>& nodes = tree_->nodes();
     std::vector<std::uint32_t>& stack = verdict.stack;  // nodes to visit
     stack.assign(1, 0);
     while (!stack.empty()) {
-      const BoxTree::Node& node = nodes[stack.back()];
+      const ClientTree::Node& node = nodes[stack.back()];
       stack.pop_back();
       if (space_.box_distance(candidate, node.box) >= node.longest) continue;
       for (std::uint32_t c = 0; c < node.child_count; ++c) stack.push_back(node.first_child + c);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "facility/points/box_tree.hpp"
+#include "facility/points/client_tree.hpp"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@ constexpr std::uint32_t kLeaf = 16;
 
 }  // namespace
 
-BoxTree::BoxTree(Kind kind, std::span<const Point3> points)
+ClientTree::ClientTree(Kind kind, std::span<const Point3> points)
     : order_(points.size()), leaf_(points.size()) {
   std::iota(order_.begin(), order_.end(), 0u);
   Node root;
@@ -34,7 +34,7 @@ BoxTree::BoxTree(Kind kind, std::span<const Point3> points)
   }
 }
 
-void BoxTree::split(std::uint32_t node, Kind kind, std::span<const Point3> points) {
+void ClientTree::split(std::uint32_t node, Kind kind, std::span<const Point3> points) {
   const Node parent = nodes_[node];
   if (parent.count <= kLeaf) return;
   const Point3 size = difference(parent.box.max, parent.box.min);
@@ -91,7 +91,7 @@ void BoxTree::split(std::uint32_t node, Kind kind, std::span<const Point3> point
   nodes_[node].child_count = static_cast<std::uint32_t>(nodes_.size()) - first_child;
 }
 
-double BoxTree::longest_below(const Node& node, std::span<const double> connections) const {
+double ClientTree::longest_below(const Node& node, std::span<const double> connections) const {
   double longest = 0.0;
   for (std::uint32_t c = 0; c < node.child_count; ++c) {
     longest = std::max(longest, nodes_[node.first_child + c].longest);
@@ -104,13 +104,14 @@ double BoxTree::longest_below(const Node& node, std::span<const double> connecti
   return longest;
 }
 
-void BoxTree::set(std::span<const double> connections) {
+void ClientTree::set(std::span<const double> connections) {
   for (std::size_t n = nodes_.size(); n-- > 0;) {
     nodes_[n].longest = longest_below(nodes_[n], connections);
   }
 }
 
-void BoxTree::update(std::span<const std::uint32_t> changed, std::span<const double> connections) {
+void ClientTree::update(std::span<const std::uint32_t> changed,
+                        std::span<const double> connections) {
   marked_.clear();
   for (const std::uint32_t client : changed) marked_.push_back(leaf_[client]);
   std::sort(marked_.begin(), marked_.end());

@@ -14,7 +14,7 @@ namespace terrace::cluster {
 /// once; the connections change. Source: J. Skála, Algorithms for manipulating large geometric
 /// data, 7.3.2, figure 7.9. It differs from that in: boxes are those of the points, not those of
 /// the grid.
-class BoxTree {
+class ClientTree {
  public:
   enum class Kind : std::uint8_t {
     quadtree,  ///< halves x and y
@@ -32,7 +32,7 @@ class BoxTree {
 
   /// O(n log n); a quadtree or octree may take O(n) levels, as many as the binary digits of the
   /// range of coordinates.
-  BoxTree(Kind kind, std::span<const Point3> points);
+  ClientTree(Kind kind, std::span<const Point3> points);
 
   [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
   [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "facility/points/box_tree.hpp"
+#include "facility/points/client_tree.hpp"
 
 #include <algorithm>
 #include <random>
@@ -14,18 +14,18 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr BoxTree::Kind kKinds[] = {BoxTree::Kind::quadtree, BoxTree::Kind::octree,
-                                    BoxTree::Kind::kd_tree};
+constexpr ClientTree::Kind kKinds[] = {ClientTree::Kind::quadtree, ClientTree::Kind::octree,
+                                       ClientTree::Kind::kd_tree};
 
 // Checks every node: its box and connection are those of its clients, which its children partition.
-void expect_tree(const BoxTree& tree, const std::vector<Point3>& points,
+void expect_tree(const ClientTree& tree, const std::vector<Point3>& points,
                  const std::vector<double>& connections) {
   const auto& nodes = tree.nodes();
   ASSERT_EQ(nodes[0].count, points.size());
   ASSERT_EQ(std::set<std::uint32_t>(tree.order().begin(), tree.order().end()).size(),
             points.size());
   for (std::uint32_t n = 0; n < nodes.size(); ++n) {
-    const BoxTree::Node& node = nodes[n];
+    const ClientTree::Node& node = nodes[n];
     std::vector<Point3> inside;
     double longest = 0.0;
     for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
@@ -47,16 +47,16 @@ void expect_tree(const BoxTree& tree, const std::vector<Point3>& points,
   }
 }
 
-TEST(BoxTree, HoldsWhatItSaysWhileConnectionsChange) {
+TEST(ClientTree, HoldsWhatItSaysWhileConnectionsChange) {
   for (laws::OwnedProblem& p : laws::problems(500, 41)) {
     if (p.name == "collinear") {
       double size = 1.0;
       for (Point3& q : p.points) q = {size *= 0.5, 0.0, size};  // halves down to denormal numbers
     }
-    for (const BoxTree::Kind kind : kKinds) {
+    for (const ClientTree::Kind kind : kKinds) {
       SCOPED_TRACE(p.name + ", kind " + std::to_string(static_cast<int>(kind)));
       std::mt19937_64 random(42);
-      BoxTree tree(kind, p.points);
+      ClientTree tree(kind, p.points);
       std::vector<double> connections(p.points.size());
       for (double& c : connections) c = inputs::uniform(random);
       tree.set(connections);
@@ -75,13 +75,13 @@ TEST(BoxTree, HoldsWhatItSaysWhileConnectionsChange) {
   }
 }
 
-TEST(BoxTree, LeavesAreSmallWherePointsDiffer) {
+TEST(ClientTree, LeavesAreSmallWherePointsDiffer) {
   std::mt19937_64 random(43);
   const std::vector<Point3> points = inputs::cube(5000, random);
-  for (const BoxTree::Kind kind : kKinds) {
-    const BoxTree tree(kind, points);
+  for (const ClientTree::Kind kind : kKinds) {
+    const ClientTree tree(kind, points);
     EXPECT_GT(tree.nodes().size(), 5000u / 16);
-    for (const BoxTree::Node& node : tree.nodes()) {
+    for (const ClientTree::Node& node : tree.nodes()) {
       if (node.child_count == 0) {
         EXPECT_LE(node.count, 16u);
       }
