@@ -225,48 +225,46 @@ class VrtReader {
 
   /// Reads a source's place. It must be whole cells, and as many of the source as of the mosaic.
   void place(const XmlElement& element, VrtSource& source) {
-    struct Rect {
-      std::array<double, 4> v{};
-    };
+    using Rect = std::array<double, 4>;  // offset and size, as in the file
     const auto rect = [&](const char* name) -> std::optional<Rect> {
       const XmlElement* const found = element.child(name);
       if (found == nullptr) return std::nullopt;
-      Rect r;
+      Rect r{};
       constexpr std::array kNames{"xOff", "yOff", "xSize", "ySize"};
       for (std::size_t i = 0; i < 4; ++i) {
         const double value = number(found->attribute(kNames[i]), name);
-        r.v[i] = std::round(value);
-        const double off = std::abs(value - r.v[i]);
+        r[i] = std::round(value);
+        const double off = std::abs(value - r[i]);
         if (off > kNearestCell) {
           throw fault("is not on whole cells, so its source would be resampled")
               .at(name)
               .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
         }
         farthest_ = std::max(farthest_, off);
-        if (!(r.v[i] >= (i < 2 ? 0 : 1)) || r.v[i] >= static_cast<double>(kMostVrtCells)) {
+        if (!(r[i] >= (i < 2 ? 0 : 1)) || r[i] >= static_cast<double>(kMostVrtCells)) {
           throw fault("is outside the raster").at(name).remedy(kAsGeoTiff);
         }
       }
       return r;
     };
     const auto columns = static_cast<double>(info_.columns), rows = static_cast<double>(info_.rows);
-    const Rect whole{{0, 0, columns, rows}};
+    const Rect whole{0, 0, columns, rows};
     const Rect from = rect("SrcRect").value_or(whole), to = rect("DstRect").value_or(whole);
-    if (from.v[2] != to.v[2] || from.v[3] != to.v[3]) {
+    if (from[2] != to[2] || from[3] != to[3]) {
       throw fault("is not as large as its SrcRect, so its source would be resampled")
           .at("DstRect")
           .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
     }
-    if (to.v[0] + to.v[2] > columns || to.v[1] + to.v[3] > rows) {
+    if (to[0] + to[2] > columns || to[1] + to[3] > rows) {
       throw fault("is outside the raster").at("DstRect").remedy(kAsGeoTiff);
     }
     const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
-    source.from_column = cells(from.v[0]);
-    source.from_row = cells(from.v[1]);
-    source.column = cells(to.v[0]);
-    source.row = cells(to.v[1]);
-    source.columns = cells(to.v[2]);
-    source.rows = cells(to.v[3]);
+    source.from_column = cells(from[0]);
+    source.from_row = cells(from[1]);
+    source.column = cells(to[0]);
+    source.row = cells(to[1]);
+    source.columns = cells(to[2]);
+    source.rows = cells(to[3]);
   }
 
   static constexpr std::string_view kBand = "VRTRasterBand";

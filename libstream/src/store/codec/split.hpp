@@ -17,6 +17,7 @@
 
 namespace terrace::stream::store {
 
+/// Has sizes instead of upper ends, because the coder halves and codes sizes.
 struct IntegerBox {
   std::array<std::uint64_t, 3> low{};
   std::array<std::uint64_t, 3> size{1, 1, 1};  ///< low + size is the first value above it

@@ -18,7 +18,7 @@ namespace terrace::stream::store {
 /// A box inside another, with its ends in steps of 1/kMost of the outer box. A default object is
 /// empty.
 template <class Number>
-struct BoxWithin {
+struct QuantisedBox {
   static constexpr Number kMost = std::numeric_limits<Number>::max();
 
   std::array<Number, 3> low{kMost, kMost, kMost}, high{};
@@ -32,8 +32,8 @@ struct BoxWithin {
     return box;
   }
   /// Returns the smallest one that contains the intersection of `box` and `outer`.
-  static BoxWithin around(const Box3& box, const Box3& outer) {
-    BoxWithin found;
+  static QuantisedBox around(const Box3& box, const Box3& outer) {
+    QuantisedBox found;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = outer.min[axis], high = outer.max[axis];
       const auto place = [&](double value) {
@@ -63,9 +63,9 @@ struct BoxWithin {
 /// Pages of the index in a chapter; the last one may have fewer.
 inline constexpr std::uint64_t kChapterPages = 64;
 /// A box in the bounds of the store.
-using ChapterBox = BoxWithin<std::uint16_t>;
+using ChapterBox = QuantisedBox<std::uint16_t>;
 /// A box in its chapter's box.
-using PageBox = BoxWithin<std::uint8_t>;
+using PageBox = QuantisedBox<std::uint8_t>;
 
 /// The positions of the parts of a level's index: pages, the contents of each chapter, sets of
 /// tables. The contents of chapters are read when needed, unless all of them together are small.
