@@ -15,9 +15,7 @@
 /// Shared by tests of meshes of grids: windows meshed individually, and brute-force checks of the
 /// result.
 
-namespace grid_tin_oracle {
-
-using namespace terrace::tri;
+namespace terrace::tri::grid_tin_oracle {
 
 using Corners = std::array<std::array<std::int64_t, 2>, 3>;
 
@@ -101,4 +99,4 @@ GridTin make(const OwnedWindow<T>& owned, double bound, TinQuality quality, doub
   return grid_tin(owned.window(), settle_sides(owned.window(), bound), options);
 }
 
-}  // namespace grid_tin_oracle
+}  // namespace terrace::tri::grid_tin_oracle

@@ -9,7 +9,8 @@
 
 namespace {
 
-using namespace grid_tin_oracle;
+using namespace terrace::tri;
+using namespace terrace::tri::grid_tin_oracle;
 
 TEST(GridTin, BestOfPoints) {
   const auto owned = make_window<float>(Relief::kNoise, Gaps::kNone, 40, 40, 8);

@@ -11,7 +11,8 @@
 
 namespace {
 
-using namespace grid_tin_oracle;
+using namespace terrace::tri;
+using namespace terrace::tri::grid_tin_oracle;
 
 __extension__ typedef __int128 Int128;
 

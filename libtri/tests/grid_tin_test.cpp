@@ -15,7 +15,8 @@
 
 namespace {
 
-using namespace grid_tin_oracle;
+using namespace terrace::tri;
+using namespace terrace::tri::grid_tin_oracle;
 
 template <class T>
 void expect_within_bounds(std::uint32_t columns, std::uint32_t rows, std::uint64_t seed) {

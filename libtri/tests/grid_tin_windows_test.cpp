@@ -9,7 +9,8 @@
 
 namespace {
 
-using namespace grid_tin_oracle;
+using namespace terrace::tri;
+using namespace terrace::tri::grid_tin_oracle;
 
 /// Windows of a raster that share sides, each settled with the adjacent lines.
 TEST(GridTin, WindowsFitTogether) {

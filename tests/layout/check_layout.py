@@ -151,6 +151,7 @@ CGAL_LGPL = re.compile(r'CGAL/(Exact_(predicates|rational)|Gmpq|Mpzf|Simple_cart
 COMPARES = re.compile(r'lib[a-z]+/(tests|bench)/')
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+USING_NAMESPACE = re.compile(r'\s*using\s+namespace\b')
 SOURCE_ENDINGS = ('.cpp', '.hpp', '.h', '.cu', '.cpp.in', '.py', '.sh')
 # CUDA kernels and such aside, these folders hold what a Meson list must name, with the ending that
 # the list leaves out.
@@ -241,6 +242,10 @@ def check_sources(root):
             for number, included in includes:
                 for breach in check_include(path, *included):
                     yield f'{path}:{number}: {breach}'
+            if name.endswith(('.hpp', '.h')):
+                for number, line in enumerate(lines, 1):
+                    if USING_NAMESPACE.match(line):
+                        yield f'{path}:{number}: a header has `using namespace`, which reaches all files that include it; qualify the names'
 
 
 def check_inexact(root):

@@ -111,6 +111,14 @@ class CheckLayout(unittest.TestCase):
         self.assertEqual(found('libstream/src/b.cpp', '', listed=['io/core']),
                          [f'libstream/src/io/more.cpp: is in {check_layout.CORE_MAKEFILE} and does not exist'])
 
+    def test_headers_have_no_using_namespace(self):
+        directive = 'namespace terrace::tri {\n  using  namespace base;\nusing base::Box3;  // not: using namespace base\n}\n'
+        for path in ('libtri/include/terrace/tri/b.hpp', 'libtri/src/b.hpp', 'libtri/tests/oracle.hpp', 'tools/src/b.hpp', 'viewer/core/b.h'):
+            found = self.breaches(lambda root: write(root, path, head(path) + directive))
+            self.assertEqual([breach for breach in found if 'using namespace' in breach],
+                             [f'{path}:3: a header has `using namespace`, which reaches all files that include it; qualify the names'])
+        self.assertEqual(self.breaches(lambda root: write(root, 'tools/src/b.cpp', head('tools') + directive)), [])
+
     def test_each_breach_is_found(self):
         apache = '// SPDX-License-Identifier: Apache-2.0\n'
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'

@@ -6,6 +6,8 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 TEST(Focus, ParsesBoxAndLevel) {

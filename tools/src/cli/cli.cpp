@@ -28,6 +28,8 @@
 #include "version.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 constexpr int kDone = 0;

@@ -25,8 +25,6 @@ class Option;
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 /// The outcome of a verb: one JSON object for programs (plain numbers, SI units, bytes, seconds)
 /// and a text for people. With --json the object goes to standard output. Otherwise the text goes
 /// to standard error, or to standard output if it is the result itself (`info`).
@@ -37,7 +35,7 @@ struct Summary {
   int exit_code = 0;  ///< 1 if a check found a fault
 
   /// Adds the cost of the work: "seconds" and "peak_rss_bytes".
-  void add_cost(const Stopwatch& watch);
+  void add_cost(const terrain::Stopwatch& watch);
 };
 
 /// Returns the value as JSON, or null for nullopt.

@@ -14,6 +14,8 @@
 // Separate from cli.cpp, which depends on all verbs.
 namespace terrace::tools {
 
+using namespace terrain;
+
 std::uint64_t peak_rss_bytes() {
   // ru_maxrss is the last resort: it survives exec and so includes the parent program's peak.
   std::ifstream status("/proc/self/status");

@@ -15,6 +15,8 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
@@ -160,7 +162,7 @@ stream::ClusterId parse_cluster(const std::string& text) {
   if (colon != std::string::npos) {
     const auto level = number_from<unsigned>(text.substr(0, colon));
     const auto number = number_from<std::uint64_t>(text.substr(colon + 1));
-    if (level && *level < 256 && number && *number < std::uint64_t{1} << 56) {
+    if (level && *level < 256 && number && *number < base::kClusterOrdinalEnd) {
       return stream::cluster_id(*level, *number);
     }
   }

@@ -27,8 +27,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 /// Returns the value that `text` names. The error lists the valid names.
 template <class T>
 T choice(const std::string& text, const char* option,
@@ -38,13 +36,13 @@ T choice(const std::string& text, const char* option,
     if (name == text) return value;
     names += (names.empty() ? "" : ", ") + std::string(name);
   }
-  throw UsageError(std::string(option) + " '" + text + "': one of " + names);
+  throw terrain::UsageError(std::string(option) + " '" + text + "': one of " + names);
 }
 
 /// Parses "none", "flat" or "interpolate".
-Fill parse_fill(const std::string& text);
+terrain::Fill parse_fill(const std::string& text);
 /// Parses "ellipsoidal", "orthometric" or "ignore". An empty text means what the store records.
-HeightReference parse_height_reference(const std::string& text);
+terrain::HeightReference parse_height_reference(const std::string& text);
 /// Parses "greedy", "removal" or "fitted".
 tri::TinQuality parse_quality(const std::string& text);
 /// Parses "all", "min", "max", "mean", "first" or "error".
@@ -52,7 +50,7 @@ tri::PointDuplicates parse_duplicates(const std::string& text);
 /// Parses "linear", "natural" or "nearest".
 tri::Interpolation parse_interpolation(const std::string& text);
 /// Parses "height", "slope", "aspect" or "hillshade".
-RasterValue parse_raster_value(const std::string& text);
+terrain::RasterValue parse_raster_value(const std::string& text);
 /// Parses the name of a search over points: "automatic", "fast", "full-scan", "quadtree", "octree",
 /// "kd-tree" or "facilities".
 cluster::FacilityStrategy parse_strategy(const std::string& text);
@@ -70,8 +68,8 @@ std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text);
 std::pair<std::string, double> channel_of(const std::string& text);
 
 struct Line {
-  std::vector<Point2> places;      ///< at least two
-  std::optional<PlacesCrs> crs{};  ///< as Region::crs()
+  std::vector<terrain::Point2> places;      ///< at least two
+  std::optional<terrain::PlacesCrs> crs{};  ///< as Region::crs()
 };
 /// Parses "x1,y1,x2,y2[,...]" or a GeoJSON file with one LineString (plain, in a Feature, or in a
 /// FeatureCollection with one feature). Throws stream::Error for an invalid file.
@@ -82,7 +80,7 @@ std::optional<unsigned> parse_level(const std::string& text);
 
 /// A region and the level requested there; nullopt means the top.
 struct Focus {
-  Region region;
+  terrain::Region region;
   std::optional<unsigned> level;
 };
 /// Parses "BOX:L", where L is a number or "top". Throws as Region::parse does.
@@ -91,8 +89,8 @@ Focus parse_focus(const std::string& text);
 /// Parses the requested levels and checks them against the store. An empty level means the top if
 /// there are focuses, otherwise level 0. `conversion` applies to regions given in another CRS.
 /// Throws as Region::parse does, and UsageError for a level above the store's top.
-Detail parse_detail(const stream::Store& store, const std::string& level, const std::string& region,
-                    const std::vector<std::string>& focuses,
-                    const RegionConversion& conversion = {});
+terrain::Detail parse_detail(const stream::Store& store, const std::string& level,
+                             const std::string& region, const std::vector<std::string>& focuses,
+                             const terrain::RegionConversion& conversion = {});
 
 }  // namespace terrace::tools

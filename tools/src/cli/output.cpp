@@ -14,6 +14,8 @@
 
 namespace terrace::tools {
 
+using namespace terrain;
+
 bool written_by_terrace(const std::string& path) {
   const std::optional<bool> marked = marked_by_terrace(path);
   return marked ? *marked : stream::is_unchanged_output(path);

@@ -12,6 +12,8 @@
 
 namespace terrace::tools {
 
+using namespace terrain;
+
 std::optional<Transformation> CrsOptions::given(const stream::Store& store,
                                                 const CommonOptions& common) const {
   if (given_.empty()) return std::nullopt;

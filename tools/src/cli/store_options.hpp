@@ -23,8 +23,6 @@ namespace terrace::tools {
 
 struct CommonOptions;
 
-using namespace terrain;
-
 /// The CRS of coordinates in the request (--region-crs unless the verb names it otherwise),
 /// --to-crs and --towgs84.
 class CrsOptions {
@@ -39,21 +37,21 @@ class CrsOptions {
   /// transformation_to throws.
   /// Returns the transformation from the store's CRS to that of the request; nullopt if none is
   /// named.
-  [[nodiscard]] std::optional<Transformation> given(const stream::Store& store,
-                                                    const CommonOptions& common) const;
-  [[nodiscard]] RegionConversion regions(const stream::Store& store,
-                                         const CommonOptions& common) const;
-  [[nodiscard]] PlaceConversion places(const stream::Store& store,
-                                       const CommonOptions& common) const;
+  [[nodiscard]] std::optional<terrain::Transformation> given(const stream::Store& store,
+                                                             const CommonOptions& common) const;
+  [[nodiscard]] terrain::RegionConversion regions(const stream::Store& store,
+                                                  const CommonOptions& common) const;
+  [[nodiscard]] terrain::PlaceConversion places(const stream::Store& store,
+                                                const CommonOptions& common) const;
   /// Returns the transformation to --to-crs, from `given` or otherwise from the store's CRS;
   /// nullopt without --to-crs.
-  [[nodiscard]] std::optional<Transformation> written(
+  [[nodiscard]] std::optional<terrain::Transformation> written(
       const stream::Store& store, const CommonOptions& common,
-      const std::optional<Transformation>& given = {}) const;
+      const std::optional<terrain::Transformation>& given = {}) const;
   /// Returns the transformation from the store's CRS to --to-crs; nullopt also if both are the
   /// same.
-  [[nodiscard]] std::optional<Transformation> to(const stream::Store& store,
-                                                 const CommonOptions& common) const;
+  [[nodiscard]] std::optional<terrain::Transformation> to(const stream::Store& store,
+                                                          const CommonOptions& common) const;
 
  private:
   std::string given_, to_, shift_;
@@ -71,7 +69,8 @@ struct PartOptions {
   /// Adds --cluster. `given` says what the option outputs for a cluster.
   CLI::Option* define_cluster(CLI::App& app, const std::string& given);
   /// Throws as parse_detail does.
-  [[nodiscard]] Detail detail(const stream::Store& store, const CommonOptions& common) const;
+  [[nodiscard]] terrain::Detail detail(const stream::Store& store,
+                                       const CommonOptions& common) const;
 };
 
 /// Selects the surface through a store's samples: the store, --level, --max-edge, --where and
@@ -84,7 +83,7 @@ struct SurfaceOptions {
   /// Adds all but --method.
   void define_triangles(CLI::App& app);
   /// Checks the options, then opens the store. Throws UsageError and stream::Error.
-  [[nodiscard]] stream::Store open(SamplerOptions& sampler) const;
+  [[nodiscard]] stream::Store open(terrain::SamplerOptions& sampler) const;
 };
 
 }  // namespace terrace::tools

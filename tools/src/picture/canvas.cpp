@@ -11,6 +11,8 @@
 #include "cli/interrupt.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// Distinct from both snow and shadow.

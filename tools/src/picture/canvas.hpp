@@ -12,8 +12,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 /// The drawing surface: colour and depth of samples, with 2 x 2 samples per pixel.
 class Canvas {
  public:

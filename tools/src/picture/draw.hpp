@@ -23,14 +23,16 @@ struct DrawOptions {
 /// Draws the triangles of `mesh` (positions in metres on the ground) in the colours of their
 /// vertices, with a depth buffer. Edges are anti-aliased and fade where triangles are only a few
 /// pixels large. O(triangles + samples).
-void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, const Camera& camera,
-                    const Light& light, const DrawOptions& options, Canvas& canvas);
+void draw_triangles(const terrain::TriangleMesh& mesh, const std::vector<Rgb>& colours,
+                    const Camera& camera, const Light& light, const DrawOptions& options,
+                    Canvas& canvas);
 
 /// Draws a point cloud as discs just large enough to close the gaps at the cloud's density, or at
 /// each part's density if some parts are coarser. Lighting uses the points' normals if they have
 /// any, otherwise normals estimated from the surrounding depths.
-void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
-                 const Light& light, const DrawOptions& options, Canvas& canvas);
+void draw_points(const terrain::TriangleMesh& cloud, const std::vector<Rgb>& colours,
+                 const Camera& camera, const Light& light, const DrawOptions& options,
+                 Canvas& canvas);
 
 /// Marks positions (metres on the ground) with small dark discs on top of the picture, unless
 /// something is in front of them.
@@ -51,7 +53,7 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
 /// Draws lines, which are runs of `positions` (metres on the ground), on white. Each piece has the
 /// colour of its first vertex, or is dark without colours. O(vertices + samples drawn).
 void draw_lines(const std::vector<stream::Point3>& positions,
-                const std::vector<LineSet::Line>& lines, const std::vector<Rgb>& colours,
+                const std::vector<terrain::LineSet::Line>& lines, const std::vector<Rgb>& colours,
                 const Camera& camera, const DrawOptions& options, Canvas& canvas);
 
 /// Sets scale and centre so that all positions just fit onto `canvas`, with a margin of 2 %.

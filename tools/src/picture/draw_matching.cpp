@@ -12,6 +12,8 @@
 #include "tables/matching_result.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 using Colour = std::array<float, 3>;

@@ -19,6 +19,8 @@
 #include "picture/draw.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 struct Splat {

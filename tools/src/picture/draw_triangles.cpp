@@ -8,6 +8,8 @@
 #include "picture/draw.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// A projected vertex: position in samples, depth, brightness.

@@ -10,6 +10,8 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// Memory of CGAL's triangulation, in bytes per point.

@@ -8,14 +8,12 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 /// Parses --criterion: poles, gabriel, edge[:FACTOR], advancing-front or alpha-wrap[:METRES].
 /// Throws UsageError.
-ScanSurfaceOptions parse_criterion(const std::string& text);
+terrain::ScanSurfaceOptions parse_criterion(const std::string& text);
 
 /// Sets the elliptical metric between positions in metres; a Euclidean one changes nothing. Throws
 /// UsageError for another kind of metric, for one with boxes, or together with a CGAL method.
-void set_metric(const MetricChoice& metric, ScanSurfaceOptions& options);
+void set_metric(const terrain::MetricChoice& metric, terrain::ScanSurfaceOptions& options);
 
 }  // namespace terrace::tools

@@ -20,6 +20,8 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 constexpr std::uint32_t kSynthTile = 256;

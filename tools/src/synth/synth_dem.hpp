@@ -12,10 +12,8 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
-
 struct SynthDemOptions {
-  ImageSize size{4096, 4096};
+  terrain::ImageSize size{4096, 4096};
   double cell = 30.0;  ///< side of a cell, in units of the CRS
   double hurst = 0.8;
   double roughness = 2.65;

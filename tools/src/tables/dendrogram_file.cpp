@@ -14,6 +14,8 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 std::string row_text(const cluster::Merge& merge) {

@@ -15,6 +15,8 @@
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// One row of the file.

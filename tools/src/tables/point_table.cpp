@@ -17,6 +17,8 @@
 
 namespace terrace::tools {
 
+using namespace terrain;
+
 std::vector<double> PointTable::column(const std::string& name) const {
   std::string known;
   for (std::size_t c = 0; c < info.attributes.size(); ++c) {

@@ -30,6 +30,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// Points that the trial run of --dry-run reads before it extrapolates.

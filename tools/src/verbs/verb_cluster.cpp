@@ -41,6 +41,8 @@
 
 namespace terrace::tools {
 
+using namespace terrain;
+
 using cluster::FacilityPoints;
 using cluster::FacilitySolution;
 using cluster::FacilityStrategy;

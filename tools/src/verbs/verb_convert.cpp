@@ -29,6 +29,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 class ConvertCommand : public Command {

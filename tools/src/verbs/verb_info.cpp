@@ -33,6 +33,8 @@
 
 namespace terrace::tools {
 
+using namespace terrain;
+
 namespace {
 
 using Json = nlohmann::ordered_json;

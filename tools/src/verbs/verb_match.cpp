@@ -38,6 +38,8 @@
 
 namespace terrace::tools {
 
+using namespace terrain;
+
 using matching::Point3;
 
 namespace {

@@ -31,6 +31,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// Keeps freed memory in the process, if the C library supports it, for work on several threads

@@ -33,6 +33,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 class PointsCommand final : public Command {

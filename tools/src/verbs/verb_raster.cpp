@@ -18,6 +18,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 class RasterCommand final : public Command {

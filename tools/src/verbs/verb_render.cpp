@@ -45,6 +45,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// The part of an input that a picture shows.

@@ -21,6 +21,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 class SampleCommand final : public Command {

@@ -22,6 +22,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 class SurfaceCommand final : public Command {

@@ -21,6 +21,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// Parses "LAST" or "FIRST-LAST". An empty text leaves the request unchanged.

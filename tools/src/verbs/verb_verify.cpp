@@ -21,6 +21,8 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+
+using namespace terrain;
 namespace {
 
 /// Adds a problem to both forms of the summary.
