@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
 #include <vector>
@@ -22,6 +23,20 @@ TEST(Box, DefaultIsEmpty) {
   EXPECT_EQ(box_of(std::vector<Point3>{}), box);
 }
 
+TEST(Box, MayHaveOtherCoordinates) {
+  using IntegerBox = Box<3, std::int32_t>;
+  IntegerBox integers;
+  EXPECT_TRUE(integers.empty());
+  integers.include(IntegerBox::Point{INT32_MIN, 2, INT32_MAX});
+  integers.include(IntegerBox::Point{5, -1, INT32_MAX});
+  EXPECT_EQ(integers, (IntegerBox{{INT32_MIN, -1, INT32_MAX}, {5, 2, INT32_MAX}}));
+  using FloatBox = Box<2, float>;
+  FloatBox floats;
+  EXPECT_TRUE(floats.empty());
+  floats.include(FloatBox::Point{1.5F, 2.5F});
+  EXPECT_EQ(floats, (FloatBox{{1.5F, 2.5F}, {1.5F, 2.5F}}));
+}
+
 TEST(Box, IncludesItsBorder) {
   constexpr Box2 box{{0, 0}, {2, 1}};
   EXPECT_TRUE(box.contains(Point2{0, 1}));
@@ -40,6 +55,41 @@ TEST(Box, IncludingAnEmptyBoxChangesNothing) {
   box.include(Box2{});
   box.include(Box2{{5, 5}, {4, 9}});
   EXPECT_EQ(box, before);
+}
+
+TEST(Box, IsWidenedOnAllSides) {
+  EXPECT_EQ((Box2{{0, 0}, {2, 1}}.widened(0.5)), (Box2{{-0.5, -0.5}, {2.5, 1.5}}));
+  EXPECT_TRUE(Box2{}.widened(3).empty());
+}
+
+TEST(Box, HasSquaredDistances) {
+  constexpr Box2 box{{0, 0}, {2, 1}};
+  EXPECT_EQ(box.squared_distance(Point2{1, 1}), 0);
+  EXPECT_EQ(box.squared_distance(Point2{5, 0.5}), 9);
+  EXPECT_EQ(box.squared_distance(Point2{-3, 5}), 25);
+  EXPECT_EQ(box.squared_distance(Box2{{2, 1}, {3, 3}}), 0);
+  EXPECT_EQ(box.squared_distance(Box2{{5, -9}, {6, -4}}), 25);
+  EXPECT_EQ((Box2{{5, -9}, {6, -4}}.squared_distance(box)), 25);
+}
+
+/// Uses coordinates with many digits, so that every operation is rounded.
+TEST(Box, RoundingDoesNotRaiseDistances) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> draw(-1, 1);
+  const auto point = [&] { return Point3{draw(random), draw(random), draw(random)}; };
+  const auto squared = [](const Point3& a, const Point3& b) {
+    double sum = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) sum += (a[axis] - b[axis]) * (a[axis] - b[axis]);
+    return sum;
+  };
+  for (int round = 0; round < 2000; ++round) {
+    const std::vector<Point3> some{point(), point(), point()}, more{point(), point()};
+    const Box3 a = box_of(some), b = box_of(more);
+    for (const Point3& q : more) {
+      EXPECT_LE(a.squared_distance(b), a.squared_distance(q));
+      for (const Point3& p : some) EXPECT_LE(a.squared_distance(q), squared(p, q));
+    }
+  }
 }
 
 TEST(Box, NanIsNowhere) {

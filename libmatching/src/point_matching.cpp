@@ -8,15 +8,15 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "blossom/box_tree.hpp"
+#include "blossom/kd_tree.hpp"
 #include "blossom/pricing.hpp"
 #include "blossom/solver.hpp"
 
 namespace terrace::matching {
 namespace {
 
-using blossom::BoxTree;
 using blossom::Edge;
+using blossom::KdTree;
 using blossom::PairCost;
 using blossom::Pricing;
 using blossom::Solver;
@@ -97,7 +97,7 @@ class Problem {
   void set_cost() {
     if (!options_.metric.distance) {
       cost_.distance = [this](std::uint32_t i, std::uint32_t j) {
-        return std::sqrt(BoxTree<D>::distance2(points_[i], points_[j]));
+        return std::sqrt(KdTree<D>::distance2(points_[i], points_[j]));
       };
       return;
     }
@@ -117,7 +117,7 @@ class Problem {
   // form a perfect matching, which makes the graph feasible.
   void set_candidates() {
     const auto n = static_cast<std::uint32_t>(points_.size());
-    const BoxTree<D> tree(points_);
+    const KdTree<D> tree(points_);
     std::vector<std::pair<double, std::uint32_t>> near;
     const auto join = [&](std::uint32_t i, std::uint32_t j) {
       candidates_.emplace_back(std::min(i, j), std::max(i, j));

@@ -36,10 +36,10 @@ TEST(BoxTree, VisitsBoxesThatMeetAQuery) {
     for (int query = 0; query < 20; ++query) {
       const StoredBox box = random_box(query % 2 == 0 ? 3 : 40);
       std::multiset<std::uint32_t> found, expected;
-      tree.visit([&](const StoredBox& other) { return box.meets(other); },
+      tree.visit([&](const StoredBox& other) { return box.intersects(other); },
                  [&](std::uint32_t number) { found.insert(number); });
       for (const BoxTree::Item& item : all) {
-        if (box.meets(item.box)) expected.insert(item.number);
+        if (box.intersects(item.box)) expected.insert(item.number);
       }
       EXPECT_EQ(found, expected);
     }

@@ -17,21 +17,21 @@ namespace terrace::python {
 namespace {
 
 /// The number of points on each level and above, the mean height, and the bounding box.
-struct Extent {
+struct PointStatistics {
   std::vector<std::uint64_t> points;
   double mean_height = 0.0;
   stream::Box3 bounds;
 };
 
-Extent extent_of(const stream::Store& store) {
-  Extent extent;
+PointStatistics statistics_of(const stream::Store& store) {
+  PointStatistics statistics;
   if (store.condition() == nullptr) {
-    for (const stream::LevelInfo& level : store.levels()) extent.points.push_back(level.points);
-    extent.mean_height = store.mean_height();
-    extent.bounds = store.bounds();
-    return extent;
+    for (const stream::LevelInfo& level : store.levels()) statistics.points.push_back(level.points);
+    statistics.mean_height = store.mean_height();
+    statistics.bounds = store.bounds();
+    return statistics;
   }
-  extent.points.resize(store.top() + 1);
+  statistics.points.resize(store.top() + 1);
   double sum = 0.0;
   std::uint64_t points = 0;
   for (unsigned level = store.top() + 1; level-- > 0;) {
@@ -41,23 +41,23 @@ Extent extent_of(const stream::Store& store) {
         if (!of.match(i)) continue;
         ++points;
         sum += of.positions[i][2];
-        extent.bounds.include(of.positions[i]);
+        statistics.bounds.include(of.positions[i]);
       }
     });
-    extent.points[level] = points;
+    statistics.points[level] = points;
   }
-  extent.mean_height = sum / static_cast<double>(points);
-  return extent;
+  statistics.mean_height = sum / static_cast<double>(points);
+  return statistics;
 }
 
 py::dict info_of(const OpenStore& open) {
   const stream::Store store = open.get();
   const stream::StoreSchema& schema = store.schema();
-  const Extent extent = released([&] { return extent_of(store); });
-  const stream::Box3 box = world_box(schema, extent.bounds);
+  const PointStatistics statistics = released([&] { return statistics_of(store); });
+  const stream::Box3 box = world_box(schema, statistics.bounds);
   py::dict info;
   info["path"] = text_of(store.path().string());
-  info["points"] = extent.points.front();
+  info["points"] = statistics.points.front();
   info["bytes"] = store.bytes();
   info["format"] = schema.format;
   info["grid"] = schema.grid;
@@ -67,7 +67,7 @@ py::dict info_of(const OpenStore& open) {
   info["bounds"] =
       py::make_tuple(box.min[0], box.min[1], box.min[2], box.max[0], box.max[1], box.max[2]);
   const stream::Channel& z = schema.coordinates[2];
-  info["mean_height"] = extent.mean_height * z.scale + z.offset;
+  info["mean_height"] = statistics.mean_height * z.scale + z.offset;
   info["vertical"] = schema.vertical;
   info["transform"] = py::cast(schema.world.xy);
   info["crs"] = crs_info(schema.crs);
@@ -77,7 +77,7 @@ py::dict info_of(const OpenStore& open) {
   for (const stream::LevelInfo& of : store.levels()) {
     py::dict level;
     level["level"] = of.level;
-    level["points"] = extent.points[of.level];
+    level["points"] = statistics.points[of.level];
     level["clusters"] = of.clusters;
     level["bytes"] = of.bytes;
     levels.append(level);
@@ -131,10 +131,7 @@ py::array points(const OpenStore& open, unsigned level, const py::object& region
                  const py::tuple& settings) {
   const stream::Store store = open.get(where);
   terrain::Detail detail = detail_of(store, level, region, focuses);
-  if (cluster) {
-    const tri::ClusterId id = cluster_of(store, cluster->first, cluster->second);
-    detail.cluster = static_cast<stream::ClusterId>(id);
-  }
+  if (cluster) detail.cluster = cluster_of(store, cluster->first, cluster->second);
   const std::size_t payload = store.schema().payload_size();
   std::vector<std::byte> records = Call(settings).run([&](const terrain::Context& context) {
     const auto to = change_to(store, crs);

@@ -109,7 +109,7 @@ StoredBox random_box(const stream::Box3& bounds, const std::vector<Point2>& poin
   Point2 to = place();
   const double share = random.below(2) == 0 ? 1 : random(0, 0.2);
   for (std::size_t k = 0; k < 2; ++k) to[k] = from[k] + share * (to[k] - from[k]);
-  return StoredBox::around(from, to);
+  return base::box_of(std::array{from, to});
 }
 
 Point2 random_place(const stream::Box3& bounds, const std::vector<Point2>& points, Random& random) {

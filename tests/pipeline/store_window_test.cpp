@@ -208,7 +208,7 @@ TEST(StoreWindow, GivesThePointsInABoxFromHigherLevelsDown) {
         ASSERT_TRUE(k == 0 || points.levels[k] <= points.levels[k - 1]);
       }
       for (std::size_t k = 0; k < whole.positions.size(); ++k) {
-        if (whole.levels[k] >= level && box.contains(whole.positions[k])) {
+        if (whole.levels[k] >= level && box.contains(terrain::flat(whole.positions[k]))) {
           expected.emplace_back(whole.levels[k], whole.positions[k]);
         }
       }

@@ -64,7 +64,7 @@ KMeansFilter::Candidates KMeansFilter::room(Scratch& scratch, std::size_t level)
 bool KMeansFilter::assign(std::span<const Point3> centres) {
   bool flat = true;
   const KMeansTree::Node& root = tree_.levels.back().front();
-  flat = root.high[2] == 0.0;
+  flat = root.box.max[2] == 0.0;
   for (const Point3& c : centres) flat = flat && c[2] == 0.0;
   for (Scratch& scratch : scratch_) {
     scratch.changed = false;
@@ -104,9 +104,9 @@ void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates&
                          Scratch& scratch, std::span<Sum> sums) {
   scratch.ticks(from.count);
   const KMeansTree::Node& node = tree_.levels[level][index];
-  const double mx = 0.5 * (node.low[0] + node.high[0]);
-  const double my = 0.5 * (node.low[1] + node.high[1]);
-  const double mz = 0.5 * (node.low[2] + node.high[2]);
+  const double mx = 0.5 * (node.box.min[0] + node.box.max[0]);
+  const double my = 0.5 * (node.box.min[1] + node.box.max[1]);
+  const double mz = 0.5 * (node.box.min[2] + node.box.max[2]);
   double least = distance2<D>(mx, my, mz, from.x[0], from.y[0], from.z[0]);
   std::size_t best = 0;
   for (std::size_t k = 1; k < from.count; ++k) {
@@ -126,9 +126,9 @@ void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates&
     const double x = from.x[k];
     const double y = from.y[k];
     const double z = from.z[k];
-    const double px = x > bx ? node.high[0] : node.low[0];
-    const double py = y > by ? node.high[1] : node.low[1];
-    const double pz = z > bz ? node.high[2] : node.low[2];
+    const double px = x > bx ? node.box.max[0] : node.box.min[0];
+    const double py = y > by ? node.box.max[1] : node.box.min[1];
+    const double pz = z > bz ? node.box.max[2] : node.box.min[2];
     const double to_this = distance2<D>(px, py, pz, x, y, z);
     const double to_best = distance2<D>(px, py, pz, bx, by, bz);
     kept.x[kept.count] = x;

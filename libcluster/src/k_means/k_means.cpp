@@ -88,13 +88,8 @@ struct ScaledWeights {
 constexpr std::size_t kFan = KMeansTree::kFan;
 
 /// Returns a lower bound of the squared distance from a point to a box, rounding errors included.
-double squared_distance_bound(const Point3& p, const KMeansTree::Node& box) {
-  double sum = 0;
-  for (unsigned axis = 0; axis < 3; ++axis) {
-    const double d = std::max({box.low[axis] - p[axis], p[axis] - box.high[axis], 0.0});
-    sum += d * d;
-  }
-  return sum * (1 - 1e-14);
+double squared_distance_bound(const Point3& p, const Box3& box) {
+  return box.squared_distance(p) * (1 - 1e-14);
 }
 
 /// The costs of all points for the seeds so far, summed over the boxes of the tree. Draws further
@@ -159,7 +154,7 @@ class CentreSeeder {
 
   [[nodiscard]] double gain(const Point3& seed, std::size_t level, std::size_t node) {
     ticks_(KMeansTree::kBlock);
-    if (squared_distance_bound(seed, tree_.levels[level][node]) >= states_[level][node].most)
+    if (squared_distance_bound(seed, tree_.levels[level][node].box) >= states_[level][node].most)
       return 0.0;
     double sum = 0;
     if (level == 0) {
@@ -178,7 +173,7 @@ class CentreSeeder {
   void add(const Point3& seed, std::size_t level, std::size_t node) {
     ticks_(KMeansTree::kBlock);
     State& state = states_[level][node];
-    if (squared_distance_bound(seed, tree_.levels[level][node]) >= state.most) return;
+    if (squared_distance_bound(seed, tree_.levels[level][node].box) >= state.most) return;
     state = {0, 0};
     if (level == 0) {
       for (std::size_t place = node * KMeansTree::kBlock; place < (node + 1) * KMeansTree::kBlock;

@@ -54,15 +54,14 @@ KMeansTree::Node joined(std::span<const KMeansTree::Node> children) {
   KMeansTree::Node node = children.front();
   for (const KMeansTree::Node& child : children.subspan(1)) {
     for (unsigned axis = 0; axis < 3; ++axis) {
-      node.low[axis] = std::min(node.low[axis], child.low[axis]);
-      node.high[axis] = std::max(node.high[axis], child.high[axis]);
       node.sum[axis] += child.sum[axis];
     }
+    node.box.include(child.box);
     node.weight += child.weight;
   }
   node.diagonal2 = 0;
   for (unsigned axis = 0; axis < 3; ++axis) {
-    const double side = node.high[axis] - node.low[axis];
+    const double side = node.box.max[axis] - node.box.min[axis];
     node.diagonal2 += side * side;
   }
   return node;
@@ -112,7 +111,7 @@ KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> w
     for (std::size_t k = 0; k < kBlock; ++k) {
       const std::size_t place = b * kBlock + k;
       const Point3 p = point(place);
-      single[k] = {p, p, 0.0, {w[place] * p[0], w[place] * p[1], w[place] * p[2]}, w[place]};
+      single[k] = {{p, p}, 0.0, {w[place] * p[0], w[place] * p[1], w[place] * p[2]}, w[place]};
     }
     level[b] = joined(single);
   }

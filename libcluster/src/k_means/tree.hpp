@@ -28,7 +28,7 @@ struct KMeansTree {
   static constexpr std::size_t kFan = 4;
 
   struct Node {
-    Point3 low, high;
+    Box3 box;
     double diagonal2 = 0;  ///< squared diagonal of the box
     Point3 sum{};          ///< sum of weight times position
     double weight = 0;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/neighbour_lists.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include <terrace/base/parallel.hpp>
@@ -49,7 +50,7 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   const std::size_t first = tree.leaf_begin(leaf);
   const std::size_t count = tree.leaf_begin(leaf + 1) - first;
   const std::size_t own = tree.leaf_node(leaf);
-  const LinkageTree::Box& box = tree.box(own);
+  const Box3& box = tree.box(own);
   Best best[LinkageTree::kLeaf];
   for (std::size_t q = 0; q < count; ++q) best[q].clear(length_);
   double reach = std::numeric_limits<double>::infinity();
@@ -64,7 +65,7 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
     for (std::size_t q = 0; q < count; ++q) {
       const Point3 p = tree.point(first + q);
       const double limit = best[q].reach();
-      if (squared_distance(p, tree.box(node)) <= limit) {
+      if (tree.box(node).squared_distance(p) <= limit) {
         double square[LinkageTree::kLeaf];
         unsigned close = 0;
         for (std::size_t k = 0; k < LinkageTree::kLeaf; ++k) {
@@ -104,8 +105,8 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
       visit(top.node);
       continue;
     }
-    Waiting near{squared_distance(box, tree.box(2 * top.node)), 2 * top.node};
-    Waiting far{squared_distance(box, tree.box(2 * top.node + 1)), 2 * top.node + 1};
+    Waiting near{box.squared_distance(tree.box(2 * top.node)), 2 * top.node};
+    Waiting far{box.squared_distance(tree.box(2 * top.node + 1)), 2 * top.node + 1};
     if (far.square < near.square) std::swap(near, far);
     if (far.square <= reach) stack[waiting++] = far;
     if (near.square <= reach) stack[waiting++] = near;

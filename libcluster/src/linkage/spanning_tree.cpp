@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/spanning_tree.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <limits>
@@ -153,8 +154,8 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
     const Waiting top = stack[--waiting];
     if (top.square > best.square) continue;
     if (!tree_.is_leaf(top.node)) {
-      Waiting near{squared_distance(group.box, tree_.box(2 * top.node)), 2 * top.node};
-      Waiting far{squared_distance(group.box, tree_.box(2 * top.node + 1)), 2 * top.node + 1};
+      Waiting near{group.box.squared_distance(tree_.box(2 * top.node)), 2 * top.node};
+      Waiting far{group.box.squared_distance(tree_.box(2 * top.node + 1)), 2 * top.node + 1};
       if (far.square < near.square) std::swap(near, far);
       if (far.square <= best.square && label_[far.node] != own) stack[waiting++] = far;
       if (near.square <= best.square && label_[near.node] != own) stack[waiting++] = near;
@@ -164,7 +165,7 @@ void SpanningTree::search_from(const Group& group, std::uint32_t own) {
     const auto end = static_cast<std::uint32_t>(tree_.leaf_begin(leaf + 1));
     for (unsigned q = 0; q < group.count; ++q) {
       const Point3 p = tree_.point(group.place[q]);
-      if (squared_distance(p, tree_.box(top.node)) > best.square) continue;
+      if (tree_.box(top.node).squared_distance(p) > best.square) continue;
       for (auto j = static_cast<std::uint32_t>(tree_.leaf_begin(leaf)); j < end; ++j) {
         if (component_[j] == own) continue;
         const TreeEdge edge = TreeEdge::of(squared_distance(p, tree_.point(j)), group.place[q], j);

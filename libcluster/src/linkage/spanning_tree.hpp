@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -49,15 +48,11 @@ class SpanningTree {
 
   /// Points of one leaf and one component, with their box.
   struct Group {
-    LinkageTree::Box box;
+    Box3 box;
     std::uint32_t place[LinkageTree::kLeaf];
     unsigned count = 0;
     void add(std::uint32_t i, const Point3& p) {
-      if (count == 0) box = {p, p};
-      for (unsigned a = 0; a < 3; ++a) {
-        box.low[a] = std::min(box.low[a], p[a]);
-        box.high[a] = std::max(box.high[a], p[a]);
-      }
+      box.include(p);
       place[count++] = i;
     }
   };

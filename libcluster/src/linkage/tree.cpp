@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/tree.hpp"
 
+#include <algorithm>
+
 #include <terrace/base/parallel.hpp>
 #include <terrace/base/stop_check.hpp>
 
@@ -46,14 +48,8 @@ void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& r
   const std::size_t q = node - (std::size_t{1} << level);
   const std::size_t begin = (q * size()) >> level;
   const std::size_t end = ((q + 1) * size()) >> level;
-  Box box{records[begin].p, records[begin].p};
-  for (std::size_t i = begin + 1; i < end; ++i) {
-    for (unsigned a = 0; a < 3; ++a) {
-      const double v = records[i].p[a];
-      box.low[a] = v < box.low[a] ? v : box.low[a];
-      box.high[a] = v > box.high[a] ? v : box.high[a];
-    }
-  }
+  Box3 box;
+  for (std::size_t i = begin; i < end; ++i) box.include(records[i].p);
   boxes_[node] = box;
   const auto at = [&](std::size_t i) { return records.begin() + static_cast<std::ptrdiff_t>(i); };
   if (level == depth_) {
@@ -65,7 +61,7 @@ void LinkageTree::split(std::size_t node, unsigned level, std::vector<Record>& r
   }
   unsigned axis = 0;
   for (unsigned a = 1; a < 3; ++a) {
-    if (box.high[a] - box.low[a] > box.high[axis] - box.low[axis]) axis = a;
+    if (box.max[a] - box.min[a] > box.max[axis] - box.min[axis]) axis = a;
   }
   const std::size_t middle = ((2 * q + 1) * size()) >> (level + 1);
   std::nth_element(at(begin), at(middle), at(end), [axis](const Record& x, const Record& y) {

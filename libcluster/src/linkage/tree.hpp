@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -22,10 +21,6 @@ class LinkageTree {
  public:
   static constexpr std::size_t kLeaf = 8;  ///< maximum points per leaf
 
-  struct Box {
-    Point3 low, high;
-  };
-
   /// The order depends on the points alone. Takes O(n log n).
   LinkageTree(std::span<const Point3> points, std::span<const std::uint32_t> chosen,
               unsigned threads, const base::StopCheck& check_stop = {});
@@ -37,7 +32,7 @@ class LinkageTree {
   [[nodiscard]] bool is_leaf(std::size_t node) const { return node >= leaves(); }
   /// Returns the position of the first point of a leaf. leaf_begin(leaf + 1) is its end.
   [[nodiscard]] std::size_t leaf_begin(std::size_t leaf) const { return (leaf * size()) >> depth_; }
-  [[nodiscard]] const Box& box(std::size_t node) const { return boxes_[node]; }
+  [[nodiscard]] const Box3& box(std::size_t node) const { return boxes_[node]; }
   /// Returns coordinates in tree order. kLeaf extra entries follow, which may be read.
   [[nodiscard]] const double* axis(unsigned a) const { return axes_[a].data(); }
   [[nodiscard]] Point3 point(std::size_t i) const {
@@ -56,30 +51,9 @@ class LinkageTree {
                  base::StopTicks& ticks);
 
   unsigned depth_ = 0;
-  std::vector<Box> boxes_;
+  std::vector<Box3> boxes_;
   std::vector<double> axes_[3];
   std::vector<std::uint32_t> number_;
 };
-
-/// Returns a lower bound of squared_distance(p, q) for all q in the box. The bound includes
-/// rounding, because all operations are monotone and in the same order as there.
-[[nodiscard]] inline double squared_distance(const Point3& p, const LinkageTree::Box& box) {
-  double sum[3];
-  for (unsigned a = 0; a < 3; ++a) {
-    const double d = std::max({box.low[a] - p[a], p[a] - box.high[a], 0.0});
-    sum[a] = d * d;
-  }
-  return sum[0] + sum[1] + sum[2];
-}
-
-/// As above, for two boxes.
-[[nodiscard]] inline double squared_distance(const LinkageTree::Box& p, const LinkageTree::Box& q) {
-  double sum[3];
-  for (unsigned a = 0; a < 3; ++a) {
-    const double d = std::max({q.low[a] - p.high[a], p.low[a] - q.high[a], 0.0});
-    sum[a] = d * d;
-  }
-  return sum[0] + sum[1] + sum[2];
-}
 
 }  // namespace terrace::cluster

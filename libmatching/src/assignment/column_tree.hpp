@@ -11,6 +11,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/box.hpp>
+
 #include "assignment/sparse_solver.hpp"
 #include "terrace/matching/assignment.hpp"
 
@@ -92,7 +94,7 @@ class ColumnTree {
 
   /// A node. Its left child is the next one in the array.
   struct Node {
-    Point low, high;
+    base::Box<D> box;
     double label = 0.0;
     std::uint32_t begin, end, free, right = 0, parent = 0;
   };
@@ -108,13 +110,7 @@ class ColumnTree {
              std::size_t end) {
     const auto me = static_cast<std::uint32_t>(nodes_.size());
     Node node;
-    node.low = node.high = points[original_[begin]];
-    for (std::size_t k = begin; k < end; ++k) {
-      for (std::size_t d = 0; d < D; ++d) {
-        node.low[d] = std::min(node.low[d], points[original_[k]][d]);
-        node.high[d] = std::max(node.high[d], points[original_[k]][d]);
-      }
-    }
+    for (std::size_t k = begin; k < end; ++k) node.box.include(points[original_[k]]);
     node.begin = static_cast<std::uint32_t>(begin);
     node.end = static_cast<std::uint32_t>(end);
     node.free = node.end - node.begin;
@@ -124,9 +120,10 @@ class ColumnTree {
       leaf_.resize(end, me);
       return;
     }
+    const base::Box<D>& box = node.box;
     std::size_t widest = 0;
     for (std::size_t d = 1; d < D; ++d) {
-      if (node.high[d] - node.low[d] > node.high[widest] - node.low[widest]) widest = d;
+      if (box.max[d] - box.min[d] > box.max[widest] - box.min[widest]) widest = d;
     }
     const std::size_t middle = begin + (end - begin) / 2;
     const auto at = [&](std::size_t k) {
@@ -140,15 +137,6 @@ class ColumnTree {
     build(points, me, begin, middle);
     nodes_[me].right = static_cast<std::uint32_t>(nodes_.size());
     build(points, me, middle, end);
-  }
-
-  static double distance_to_box(const Point& p, const Node& node) {
-    double sum = 0;
-    for (std::size_t d = 0; d < D; ++d) {
-      const double out = std::max({node.low[d] - p[d], p[d] - node.high[d], 0.0});
-      sum += out * out;
-    }
-    return std::sqrt(sum);
   }
 
   void descend_nearest(const Point& p, const std::vector<double>& labels, std::size_t count,
@@ -177,8 +165,8 @@ class ColumnTree {
       return;
     }
     std::uint32_t near = n + 1, far = node.right;
-    double to_near = distance_to_box(p, nodes_[near]) - nodes_[near].label;
-    double to_far = distance_to_box(p, nodes_[far]) - nodes_[far].label;
+    double to_near = std::sqrt(nodes_[near].box.squared_distance(p)) - nodes_[near].label;
+    double to_far = std::sqrt(nodes_[far].box.squared_distance(p)) - nodes_[far].label;
     if (to_far < to_near) {
       std::swap(near, far);
       std::swap(to_near, to_far);
@@ -199,7 +187,8 @@ class ColumnTree {
       return;
     }
     std::uint32_t near = n + 1, far = node.right;
-    double to_near = distance_to_box(p, nodes_[near]), to_far = distance_to_box(p, nodes_[far]);
+    double to_near = std::sqrt(nodes_[near].box.squared_distance(p));
+    double to_far = std::sqrt(nodes_[far].box.squared_distance(p));
     if (to_far < to_near) {
       std::swap(near, far);
       std::swap(to_near, to_far);

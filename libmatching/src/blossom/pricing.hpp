@@ -11,7 +11,7 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "blossom/box_tree.hpp"
+#include "blossom/kd_tree.hpp"
 #include "blossom/nest.hpp"
 #include "blossom/solver.hpp"
 
@@ -129,7 +129,7 @@ class Pricing {
   void test(const Member& a, const Member& b,
             std::vector<std::pair<std::int64_t, std::uint32_t>>& worst) {
     const std::int64_t duals = a.potential + b.potential - 2 * around_[a.level];
-    if (!cost_.may_violate(BoxTree<D>::distance2(points_[a.vertex], points_[b.vertex]), duals)) {
+    if (!cost_.may_violate(KdTree<D>::distance2(points_[a.vertex], points_[b.vertex]), duals)) {
       return;
     }
     const std::int64_t cost = cost_(a.vertex, b.vertex);
@@ -185,7 +185,7 @@ class Pricing {
     }
     std::vector<Point> points(count);
     for (std::uint32_t k = 0; k < count; ++k) points[k] = points_[members_[k].vertex];
-    const BoxTree<D> tree(std::move(points));
+    const KdTree<D> tree(std::move(points));
     const auto& nodes = tree.nodes();
     // For each box: the largest potential, and the part if all its points belong to the same one.
     std::vector<std::int64_t> most(nodes.size());
@@ -217,7 +217,7 @@ class Pricing {
         const auto& node = nodes[x];
         if (deepest[x] < a.level || (deepest[x] == a.level && node.end <= i + 1) ||
             part[x] == a.part ||
-            !cost_.may_violate(BoxTree<D>::distance2(node, points_[a.vertex]),
+            !cost_.may_violate(node.box.squared_distance(points_[a.vertex]),
                                a.potential + most[x] - 2 * around_[a.level])) {
           continue;
         }

@@ -30,18 +30,9 @@ float rounded_down(double x) {
 
 float rounded_up(double x) { return -rounded_down(-x); }
 
-/// A box in floats. The union of two such boxes is exact.
+/// The union of two such boxes is exact.
 template <std::size_t D>
-struct FloatBox {
-  std::array<float, D> min, max;
-
-  void add(const FloatBox& other) {
-    for (std::size_t d = 0; d < D; ++d) {
-      min[d] = std::min(min[d], other.min[d]);
-      max[d] = std::max(max[d], other.max[d]);
-    }
-  }
-};
+using FloatBox = base::Box<D, float>;
 
 void check_costs(const SurfaceAreaCosts& costs) {
   const auto bad = [](double c) { return !(c >= 0.0) || !std::isfinite(c); };
@@ -93,7 +84,7 @@ class Plan {
       const auto [a, b] = rows[r];
       const std::size_t v = count_ + r;
       boxes_[v] = boxes_[a];
-      boxes_[v].add(boxes_[b]);
+      boxes_[v].include(boxes_[b]);
       size_[r] = size(a) + size(b);
       const double area = area_of(boxes_[v]);
       cost[v] = costs.traversal * area + cost[a] + cost[b];

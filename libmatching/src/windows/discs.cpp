@@ -7,11 +7,11 @@
 #include <terrace/base/parallel.hpp>
 #include <terrace/base/stop_check.hpp>
 
-#include "blossom/box_tree.hpp"
+#include "blossom/kd_tree.hpp"
 
 namespace terrace::matching::windows {
 
-using blossom::BoxTree;
+using blossom::KdTree;
 
 void Discs::start(std::size_t windows) {
   windows_.assign(windows, {});
@@ -162,7 +162,7 @@ class Excess {
         open.pop_back();
         if (owner_[x] == window_[i]) continue;
         const auto& node = nodes[x];
-        const double apart = std::sqrt(BoxTree<D>::distance2(node, points_[i])) * (1.0 - 1e-13);
+        const double apart = std::sqrt(node.box.squared_distance(points_[i])) * (1.0 - 1e-13);
         const double least = metric_.distance ? metric_.factor * apart - metric_.offset : apart;
         if (own[i] + largest_[x] - least <= most) continue;
         if (node.right != 0) {
@@ -190,7 +190,7 @@ class Excess {
 
   double distance(std::uint32_t i, std::uint32_t j) const {
     return metric_.distance ? metric_.distance(i, j)
-                            : std::sqrt(BoxTree<D>::distance2(points_[i], points_[j]));
+                            : std::sqrt(KdTree<D>::distance2(points_[i], points_[j]));
   }
 
   template <class Work>
@@ -213,7 +213,7 @@ class Excess {
   unsigned threads_;
   const base::StopCheck& check_stop_;
   std::vector<std::uint32_t> order_;
-  BoxTree<D> tree_;
+  KdTree<D> tree_;
   std::vector<std::uint32_t> owner_;  // for each box: its window, if all its points are in the same
   std::vector<double> largest_;       // for each box: the largest of `others` in it
 };

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cassert>
 #include <cstring>
-#include <limits>
+
+#include <terrace/base/box.hpp>
 
 namespace terrace::stream {
 namespace {
@@ -13,33 +14,16 @@ namespace {
 constexpr std::size_t kRankBins = 1024;
 
 template <class Coordinate>
-struct Extent {
-  using Limits = std::numeric_limits<Coordinate>;
-  static constexpr Coordinate kMost = Limits::has_infinity ? Limits::infinity() : Limits::max();
-  static constexpr Coordinate kLeast = Limits::has_infinity ? -Limits::infinity() : Limits::min();
-
-  std::array<Coordinate, 3> min{kMost, kMost, kMost}, max{kLeast, kLeast, kLeast};
-
-  explicit Extent(std::span<const Numbered<Coordinate>> points) {
-    for (const Numbered<Coordinate>& point : points) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const Coordinate value = point.place[axis];
-        min[axis] = value < min[axis] ? value : min[axis];
-        max[axis] = value > max[axis] ? value : max[axis];
-      }
-    }
-  }
-  [[nodiscard]] double width(std::size_t axis) const {
-    return static_cast<double>(max[axis]) - static_cast<double>(min[axis]);
-  }
-};
+double width(const base::Box<3, Coordinate>& box, std::size_t axis) {
+  return static_cast<double>(box.max[axis]) - static_cast<double>(box.min[axis]);
+}
 
 /// Divides an axis into bins, in ascending order.
 template <class Coordinate>
 class RankBins {
  public:
-  RankBins(const Extent<Coordinate>& extent, std::size_t axis) : low_(extent.min[axis]) {
-    if (extent.width(axis) > 0) bins_per_unit_ = kRankBins / extent.width(axis);
+  RankBins(const base::Box<3, Coordinate>& box, std::size_t axis) : low_(box.min[axis]) {
+    if (width(box, axis) > 0) bins_per_unit_ = kRankBins / width(box, axis);
   }
 
   /// Returns the bin of a value: the last one for a NaN, which results from infinities.
@@ -55,10 +39,10 @@ class RankBins {
 template <>
 class RankBins<std::int32_t> {
  public:
-  RankBins(const Extent<std::int32_t>& extent, std::size_t axis)
-      : low_(static_cast<std::uint32_t>(extent.min[axis])),
+  RankBins(const base::Box<3, std::int32_t>& box, std::size_t axis)
+      : low_(static_cast<std::uint32_t>(box.min[axis])),
         bins_per_unit_((std::uint64_t{kRankBins} << 32) /
-                       (static_cast<std::uint64_t>(extent.width(axis)) + 1)) {}
+                       (static_cast<std::uint64_t>(width(box, axis)) + 1)) {}
 
   [[nodiscard]] std::size_t of(std::int32_t value) const {
     return (static_cast<std::uint32_t>(value) - low_) * bins_per_unit_ >> 32;
@@ -108,17 +92,18 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
                const std::array<double, 3>& lengths) {
   using Point = Numbered<Coordinate>;
   if (points.empty()) return {};
-  const Extent<Coordinate> extent(points);
+  base::Box<3, Coordinate> box;
+  for (const Point& point : points) box.include(point.place);
   std::size_t axis = 0;
   double most = -1;
   for (std::size_t a = 0; a < 3; ++a) {
-    const double width = extent.width(a) * lengths[a];
-    if (width > most) {
-      most = width;
+    const double length = width(box, a) * lengths[a];
+    if (length > most) {
+      most = length;
       axis = a;
     }
   }
-  const RankBins<Coordinate> bins(extent, axis);
+  const RankBins<Coordinate> bins(box, axis);
   std::array<std::uint32_t, kRankBins> counts{};
   for (const Point& point : points) ++counts[bins.of(point.place[axis])];
   std::size_t middle = 0, begin = 0;

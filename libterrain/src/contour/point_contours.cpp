@@ -66,7 +66,7 @@ class PointContours {
         rank_(tree_.size(), kNoPart),
         is_selective_(request_.max_edge || request_.region) {
     const stream::Box3& bounds = parts.store.bounds();
-    bounds_ = {{bounds.min[0], bounds.min[1]}, {bounds.max[0], bounds.max[1]}};
+    bounds_ = flat(bounds);
     // Widened, so that a triangle whose rounded middle is in a box meets the box.
     const auto widened = [&](StoredBox box) {
       for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -78,7 +78,7 @@ class PointContours {
       return box;
     };
     const std::optional<Region>& region = request_.region;
-    if (region && !widened(box_around(*region, ground_)).meets(bounds_)) {
+    if (region && !widened(box_around(*region, ground_)).intersects(bounds_)) {
       throw_none_inside(parts.store);
     }
     for (std::size_t part = 0; part < tree_.size(); ++part) {

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/box.hpp>
+
 namespace terrace::terrain {
 namespace {
 
@@ -20,17 +22,6 @@ constexpr std::size_t kFewestOffsets = 256;
 
 using Exact = std::function<void(std::span<const Point2>, std::span<double>)>;
 using OffsetPatch = PolynomialPatch<5, 1>;
-
-struct Box {
-  Point2 low{HUGE_VAL, HUGE_VAL}, high{-HUGE_VAL, -HUGE_VAL};
-
-  void include(const Point2& p) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      low[axis] = std::min(low[axis], p[axis]);
-      high[axis] = std::max(high[axis], p[axis]);
-    }
-  }
-};
 
 /// Returns where to split a range of longitudes or latitudes: near its middle, on a common grid
 /// line if there is one, so that the function may be smooth on either side.
@@ -53,10 +44,10 @@ class Adder {
   /// Handles the places with these numbers, which it reorders.
   void add(std::span<std::uint32_t> numbers) {
     if (numbers.size() < kFewestOffsets) return add_exactly(numbers);
-    Box box;
+    base::Box2 box;
     for (const std::uint32_t i : numbers) box.include(places_[i]);
     if (add_by_polynomials(box, numbers)) return;
-    const Point2 cut{cut_between(box.low[0], box.high[0]), cut_between(box.low[1], box.high[1])};
+    const Point2 cut{cut_between(box.min[0], box.max[0]), cut_between(box.min[1], box.max[1])};
     const auto south = std::partition(numbers.begin(), numbers.end(),
                                       [&](std::uint32_t i) { return places_[i][1] < cut[1]; });
     for (const auto& [begin, end] : {std::pair(numbers.begin(), south), {south, numbers.end()}}) {
@@ -79,9 +70,9 @@ class Adder {
     exact_(some_places_, some_heights_);
     for (std::size_t k = 0; k < numbers.size(); ++k) heights_[numbers[k]] += some_heights_[k];
   }
-  bool add_by_polynomials(const Box& box, std::span<const std::uint32_t> numbers) {
-    const Point2 size{box.high[0] - box.low[0], box.high[1] - box.low[1]};
-    const std::array<Point2, OffsetPatch::kPlaces> at = OffsetPatch::places(box.low, size);
+  bool add_by_polynomials(const base::Box2& box, std::span<const std::uint32_t> numbers) {
+    const Point2 size{box.max[0] - box.min[0], box.max[1] - box.min[1]};
+    const std::array<Point2, OffsetPatch::kPlaces> at = OffsetPatch::places(box.min, size);
     std::array<double, OffsetPatch::kPlaces> offsets{};
     exact_(at, offsets);
     std::array<OffsetPatch::Values, OffsetPatch::kPlaces> values{};
@@ -92,7 +83,7 @@ class Adder {
     const double s = size[0] > 0 ? 1.0 / size[0] : 0.0, t = size[1] > 0 ? 1.0 / size[1] : 0.0;
     const auto add_all = [&](const auto& offset) {
       for (const std::uint32_t i : numbers) {
-        heights_[i] += offset((places_[i][0] - box.low[0]) * s, (places_[i][1] - box.low[1]) * t);
+        heights_[i] += offset((places_[i][0] - box.min[0]) * s, (places_[i][1] - box.min[1]) * t);
       }
     };
     // Most grids are interpolated bilinearly.

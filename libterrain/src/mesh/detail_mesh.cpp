@@ -114,7 +114,7 @@ tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement&
   for (const FinerRegion& focus : detail.focuses) add(focus.region, focus.level);
   stored.needs = [&detail, placement, regions](std::size_t focus, const tri::Box3& box) {
     return regions[focus].polygons().empty() ||
-           detail.reaches_into(regions[focus], world_box(placement, {box.min, box.max}));
+           detail.reaches_into(regions[focus], world_box(placement, box));
   };
   return stored;
 }
@@ -209,7 +209,7 @@ class CollapsedClusters {
   [[nodiscard]] bool leave_gap(const std::array<std::array<std::int32_t, 2>, 3>& corners) const {
     return spans_gap(corners, [&](const stream::Box3& cells) {
       bool far = true;
-      boxes_.visit([&](const StoredBox& box) { return far && box.meets(cells); },
+      boxes_.visit([&](const StoredBox& box) { return far && box.intersects(flat(cells)); },
                    [&](std::uint32_t) { far = false; });
       return far;
     });

@@ -276,9 +276,9 @@ class PointSampler final : public HeightSampler {
     std::sort(numbers.begin(), numbers.end(),
               [&](std::uint32_t a, std::uint32_t b) { return part(a) < part(b); });
     for (std::size_t begin = 0, end = 0; begin < numbers.size(); begin = end) {
-      StoredBox around = StoredBox::empty();
+      StoredBox around;
       for (; end < numbers.size() && part(numbers[end]) == part(numbers[begin]); ++end) {
-        around.include({places[numbers[end]], places[numbers[end]]});
+        around.include(places[numbers[end]]);
       }
       if (!worker.load(around, margin, room_, true) && !worker.load(around, 0, room_, true)) {
         throw_no_room(window);

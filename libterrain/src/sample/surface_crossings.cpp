@@ -79,7 +79,7 @@ void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begi
   // Includes crossings that rounding may move into this piece.
   const Point2 a = point_between(from, to, std::max(0.0, begin - 1e-9));
   const Point2 b = point_between(from, to, std::min(1.0, end + 1e-9));
-  window_.load(StoredBox::around(a, b));
+  window_.load(base::box_of(std::array{a, b}));
   found_.clear();
   const auto& triangulation = window_.triangulation();
   const double dx = to[0] - from[0], dy = to[1] - from[1], square = dx * dx + dy * dy;

@@ -55,7 +55,7 @@ class BoxForest {
   template <class BoxOf, class Halve>
   StoredBox add_node(std::uint32_t begin, std::uint32_t end, std::uint32_t per_leaf,
                      const BoxOf& box_of, const Halve& halve) {
-    StoredBox box = StoredBox::empty();
+    StoredBox box;
     const std::size_t at = nodes_.size();
     nodes_.push_back({});
     if (end - begin <= per_leaf) {

@@ -64,7 +64,7 @@ void ClusterFrontier::read_one(std::size_t at, const Take& take) {
 
 void ClusterFrontier::read_meeting(const StoredBox& box, const Take& take) {
   for (std::size_t at = 0; at < open_.size();) {
-    if (open_[at].box.meets(box)) {
+    if (open_[at].box.intersects(box)) {
       read_one(at, take);  // the entry that replaced it is next
     } else {
       ++at;

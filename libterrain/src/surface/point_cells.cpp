@@ -47,11 +47,11 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
   query.descend(
       level,
       [&](unsigned, const stream::StoreQuery::Branch& branch) {
-        return !too_many && box.meets(branch.box);
+        return !too_many && box.intersects(flat(branch.box));
       },
       [&](const stream::StoreQuery::Node& node) {
         for (const stream::Point3& p : node.positions) {
-          if (!box.contains(p)) continue;
+          if (!box.contains(flat(p))) continue;
           places.push_back({p[0], p[1]});
           heights.push_back(p[2] * channel.scale + channel.offset);
         }

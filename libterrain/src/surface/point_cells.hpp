@@ -42,14 +42,9 @@ class PointCells {
   /// The box in which all points are known; infinite in directions where the store has no more
   /// points.
   [[nodiscard]] const StoredBox& known() const { return known_; }
-  [[nodiscard]] bool knows(const Point2& place) const {
-    return known_.contains({place[0], place[1], 0});
-  }
+  [[nodiscard]] bool knows(const Point2& place) const { return known_.contains(place); }
   /// Whether all points in a box are known.
-  [[nodiscard]] bool knows(const StoredBox& box) const {
-    return box.min[0] >= known_.min[0] && box.min[1] >= known_.min[1] &&
-           box.max[0] <= known_.max[0] && box.max[1] <= known_.max[1];
-  }
+  [[nodiscard]] bool knows(const StoredBox& box) const { return known_.covers(box); }
   /// Returns the height of a known point, in the store's vertical unit.
   [[nodiscard]] double height(const Point2& point) const;
   /// All points ordered by cells, and their heights.

@@ -58,7 +58,7 @@ CircleCover disk(const Point2& place, double square) {
 
 /// Returns a box around all covers.
 StoredBox bounds_of(std::span<const CircleCover> covers) {
-  StoredBox all = StoredBox::empty();
+  StoredBox all;
   for (const CircleCover& cover : covers) all.include(cover.bounds());
   return all;
 }
@@ -312,7 +312,7 @@ double PointSurface::read_height(const Point2& point) {
   query_.descend(
       cloud_.level,
       [&](unsigned, const stream::StoreQuery::Branch& branch) {
-        return !found && box.meets(branch.box);
+        return !found && box.intersects(flat(branch.box));
       },
       [&](const stream::StoreQuery::Node& node) {
         for (const stream::Point3& p : node.positions) {

@@ -104,7 +104,8 @@ void PointVoids::triangulate() {
 double PointVoids::reach(const StoredBox& box) const {
   double reach = 0;
   for (std::size_t i = 0; i < parts_.size(); ++i) {
-    if (tree_->box(i).widened(parts_[i].reach).meets(box)) reach = std::max(reach, parts_[i].reach);
+    if (!tree_->box(i).widened(parts_[i].reach).intersects(box)) continue;
+    reach = std::max(reach, parts_[i].reach);
   }
   return reach;
 }
@@ -113,7 +114,7 @@ void PointVoids::for_each(const StoredBox& box,
                           const std::function<void(const SurfaceCorner&)>& visit) const {
   std::vector<tri::VertexId> corners;
   triangles_.visit(
-      [&](const StoredBox& around) { return around.meets(box); },
+      [&](const StoredBox& around) { return around.intersects(box); },
       [&](std::uint32_t number) {
         const std::array<tri::VertexId, 3> v = border_.vertices(tri::TriangleId{number});
         if (!triangle_meets({border_.point(v[0]), border_.point(v[1]), border_.point(v[2])}, box)) {

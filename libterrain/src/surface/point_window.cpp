@@ -81,18 +81,18 @@ void PointWindow::take(const stream::StoreQuery::Node& node) {
   check_memory(node.positions.size());
   const auto cluster = static_cast<std::uint32_t>(read_.size());
   read_.push_back(node.id);
-  Outer outer{.box = StoredBox::empty(), .begin = pending_.size()};
+  Outer outer{.box = {}, .begin = pending_.size()};
   for (std::size_t i = 0; i < node.positions.size(); ++i) {
     const stream::Point3& p = node.positions[i];
     const Origin origin{cluster, static_cast<std::uint32_t>(i)};
     const double height = p[2] * scale_ + offset_;
-    if (inner_.contains(p)) {
+    if (inner_.contains(flat(p))) {
       places_.push_back({p[0], p[1]});
       taken_.push_back({height, origin});
       continue;
     }
     pending_.push_back({{p[0], p[1]}, height, origin});
-    outer.box.include({pending_.back().place, pending_.back().place});
+    outer.box.include(pending_.back().place);
   }
   outer.count = pending_.size() - outer.begin;
   left_ += outer.count;
@@ -109,10 +109,10 @@ void PointWindow::take(Pending& point) {
 void PointWindow::grow_inner(const StoredBox& box) {
   inner_ = box;
   for (const Outer& outer : outer_) {
-    if (!outer.box.meets(inner_)) continue;
+    if (!outer.box.intersects(inner_)) continue;
     for (std::size_t i = outer.begin; i < outer.begin + outer.count; ++i) {
       Pending& p = pending_[i];
-      if (p.origin.cluster != kNowhere && inner_.contains({p.place[0], p.place[1], 0})) take(p);
+      if (p.origin.cluster != kNowhere && inner_.contains(p.place)) take(p);
     }
   }
   frontier_.read_meeting(inner_, [this](const stream::StoreQuery::Node& node) { take(node); });
@@ -189,7 +189,7 @@ void PointWindow::begin(const StoredBox& box) {
 }
 
 void PointWindow::load(const StoredBox& box) {
-  if (!box.meets(flat(cloud_.store.bounds()))) {
+  if (!box.intersects(flat(cloud_.store.bounds()))) {
     clear();
     box_ = inner_ = box;
     return;
@@ -211,7 +211,7 @@ void PointWindow::load(const StoredBox& box) {
 }
 
 void PointWindow::take_distant(const SurfaceCorner& corner) {
-  if (inner_.contains({corner.place[0], corner.place[1], 0})) return;
+  if (inner_.contains(corner.place)) return;
   places_.push_back(corner.place);
   taken_.push_back({corner.height, {}});
 }
@@ -223,7 +223,7 @@ void PointWindow::load_with_border() {
   insert_taken();
   states_.assign(triangulation_.triangle_slots(), State::kUnknown);
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
-    if (inner_.holds(circle(t).bounds()) || triangle_meets(corners(t), box_)) {
+    if (inner_.covers(circle(t).bounds()) || triangle_meets(corners(t), box_)) {
       states_[tri::slot(t)] = State::kCertain;
     }
   }
@@ -237,7 +237,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
   insert_taken();
   const auto is_inside = [&](tri::VertexId v) {
     const Point2 p = triangulation_.point(v);
-    return box.contains({p[0], p[1], 0});
+    return box.contains(p);
   };
   // With evenly spread points, one circle in a thousand million is this wide.
   std::vector<double> radii;

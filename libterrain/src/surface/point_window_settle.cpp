@@ -48,7 +48,7 @@ bool triangle_meets(const std::array<Point2, 3>& corner, const StoredBox& box) {
 void PointWindow::examine(tri::TriangleId triangle) {
   State& state = states_[tri::slot(triangle)];
   const CircleCover cover = circle(triangle);
-  if (inner_.holds(cover.bounds())) {
+  if (inner_.covers(cover.bounds())) {
     state = State::kCertain;
   } else if (triangle_meets(corners(triangle), box_)) {
     state = State::kSuspect;
@@ -166,7 +166,7 @@ bool PointWindow::widen() {
   insert_taken();
   examine_changes();
   for (const Suspect& suspect : suspects_) {
-    if (!inner_.holds(suspect.cover.bounds())) continue;
+    if (!inner_.covers(suspect.cover.bounds())) continue;
     states_[tri::slot(suspect.triangle)] = State::kCertain;
   }
   drop_settled();
@@ -196,11 +196,14 @@ void PointWindow::part(Outer& outer) {
                                     [](const Pending& p) { return p.origin.cluster != kNowhere; });
   outer.groups = groups_.add(
       static_cast<std::uint32_t>(outer.begin), static_cast<std::uint32_t>(taken - pending_.begin()),
-      kPointsPerGroup, [&](std::uint32_t i) { return StoredBox::around(pending_[i].place); },
+      kPointsPerGroup,
+      [&](std::uint32_t i) {
+        return StoredBox{pending_[i].place, pending_[i].place};
+      },
       [&](std::uint32_t begin, std::uint32_t middle, std::uint32_t end) {
-        StoredBox box = StoredBox::empty();
+        StoredBox box;
         for (std::uint32_t i = begin; i < end; ++i) {
-          box.include({pending_[i].place, pending_[i].place});
+          box.include(pending_[i].place);
         }
         const std::size_t axis = box.max[0] - box.min[0] >= box.max[1] - box.min[1] ? 0 : 1;
         std::nth_element(at(begin), at(middle), at(end),
@@ -216,7 +219,7 @@ void PointWindow::make_trees() {
   read_in_trees_ = read_.size();
   std::vector<BoxTree::Item>& outer = outer_tree_.start();
   for (std::uint32_t k = 0; k < outer_.size(); ++k) {
-    if (!inner_.holds(outer_[k].box)) outer.push_back({outer_[k].box, k});
+    if (!inner_.covers(outer_[k].box)) outer.push_back({outer_[k].box, k});
   }
   outer_tree_.build();
   std::vector<BoxTree::Item>& open = open_tree_.start();
@@ -232,7 +235,7 @@ bool PointWindow::find_missing(const Suspect& suspect) {
   const StoredBox bounds = cover.bounds();
   const auto meets_cover = [&](const StoredBox& box) {
     ++looks_;
-    return bounds.meets(box) && cover.meets(box);
+    return bounds.intersects(box) && cover.meets(box);
   };
   // Take the innermost of the points that were read: it leaves the smallest remainder.
   std::size_t point = pending_.size();

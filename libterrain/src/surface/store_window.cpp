@@ -16,7 +16,9 @@ template <class Visit>
 void descend(stream::StoreQuery& query, const StoredBox& box, unsigned level, const Visit& visit) {
   query.descend(
       level,
-      [&box](unsigned, const stream::StoreQuery::Branch& branch) { return box.meets(branch.box); },
+      [&box](unsigned, const stream::StoreQuery::Branch& branch) {
+        return box.intersects(flat(branch.box));
+      },
       visit);
 }
 
@@ -30,7 +32,7 @@ std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const S
       [&](const stream::Point3* head, const stream::StoreQuery::Branch& cluster) {
         found.low = std::min(found.low, cluster.box.min[2]);
         found.high = std::max(found.high, cluster.box.max[2]);
-        if (head != nullptr && found.some.size() < kMostSome && box.contains(*head)) {
+        if (head != nullptr && found.some.size() < kMostSome && box.contains(flat(*head))) {
           found.some.push_back(*head);
         }
         return true;
@@ -62,7 +64,7 @@ void StoreWindow::scatter(const LatticeWindow& window, std::span<Height> out, un
   const double scale = channel.scale, offset = channel.offset;
   descend(query_, box, level, [&](const stream::StoreQuery::Node& node) {
     for (const stream::Point3& p : node.positions) {
-      if (!box.contains(p)) continue;
+      if (!box.contains(flat(p))) continue;
       const auto column = static_cast<std::size_t>(static_cast<std::int64_t>(p[0] - box.min[0]));
       const auto row = static_cast<std::size_t>(static_cast<std::int64_t>(p[1] - box.min[1]));
       out[row * columns + column] = static_cast<Height>(p[2] * scale + offset);
@@ -98,7 +100,7 @@ void StoreWindow::points(const StoredBox& box, WindowPoints& out, unsigned level
   out.clear();
   descend(query_, box, level, [&](const stream::StoreQuery::Node& node) {
     for (const stream::Point3& p : node.positions) {
-      if (!box.contains(p)) continue;
+      if (!box.contains(flat(p))) continue;
       out.positions.push_back(p);
       out.levels.push_back(static_cast<std::uint8_t>(node.level()));
     }

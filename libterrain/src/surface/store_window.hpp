@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/box.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
@@ -27,52 +28,13 @@ struct LatticeWindow {
   }
 };
 
-/// A closed rectangle in stored coordinates.
-struct StoredBox {
-  std::array<double, 2> min{}, max{};
+/// In stored coordinates.
+using StoredBox = base::Box2;
 
-  /// Returns the box of no place, which grows by include().
-  static StoredBox empty() {
-    constexpr double kFar = std::numeric_limits<double>::infinity();
-    return {{kFar, kFar}, {-kFar, -kFar}};
-  }
-  /// Returns the smallest box with some places.
-  template <class... Places>
-  static StoredBox around(const Places&... places) {
-    StoredBox box = empty();
-    (box.include({places, places}), ...);
-    return box;
-  }
-  void include(const StoredBox& other) {
-    for (std::size_t k = 0; k < 2; ++k) {
-      min[k] = std::min(min[k], other.min[k]);
-      max[k] = std::max(max[k], other.max[k]);
-    }
-  }
-  [[nodiscard]] bool meets(const StoredBox& other) const {
-    return min[0] <= other.max[0] && max[0] >= other.min[0] && min[1] <= other.max[1] &&
-           max[1] >= other.min[1];
-  }
-  [[nodiscard]] bool meets(const stream::Box3& other) const {
-    return min[0] <= other.max[0] && max[0] >= other.min[0] && min[1] <= other.max[1] &&
-           max[1] >= other.min[1];
-  }
-  [[nodiscard]] bool contains(const stream::Point3& p) const {
-    return p[0] >= min[0] && p[0] <= max[0] && p[1] >= min[1] && p[1] <= max[1];
-  }
-  [[nodiscard]] bool holds(const StoredBox& other) const {
-    return min[0] <= other.min[0] && max[0] >= other.max[0] && min[1] <= other.min[1] &&
-           max[1] >= other.max[1];
-  }
-  [[nodiscard]] StoredBox widened(double by) const {
-    return {{min[0] - by, min[1] - by}, {max[0] + by, max[1] + by}};
-  }
-};
-
+/// Returns x and y.
+inline base::Point2 flat(const stream::Point3& p) { return {p[0], p[1]}; }
 /// Returns the x and y range of a box.
-inline StoredBox flat(const stream::Box3& box) {
-  return {{box.min[0], box.min[1]}, {box.max[0], box.max[1]}};
-}
+inline StoredBox flat(const stream::Box3& box) { return {flat(box.min), flat(box.max)}; }
 /// Returns the box with all heights.
 inline stream::Box3 tall(const StoredBox& box) {
   constexpr double kFar = std::numeric_limits<double>::infinity();

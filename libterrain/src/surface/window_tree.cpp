@@ -40,9 +40,7 @@ WindowTree::WindowTree(const stream::Store& store, unsigned level, std::size_t p
   const double sampled = each > 0 ? static_cast<double>(points) / each : 0.0;
   const auto most = static_cast<std::size_t>(
       std::clamp(sampled, 1.0, static_cast<double>(std::max<std::size_t>(sample.size(), 1))));
-  const StoredBox all{{store.bounds().min[0], store.bounds().min[1]},
-                      {store.bounds().max[0], store.bounds().max[1]}};
-  split(all, sample, each, most, 0);
+  split(flat(store.bounds()), sample, each, most, 0);
 }
 
 std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, double each,

@@ -18,6 +18,7 @@ constexpr std::size_t kBlock = 256;
 /// Only the first entries are used, one per box.
 using Block = std::array<double, kBlock>;
 
+/// By axis, for loops over many boxes.
 struct Boxes {
   std::array<const double*, 3> min, max;
   std::size_t count;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -15,13 +16,14 @@ using Point2 = std::array<double, 2>;
 using Point3 = std::array<double, 3>;
 
 /// An axis-aligned box, closed on all sides: a point on the border is inside. The default box is
-/// empty (min = +infinity, max = -infinity) and grows by include().
-template <std::size_t D>
+/// empty (min = +infinity, max = -infinity; for integers, the greatest and the least) and grows by
+/// include().
+template <std::size_t D, class T = double>
 struct Box {
-  using Point = std::array<double, D>;
+  using Point = std::array<T, D>;
 
-  Point min = filled(std::numeric_limits<double>::infinity());
-  Point max = filled(-std::numeric_limits<double>::infinity());
+  Point min = filled(kGreatest);
+  Point max = filled(kLeast);
 
   /// True if no point is inside: min > max, or a bound is NaN, on some axis.
   [[nodiscard]] constexpr bool empty() const {
@@ -64,11 +66,45 @@ struct Box {
     }
     return true;
   }
+  /// The box with each side moved outward by `by`.
+  [[nodiscard]] constexpr Box widened(T by) const {
+    Box box = *this;
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      box.min[axis] -= by;
+      box.max[axis] += by;
+    }
+    return box;
+  }
+  /// The squared distance from `p` to the nearest point of the box, 0 inside. The box must not be
+  /// empty. Rounding does not raise it above the squared distance from `p` to a point of the box,
+  /// if that is the sum of the squared differences in the order of the axes.
+  [[nodiscard]] constexpr T squared_distance(const Point& p) const {
+    T sum = 0;
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      const T outside = std::max({min[axis] - p[axis], p[axis] - max[axis], T{0}});
+      sum += outside * outside;
+    }
+    return sum;
+  }
+  /// The squared distance between the nearest points of two boxes, 0 if they intersect. Neither may
+  /// be empty. The bound on rounding is that of squared_distance() of a point.
+  [[nodiscard]] constexpr T squared_distance(const Box& other) const {
+    T sum = 0;
+    for (std::size_t axis = 0; axis < D; ++axis) {
+      const T outside = std::max({min[axis] - other.max[axis], other.min[axis] - max[axis], T{0}});
+      sum += outside * outside;
+    }
+    return sum;
+  }
 
   friend constexpr bool operator==(const Box&, const Box&) = default;
 
  private:
-  static constexpr Point filled(double value) {
+  using Limits = std::numeric_limits<T>;
+  static constexpr T kGreatest = Limits::has_infinity ? Limits::infinity() : Limits::max();
+  static constexpr T kLeast = Limits::has_infinity ? -Limits::infinity() : Limits::lowest();
+
+  static constexpr Point filled(T value) {
     Point point{};
     point.fill(value);
     return point;

@@ -99,14 +99,14 @@ void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
 }
 
 /// Returns the CRS without its third axis.
-ProjObject flat(const PJ* crs) {
+ProjObject demoted_to_2d(const PJ* crs) {
   return ProjObject(proj_crs_demote_to_2D(proj_context(), nullptr, crs));
 }
 
 void read_base(const PJ* crs, CrsDefinition& definition) {
   PJ_CONTEXT* const context = proj_context();
   const ProjObject geodetic(proj_crs_get_geodetic_crs(context, crs));
-  ProjObject base = geodetic != nullptr ? flat(geodetic.get()) : nullptr;
+  ProjObject base = geodetic != nullptr ? demoted_to_2d(geodetic.get()) : nullptr;
   if (base == nullptr) {
     throw CrsError("the CRS \"" + definition.name + "\" has no base geographic CRS", kByCode);
   }
@@ -204,7 +204,7 @@ std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition
                        "\" is derived from another geographic one, which is not supported",
                    "convert the data to longitudes and latitudes first");
   }
-  const ProjObject plane = flat(crs);
+  const ProjObject plane = demoted_to_2d(crs);
   if (plane == nullptr)
     throw CrsError("the CRS \"" + definition.name + "\" is incomplete", kByCode);
   const std::vector<Axis> axes = axes_of(crs);

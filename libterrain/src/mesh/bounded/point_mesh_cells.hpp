@@ -26,8 +26,8 @@ namespace terrace::terrain {
 
 inline constexpr std::uint32_t kNoNumber = std::numeric_limits<std::uint32_t>::max();
 
-/// A half-open rectangle of the plane, with its lower borders but without its upper ones. May be
-/// infinite.
+/// A half-open rectangle of the plane, with its lower borders but without its upper ones, so that
+/// each sample is in one cell. May be infinite.
 struct PlaneBox {
   Point2 min{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   Point2 max{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};

@@ -49,7 +49,8 @@ std::optional<TileAddress> parse_tile_path(const std::string& path);
 inline constexpr std::uint32_t tile_columns(unsigned zoom) { return std::uint32_t{2} << zoom; }
 inline constexpr std::uint32_t tile_rows(unsigned zoom) { return std::uint32_t{1} << zoom; }
 
-/// In degrees; closed. Borders of neighbouring tiles are the same numbers.
+/// In degrees; closed. Borders of neighbouring tiles are the same numbers. A separate type, so that
+/// it is not taken for a box in stored coordinates.
 struct GeographicBox {
   double west = 0.0, south = 0.0, east = 0.0, north = 0.0;
 

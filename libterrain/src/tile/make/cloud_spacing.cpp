@@ -81,9 +81,7 @@ StoredBox widened(StoredBox box, const stream::Box3& store) {
   return box;
 }
 
-bool holds(const StoredBox& outer, const stream::Box3& inner) {
-  return outer.contains(inner.min) && outer.contains(inner.max);
-}
+bool holds(const StoredBox& outer, const stream::Box3& inner) { return outer.covers(flat(inner)); }
 
 /// Returns the seed's box, or a smaller one around the seed with few enough points near it.
 StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
@@ -149,7 +147,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
     // A circle of this radius contains `rank` points.
     const auto share = static_cast<float>(std::sqrt(std::numbers::pi / rank));
     for (std::size_t i = 0; i < found.size(); ++i) {
-      if (found[i] > 0.0F && box.contains({stored[i][0], stored[i][1], 0.0})) {
+      if (found[i] > 0.0F && box.contains(stored[i])) {
         distances.push_back(found[i] * share);
       }
     }

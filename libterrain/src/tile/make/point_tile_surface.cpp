@@ -172,21 +172,15 @@ std::optional<HeightRange> PointTileSurface::range(const GeographicBox& box) {
   return range;
 }
 
-bool PointTileSurface::holds(const StoredBox& box) const {
-  return held_ && held_->contains({box.min[0], box.min[1], 0.0}) &&
-         held_->contains({box.max[0], box.max[1], 0.0});
-}
+bool PointTileSurface::holds(const StoredBox& box) const { return held_ && held_->covers(box); }
 
 void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
                                     std::span<double> out) {
   if (part.empty()) return;
-  StoredBox box = StoredBox::empty();
-  for (const std::uint32_t i : part) box.include({stored[i], stored[i]});
+  StoredBox box;
+  for (const std::uint32_t i : part) box.include(stored[i]);
   if (!holds(box)) {
-    const auto within = [&](const StoredBox& all) {
-      return all.contains({box.min[0], box.min[1], 0.0}) &&
-             all.contains({box.max[0], box.max[1], 0.0});
-    };
+    const auto within = [&](const StoredBox& all) { return all.covers(box); };
     std::optional<StoredBox> wanted;
     if (expected_ && within(*expected_) && estimate(*expected_, kMostTogether) <= kMostTogether) {
       wanted = expected_;
@@ -229,9 +223,7 @@ void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span
   std::fill(out.begin(), out.end(), std::numeric_limits<double>::quiet_NaN());
   std::vector<std::uint32_t> within;
   for (std::uint32_t i = 0; i < stored.size(); ++i) {
-    if (cloud_.places.stored_bounds().contains({stored[i][0], stored[i][1], 0.0})) {
-      within.push_back(i);
-    }
+    if (cloud_.places.stored_bounds().contains(stored[i])) within.push_back(i);
   }
   if (!has_all_) return part_heights(stored, within, out);
   for (const std::uint32_t i : within) out[i] = surface_.linear(stored[i]).height;

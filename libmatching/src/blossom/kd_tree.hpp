@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <terrace/base/box.hpp>
 #include <terrace/base/stop_check.hpp>
 
 namespace terrace::matching::blossom {
@@ -61,34 +62,25 @@ std::vector<std::uint32_t> halving_order(std::span<const std::array<double, D>> 
   return order;
 }
 
-/// Nested boxes over a sequence of points in halving order, or a part of such a sequence.
+/// A k-d tree with boxes over a sequence of points in halving order, or a part of such a sequence.
 template <std::size_t D>
-class BoxTree {
+class KdTree {
  public:
   using Point = std::array<double, D>;
 
   struct Node {
-    Point lo, hi;
+    base::Box<D> box;
     std::uint32_t begin, end;
     std::uint32_t right;  // 0: a leaf; the left child is the next node
   };
 
-  explicit BoxTree(std::vector<Point> points) : points_(std::move(points)) {
+  explicit KdTree(std::vector<Point> points) : points_(std::move(points)) {
     nodes_.reserve(points_.size() / 2 + 1);
     if (!points_.empty()) build(0, static_cast<std::uint32_t>(points_.size()));
   }
 
   std::span<const Point> points() const { return points_; }
   const std::vector<Node>& nodes() const { return nodes_; }
-
-  static double distance2(const Node& node, const Point& p) {
-    double sum = 0.0;
-    for (std::size_t d = 0; d < D; ++d) {
-      const double out = std::max({node.lo[d] - p[d], p[d] - node.hi[d], 0.0});
-      sum += out * out;
-    }
-    return sum;
-  }
 
   static double distance2(const Point& a, const Point& b) {
     double sum = 0.0;
@@ -110,7 +102,8 @@ class BoxTree {
       if (found.size() == k && far >= found.back().first) continue;
       const Node& node = nodes_[at];
       if (node.right != 0) {
-        const double left = distance2(nodes_[at + 1], p), right = distance2(nodes_[node.right], p);
+        const double left = nodes_[at + 1].box.squared_distance(p);
+        const double right = nodes_[node.right].box.squared_distance(p);
         const bool left_first = left <= right;
         open[depth++] = left_first ? std::pair{right, node.right} : std::pair{left, at + 1};
         open[depth++] = left_first ? std::pair{left, at + 1} : std::pair{right, node.right};
@@ -130,23 +123,16 @@ class BoxTree {
  private:
   std::uint32_t build(std::uint32_t begin, std::uint32_t end) {
     const auto at = static_cast<std::uint32_t>(nodes_.size());
-    nodes_.push_back({points_[begin], points_[begin], begin, end, 0});
+    nodes_.push_back({{}, begin, end, 0});
     if (end - begin <= kLeaf) {
-      for (std::uint32_t k = begin; k < end; ++k) {
-        for (std::size_t d = 0; d < D; ++d) {
-          nodes_[at].lo[d] = std::min(nodes_[at].lo[d], points_[k][d]);
-          nodes_[at].hi[d] = std::max(nodes_[at].hi[d], points_[k][d]);
-        }
-      }
+      for (std::uint32_t k = begin; k < end; ++k) nodes_[at].box.include(points_[k]);
       return at;
     }
     const std::uint32_t middle = begin + (end - begin + 1) / 2;
     const std::uint32_t left = build(begin, middle), right = build(middle, end);
     nodes_[at].right = right;
-    for (std::size_t d = 0; d < D; ++d) {
-      nodes_[at].lo[d] = std::min(nodes_[left].lo[d], nodes_[right].lo[d]);
-      nodes_[at].hi[d] = std::max(nodes_[left].hi[d], nodes_[right].hi[d]);
-    }
+    nodes_[at].box = nodes_[left].box;
+    nodes_[at].box.include(nodes_[right].box);
     return at;
   }
 
