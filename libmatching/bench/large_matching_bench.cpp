@@ -51,7 +51,7 @@ std::vector<double> above_in_windows(const std::vector<std::array<double, D>>& p
                                      const LargeMatching& matching, std::size_t pairs) {
   std::vector<std::uint32_t> heads;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
-    if (matching.mate[i] != kNobody && i < matching.mate[i]) heads.push_back(i);
+    if (matching.mate[i] != kNone && i < matching.mate[i]) heads.push_back(i);
   }
   pairs = std::min(pairs, heads.size());
   std::vector<double> above;

@@ -34,17 +34,17 @@ std::vector<TreeChildren> divide(std::size_t n, Split&& split) {
     bool divided;
   };
   std::vector<Open> open{{0, static_cast<std::uint32_t>(n), 0, false}};
-  std::vector<std::uint32_t> made;
+  std::vector<std::uint32_t> created;
   while (n > 0 && !open.empty()) {
     Open at = open.back();
     open.pop_back();
     if (at.end - at.begin == 1) {
-      made.push_back(order[at.begin]);
+      created.push_back(order[at.begin]);
     } else if (at.divided) {
-      const std::uint32_t b = made.back();
-      made.pop_back();
-      rows.push_back({made.back(), b});
-      made.back() = static_cast<std::uint32_t>(n + rows.size() - 1);
+      const std::uint32_t b = created.back();
+      created.pop_back();
+      rows.push_back({created.back(), b});
+      created.back() = static_cast<std::uint32_t>(n + rows.size() - 1);
     } else {
       const auto range = std::span(order).subspan(at.begin, at.end - at.begin);
       at.middle = at.begin + static_cast<std::uint32_t>(split(range));
@@ -135,9 +135,9 @@ inline std::vector<TreeChildren> binned_sah(Boxes boxes) {
         if (bins[k].count > 0) sum.add(bins[k].box);
         sum.count += bins[k].count;
         if (sum.count == 0 || sum.count == range.size()) continue;
-        const double here = half_area(sum.box) * static_cast<double>(sum.count) + cost[k + 1];
-        if (here < least) {
-          least = here;
+        const double split_cost = half_area(sum.box) * static_cast<double>(sum.count) + cost[k + 1];
+        if (split_cost < least) {
+          least = split_cost;
           best_axis = axis;
           best_bin = k;
         }

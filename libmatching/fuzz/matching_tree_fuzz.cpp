@@ -24,7 +24,7 @@ void require(bool holds) {
 template <class Tree>
 void check_rows(const Tree& tree, std::size_t n) {
   require(tree.rows.size() == (n == 0 ? 0 : n - 1) && tree.positions.size() == tree.rows.size());
-  require(tree.root == (n == 0 ? kNobody : 2 * n - 2));
+  require(tree.root == (n == 0 ? kNone : 2 * n - 2));
   std::vector<std::uint32_t> size(2 * n, 1), level(2 * n, 0), parents(2 * n, 0);
   for (std::size_t r = 0; r + 1 < n; ++r) {
     const MatchingTreeRow& row = tree.rows[r];
@@ -107,12 +107,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const MatchingTree<Point3> clustered = make_matching_tree(scaled, options);
   check_rows(clustered, points.size());
   options.threads = 2;
-  const MatchingTree<Point3> again = make_matching_tree(scaled, options);
-  require(again.rows == clustered.rows && again.positions == clustered.positions);
+  const MatchingTree<Point3> scaled_tree = make_matching_tree(scaled, options);
+  require(scaled_tree.rows == clustered.rows && scaled_tree.positions == clustered.positions);
   if (!points.empty()) check_queries(points, tree_children(clustered.rows));
   if (flat.size() > 12) flat.resize(12);
-  const MatchingTree<Point2> whole = make_matching_tree(std::span<const Point2>(flat));
-  check_rows(whole, flat.size());
-  check_levels(whole, flat);
+  const MatchingTree<Point2> planar_tree = make_matching_tree(std::span<const Point2>(flat));
+  check_rows(planar_tree, flat.size());
+  check_levels(planar_tree, flat);
   return 0;
 }

@@ -29,6 +29,7 @@ struct Halves {
   std::vector<std::uint32_t> first, second;
 };
 
+/// Divides the points at random.
 Halves random_halves(std::uint32_t count, std::mt19937_64& random) {
   std::vector<std::uint32_t> order(count);
   std::iota(order.begin(), order.end(), 0u);
@@ -38,10 +39,11 @@ Halves random_halves(std::uint32_t count, std::mt19937_64& random) {
   return {{order.begin(), middle}, {middle, order.end()}};
 }
 
-Halves ends_apart(const std::vector<std::uint32_t>& mate, std::mt19937_64& random) {
+/// Puts the two points of each pair into different halves at random.
+Halves separate_pairs(const std::vector<std::uint32_t>& mate, std::mt19937_64& random) {
   Halves halves;
   for (std::uint32_t i = 0; i < mate.size(); ++i) {
-    if (mate[i] == kNobody) {
+    if (mate[i] == kNone) {
       halves.second.push_back(i);
     } else if (i < mate[i]) {
       const bool swapped = (random() & 1u) != 0;
@@ -66,7 +68,7 @@ class Matcher {
   /// Returns the matching of least total distance between the halves.
   Trial match(const Halves& halves) {
     const std::size_t rows = halves.first.size(), columns = halves.second.size();
-    // Memory is first touched row by row, as that takes seconds.
+    // Grows the matrix row by row: touching all of its memory takes seconds, and a stop would wait.
     costs_.reserve(rows * columns);
     base::StopTicks ticks(check_stop_);
     for (std::size_t r = 0; r < rows; ++r) {
@@ -75,7 +77,7 @@ class Matcher {
       row_(halves.first[r], halves.second, costs_.data() + r * columns);
     }
     const auto assignment = assign(std::span<const double>(costs_), rows, columns, check_stop_);
-    Trial trial{std::vector<std::uint32_t>(count_, kNobody), 0.0};
+    Trial trial{std::vector<std::uint32_t>(count_, kNone), 0.0};
     std::vector<double> distance(count_, 0.0);
     for (std::size_t r = 0; r < rows; ++r) {
       const std::uint32_t i = halves.first[r], j = halves.second[assignment.column[r]];
@@ -83,7 +85,7 @@ class Matcher {
       trial.mate[j] = i;
       distance[std::min(i, j)] = costs_[r * columns + assignment.column[r]];
     }
-    // Added in the order of the points, so that equal matchings have exactly equal costs.
+    // Adds in the order of the points, so that equal matchings have exactly equal costs.
     for (const double d : distance) trial.cost += d;
     return trial;
   }
@@ -109,8 +111,8 @@ class Search {
   }
   [[nodiscard]] bool may_continue() const {
     if (result.iterations >= total_) return false;
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin_;
-    if (result.iterations > 0 && taken.count() > options_.seconds) return false;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start_;
+    if (result.iterations > 0 && elapsed.count() > options_.seconds) return false;
     return result.iterations == 0 || !options_.progress ||
            options_.progress(result.iterations, total_, best_);
   }
@@ -122,7 +124,7 @@ class Search {
   std::uint64_t total_;
   const HalvingOptions& options_;
   double best_ = std::numeric_limits<double>::infinity();
-  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
 void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& options,
@@ -130,7 +132,7 @@ void monte_carlo(std::uint32_t count, const Row& row, const HalvingOptions& opti
   std::vector<Matcher> matchers(threads, Matcher(count, row, options.check_stop));
   std::vector<Trial> trials(threads);
   while (search.may_continue()) {
-    // One round runs one iteration per thread; its results are recorded in iteration order.
+    // One round runs one iteration per thread. Its results are recorded in iteration order.
     const auto round = static_cast<unsigned>(std::min<std::uint64_t>(threads, search.remaining()));
     const std::uint64_t first = search.result.iterations;
     base::parallel_for(round, round, [&](std::size_t t) {
@@ -147,14 +149,15 @@ void monotone(std::uint32_t count, const Row& row, const HalvingOptions& options
     std::mt19937_64 random(base::seed_of_run(options.seed, search.result.iterations));
     search.record(matcher.match(search.result.mate.empty()
                                     ? random_halves(count, random)
-                                    : ends_apart(search.result.mate, random)));
+                                    : separate_pairs(search.result.mate, random)));
   }
 }
 
+/// Throws std::invalid_argument if the matrices of all threads do not fit into the limit.
 void check_memory(std::size_t count, unsigned threads, std::uint64_t limit) {
   const double half = 0.5 * static_cast<double>(count) + 1.0;
   const double needed = 8.0 * half * half * threads;
-  if (count < kNobody && (limit == 0 || needed <= static_cast<double>(limit))) return;
+  if (count < kNone && (limit == 0 || needed <= static_cast<double>(limit))) return;
   throw std::invalid_argument(
       "the distances between two halves of " + std::to_string(count) + " points would need " +
       std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
@@ -170,7 +173,7 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
   Search search(options.iterations > 0 ? options.iterations : std::max<std::uint64_t>(count, 1),
                 options);
   if (count < 2) {
-    search.result.mate.assign(count, kNobody);
+    search.result.mate.assign(count, kNone);
     if (count == 1) search.result.left_over = 0;
     return std::move(search.result);
   }
@@ -181,9 +184,9 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
   }
   HalvingMatching& result = search.result;
   result.cost = result.steps.back().cost;
-  const auto alone = std::find(result.mate.begin(), result.mate.end(), kNobody);
-  if (alone != result.mate.end()) {
-    result.left_over = static_cast<std::uint32_t>(alone - result.mate.begin());
+  const auto unmatched = std::find(result.mate.begin(), result.mate.end(), kNone);
+  if (unmatched != result.mate.end()) {
+    result.left_over = static_cast<std::uint32_t>(unmatched - result.mate.begin());
   }
   return std::move(result);
 }
@@ -192,10 +195,10 @@ HalvingMatching run(std::size_t count, const Row& row, const HalvingOptions& opt
 
 HalvingMatching match_by_halving(std::span<const Point3> points, const HalvingOptions& options) {
   // Squares of larger coordinates would overflow.
-  constexpr double kFarthest = 1e150;
+  constexpr double kMaxCoordinate = 1e150;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (const double x : points[i]) {
-      if (std::abs(x) <= kFarthest) continue;
+      if (std::abs(x) <= kMaxCoordinate) continue;
       throw std::invalid_argument("point " + std::to_string(i) +
                                   " has a coordinate that is not finite or beyond 1e150: leave it "
                                   "out or scale the points");

@@ -24,22 +24,22 @@
 namespace terrace::matching::windows {
 namespace {
 
-/// A point, or a pair at its midpoint. Windows never divide it.
+/// A point, or a pair of points represented by its midpoint. Windows never divide a pair.
 template <std::size_t D>
 struct Unit {
   std::array<double, D> centre;
-  std::uint32_t name;
+  std::uint32_t index;  ///< of the point, or of the first of the pair
 };
 
-/// Reorders units so that consecutive ranges are compact windows of at most `most` units. Appends
-/// the end of each range, counted from `first`, to `ends`.
+/// Reorders units so that consecutive ranges are compact windows of at most `max_size` units.
+/// Appends the end of each range, counted from `first`, to `ends`.
 ///
 /// Each range is split across the longest side of its bounding box, at a fraction between 3/8 and
 /// 5/8 that depends on the seed. Different seeds thus give windows with different borders. With
 /// `even`, every part except the last has an even number of units.
-/// Cost: O(n log(n / most)).
+/// Cost: O(n log(n / max_size)).
 template <std::size_t D>
-void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t seed,
+void cut(std::span<Unit<D>> units, std::size_t max_size, bool even, std::uint64_t seed,
          std::size_t first, std::vector<std::size_t>& ends, const base::StopCheck& check_stop) {
   base::StopTicks ticks(check_stop);
   std::vector<std::pair<std::size_t, std::size_t>> open{{0, units.size()}};
@@ -47,7 +47,7 @@ void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t se
     const auto [begin, end] = open.back();
     open.pop_back();
     ticks(8 * (end - begin));
-    if (end - begin <= most) {
+    if (end - begin <= max_size) {
       if (end != begin) ends.push_back(first + end);
       continue;
     }
@@ -74,7 +74,7 @@ void cut(std::span<Unit<D>> units, std::size_t most, bool even, std::uint64_t se
                      units.begin() + static_cast<std::ptrdiff_t>(begin + part),
                      units.begin() + static_cast<std::ptrdiff_t>(end),
                      [axis](const Unit<D>& a, const Unit<D>& b) {
-                       return std::tie(a.centre[axis], a.name) < std::tie(b.centre[axis], b.name);
+                       return std::tie(a.centre[axis], a.index) < std::tie(b.centre[axis], b.index);
                      });
     // The left part is processed first, so it is pushed last.
     open.emplace_back(begin + part, end);
@@ -95,7 +95,7 @@ using windows::Unit;
   throw std::invalid_argument("match_large: " + what);
 }
 
-/// Sets of points to be matched independently: set k is [ends[k - 1], ends[k]) of `points`.
+/// Sets of points that are matched independently. Set k is [ends[k - 1], ends[k]) of `points`.
 struct Parts {
   std::vector<std::uint32_t> points;
   std::vector<std::size_t> ends;
@@ -112,7 +112,8 @@ class Windows {
  public:
   using Point = std::array<double, D>;
 
-  /// points: scaled so that squares neither overflow nor underflow.
+  /// points: scaled so that squares neither overflow nor underflow. All arguments must outlive the
+  /// object.
   Windows(std::span<const Point> points, const LargeMatchingOptions& options,
           const PointMetric& metric)
       : points_(points),
@@ -120,22 +121,22 @@ class Windows {
         metric_(metric),
         threads_(options.threads == 0 ? std::max(1u, std::thread::hardware_concurrency())
                                       : options.threads) {
-    result_.mate.assign(points.size(), kNobody);
+    result_.mate.assign(points.size(), kNone);
   }
 
   LargeMatching solve() {
-    first_matching();
+    match_initial_parts();
     cost_ = cost();
     for (unsigned round = 1; round <= options_.rounds && !stopped_; ++round) {
-      const double before = cost_;
-      const Parts parts = pairs_together(round);
-      const bool whole = match_parts(parts);
+      const double previous_cost = cost_;
+      const Parts parts = parts_of_pairs(round);
+      const bool complete = match_parts(parts);
       cost_ = cost();
-      if (!whole) break;
+      if (!complete) break;
       ++result_.rounds;
       result_.optimal = parts.count() == 1;
       if (result_.optimal) break;
-      if (before - cost_ <= options_.tolerance * before) break;
+      if (previous_cost - cost_ <= options_.tolerance * previous_cost) break;
     }
     result_.cost = cost_;
     // The bound can exceed the cost by rounding alone.
@@ -143,9 +144,9 @@ class Windows {
         result_.optimal
             ? cost_
             : std::min(cost_, discs_.bound(points_, metric_, threads_, options_.check_stop));
-    const auto alone = std::find(result_.mate.begin(), result_.mate.end(), kNobody);
-    if (alone != result_.mate.end()) {
-      result_.left_over = static_cast<std::uint32_t>(alone - result_.mate.begin());
+    const auto unmatched = std::find(result_.mate.begin(), result_.mate.end(), kNone);
+    if (unmatched != result_.mate.end()) {
+      result_.left_over = static_cast<std::uint32_t>(unmatched - result_.mate.begin());
     }
     return std::move(result_);
   }
@@ -164,37 +165,37 @@ class Windows {
     double sum = 0.0;
     for (std::uint32_t i = 0; i < result_.mate.size(); ++i) {
       const std::uint32_t j = result_.mate[i];
-      if (j != kNobody && i < j) sum += distance(i, j);
+      if (j != kNone && i < j) sum += distance(i, j);
     }
     return sum;
   }
 
-  // Matches each part, then the points left over in odd parts, until at most one is left.
-  void first_matching() {
+  // Matches each part, then the points left over in odd parts, until at most one remains.
+  void match_initial_parts() {
     std::vector<std::uint32_t> all(points_.size());
     std::iota(all.begin(), all.end(), 0u);
     Parts parts = options_.labels.empty() ? compact_parts(all) : clusters();
     while (true) {
       match_parts(parts, true);
-      std::vector<std::uint32_t> alone;
+      std::vector<std::uint32_t> unmatched;
       for (std::uint32_t i = 0; i < result_.mate.size(); ++i) {
-        if (result_.mate[i] == kNobody) alone.push_back(i);
+        if (result_.mate[i] == kNone) unmatched.push_back(i);
       }
-      if (alone.size() < 2) break;
-      keep_duals_ = false;
-      parts = compact_parts(alone);
+      if (unmatched.size() < 2) break;
+      needs_duals_ = false;
+      parts = compact_parts(unmatched);
     }
-    keep_duals_ = true;
+    needs_duals_ = true;
   }
 
-  Parts compact_parts(std::span<const std::uint32_t> chosen) const {
+  Parts compact_parts(std::span<const std::uint32_t> subset) const {
     std::vector<Unit<D>> units;
-    units.reserve(chosen.size());
-    for (const std::uint32_t i : chosen) units.push_back({points_[i], i});
+    units.reserve(subset.size());
+    for (const std::uint32_t i : subset) units.push_back({points_[i], i});
     Parts parts;
     windows::cut<D>(units, options_.window, true, 0, 0, parts.ends, options_.check_stop);
     parts.points.reserve(units.size());
-    for (const auto& unit : units) parts.points.push_back(unit.name);
+    for (const auto& unit : units) parts.points.push_back(unit.index);
     sort_within(parts);
     return parts;
   }
@@ -210,21 +211,21 @@ class Windows {
       for (const std::uint32_t i : groups.group(g)) units.push_back({points_[i], i});
       windows::cut<D>(units, 4 * options_.window, true, 0, groups.begin[g], parts.ends,
                       options_.check_stop);
-      for (const auto& unit : units) parts.points.push_back(unit.name);
+      for (const auto& unit : units) parts.points.push_back(unit.index);
     }
     sort_within(parts);
     return parts;
   }
 
-  // Returns compact sets of the current pairs. The point left over is in one of them.
-  Parts pairs_together(unsigned round) const {
+  // Returns compact sets of the current pairs. One of them contains the point left over.
+  Parts parts_of_pairs(unsigned round) const {
     std::vector<Unit<D>> units;
     units.reserve(points_.size() / 2 + 1);
     for (std::uint32_t i = 0; i < result_.mate.size(); ++i) {
       const std::uint32_t j = result_.mate[i];
       if (j < i) continue;
       Unit<D> unit{points_[i], i};
-      for (std::size_t d = 0; d < D && j != kNobody; ++d) {
+      for (std::size_t d = 0; d < D && j != kNone; ++d) {
         unit.centre[d] = 0.5 * (points_[i][d] + points_[j][d]);
       }
       units.push_back(unit);
@@ -235,9 +236,9 @@ class Windows {
     std::size_t done = 0;
     for (std::size_t& end : parts.ends) {
       for (; done < end; ++done) {
-        parts.points.push_back(units[done].name);
-        const std::uint32_t mate = result_.mate[units[done].name];
-        if (mate != kNobody) parts.points.push_back(mate);
+        parts.points.push_back(units[done].index);
+        const std::uint32_t mate = result_.mate[units[done].index];
+        if (mate != kNone) parts.points.push_back(mate);
       }
       end = parts.points.size();
     }
@@ -258,18 +259,18 @@ class Windows {
   bool report() {
     if (!options_.progress) return true;
     const std::uint64_t done = windows_done_.load();
-    const std::uint64_t left = planned_ > done ? planned_ - done : 0;
+    const std::uint64_t remaining = planned_ > done ? planned_ - done : 0;
     const std::uint64_t rounds = options_.rounds - std::min(options_.rounds, result_.rounds + 1);
-    if (!options_.progress(done, done + left + rounds * parts_, cost_)) stopped_ = true;
+    if (!options_.progress(done, done + remaining + rounds * parts_, cost_)) stopped_ = true;
     // The first matching must be complete.
     return !stopped_ || cost_ == 0.0;
   }
 
   /// Returns false if stopped before all parts were matched. The parts matched so far are kept.
-  bool match_parts(const Parts& parts, bool first = false) {
+  bool match_parts(const Parts& parts, bool initial = false) {
     // A stopped round lacks the duals of some points, so the duals of the previous round are kept.
-    Discs discs(keep_duals_ ? points_.size() : 0);
-    if (keep_duals_) discs.start(parts.count());
+    Discs discs(needs_duals_ ? points_.size() : 0);
+    if (needs_duals_) discs.start(parts.count());
     parts_ = parts.count();
     planned_ = windows_done_.load() + parts_;
     // Progress is reported after each part that the calling thread matches. After a stop no more
@@ -277,17 +278,18 @@ class Windows {
     std::atomic<bool> stopped = false;
     base::parallel_for(parts.count(), threads_, [&](std::size_t k, unsigned thread) {
       if (stopped) return;
-      match_part(k, parts.part(k), first, discs);
+      match_part(k, parts.part(k), initial, discs);
       ++windows_done_;
       if (thread == 0 && !report()) stopped = true;
     });
     const bool all = !stopped;
     result_.windows = windows_done_.load();
-    if (all && keep_duals_) discs_ = std::move(discs);
+    if (all && needs_duals_) discs_ = std::move(discs);
     return all;
   }
 
-  void match_part(std::size_t k, std::span<const std::uint32_t> members, bool first, Discs& discs) {
+  void match_part(std::size_t k, std::span<const std::uint32_t> members, bool initial,
+                  Discs& discs) {
     std::vector<Point> points(members.size());
     for (std::size_t m = 0; m < members.size(); ++m) points[m] = points_[members[m]];
     PointMatchingOptions options;
@@ -299,12 +301,12 @@ class Windows {
       };
     }
     const PointMatching matching = match_points(std::span<const Point>(points), options);
-    if (keep_duals_) discs.take(k, members, matching);
-    // A new matching of equal cost is rejected; otherwise two of them might alternate forever.
-    if (!first && !(matching.cost < cost_of(members) * (1.0 - 1e-12))) return;
+    if (needs_duals_) discs.store(k, members, matching);
+    // Rejects a new matching of equal cost. Otherwise two of them might alternate forever.
+    if (!initial && !(matching.cost < cost_of(members) * (1.0 - 1e-12))) return;
     for (std::size_t m = 0; m < members.size(); ++m) {
       const std::uint32_t mate = matching.mate[m];
-      result_.mate[members[m]] = mate == kNobody ? kNobody : members[mate];
+      result_.mate[members[m]] = mate == kNone ? kNone : members[mate];
     }
   }
 
@@ -312,7 +314,7 @@ class Windows {
     double sum = 0.0;
     for (const std::uint32_t i : members) {
       const std::uint32_t j = result_.mate[i];
-      if (j != kNobody && i < j) sum += distance(i, j);
+      if (j != kNone && i < j) sum += distance(i, j);
     }
     return sum;
   }
@@ -323,7 +325,7 @@ class Windows {
   unsigned threads_;
   LargeMatching result_;
   Discs discs_{0};  // of the last completed round
-  bool keep_duals_ = true, stopped_ = false;
+  bool needs_duals_ = true, stopped_ = false;
   double cost_ = 0.0;
   std::atomic<std::uint64_t> windows_done_{0};
   std::uint64_t planned_ = 0, parts_ = 0;
@@ -352,7 +354,7 @@ LargeMatching match(std::span<const std::array<double, D>> points,
     result.optimal = true;
     return result;
   }
-  if (points.size() >= kNobody) refuse_large("at most 2^32 - 2 points are possible");
+  if (points.size() >= kNone) refuse_large("at most 2^32 - 2 points are possible");
   double largest = 0.0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     for (const double c : points[i]) {

@@ -20,8 +20,8 @@ using blossom::Solver;
   throw std::invalid_argument("min_weight_perfect_matching: " + what);
 }
 
-template <class AnyEdge>
-void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
+template <class EdgeType>
+void check_ends(std::size_t vertex_count, std::span<const EdgeType> edges) {
   if (vertex_count % 2 != 0) {
     refuse_edges(
         std::to_string(vertex_count) +
@@ -32,7 +32,7 @@ void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
                  std::to_string(vertex_count / 10000000) + " GB; at most 2^30 - 1 are possible");
   }
   for (std::size_t k = 0; k < edges.size(); ++k) {
-    const AnyEdge& e = edges[k];
+    const EdgeType& e = edges[k];
     if (e.i >= vertex_count || e.j >= vertex_count || e.i == e.j) {
       refuse_edges("edge " + std::to_string(k) + " joins " + std::to_string(e.i) + " and " +
                    std::to_string(e.j) + "; ends must differ and be below " +
@@ -41,38 +41,38 @@ void check_ends(std::size_t vertex_count, std::span<const AnyEdge> edges) {
   }
 }
 
-template <class AnyEdge>
-Matching solve(std::size_t vertex_count, std::span<const AnyEdge> edges, int exponent,
-               const std::vector<Edge>& doubled, const base::StopCheck& check_stop) {
-  Solver solver(static_cast<std::uint32_t>(vertex_count), doubled, blossom::kNone,
+template <class EdgeType>
+Matching solve(std::size_t vertex_count, std::span<const EdgeType> edges, int exponent,
+               const std::vector<Edge>& doubled_edges, const base::StopCheck& check_stop) {
+  Solver solver(static_cast<std::uint32_t>(vertex_count), doubled_edges, kNone,
                 base::StopTicks(check_stop));
-  const std::uint32_t alone = solver.solve();
-  if (alone != blossom::kNone) refuse_edges(blossom::unmatchable(solver, alone));
+  const std::uint32_t exposed = solver.solve();
+  if (exposed != kNone) refuse_edges(blossom::unmatchable_message(solver, exposed));
   Matching result = blossom::proof_of(solver);
   result.exponent = exponent;
   // The cheapest of several edges between the same vertices is the matched one.
-  std::vector<std::size_t> chosen(vertex_count, edges.size());
+  std::vector<std::size_t> matched(vertex_count, edges.size());
   for (std::size_t k = 0; k < edges.size(); ++k) {
-    const AnyEdge& e = edges[k];
+    const EdgeType& e = edges[k];
     if (result.mate[e.i] != e.j) continue;
-    std::size_t& best = chosen[std::min(e.i, e.j)];
+    std::size_t& best = matched[std::min(e.i, e.j)];
     if (best == edges.size() || e.weight < edges[best].weight) best = k;
   }
-  for (const std::size_t k : chosen) {
+  for (const std::size_t k : matched) {
     if (k != edges.size()) result.cost += static_cast<double>(edges[k].weight);
   }
   return result;
 }
 
-std::int64_t rounded(const WeightedEdge& e, int exponent) {
+std::int64_t integer_weight(const WeightedEdge& e, int exponent) {
   return std::llround(std::ldexp(e.weight, exponent));
 }
-std::int64_t rounded(const IntegerEdge& e, int) { return e.weight; }
+std::int64_t integer_weight(const IntegerEdge& e, int) { return e.weight; }
 
 /// Returns the chain of blossoms around a vertex, from the innermost outward.
 std::vector<std::uint32_t> chain_of(const Matching& m, std::uint32_t vertex) {
   std::vector<std::uint32_t> chain;
-  for (std::uint32_t b = m.vertex_blossom[vertex]; b != kNobody; b = m.blossom_parent[b]) {
+  for (std::uint32_t b = m.vertex_blossom[vertex]; b != kNone; b = m.blossom_parent[b]) {
     if (chain.size() > m.blossom_parent.size()) break;
     chain.push_back(b);
   }
@@ -80,6 +80,7 @@ std::vector<std::uint32_t> chain_of(const Matching& m, std::uint32_t vertex) {
   return chain;
 }
 
+/// Returns the sum of the duals of the blossoms that contain exactly one of two vertices.
 std::int64_t separating_duals(const Matching& m, std::uint32_t i, std::uint32_t j) {
   const std::vector<std::uint32_t> a = chain_of(m, i), b = chain_of(m, j);
   std::size_t shared = 0;
@@ -90,6 +91,8 @@ std::int64_t separating_duals(const Matching& m, std::uint32_t i, std::uint32_t 
   return sum;
 }
 
+/// Describes the first fault of the arrays themselves: sizes, indices and signs. Empty if there is
+/// none.
 std::string shape_error(const Matching& m) {
   const std::size_t n = m.mate.size(), blossoms = m.blossom_dual.size();
   if (m.vertex_dual.size() != n || m.vertex_blossom.size() != n ||
@@ -100,12 +103,12 @@ std::string shape_error(const Matching& m) {
     if (m.mate[v] >= n || m.mate[v] == v || m.mate[m.mate[v]] != v) {
       return "vertex " + std::to_string(v) + " is not the partner of its partner";
     }
-    if (m.vertex_blossom[v] != kNobody && m.vertex_blossom[v] >= blossoms) {
+    if (m.vertex_blossom[v] != kNone && m.vertex_blossom[v] >= blossoms) {
       return "vertex " + std::to_string(v) + " names a blossom that does not exist";
     }
   }
   for (std::size_t b = 0; b < blossoms; ++b) {
-    if (m.blossom_parent[b] != kNobody && m.blossom_parent[b] >= blossoms) {
+    if (m.blossom_parent[b] != kNone && m.blossom_parent[b] >= blossoms) {
       return "blossom " + std::to_string(b) + " names a parent that does not exist";
     }
     if (m.blossom_dual[b] < 0) return "blossom " + std::to_string(b) + " has a negative dual";
@@ -113,38 +116,38 @@ std::string shape_error(const Matching& m) {
   return {};
 }
 
-// Checks that blossoms have odd sizes and that one matched edge crosses the border if the dual is
-// not 0.
+/// Checks that blossoms have odd sizes and that one matched edge crosses the border of each blossom
+/// with a nonzero dual. Describes the first fault. Empty if there is none.
 std::string blossom_error(const Matching& m) {
-  std::vector<std::size_t> size(m.blossom_dual.size(), 0), leaving(m.blossom_dual.size(), 0);
+  std::vector<std::size_t> size(m.blossom_dual.size(), 0), crossing(m.blossom_dual.size(), 0);
   for (std::uint32_t v = 0; v < m.mate.size(); ++v) {
-    const std::vector<std::uint32_t> own = chain_of(m, v), other = chain_of(m, m.mate[v]);
-    for (std::size_t k = 0; k < own.size(); ++k) {
-      ++size[own[k]];
-      if (k >= other.size() || other[k] != own[k]) ++leaving[own[k]];
+    const std::vector<std::uint32_t> chain = chain_of(m, v), mate_chain = chain_of(m, m.mate[v]);
+    for (std::size_t k = 0; k < chain.size(); ++k) {
+      ++size[chain[k]];
+      if (k >= mate_chain.size() || mate_chain[k] != chain[k]) ++crossing[chain[k]];
     }
   }
   for (std::size_t b = 0; b < size.size(); ++b) {
     if (size[b] % 2 == 0) return "blossom " + std::to_string(b) + " has an even size";
-    if (m.blossom_dual[b] != 0 && leaving[b] != 1) {
-      return "blossom " + std::to_string(b) + " has " + std::to_string(leaving[b]) +
+    if (m.blossom_dual[b] != 0 && crossing[b] != 1) {
+      return "blossom " + std::to_string(b) + " has " + std::to_string(crossing[b]) +
              " matched edges over its border";
     }
   }
   return {};
 }
 
-template <class AnyEdge>
-std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
+template <class EdgeType>
+std::string error_of(const Matching& m, std::span<const EdgeType> edges) {
   if (std::string error = shape_error(m); !error.empty()) return error;
   if (std::string error = blossom_error(m); !error.empty()) return error;
   std::vector<bool> tight(m.mate.size(), false);
   for (std::size_t k = 0; k < edges.size(); ++k) {
-    const AnyEdge& e = edges[k];
+    const EdgeType& e = edges[k];
     if (e.i >= m.mate.size() || e.j >= m.mate.size() || e.i == e.j) {
       return "edge " + std::to_string(k) + " is not in the graph";
     }
-    const std::int64_t slack = 2 * rounded(e, m.exponent) - m.vertex_dual[e.i] -
+    const std::int64_t slack = 2 * integer_weight(e, m.exponent) - m.vertex_dual[e.i] -
                                m.vertex_dual[e.j] - separating_duals(m, e.i, e.j);
     if (slack < 0) {
       return "edge " + std::to_string(k) + " violates the duals by " + std::to_string(-slack);
@@ -160,7 +163,7 @@ std::string error_of(const Matching& m, std::span<const AnyEdge> edges) {
 }  // namespace
 
 double Matching::dual_bound() const {
-  // Summed as integers in two parts, which makes the sum exact and prevents overflow.
+  // Adds integers in two parts, so that the sum is exact and does not overflow.
   double high = 0.0;
   std::int64_t low = 0;
   const auto add = [&](std::int64_t dual) {
@@ -186,11 +189,12 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const W
   std::frexp(largest, &top);
   for (int bits = 52;; bits -= 9) {
     const int exponent = bits - top;
-    std::vector<Edge> doubled;
-    doubled.reserve(edges.size());
-    for (const WeightedEdge& e : edges) doubled.push_back({e.i, e.j, 2 * rounded(e, exponent)});
+    std::vector<Edge> doubled_edges;
+    doubled_edges.reserve(edges.size());
+    for (const WeightedEdge& e : edges)
+      doubled_edges.push_back({e.i, e.j, 2 * integer_weight(e, exponent)});
     try {
-      return solve(vertex_count, edges, exponent, doubled, check_stop);
+      return solve(vertex_count, edges, exponent, doubled_edges, check_stop);
     } catch (const std::overflow_error&) {
       if (bits <= 34) throw;
     }
@@ -200,8 +204,8 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const W
 Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const IntegerEdge> edges,
                                      const base::StopCheck& check_stop) {
   check_ends(vertex_count, edges);
-  std::vector<Edge> doubled;
-  doubled.reserve(edges.size());
+  std::vector<Edge> doubled_edges;
+  doubled_edges.reserve(edges.size());
   constexpr std::int64_t kLargest = blossom::kLimit / 8;
   for (std::size_t k = 0; k < edges.size(); ++k) {
     const IntegerEdge& e = edges[k];
@@ -209,9 +213,9 @@ Matching min_weight_perfect_matching(std::size_t vertex_count, std::span<const I
       refuse_edges("edge " + std::to_string(k) + " weighs " + std::to_string(e.weight) +
                    "; weights up to 2^57 fit; divide them");
     }
-    doubled.push_back({e.i, e.j, 2 * e.weight});
+    doubled_edges.push_back({e.i, e.j, 2 * e.weight});
   }
-  return solve(vertex_count, edges, 0, doubled, check_stop);
+  return solve(vertex_count, edges, 0, doubled_edges, check_stop);
 }
 
 std::string matching_error(const Matching& matching, std::span<const WeightedEdge> edges) {

@@ -31,7 +31,7 @@ class Problem {
   using Point = std::array<double, D>;
 
   Problem(std::span<const Point> points, const PointMatchingOptions& options)
-      : given_(points), options_(options) {
+      : input_(points), options_(options) {
     check();
     order_ = blossom::halving_order(points, base::StopTicks(options.check_stop));
     place_.resize(points.size());
@@ -53,12 +53,12 @@ class Problem {
 
  private:
   void check() const {
-    if (given_.size() > std::size_t{1} << 29) {
-      refuse_points(std::to_string(given_.size()) + " points would need about " +
-                    std::to_string(given_.size() >> 20) + " GiB; at most 2^29 are possible");
+    if (input_.size() > std::size_t{1} << 29) {
+      refuse_points(std::to_string(input_.size()) + " points would need about " +
+                    std::to_string(input_.size() >> 20) + " GiB; at most 2^29 are possible");
     }
-    for (std::size_t k = 0; k < given_.size(); ++k) {
-      for (const double c : given_[k]) {
+    for (std::size_t k = 0; k < input_.size(); ++k) {
+      for (const double c : input_[k]) {
         if (!std::isfinite(c)) {
           refuse_points("a coordinate of point " + std::to_string(k) +
                         " is not finite; leave it out");
@@ -72,10 +72,10 @@ class Problem {
     }
     for (std::size_t k = 0; k < options_.candidates.size(); ++k) {
       const auto& [i, j] = options_.candidates[k];
-      if (i >= given_.size() || j >= given_.size() || i == j) {
+      if (i >= input_.size() || j >= input_.size() || i == j) {
         refuse_points("candidate " + std::to_string(k) + " joins " + std::to_string(i) + " and " +
                       std::to_string(j) + "; ends must differ and be below " +
-                      std::to_string(given_.size()));
+                      std::to_string(input_.size()));
       }
     }
   }
@@ -83,13 +83,13 @@ class Problem {
   // Scales by a power of two, which is exact, so that squares neither overflow nor underflow.
   void scale_points() {
     double largest = 0.0;
-    for (const Point& p : given_) {
+    for (const Point& p : input_) {
       for (const double c : p) largest = std::max(largest, std::abs(c));
     }
     if (largest > 0x1p400 || (largest < 0x1p-400 && largest > 0.0)) std::frexp(largest, &shift_);
-    points_.resize(given_.size());
+    points_.resize(input_.size());
     for (std::size_t k = 0; k < points_.size(); ++k) {
-      points_[k] = given_[order_[k]];
+      points_[k] = input_[order_[k]];
       for (double& c : points_[k]) c = std::ldexp(c, -shift_);
     }
   }
@@ -118,43 +118,43 @@ class Problem {
   void set_candidates() {
     const auto n = static_cast<std::uint32_t>(points_.size());
     const KdTree<D> tree(points_);
-    std::vector<std::pair<double, std::uint32_t>> near;
-    const auto join = [&](std::uint32_t i, std::uint32_t j) {
+    std::vector<std::pair<double, std::uint32_t>> neighbours;
+    const auto add_candidate = [&](std::uint32_t i, std::uint32_t j) {
       candidates_.emplace_back(std::min(i, j), std::max(i, j));
     };
     base::StopTicks ticks(options_.check_stop);
     constexpr std::size_t kTicksOfSearch = 1024;
     for (std::uint32_t i = 0; i < n; ++i) {
       ticks(kTicksOfSearch);
-      tree.nearest(i, options_.neighbours, near);
-      for (const auto& [d, j] : near) join(i, j);
-      if (i % 2 == 1) join(i - 1, i);
+      tree.nearest(i, options_.neighbours, neighbours);
+      for (const auto& [d, j] : neighbours) add_candidate(i, j);
+      if (i % 2 == 1) add_candidate(i - 1, i);
     }
-    for (const auto& [i, j] : options_.candidates) join(place_[i], place_[j]);
+    for (const auto& [i, j] : options_.candidates) add_candidate(place_[i], place_[j]);
     std::sort(candidates_.begin(), candidates_.end());
     candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
     for (const auto& [i, j] : candidates_) {
-      longest_ = std::max(longest_, std::abs(cost_.distance(i, j)));
+      longest_candidate_ = std::max(longest_candidate_, std::abs(cost_.distance(i, j)));
     }
   }
 
   PointMatching solve(int bits) {
     const auto n = static_cast<std::uint32_t>(points_.size());
     int exponent = 0;
-    std::frexp(longest_, &exponent);
+    std::frexp(longest_candidate_, &exponent);
     cost_.scale = std::ldexp(1.0, std::min(bits - exponent, 1000));
     std::vector<Edge> edges;
     edges.reserve(candidates_.size() + (n % 2 == 0 ? 0 : n));
     for (const auto& [i, j] : candidates_) edges.push_back({i, j, cost_(i, j)});
-    // An odd number of points gets an extra vertex "nobody" with edges of cost 0 to all points.
-    const std::uint32_t nobody = n % 2 == 0 ? blossom::kNone : n;
-    for (std::uint32_t i = 0; nobody != blossom::kNone && i < n; ++i) edges.push_back({i, n, 0});
+    // An odd number of points gets a dummy vertex with edges of cost 0 to all points.
+    const std::uint32_t dummy = n % 2 == 0 ? kNone : n;
+    for (std::uint32_t i = 0; dummy != kNone && i < n; ++i) edges.push_back({i, n, 0});
     const base::StopTicks ticks(options_.check_stop);
-    Solver solver(n + n % 2, std::move(edges), nobody, ticks);
+    Solver solver(n + n % 2, std::move(edges), dummy, ticks);
     Pricing<D> pricing(points_, cost_, ticks);
     PointMatching result;
     while (true) {
-      if (solver.solve() != blossom::kNone) throw std::logic_error("match_points: no matching");
+      if (solver.solve() != kNone) throw std::logic_error("match_points: no matching");
       ++result.rounds;
       const std::vector<Edge> violated = pricing.violated(solver);
       if (violated.empty()) break;
@@ -170,13 +170,13 @@ class Problem {
     const Matching sorted = blossom::proof_of(solver);
     Matching& proof = result.proof;
     proof = sorted;
-    const auto given = [&](std::uint32_t k) { return k < n ? order_[k] : k; };
+    const auto original = [&](std::uint32_t k) { return k < n ? order_[k] : k; };
     for (std::uint32_t k = 0; k < sorted.mate.size(); ++k) {
-      proof.mate[given(k)] = given(sorted.mate[k]);
-      proof.vertex_dual[given(k)] = sorted.vertex_dual[k];
-      proof.vertex_blossom[given(k)] = sorted.vertex_blossom[k];
+      proof.mate[original(k)] = original(sorted.mate[k]);
+      proof.vertex_dual[original(k)] = sorted.vertex_dual[k];
+      proof.vertex_blossom[original(k)] = sorted.vertex_blossom[k];
     }
-    result.mate.assign(n, kNobody);
+    result.mate.assign(n, kNone);
     for (std::uint32_t i = 0; i < n; ++i) {
       const std::uint32_t j = proof.mate[i];
       if (j >= n) {
@@ -195,14 +195,14 @@ class Problem {
     if (!std::isfinite(result.cost)) refuse_points("the cost overflows a double; scale the points");
   }
 
-  std::span<const Point> given_;
+  std::span<const Point> input_;
   const PointMatchingOptions& options_;
   std::vector<std::uint32_t> order_, place_;  // by halving order; its inverse
   std::vector<Point> points_;                 // in halving order, times 2^-shift_
   int shift_ = 0;
   PairCost cost_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> candidates_;
-  double longest_ = 0.0;
+  double longest_candidate_ = 0.0;
 };
 
 template <std::size_t D>

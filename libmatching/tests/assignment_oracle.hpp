@@ -16,7 +16,7 @@ namespace terrace::matching {
 /// Returns the least cost over all ways to assign min(rows, columns) rows to columns.
 template <class Number>
 double brute_force(const std::vector<Number>& costs, std::size_t rows, std::size_t columns) {
-  // Permutes the longer side; its first elements are matched to the shorter side.
+  // Permutes the longer side. Its first elements are matched to the shorter side.
   const bool tall = rows > columns;
   std::vector<std::size_t> permutation(tall ? rows : columns);
   std::iota(permutation.begin(), permutation.end(), std::size_t{0});

@@ -28,7 +28,7 @@ TYPED_TEST(AssignTyped, EqualsBruteForceOnSmallMatrices) {
     std::mt19937_64 random(seed);
     const std::size_t columns = 1 + random() % 7, rows = 1 + random() % 7;
     std::vector<TypeParam> costs(rows * columns);
-    // A few distinct values make ties common; some are negative.
+    // A few distinct values make ties common. Some are negative.
     for (auto& c : costs) c = static_cast<TypeParam>(static_cast<int>(random() % 9) - 3);
     const auto a = assign(std::span<const TypeParam>(costs), rows, columns);
     EXPECT_EQ(static_cast<double>(a.cost), brute_force(costs, rows, columns));
@@ -202,8 +202,8 @@ TEST(Assign, FindsThePublishedOptimum) {
   const IntegerAssignment a = assign(costs, n, n);
   EXPECT_EQ(a.cost, 991);
   EXPECT_EQ(check(a, costs, n, n), 0);
-  const std::vector<double> real(costs.begin(), costs.end());
-  EXPECT_EQ(assign(real, n, n).cost, 991);
+  const std::vector<double> real_costs(costs.begin(), costs.end());
+  EXPECT_EQ(assign(real_costs, n, n).cost, 991);
 }
 
 }  // namespace

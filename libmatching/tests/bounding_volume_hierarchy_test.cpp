@@ -103,26 +103,26 @@ template <std::size_t D>
 std::vector<double> all_costs(const std::vector<TreeChildren>& rows,
                               const std::vector<base::Box<D>>& boxes, std::uint32_t v,
                               std::uint32_t leaf_size, const SurfaceAreaCosts& costs,
-                              base::Box<D>& around, std::uint32_t& size) {
+                              base::Box<D>& bounds, std::uint32_t& size) {
   if (v < boxes.size()) {
-    around = boxes[v];
+    bounds = boxes[v];
     size = 1;
-    return {costs.intersection * area(around)};
+    return {costs.intersection * area(bounds)};
   }
   base::Box<D> other;
   std::uint32_t other_size = 0;
   const auto [a, b] = rows[v - boxes.size()];
-  const auto first = all_costs(rows, boxes, a, leaf_size, costs, around, size);
+  const auto first = all_costs(rows, boxes, a, leaf_size, costs, bounds, size);
   const auto second = all_costs(rows, boxes, b, leaf_size, costs, other, other_size);
   size += other_size;
   for (std::size_t d = 0; d < D; ++d) {
-    around.min[d] = std::min(around.min[d], other.min[d]);
-    around.max[d] = std::max(around.max[d], other.max[d]);
+    bounds.min[d] = std::min(bounds.min[d], other.min[d]);
+    bounds.max[d] = std::max(bounds.max[d], other.max[d]);
   }
   std::vector<double> all;
-  if (size <= leaf_size) all.push_back(costs.intersection * area(around) * size);
+  if (size <= leaf_size) all.push_back(costs.intersection * area(bounds) * size);
   for (const double x : first) {
-    for (const double y : second) all.push_back(costs.traversal * area(around) + x + y);
+    for (const double y : second) all.push_back(costs.traversal * area(bounds) + x + y);
   }
   return all;
 }
@@ -140,11 +140,11 @@ void test_random(std::uint64_t seed) {
   const BoundingVolumeHierarchy<D> tree(rows, boxes, options);
   expect_sound(tree, boxes, options.leaf_size);
   if (n == 0 || n > 9) return;
-  base::Box<D> around;
+  base::Box<D> bounds;
   std::uint32_t size = 0;
   const auto all = all_costs(rows, boxes, static_cast<std::uint32_t>(n + rows.size() - 1),
-                             options.leaf_size, options.costs, around, size);
-  const double root = area(around);
+                             options.leaf_size, options.costs, bounds, size);
+  const double root = area(bounds);
   if (root == 0.0) return;
   EXPECT_NEAR(tree.surface_area_cost(options.costs) * root,
               *std::min_element(all.begin(), all.end()), 1e-5 * root);

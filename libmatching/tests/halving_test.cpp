@@ -52,7 +52,7 @@ void check(const HalvingMatching& matching, const std::vector<Point3>& points) {
   double cost = 0.0;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const std::uint32_t j = matching.mate[i];
-    if (j == kNobody) {
+    if (j == kNone) {
       EXPECT_EQ(points.size() % 2, 1u);
       EXPECT_EQ(matching.left_over, i);
       continue;
@@ -62,7 +62,7 @@ void check(const HalvingMatching& matching, const std::vector<Point3>& points) {
     EXPECT_EQ(matching.mate[j], i);
     if (i < j) cost += distance(points[i], points[j]);
   }
-  EXPECT_EQ(points.size() % 2 == 1, matching.left_over != kNobody);
+  EXPECT_EQ(points.size() % 2 == 1, matching.left_over != kNone);
   EXPECT_NEAR(matching.cost, cost, 1e-12 * cost);
   for (std::size_t k = 1; k < matching.steps.size(); ++k) {
     EXPECT_LT(matching.steps[k].cost, matching.steps[k - 1].cost);
@@ -99,10 +99,10 @@ TEST(Halving, MonotoneIsFarBelowMonteCarlo) {
   const std::vector<Point3> points = uniform(100, random);
   const HalvingMatching published =
       match_by_halving(points, {.method = Halving::monte_carlo, .iterations = 200});
-  const HalvingMatching ours = match_by_halving(points, {.iterations = 200});
+  const HalvingMatching by_halving = match_by_halving(points, {.iterations = 200});
   check(published, points);
-  check(ours, points);
-  EXPECT_GT(published.cost, 1.15 * ours.cost);
+  check(by_halving, points);
+  EXPECT_GT(published.cost, 1.15 * by_halving.cost);
 }
 
 TEST(Halving, ThreadsNeverChangeTheResult) {

@@ -55,10 +55,10 @@ template <std::size_t D>
 void expect_matching(const LargeMatching& m, const Points<D>& points) {
   ASSERT_EQ(m.mate.size(), points.size());
   double cost = 0.0;
-  std::size_t alone = 0;
+  std::size_t unmatched = 0;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
-    if (m.mate[i] == kNobody) {
-      ++alone;
+    if (m.mate[i] == kNone) {
+      ++unmatched;
       EXPECT_EQ(m.left_over, i);
       continue;
     }
@@ -67,7 +67,7 @@ void expect_matching(const LargeMatching& m, const Points<D>& points) {
     ASSERT_EQ(m.mate[m.mate[i]], i);
     if (i < m.mate[i]) cost += length(points[i], points[m.mate[i]]);
   }
-  EXPECT_EQ(alone, points.size() % 2);
+  EXPECT_EQ(unmatched, points.size() % 2);
   EXPECT_NEAR(m.cost, cost, 1e-12 * cost);
 }
 
@@ -146,11 +146,11 @@ TEST(LargeMatching, IsExactUpToTheLimit) {
   std::vector<std::uint32_t> labels(points.size());
   for (std::size_t i = 0; i < labels.size(); ++i) labels[i] = static_cast<std::uint32_t>(i % 3);
   options.labels = labels;
-  const LargeMatching whole = match_large(points, options);
-  EXPECT_TRUE(whole.optimal);
-  EXPECT_EQ(whole.rounds, 1u);
-  EXPECT_NEAR(whole.cost, m.cost, 1e-12 * m.cost);
-  EXPECT_NEAR(whole.dual_bound, m.cost, 1e-9 * m.cost);
+  const LargeMatching one_window = match_large(points, options);
+  EXPECT_TRUE(one_window.optimal);
+  EXPECT_EQ(one_window.rounds, 1u);
+  EXPECT_NEAR(one_window.cost, m.cost, 1e-12 * m.cost);
+  EXPECT_NEAR(one_window.dual_bound, m.cost, 1e-9 * m.cost);
 }
 
 TEST(LargeMatching, DoesNotDependOnThreads) {
@@ -162,10 +162,10 @@ TEST(LargeMatching, DoesNotDependOnThreads) {
   const LargeMatching one = match_large(points, options);
   for (const unsigned threads : {2u, 5u, 0u}) {
     options.threads = threads;
-    const LargeMatching many = match_large(points, options);
-    EXPECT_EQ(many.mate, one.mate);
-    EXPECT_EQ(many.cost, one.cost);
-    EXPECT_EQ(many.dual_bound, one.dual_bound);
+    const LargeMatching many_windows = match_large(points, options);
+    EXPECT_EQ(many_windows.mate, one.mate);
+    EXPECT_EQ(many_windows.cost, one.cost);
+    EXPECT_EQ(many_windows.dual_bound, one.dual_bound);
   }
 }
 
@@ -184,12 +184,12 @@ TEST(LargeMatching, ClustersAreMatchedWithinThemselvesFirst) {
   const LargeMatching m = match_large(points, options);
   expect_bounds(m, points);
   // Only points left over in their clusters, at most one each, are paired across clusters.
-  std::size_t across = 0, odd = 0;
+  std::size_t crossing = 0, odd = 0;
   double within = 0.0;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     if (m.mate[i] < i) continue;
     if (labels[i] != labels[m.mate[i]]) {
-      ++across;
+      ++crossing;
     } else {
       within += length(points[i], points[m.mate[i]]);
     }
@@ -199,7 +199,7 @@ TEST(LargeMatching, ClustersAreMatchedWithinThemselvesFirst) {
     odd += cluster.size() % 2;
     expected += match_points(cluster).cost;
   }
-  EXPECT_EQ(2 * across, odd);
+  EXPECT_EQ(2 * crossing, odd);
   EXPECT_NEAR(within, expected, 1e-12 * expected);
   // Windows then repair the pairs at the borders.
   options.rounds = 8;
@@ -214,11 +214,11 @@ TEST(LargeMatching, RoundsNeverRaiseTheCost) {
   options.exact_limit = 0;
   options.window = 100;
   options.tolerance = 0.0;
-  double before = std::numeric_limits<double>::infinity();
+  double last_cost = std::numeric_limits<double>::infinity();
   for (options.rounds = 0; options.rounds < 7; ++options.rounds) {
     const double cost = match_large(points, options).cost;
-    EXPECT_LE(cost, before);
-    before = cost;
+    EXPECT_LE(cost, last_cost);
+    last_cost = cost;
   }
 }
 
@@ -266,8 +266,8 @@ TEST(LargeMatching, HandlesFewerThanThreePoints) {
   options.exact_limit = 0;
   for (std::size_t n = 0; n < 2; ++n) {
     const LargeMatching m = match_large(Points<2>(n, {3.0, 4.0}), options);
-    EXPECT_EQ(m.mate, std::vector<std::uint32_t>(n, kNobody));
-    EXPECT_EQ(m.left_over, n == 0 ? kNobody : 0u);
+    EXPECT_EQ(m.mate, std::vector<std::uint32_t>(n, kNone));
+    EXPECT_EQ(m.left_over, n == 0 ? kNone : 0u);
     EXPECT_EQ(m.cost, 0.0);
     EXPECT_EQ(m.gap(), 0.0);
   }

@@ -172,7 +172,7 @@ TEST(Matching, DetectsForgedProofs) {
   bad.blossom_dual[0] = -bad.blossom_dual[0] - 1;
   EXPECT_NE(matching_error(bad, edges), "");
   bad = good;
-  bad.vertex_blossom[0] = kNobody;
+  bad.vertex_blossom[0] = kNone;
   EXPECT_NE(matching_error(bad, edges), "");
 }
 

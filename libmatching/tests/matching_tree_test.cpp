@@ -43,7 +43,7 @@ double least_cost(const std::vector<Point>& points) {
 }
 
 /// Checks everything that does not depend on clusters: sizes, positions, and that each level is
-/// matched at the least cost. The nodes of each level are derived from the rows alone; `nodes` is
+/// matched at the least cost. The nodes of each level are derived from the rows alone. `nodes` is
 /// the first level.
 template <class Point>
 void expect_levels_optimal(const MatchingTree<Point>& tree, const std::vector<Point>& points,
@@ -90,7 +90,7 @@ void expect_tree(const MatchingTree<Point>& tree, const std::vector<Point>& poin
   ASSERT_EQ(tree.rows.size(), n == 0 ? 0 : n - 1);
   ASSERT_EQ(tree.positions.size(), tree.rows.size());
   if (n == 0) {
-    EXPECT_EQ(tree.root, kNobody);
+    EXPECT_EQ(tree.root, kNone);
     return;
   }
   EXPECT_EQ(tree.root, n == 1 ? 0 : 2 * n - 2);
@@ -272,16 +272,16 @@ TEST(MatchingTree, ReportsProgressAndStops) {
     MatchingTreeOptions<Point2> options;
     options.labels = labels;
     options.threads = threads;
-    std::vector<std::size_t> seen;
+    std::vector<std::size_t> reports;
     options.progress = [&](std::size_t done, std::size_t total) {
       EXPECT_EQ(total, 199u);
-      seen.push_back(done);
+      reports.push_back(done);
       return true;
     };
     EXPECT_EQ(tree_of(points, options).rows.size(), 199u);
-    ASSERT_FALSE(seen.empty());
-    EXPECT_TRUE(std::is_sorted(seen.begin(), seen.end()));
-    EXPECT_EQ(seen.back(), 199u);
+    ASSERT_FALSE(reports.empty());
+    EXPECT_TRUE(std::is_sorted(reports.begin(), reports.end()));
+    EXPECT_EQ(reports.back(), 199u);
     std::size_t calls = 0;
     // The caller's thread reports at least the last levels, so the work stops before the end.
     options.progress = [&](std::size_t, std::size_t) { return ++calls < 2; };
@@ -289,7 +289,7 @@ TEST(MatchingTree, ReportsProgressAndStops) {
     EXPECT_EQ(calls, 2u);
     EXPECT_TRUE(stopped.rows.empty());
     EXPECT_TRUE(stopped.positions.empty());
-    EXPECT_EQ(stopped.root, kNobody);
+    EXPECT_EQ(stopped.root, kNone);
   }
 }
 
@@ -301,7 +301,7 @@ TEST(MatchingTree, UsesTheCallersMatcher) {
   options.matcher = [](std::span<const Point2> present) {
     std::vector<std::uint32_t> mate(present.size());
     for (std::uint32_t i = 0; i < mate.size(); ++i) mate[i] = i ^ 1u;
-    if (mate.size() % 2 == 1) mate.back() = kNobody;
+    if (mate.size() % 2 == 1) mate.back() = kNone;
     return mate;
   };
   const MatchingTree<Point2> tree = tree_of(points, options);
@@ -322,7 +322,7 @@ TEST(MatchingTree, UsesTheCallersMatcher) {
   expect_refused({1, 2, 0}, "node 0");
   expect_refused({1, 0, 2}, "node 2");
   expect_refused({1, 0, 3}, "node 2");
-  expect_refused({kNobody, kNobody, kNobody}, "node 1");
+  expect_refused({kNone, kNone, kNone}, "node 1");
   options.matcher = [](std::span<const Point2>) -> std::vector<std::uint32_t> {
     throw std::runtime_error("matcher");
   };
@@ -368,8 +368,8 @@ TEST(MatchingTree, RefusesBadInput) {
   options.weights = heavy;
   refuse(options, "sum overflows a double");
   // The size is checked before anything is read.
-  const std::span<const Point3> many(points.data(), std::size_t{1} << 31);
-  EXPECT_NE(refusal(many).find("MiB"), std::string::npos);
+  const std::span<const Point3> too_many(points.data(), std::size_t{1} << 31);
+  EXPECT_NE(refusal(too_many).find("MiB"), std::string::npos);
 }
 
 }  // namespace

@@ -123,7 +123,7 @@ TEST(PointHierarchy, FindsTheFirstBall) {
         ray.direction[d] = draw<3>(0, random)[d] - (grid ? 0.0 : ray.origin[d]);
       }
       if (grid) {
-        // Along an axis through the grid; some rays are tangential.
+        // Along an axis through the grid. Some rays are tangential.
         ray.origin = {-1.0, 0.25 * static_cast<double>(random() % 17),
                       0.25 * static_cast<double>(random() % 17)};
         ray.direction = {2.0, 0.0, -0.0};

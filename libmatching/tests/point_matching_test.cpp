@@ -30,10 +30,10 @@ std::vector<Point2> uniform_points(std::size_t n, std::mt19937_64& random) {
 
 void expect_pairs(const PointMatching& m, std::size_t n) {
   ASSERT_EQ(m.mate.size(), n);
-  std::size_t alone = 0;
+  std::size_t unmatched = 0;
   for (std::uint32_t i = 0; i < n; ++i) {
-    if (m.mate[i] == kNobody) {
-      ++alone;
+    if (m.mate[i] == kNone) {
+      ++unmatched;
       EXPECT_EQ(m.left_over, i);
       continue;
     }
@@ -41,7 +41,7 @@ void expect_pairs(const PointMatching& m, std::size_t n) {
     EXPECT_NE(m.mate[i], i);
     EXPECT_EQ(m.mate[m.mate[i]], i);
   }
-  EXPECT_EQ(alone, n % 2);
+  EXPECT_EQ(unmatched, n % 2);
 }
 
 /// Checks that the proof of the sparse graph holds on the complete graph, as pricing must ensure.
@@ -275,7 +275,7 @@ TEST(PointMatching, EqualsTheKnownOptimaOfTsplib) {
   const std::string folder = std::string(data) + "/matching/";
   std::ifstream list(folder + "mwpm_optima.tsv");
   ASSERT_TRUE(list) << folder;
-  std::size_t seen = 0;
+  std::size_t reports = 0;
   for (const auto& [name, optimum] : tsplib::read_optima(list)) {
     SCOPED_TRACE(name);
     std::ifstream file(folder + "tsplib/" + name + ".tsp");
@@ -287,9 +287,9 @@ TEST(PointMatching, EqualsTheKnownOptimaOfTsplib) {
     expect_pairs(m, instance.points.size());
     EXPECT_EQ(m.cost, optimum);
     EXPECT_EQ(m.dual_bound, optimum);
-    ++seen;
+    ++reports;
   }
-  EXPECT_GE(seen, 30u);
+  EXPECT_GE(reports, 30u);
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(AssignSparse, EqualsBruteForceOrReportsInfeasibility) {
     std::vector<CostEdge> edges;
     for (std::size_t k = 0; k < rows * columns; ++k) {
       if (random() % 5 > density) continue;
-      // Some pairs occur more than once; the cheapest counts.
+      // Some pairs occur more than once. The cheapest counts.
       const std::size_t entry = random() % costs.size();
       const double cost = static_cast<double>(random() % 9) - 3.0;
       costs[entry] = std::min(costs[entry], cost);
@@ -110,13 +110,13 @@ TEST(AssignSparse, NamesARowOfAHallViolator) {
 }
 
 TEST(AssignSparse, NamesBadInput) {
-  const auto with = [](CostEdge edge) {
+  const auto with_edge = [](CostEdge edge) {
     return message_of([&] { assign_sparse(std::vector<CostEdge>{{0, 0, 1}, edge}, 2, 2); });
   };
-  EXPECT_NE(with({2, 0, 1}).find("entry 1 has row 2"), std::string::npos);
-  EXPECT_NE(with({1, 2, 1}).find("entry 1 has column 2"), std::string::npos);
-  EXPECT_NE(with({1, 1, std::nan("")}).find("entry 1"), std::string::npos);
-  EXPECT_NE(with({1, 1, -1e301}).find("entry 1"), std::string::npos);
+  EXPECT_NE(with_edge({2, 0, 1}).find("entry 1 has row 2"), std::string::npos);
+  EXPECT_NE(with_edge({1, 2, 1}).find("entry 1 has column 2"), std::string::npos);
+  EXPECT_NE(with_edge({1, 1, std::nan("")}).find("entry 1"), std::string::npos);
+  EXPECT_NE(with_edge({1, 1, -1e301}).find("entry 1"), std::string::npos);
   const std::vector<std::uint32_t> column{0, 1};
   const std::vector<double> cost{1, 2};
   for (const std::vector<std::size_t>& begin :

@@ -103,9 +103,9 @@ inline std::optional<double> ball(const Ray& ray, const Point3& centre, Wide rad
   const WidePoint along{ray.direction[0], ray.direction[1], ray.direction[2]};
   const WidePoint to = wide_difference(ray.origin, centre);
   const Wide a = dot(along, along), b = dot(along, to), c = dot(to, to) - radius * radius;
-  const Wide under = b * b - a * c;
-  if (under < 0) return std::nullopt;
-  const Wide enter = (-b - std::sqrt(under)) / a, leave = (-b + std::sqrt(under)) / a;
+  const Wide discriminant = b * b - a * c;
+  if (discriminant < 0) return std::nullopt;
+  const Wide enter = (-b - std::sqrt(discriminant)) / a, leave = (-b + std::sqrt(discriminant)) / a;
   if (leave < Wide{ray.t_min} || enter > Wide{ray.t_max}) return std::nullopt;
   return static_cast<double>(std::max(enter, Wide{ray.t_min}));
 }

@@ -61,18 +61,18 @@ Mesh ball_mesh(int divisions, std::mt19937_64& random) {
     }
   }
   for (int round = 0; round < divisions; ++round) {
-    std::vector<std::pair<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>> made;
+    std::vector<std::pair<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>> rows;
     const auto middle = [&](std::uint32_t i, std::uint32_t j) {
       const auto edge = std::minmax(i, j);
-      for (const auto& [key, value] : made) {
+      for (const auto& [key, value] : rows) {
         if (key.first == edge.first && key.second == edge.second) return value;
       }
       Point3 p;
       for (std::size_t d = 0; d < 3; ++d) p[d] = 0.5 * (mesh.corners[i][d] + mesh.corners[j][d]);
       mesh.corners.push_back(p);
-      made.push_back(
+      rows.push_back(
           {{edge.first, edge.second}, static_cast<std::uint32_t>(mesh.corners.size() - 1)});
-      return made.back().second;
+      return rows.back().second;
     };
     std::vector<Triangle> finer;
     for (const auto& [a, b, c] : mesh.triangles) {
@@ -239,19 +239,19 @@ TEST(TriangleHierarchy, RaysNeverLeaveAClosedSurface) {
 double distance_by_search(const Point3& place, const std::array<Point3, 3>& corners) {
   double best = kInfinity, u0 = 0.0, v0 = 0.0, width = 1.0;
   for (int round = 0; round < 60; ++round, width *= 0.6) {
-    const double u_from = u0, v_from = v0;
+    const double u_begin = u0, v_begin = v0;
     for (int i = -6; i <= 6; ++i) {
       for (int j = -6; j <= 6; ++j) {
-        const double u = std::clamp(u_from + width * i / 6.0, 0.0, 1.0);
-        const double v = std::clamp(v_from + width * j / 6.0, 0.0, 1.0 - u);
+        const double u = std::clamp(u_begin + width * i / 6.0, 0.0, 1.0);
+        const double v = std::clamp(v_begin + width * j / 6.0, 0.0, 1.0 - u);
         Point3 at;
         for (std::size_t d = 0; d < 3; ++d) {
           at[d] = corners[0][d] + u * (corners[1][d] - corners[0][d]) +
                   v * (corners[2][d] - corners[0][d]);
         }
-        const double here = oracles::distance(at, place);
-        if (here < best) {
-          best = here;
+        const double expected_distance = oracles::distance(at, place);
+        if (expected_distance < best) {
+          best = expected_distance;
           u0 = u;
           v0 = v;
         }

@@ -41,23 +41,23 @@ inline Instance read(std::istream& in) {
 
 /// Returns the file's metric. The instance must outlive it.
 inline PointMetric metric_of(const Instance& instance) {
-  const auto apart = [&points = instance.points](std::uint32_t i, std::uint32_t j) {
+  const auto squared_distance = [&points = instance.points](std::uint32_t i, std::uint32_t j) {
     const double dx = points[i][0] - points[j][0], dy = points[i][1] - points[j][1];
     return dx * dx + dy * dy;
   };
   PointMetric metric;
   if (instance.type == "EUC_2D") {
-    metric.distance = [apart](std::uint32_t i, std::uint32_t j) {
-      return std::floor(std::sqrt(apart(i, j)) + 0.5);
+    metric.distance = [squared_distance](std::uint32_t i, std::uint32_t j) {
+      return std::floor(std::sqrt(squared_distance(i, j)) + 0.5);
     };
     metric.offset = 0.5;
   } else if (instance.type == "CEIL_2D") {
-    metric.distance = [apart](std::uint32_t i, std::uint32_t j) {
-      return std::ceil(std::sqrt(apart(i, j)));
+    metric.distance = [squared_distance](std::uint32_t i, std::uint32_t j) {
+      return std::ceil(std::sqrt(squared_distance(i, j)));
     };
   } else if (instance.type == "ATT") {
-    metric.distance = [apart](std::uint32_t i, std::uint32_t j) {
-      return std::ceil(std::sqrt(apart(i, j) / 10.0));
+    metric.distance = [squared_distance](std::uint32_t i, std::uint32_t j) {
+      return std::ceil(std::sqrt(squared_distance(i, j) / 10.0));
     };
     metric.factor = 0.3162277660168379;  // 1 / sqrt(10), rounded down
   } else {

@@ -4,7 +4,7 @@
 // Clusters: 500 compact ones, each the 300 points nearest to a centre on a lattice.
 //
 // items_per_second counts points and is a median of 5 rounds. A round of a cluster row removes
-// (collapse) or inserts (expand) all clusters once; restoring the state afterwards is not timed.
+// (collapse) or inserts (expand) all clusters once. Restoring the state afterwards is not timed.
 #include <algorithm>
 #include <cstdlib>
 #include <ctime>
@@ -73,8 +73,8 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
   for (const Cells& p : points) extent = std::max<std::int64_t>(extent, p[0]);
 
   std::vector<Cluster> clusters;
-  std::vector<char> seen(triangulation.vertex_slots());
-  std::vector<VertexId> around;
+  std::vector<char> used(triangulation.vertex_slots());
+  std::vector<VertexId> neighbours;
   for (std::uint32_t j = 0; j < kClustersPerColumn; ++j) {
     for (std::uint32_t i = 0; i < kClustersPerRow; ++i) {
       const Cells centre{
@@ -88,15 +88,15 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
       };
       // Breadth-first, far enough to include the nearest points.
       std::vector<VertexId> found{triangulation.nearest(centre)};
-      seen[slot(found[0])] = 1;
+      used[slot(found[0])] = 1;
       for (std::size_t k = 0; found.size() < 3 * kClusterSize; ++k) {
-        triangulation.adjacent(found[k], around);
-        for (const VertexId v : around) {
-          if (seen[slot(v)] == 0) found.push_back(v);
-          seen[slot(v)] = 1;
+        triangulation.adjacent(found[k], neighbours);
+        for (const VertexId v : neighbours) {
+          if (used[slot(v)] == 0) found.push_back(v);
+          used[slot(v)] = 1;
         }
       }
-      for (const VertexId v : found) seen[slot(v)] = 0;
+      for (const VertexId v : found) used[slot(v)] = 0;
       std::sort(found.begin(), found.end(), [&](VertexId a, VertexId b) {
         return std::pair(distance(a), slot(a)) < std::pair(distance(b), slot(b));
       });
@@ -229,7 +229,7 @@ class Stopwatch {
   std::clock_t start_ = std::clock();
 };
 
-/// VmRSS or VmHWM in bytes; 0 if there is no such file.
+/// VmRSS or VmHWM in bytes, or 0 if there is no such file.
 double resident(const std::string& key) {
   std::ifstream file("/proc/self/status");
   std::string word;
@@ -265,7 +265,7 @@ template <class Engine>
 void bulk(benchmark::State& state) {
   const auto& input = input_points(static_cast<Input>(state.range(0)));
   double peak = 0;
-  double held = 0;
+  double bytes_per_point = 0;
   measure(state, input.size(), [&] {
     Engine engine(input);
     start_peak();
@@ -275,12 +275,12 @@ void bulk(benchmark::State& state) {
     const double seconds = watch.seconds();
     peak = std::max(peak, resident("VmHWM") - before);
     if constexpr (!std::is_same_v<Engine, Cgal>)
-      held = static_cast<double>(engine.triangulation.memory_bytes()) /
-             static_cast<double>(engine.triangulation.vertex_count());
+      bytes_per_point = static_cast<double>(engine.triangulation.memory_bytes()) /
+                        static_cast<double>(engine.triangulation.vertex_count());
     return seconds;
   });
   state.counters["peak_B/pt"] = peak / static_cast<double>(input.size());
-  if (held > 0) state.counters["held_B/pt"] = held;
+  if (bytes_per_point > 0) state.counters["held_B/pt"] = bytes_per_point;
 }
 
 template <class Coord>

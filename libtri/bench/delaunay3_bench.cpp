@@ -6,7 +6,7 @@
 // point.
 //
 // items_per_second counts points and is a median of 5 rounds (CGAL's removal: 1). A round of a
-// cluster row removes or inserts all clusters once; restoring the state afterwards is not timed.
+// cluster row removes or inserts all clusters once. Restoring the state afterwards is not timed.
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -93,9 +93,9 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
   for (std::uint32_t i = 0; i < points.size(); ++i) point_of[slot(vertices[i])] = i;
   std::mt19937_64 random(2);
   std::vector<Cluster> clusters;
-  std::vector<char> seen(triangulation.vertex_slots());  // 1: in a list, 2: in a cluster or next to
+  std::vector<char> used(triangulation.vertex_slots());  // 1: in a list, 2: in a cluster or next to
                                                          // one
-  std::vector<VertexId> around;
+  std::vector<VertexId> neighbours;
   while (clusters.size() < kClusters) {
     const VertexId centre = vertices[random() % vertices.size()];
     const auto distance = [&](VertexId v) {
@@ -109,17 +109,17 @@ std::vector<Cluster> find_clusters(const std::vector<Cells>& points) {
     // Breadth-first, far enough to include the nearest points.
     std::vector<VertexId> found{centre};
     for (std::size_t k = 0; k < found.size() && found.size() < 8 * kClusterSize; ++k) {
-      triangulation.adjacent(found[k], around);
-      for (const VertexId v : around)
+      triangulation.adjacent(found[k], neighbours);
+      for (const VertexId v : neighbours)
         if (std::find(found.begin(), found.end(), v) == found.end()) found.push_back(v);
     }
     std::sort(found.begin(), found.end(), [&](VertexId a, VertexId b) {
       return std::pair(distance(a), slot(a)) < std::pair(distance(b), slot(b));
     });
     found.resize(kClusterSize + 1);
-    if (std::any_of(found.begin(), found.end(), [&](VertexId v) { return seen[slot(v)] != 0; }))
+    if (std::any_of(found.begin(), found.end(), [&](VertexId v) { return used[slot(v)] != 0; }))
       continue;
-    for (const VertexId v : found) seen[slot(v)] = 1;
+    for (const VertexId v : found) used[slot(v)] = 1;
     Cluster cluster;
     cluster.outside = point_of[slot(found.back())];
     found.pop_back();
@@ -240,7 +240,7 @@ class Stopwatch {
   std::clock_t start_ = std::clock();
 };
 
-/// VmRSS or VmHWM in bytes; 0 if there is no such file.
+/// VmRSS or VmHWM in bytes, or 0 if there is no such file.
 double resident(const std::string& key) {
   std::ifstream file("/proc/self/status");
   std::string word;
@@ -276,7 +276,7 @@ template <class Engine>
 void bulk(benchmark::State& state) {
   const auto& input = input_points(static_cast<Input>(state.range(0)));
   double peak = 0;
-  double held = 0;
+  double bytes_per_point = 0;
   measure(state, input.size(), 3, [&] {
     Engine engine(input);
     start_peak();
@@ -286,12 +286,12 @@ void bulk(benchmark::State& state) {
     const double seconds = watch.seconds();
     peak = std::max(peak, resident("VmHWM") - before);
     if constexpr (!std::is_same_v<Engine, Cgal>)
-      held = static_cast<double>(engine.triangulation.memory_bytes()) /
-             static_cast<double>(engine.triangulation.vertex_count());
+      bytes_per_point = static_cast<double>(engine.triangulation.memory_bytes()) /
+                        static_cast<double>(engine.triangulation.vertex_count());
     return seconds;
   });
   state.counters["peak_B/pt"] = peak / static_cast<double>(input.size());
-  if (held > 0) state.counters["held_B/pt"] = held;
+  if (bytes_per_point > 0) state.counters["held_B/pt"] = bytes_per_point;
 }
 
 /// Measures the wall time of bulk construction by one or two threads. Run it on two idle cores.

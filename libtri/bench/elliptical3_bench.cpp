@@ -74,15 +74,15 @@ void measure(benchmark::State& state, std::size_t points, Round round) {
   state.SetItemsProcessed(static_cast<std::int64_t>(points));
 }
 
-double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 void euclidean(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   measure(state, points.size(), [&] {
     tri::Delaunay3<double> triangulation;
-    const double start = now();
+    const double start = cpu_seconds();
     triangulation.build(points);
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -91,9 +91,9 @@ void elliptical(benchmark::State& state) {
   measure(state, points.size(), [&] {
     tri::Delaunay3<double, tri::EllipticalMetric3> triangulation(
         map_of(static_cast<Metric>(state.range(1))));
-    const double start = now();
+    const double start = cpu_seconds();
     triangulation.build(points);
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -102,14 +102,14 @@ void cgal_mapped(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   const tri::LinearMap3 m = map_of(static_cast<Metric>(state.range(1)));
   measure(state, points.size(), [&] {
-    const double start = now();
+    const double start = cpu_seconds();
     std::vector<Kernel::Point_3> mapped;
     mapped.reserve(points.size());
     for (const auto& [x, y, z] : points)
       mapped.emplace_back(m[0] * x + m[1] * y + m[2] * z, m[3] * x + m[4] * y + m[5] * z,
                           m[6] * x + m[7] * y + m[8] * z);
     const CGAL::Delaunay_triangulation_3<Kernel> triangulation(mapped.begin(), mapped.end());
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -119,7 +119,7 @@ std::vector<std::vector<tri::VertexId>> compact_sets(const Triangulation& triang
   std::mt19937_64 random(2);
   std::vector<char> taken(triangulation.vertex_slots());
   std::vector<std::vector<tri::VertexId>> sets;
-  std::vector<tri::VertexId> around;
+  std::vector<tri::VertexId> neighbours;
   while (sets.size() < kSets) {
     const tri::VertexId start{
         static_cast<std::uint32_t>(1 + random() % (triangulation.vertex_slots() - 1))};
@@ -128,8 +128,8 @@ std::vector<std::vector<tri::VertexId>> compact_sets(const Triangulation& triang
     if (taken[slot(start)] != 0) continue;
     seen[slot(start)] = 1;
     for (std::size_t k = 0; k < found.size() && found.size() < kSetSize; ++k) {
-      triangulation.adjacent(found[k], around);
-      for (const tri::VertexId v : around) {
+      triangulation.adjacent(found[k], neighbours);
+      for (const tri::VertexId v : neighbours) {
         if (found.size() == kSetSize || seen[slot(v)] != 0) continue;
         seen[slot(v)] = 1;
         found.push_back(v);
@@ -146,13 +146,13 @@ template <class Triangulation>
 void change_sets(benchmark::State& state, Triangulation triangulation, bool inserting) {
   triangulation.build(input_points(kUniform));
   auto sets = compact_sets(triangulation);
-  std::vector<tri::VertexId> hints, around;
+  std::vector<tri::VertexId> hints, neighbours;
   for (auto& set : sets) {
     std::sort(set.begin(), set.end());
     hints.push_back(tri::kNoVertex);
     for (const tri::VertexId v : set) {
-      triangulation.adjacent(v, around);
-      for (const tri::VertexId n : around)
+      triangulation.adjacent(v, neighbours);
+      for (const tri::VertexId n : neighbours)
         if (!std::binary_search(set.begin(), set.end(), n)) hints.back() = n;
     }
   }
@@ -163,12 +163,12 @@ void change_sets(benchmark::State& state, Triangulation triangulation, bool inse
     for (std::size_t s = 0; s < sets.size(); ++s) {
       points.clear();
       for (const tri::VertexId v : sets[s]) points.push_back(triangulation.point(v));
-      const double start = now();
+      const double start = cpu_seconds();
       triangulation.remove(std::span<const tri::VertexId>(sets[s]));
-      const double middle = now();
+      const double middle = cpu_seconds();
       const tri::VertexId hint = triangulation.alive(hints[s]) ? hints[s] : tri::kNoVertex;
       triangulation.insert(points, results, hint);
-      seconds += inserting ? now() - middle : middle - start;
+      seconds += inserting ? cpu_seconds() - middle : middle - start;
       for (std::size_t i = 0; i < results.size(); ++i) sets[s][i] = results[i].vertex;
     }
     return seconds;
@@ -186,7 +186,7 @@ void elliptical_sets(benchmark::State& state) {
 }
 
 /// Three boxes that cover most of the cube, with ellipsoids of the given ratio. Also counts the
-/// facets that remain non-Delaunay; there are about twice as many facets within regions as
+/// facets that remain non-Delaunay. There are about twice as many facets within regions as
 /// tetrahedra.
 void regions(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
@@ -201,9 +201,9 @@ void regions(benchmark::State& state) {
   tri::Delaunay3<double> triangulation;
   triangulation.build(points);
   measure(state, points.size(), [&] {
-    const double start = now();
+    const double start = cpu_seconds();
     const tri::MetricTetrahedra result = tri::metric_tetrahedra(triangulation, field);
-    const double seconds = now() - start;
+    const double seconds = cpu_seconds() - start;
     state.counters["tetrahedra"] = static_cast<double>(result.tetrahedra.size());
     state.counters["flips"] = static_cast<double>(result.flips);
     state.counters["stuck"] = static_cast<double>(result.stuck);

@@ -71,15 +71,15 @@ void measure(benchmark::State& state, std::size_t points, Round round) {
   state.SetItemsProcessed(static_cast<std::int64_t>(points));
 }
 
-double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 void euclidean(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   measure(state, points.size(), [&] {
     tri::Delaunay2<double> triangulation;
-    const double start = now();
+    const double start = cpu_seconds();
     triangulation.build(points);
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -88,9 +88,9 @@ void elliptical(benchmark::State& state) {
   measure(state, points.size(), [&] {
     tri::Delaunay2<double, tri::EllipticalMetric2> triangulation(
         map_of(static_cast<Metric>(state.range(1))));
-    const double start = now();
+    const double start = cpu_seconds();
     triangulation.build(points);
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -99,12 +99,12 @@ void cgal_mapped(benchmark::State& state) {
   const auto points = input_points(static_cast<Input>(state.range(0)));
   const tri::LinearMap2 m = map_of(static_cast<Metric>(state.range(1)));
   measure(state, points.size(), [&] {
-    const double start = now();
+    const double start = cpu_seconds();
     std::vector<Kernel::Point_2> mapped;
     mapped.reserve(points.size());
     for (const auto& [x, y] : points) mapped.emplace_back(m[0] * x + m[1] * y, m[2] * x + m[3] * y);
     const CGAL::Delaunay_triangulation_2<Kernel> triangulation(mapped.begin(), mapped.end());
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -123,9 +123,9 @@ void regions(benchmark::State& state) {
   tri::Delaunay2<double> triangulation;
   triangulation.build(points);
   measure(state, points.size(), [&] {
-    const double start = now();
+    const double start = cpu_seconds();
     benchmark::DoNotOptimize(tri::metric_triangles(triangulation, field));
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 
@@ -147,7 +147,7 @@ void sets(benchmark::State& state, Triangulation triangulation) {
   for (const auto& set : all) count += 2 * set.size();
   typename Triangulation::Changes changes;
   measure(state, count, [&] {
-    const double start = now();
+    const double start = cpu_seconds();
     for (auto& set : all) {
       std::vector<Point> places;
       for (const tri::VertexId v : set) places.push_back(triangulation.point(v));
@@ -158,7 +158,7 @@ void sets(benchmark::State& state, Triangulation triangulation) {
       triangulation.take_changes(changes);
       for (std::size_t i = 0; i < set.size(); ++i) set[i] = inserted[i].vertex;
     }
-    return now() - start;
+    return cpu_seconds() - start;
   });
 }
 void plain_sets(benchmark::State& state) { sets(state, tri::Delaunay2<double>()); }

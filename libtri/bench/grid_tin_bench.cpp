@@ -91,7 +91,7 @@ const Raster& raster() {
   return raster;
 }
 
-double now() {
+double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
@@ -138,15 +138,15 @@ void mesh(benchmark::State& state) {
     checking = most = squares = covered = 0;
     for_windows(options.max_error, [&](const GridWindow<float>& window, const GridSides& sides) {
       const GridTin tin = grid_tin(window, sides, options);
-      const double start = now();
+      const double start = steady_seconds();
       std::vector<Point3> points;
       points.reserve(tin.vertices.size());
       for (const GridVertex& v : tin.vertices)
         points.push_back({static_cast<double>(v.column), static_cast<double>(v.row), v.height});
       const GridTinCheck check = check_grid_tin<float>(window, points, tin.triangles);
-      checking += now() - start;
+      checking += steady_seconds() - start;
       triangles += tin.triangles.size();
-      missed += check.uncovered_inner + check.nodata_covered + check.turned;
+      missed += check.uncovered_inner + check.nodata_covered + check.inverted;
       most = std::max(most, check.max_error);
       const auto samples = static_cast<double>(check.covered);
       squares += check.rms_error * check.rms_error * samples;

@@ -5,7 +5,7 @@
 // 26 bits. Grid: 1000 x 1000, where every cell is cocircular.
 //
 // items_per_second counts queries per second of CPU time. Ours includes all work of a call, such as
-// sorting; CGAL's excludes sorting.
+// sorting. CGAL's excludes sorting.
 #include <cstdlib>
 #include <random>
 #include <string>

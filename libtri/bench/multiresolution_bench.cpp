@@ -11,7 +11,7 @@
 
 #include <benchmark/benchmark.h>
 
-#include "model/model.hpp"
+#include "model/multiresolution.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
@@ -27,12 +27,12 @@ int side() { return std::getenv("TERRACE_BENCH_SMALL") ? 128 : 2048; }
 
 /// Clusters of about 140 points, two levels of them below the root.
 ArraySource& source(Kind kind) {
-  static std::map<Kind, ArraySource> made;
-  const auto found = made.find(kind);
-  if (found != made.end()) return found->second;
+  static std::map<Kind, ArraySource> hierarchies;
+  const auto found = hierarchies.find(kind);
+  if (found != hierarchies.end()) return found->second;
   std::mt19937_64 random(1);
   const std::size_t count = static_cast<std::size_t>(side()) * static_cast<std::size_t>(side());
-  return made[kind] = make_hierarchy(
+  return hierarchies[kind] = make_hierarchy(
              kind == kGrid ? grid_points(side()) : random_points(count, random), 2, 140.0, random);
 }
 

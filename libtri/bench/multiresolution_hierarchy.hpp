@@ -72,7 +72,7 @@ class ArraySource : public ClusterSource {
 };
 
 /// Makes one point a centre in each cell of about `cell_points` points. Each point joins the
-/// nearest centre of the cells around its own; members keep the order of `points`. Repeats this
+/// nearest centre of the cells around its own. Members keep the order of `points`. Repeats this
 /// `levels` times with the centres as points.
 inline ArraySource make_hierarchy(std::vector<Point3> points, unsigned levels, double cell_points,
                                   std::mt19937_64& random) {

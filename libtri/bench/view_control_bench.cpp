@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera flies over a grid of points in clusters of about 140, on three levels, with an error
-// chosen such that about 500,000 points are in the model. There are 600 frames; each moves by 1 %
+// chosen such that about 500,000 points are in the model. There are 600 frames. Each moves by 1 %
 // of the width of the view and has one step of at most 10 ms. The clusters that a step requests are
 // given before the next one.
 //
@@ -32,8 +32,8 @@ int frames() { return small() ? 60 : 600; }
 
 ArraySource& source() {
   static std::mt19937_64 random(1);
-  static ArraySource made = make_hierarchy(grid_points(side()), 2, 140.0, random);
-  return made;
+  static ArraySource hierarchy = make_hierarchy(grid_points(side()), 2, 140.0, random);
+  return hierarchy;
 }
 
 std::vector<std::uint64_t> counts() {
@@ -57,8 +57,8 @@ struct Flight {
     if (kind == kMap) return 1.5 * view_height();
     return 2.0 * (2.0 * height) * std::tan(30.0 * std::acos(-1.0) / 180.0) * 1.5;
   }
-  [[nodiscard]] Camera camera(double way) const {
-    const double angle = way / radius, c = std::cos(angle), s = std::sin(angle);
+  [[nodiscard]] Camera camera(double distance) const {
+    const double angle = distance / radius, c = std::cos(angle), s = std::sin(angle);
     Pose pose;
     pose.position = {middle + radius * c, middle + radius * s, height};
     if (kind == kMap) {
@@ -98,11 +98,11 @@ double pixel_error_for(const Flight& flight) {
 }
 
 void flight(benchmark::State& state, Kind kind, bool heights) {
-  Flight way{kind};
+  Flight path{kind};
   View view;
   // The map is at full resolution. In perspective the error decides.
-  view.pixel_error = kind == kMap ? 0.01 : pixel_error_for(way);
-  view.camera = way.camera(0.0);
+  view.pixel_error = kind == kMap ? 0.01 : pixel_error_for(path);
+  view.camera = path.camera(0.0);
   ViewOptions options;
   options.model.old_heights = heights;
   StepBudget budget;
@@ -149,11 +149,11 @@ void flight(benchmark::State& state, Kind kind, bool heights) {
     };
     while (!frame(false)) {
     }
-    const double each = 0.01 * way.width();
+    const double each = 0.01 * path.width();
     double at = 0.0;
     for (int i = 0; i < frames(); ++i) {
       at += each;
-      view.camera = way.camera(at);
+      view.camera = path.camera(at);
       frame(true);
     }
     const auto flown = static_cast<double>(times.size());

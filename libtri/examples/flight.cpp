@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A camera flies over a terrain that is never in memory as a whole. In each frame the control
 // brings the model closer to the camera's view and names the missing clusters. A "loader" delivers
-// them two frames later; in a viewer these would be threads or requests to a server.
+// them two frames later. In a viewer these would be threads or requests to a server.
 #include <cmath>
 #include <cstdio>
 #include <deque>
@@ -102,9 +102,9 @@ int main() {
     tri::View view;
     view.pixel_error = 8.0;
     // Flies to the middle of the terrain, looking ahead and down, and stops there.
-    const double way = 100.0 + 2.5 * std::min(frame, 100);
-    view.camera =
-        tri::perspective_camera({{way, way, 60.0}, {1, 1, -1.2}, {0, 0, 1}}, 60.0, 1.6, 800.0);
+    const double distance = 100.0 + 2.5 * std::min(frame, 100);
+    view.camera = tri::perspective_camera({{distance, distance, 60.0}, {1, 1, -1.2}, {0, 0, 1}},
+                                          60.0, 1.6, 800.0);
     tri::StepBudget budget;
     budget.operations = 300;  // or budget.seconds = 0.010; budget.clock = ...
 

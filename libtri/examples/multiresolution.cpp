@@ -58,7 +58,7 @@ int main() {
   std::printf("coarse: %zu vertices, %zu triangles\n", model.triangulation().vertex_count(),
               model.triangulation().triangle_count());
 
-  // Adds all of level 0 inside the box; the rest stays as it is.
+  // Adds all of level 0 inside the box. The rest stays as it is.
   const auto& finer = model.refine(tri::box2(0, 0, 7, 7), 0);
   std::printf("a fine corner: %zu vertices and %zu triangles more, %zu triangles removed\n",
               finer.changes.added_vertices.size(), finer.changes.added_triangles.size(),

@@ -145,10 +145,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (kind == 4 || kind == 5) control.give(load(source, request));
     if (kind == 6) control.forget(request.cluster);
     if (kind == 7) {
-      const std::size_t how = input.below(3);
-      if (how == 0) control.unpin(request.cluster);
-      if (how == 1) control.pin(request.cluster, Control::Pin::expanded);
-      if (how == 2) control.pin(request.cluster, Control::Pin::collapsed);
+      const std::size_t action = input.below(3);
+      if (action == 0) control.unpin(request.cluster);
+      if (action == 1) control.pin(request.cluster, Control::Pin::expanded);
+      if (action == 2) control.pin(request.cluster, Control::Pin::collapsed);
     }
   }
   for (int count = 0;; ++count) {

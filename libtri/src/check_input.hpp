@@ -9,6 +9,8 @@
 #include <string>
 #include <type_traits>
 
+#include "terrace/tri/interpolation.hpp"
+
 namespace terrace::tri {
 
 /// Maximum number of vertices of a triangulation, in the plane or in space.
@@ -35,6 +37,16 @@ inline void check_count(std::size_t present, std::size_t added) {
   throw std::length_error("a triangulation holds at most 2^29 - 2 vertices; " +
                           std::to_string(present) + " exist and " + std::to_string(added) +
                           " are added");
+}
+
+/// Throws std::invalid_argument if an array of heights is too short.
+template <class Coord>
+void check_heights(const Delaunay2<Coord>& triangulation, const Heights& heights) {
+  if (heights.slots() >= triangulation.vertex_slots()) return;
+  throw std::invalid_argument("heights: " + std::to_string(heights.slots()) +
+                              " values for vertices in " +
+                              std::to_string(triangulation.vertex_slots()) +
+                              " slots; give as many as vertex_slots(), indexed by slot()");
 }
 
 }  // namespace terrace::tri

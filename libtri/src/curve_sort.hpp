@@ -102,11 +102,18 @@ void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of, u
     sort_along_curve<kKeyBits>(run, cells_of, 1, sort_run);
 }
 
-/// The same; points of one cell stay in their order.
+/// The same. Points of one cell stay in their order.
 template <unsigned kKeyBits, class CellsOf>
 void sort_along_curve(std::span<std::uint32_t> order, const CellsOf& cells_of,
                       unsigned threads = 1) {
   sort_along_curve<kKeyBits>(order, cells_of, threads, [](std::span<std::uint32_t>) {});
 }
+
+/// Indices of the points along a Hilbert curve over their bounding square or cube, so that points
+/// close in the result are close in the plane or in space. Points that 16 (in space 10) bits per
+/// axis cannot distinguish are sorted in their own square or cube. Points must be valid. O(n).
+/// Needs 16 bytes per point besides the result.
+template <class Point>
+Pool<std::uint32_t> hilbert_order(std::span<const Point> points, unsigned threads = 1);
 
 }  // namespace terrace::tri

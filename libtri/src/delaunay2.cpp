@@ -10,17 +10,15 @@
 
 #include "check_input.hpp"
 #include "delaunay2/access.hpp"
-#include "delaunay2/build.hpp"
 #include "delaunay2/insert.hpp"
-#include "delaunay2/query.hpp"
-#include "delaunay2/remove.hpp"
+#include "delaunay2/operations.hpp"
 
 namespace terrace::tri {
 namespace {
 
 using planar::kNone;
 
-/// Returns the coordinates of a grid's lines; throws if they would be rounded or out of range.
+/// Returns the coordinates of a grid's lines. Throws if they would be rounded or out of range.
 template <class Kernel, class Coord>
 std::vector<Coord> grid_lines(Coord begin, Coord step, std::uint32_t count, const char* axis) {
   std::vector<Coord> lines(count);

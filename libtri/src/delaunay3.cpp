@@ -7,10 +7,8 @@
 
 #include "check_input.hpp"
 #include "delaunay3/access.hpp"
-#include "delaunay3/build.hpp"
 #include "delaunay3/insert.hpp"
-#include "delaunay3/query.hpp"
-#include "delaunay3/remove.hpp"
+#include "delaunay3/operations.hpp"
 
 namespace terrace::tri {
 

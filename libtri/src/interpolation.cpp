@@ -10,9 +10,9 @@
 #include <terrace/base/parallel.hpp>
 #include <terrace/base/portable_math.hpp>
 
+#include "check_input.hpp"
+#include "curve_sort.hpp"
 #include "delaunay2/access.hpp"
-#include "hilbert.hpp"
-#include "interpolation/check_heights.hpp"
 #include "interpolation/sampler.hpp"
 
 namespace terrace::tri {
@@ -70,7 +70,7 @@ void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Inte
   using Kernel = typename std::remove_cvref_t<decltype(mesh)>::Kernel;
   planar::Sampler<Kernel> sampler(mesh);
   sampler.start_at(slot(hint));
-  const auto found = sampler.weigh(query, method);
+  const auto found = sampler.compute_weights(query, method);
   weights.assign(found.begin(), found.end());
 }
 
@@ -84,7 +84,7 @@ std::vector<double> heights_at(const Delaunay2<Coord>& triangulation, const Heig
   std::vector<double> results(queries.size(), kNoValue);
   answer_all(Delaunay2Access::mesh(triangulation), queries, results, threads,
              [&](auto& sampler, const Point2& query) {
-               const auto weights = sampler.weigh(query, method);
+               const auto weights = sampler.compute_weights(query, method);
                if (weights.empty()) return kNoValue;
                double sum = 0;
                for (const auto& [vertex, weight] : weights) sum += weight * heights(vertex);

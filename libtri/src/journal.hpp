@@ -20,12 +20,12 @@ class Journal {
   using Corners = std::array<std::uint32_t, kCorners>;
   struct CellRecord {
     std::uint32_t slot;
-    Corners before;  ///< kFreeCorner or a ghost: not a cell
+    Corners former;  ///< kFreeCorner or a ghost: not a cell
   };
   struct VertexRecord {
     std::uint32_t slot;
     bool was_alive;
-    Point before;
+    Point former;
   };
 
   [[nodiscard]] bool on() const { return on_; }
@@ -41,54 +41,56 @@ class Journal {
   }
 
   /// Must be called only while on(), before the slot changes.
-  void touch_cell(std::uint32_t slot, const Corners& before) {
-    if (cells_.first_touch(slot)) cells_.records.push_back({slot, before});
+  void touch_cell(std::uint32_t slot, const Corners& former) {
+    if (cells_.first_touch(slot)) cells_.records.push_back({slot, former});
   }
-  void touch_vertex(std::uint32_t slot, bool was_alive, const Point& before) {
-    if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, before});
+  void touch_vertex(std::uint32_t slot, bool was_alive, const Point& former) {
+    if (vertices_.first_touch(slot)) vertices_.records.push_back({slot, was_alive, former});
   }
 
-  /// Calls visit(slot, before) for each cell that was touched.
+  /// Calls visit(slot, former corners) for each cell that was touched.
   template <class Visit>
   void for_each_cell(const Visit& visit) const {
-    for (const CellRecord& record : cells_.records) visit(record.slot, record.before);
+    for (const CellRecord& record : cells_.records) visit(record.slot, record.former);
   }
   /// Turns the records into net changes and empties the journal. The callbacks describe the current
   /// state: point(slot) returns the point of an existing vertex and corners(slot) the corners of a
-  /// finite cell, both nullptr for others; is_finite(corners) classifies recorded cells. `changes`:
-  /// an empty Changes of a triangulation; the last two arguments are its lists of cells.
-  template <class PointNow, class CornersNow, class IsFinite, class Changes, class CellId>
-  void take(const PointNow& point, const CornersNow& corners, const IsFinite& is_finite,
+  /// finite cell, both nullptr for others. is_finite(corners) classifies recorded cells. `changes`:
+  /// an empty Changes of a triangulation. The last two arguments are its lists of cells.
+  template <class CurrentPoint, class CurrentCorners, class IsFinite, class Changes, class CellId>
+  void take(const CurrentPoint& point, const CurrentCorners& corners, const IsFinite& is_finite,
             Changes& changes, std::vector<CellId>& removed_cells,
             std::vector<CellId>& added_cells) {
     for (const VertexRecord& record : vertices_.records) {
-      const Point* const now = point(record.slot);
-      if (record.was_alive && now != nullptr && record.before == *now) {
+      const Point* const current = point(record.slot);
+      if (record.was_alive && current != nullptr && record.former == *current) {
         // The vertex is unchanged, so its cells may be unchanged too.
         vertices_.untouch(record.slot);
         continue;
       }
       if (record.was_alive) {
         changes.removed_vertices.push_back(VertexId{record.slot});
-        changes.removed_points.push_back(record.before);
+        changes.removed_points.push_back(record.former);
       }
-      if (now != nullptr) changes.added_vertices.push_back(VertexId{record.slot});
+      if (current != nullptr) changes.added_vertices.push_back(VertexId{record.slot});
     }
-    const auto of_same_vertices = [&](const Corners& cell) {
+    const auto has_same_vertices = [&](const Corners& cell) {
       for (const std::uint32_t v : cell)
         if (vertices_.touched(v)) return false;
       return true;
     };
     for (const CellRecord& record : cells_.records) {
-      const bool before = is_finite(record.before);
-      const Corners* const now = corners(record.slot);
-      if (before && now != nullptr && record.before == *now && of_same_vertices(*now)) continue;
-      if (before) {
+      const bool was_cell = is_finite(record.former);
+      const Corners* const current = corners(record.slot);
+      if (was_cell && current != nullptr && record.former == *current &&
+          has_same_vertices(*current))
+        continue;
+      if (was_cell) {
         removed_cells.push_back(CellId{record.slot});
         auto& ids = changes.removed_corners.emplace_back();
-        for (std::size_t i = 0; i < kCorners; ++i) ids[i] = VertexId{record.before[i]};
+        for (std::size_t i = 0; i < kCorners; ++i) ids[i] = VertexId{record.former[i]};
       }
-      if (now != nullptr) added_cells.push_back(CellId{record.slot});
+      if (current != nullptr) added_cells.push_back(CellId{record.slot});
     }
     cells_.clear();
     vertices_.clear();

@@ -18,7 +18,7 @@ struct Finite {
 };
 
 /// The finalizer of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
-std::uint64_t mixed(std::uint64_t x) {
+std::uint64_t mix(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
   x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
   return x ^ (x >> 31);
@@ -34,38 +34,38 @@ std::uint64_t bits_of(double value) {
 }  // namespace
 
 struct PointCloud::Impl {
-  std::vector<Point> points;  // by slot
-  std::vector<bool> living;   // by slot
+  std::vector<Point> points;   // by slot
+  std::vector<bool> is_alive;  // by slot
   FreeSlots free;
   std::size_t count = 0;
   bool journal = false;
-  // Since the last call of take_changes(): slots touched, their former contents, and whether a slot
-  // is listed.
+  // Since the last call of take_changes(): the slots touched, their former contents, and by slot
+  // whether it is among them.
   std::vector<std::uint32_t> touched;
-  std::vector<Point> before;  // points of `touched`, where was_living
-  std::vector<bool> was_living, listed;
+  std::vector<Point> former_points;  // points of `touched`, where was_alive
+  std::vector<bool> was_alive, is_recorded;
 
   void touch(std::uint32_t slot) {
     if (!journal) return;
-    if (listed.size() < living.size()) listed.resize(living.size());
-    if (listed[slot]) return;
-    listed[slot] = true;
+    if (is_recorded.size() < is_alive.size()) is_recorded.resize(is_alive.size());
+    if (is_recorded[slot]) return;
+    is_recorded[slot] = true;
     touched.push_back(slot);
-    before.push_back(points[slot]);
-    was_living.push_back(living[slot]);
+    former_points.push_back(points[slot]);
+    was_alive.push_back(is_alive[slot]);
   }
   VertexId add(const Point& point) {
     std::uint32_t slot = 0;
     if (free.empty()) {
       slot = static_cast<std::uint32_t>(points.size());
       points.push_back({});
-      living.push_back(false);
+      is_alive.push_back(false);
     } else {
       slot = free.take();
     }
     touch(slot);
     points[slot] = point;
-    living[slot] = true;
+    is_alive[slot] = true;
     ++count;
     return VertexId{slot};
   }
@@ -105,7 +105,7 @@ void PointCloud::remove(std::span<const VertexId> vertices) {
   for (const VertexId vertex : vertices) {
     assert(alive(vertex));
     impl_->touch(slot(vertex));
-    impl_->living[slot(vertex)] = false;
+    impl_->is_alive[slot(vertex)] = false;
     impl_->free.put(slot(vertex));
   }
   impl_->count -= vertices.size();
@@ -113,7 +113,7 @@ void PointCloud::remove(std::span<const VertexId> vertices) {
 
 void PointCloud::reserve(std::size_t vertices) {
   impl_->points.reserve(vertices);
-  impl_->living.reserve(vertices);
+  impl_->is_alive.reserve(vertices);
 }
 
 std::size_t PointCloud::vertex_count() const { return impl_->count; }
@@ -122,24 +122,24 @@ std::uint32_t PointCloud::vertex_slots() const {
   return static_cast<std::uint32_t>(impl_->points.size());
 }
 bool PointCloud::alive(VertexId vertex) const {
-  return slot(vertex) < impl_->living.size() && impl_->living[slot(vertex)];
+  return slot(vertex) < impl_->is_alive.size() && impl_->is_alive[slot(vertex)];
 }
 
 std::uint64_t PointCloud::hash() const {
-  std::uint64_t sum = mixed(impl_->count);
+  std::uint64_t sum = mix(impl_->count);
   for (const VertexId vertex : all_vertices()) {
     std::uint64_t one = 0;
-    for (const double c : point(vertex)) one = mixed(one ^ bits_of(c + 0.0));
+    for (const double c : point(vertex)) one = mix(one ^ bits_of(c + 0.0));
     sum += one;
   }
   return sum;
 }
 
 std::size_t PointCloud::memory_bytes() const {
-  return impl_->points.capacity() * sizeof(Point) + impl_->living.capacity() / 8 +
+  return impl_->points.capacity() * sizeof(Point) + impl_->is_alive.capacity() / 8 +
          impl_->free.bytes() + impl_->touched.capacity() * sizeof(std::uint32_t) +
-         impl_->before.capacity() * sizeof(Point) +
-         (impl_->was_living.capacity() + impl_->listed.capacity()) / 8;
+         impl_->former_points.capacity() * sizeof(Point) +
+         (impl_->was_alive.capacity() + impl_->is_recorded.capacity()) / 8;
 }
 
 void PointCloud::start_journal() {
@@ -152,18 +152,18 @@ void PointCloud::take_changes(Changes& changes) {
   changes.clear();
   for (std::size_t i = 0; i < impl_->touched.size(); ++i) {
     const std::uint32_t slot = impl_->touched[i];
-    impl_->listed[slot] = false;
-    const bool living = impl_->living[slot];
-    if (impl_->was_living[i] && living && impl_->before[i] == impl_->points[slot]) continue;
-    if (impl_->was_living[i]) {
+    impl_->is_recorded[slot] = false;
+    const bool is_alive = impl_->is_alive[slot];
+    if (impl_->was_alive[i] && is_alive && impl_->former_points[i] == impl_->points[slot]) continue;
+    if (impl_->was_alive[i]) {
       changes.removed_vertices.push_back(VertexId{slot});
-      changes.removed_points.push_back(impl_->before[i]);
+      changes.removed_points.push_back(impl_->former_points[i]);
     }
-    if (living) changes.added_vertices.push_back(VertexId{slot});
+    if (is_alive) changes.added_vertices.push_back(VertexId{slot});
   }
   impl_->touched.clear();
-  impl_->before.clear();
-  impl_->was_living.clear();
+  impl_->former_points.clear();
+  impl_->was_alive.clear();
 }
 
 }  // namespace terrace::tri

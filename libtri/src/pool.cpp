@@ -26,7 +26,7 @@ std::size_t round_up(std::size_t bytes, std::size_t unit) {
   return (bytes + unit - 1) / unit * unit;
 }
 
-// Huge pages where whole ones fit; a last part stays in small pages automatically. The whole
+// Huge pages where whole ones fit. A last part stays in small pages automatically. The whole
 // mapping is advised, including that part: the kernel refuses to move a mapping whose parts have
 // different advice.
 void advise(void* memory, std::size_t bytes) {

@@ -17,9 +17,9 @@ namespace terrace::tri {
 
 inline constexpr std::size_t kHugePage = std::size_t{2} << 20;
 
-/// Allocates at least `bytes` bytes; throws std::bad_alloc.
+/// Allocates at least `bytes` bytes. Throws std::bad_alloc.
 void* allocate_pages(std::size_t bytes);
-/// Moves `old_bytes` bytes of contents to `new_bytes` bytes of memory; throws std::bad_alloc, which
+/// Moves `old_bytes` bytes of contents to `new_bytes` bytes of memory. Throws std::bad_alloc, which
 /// leaves the old memory valid.
 void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes);
 void free_pages(void* memory, std::size_t bytes) noexcept;
@@ -61,11 +61,11 @@ class Pool {
   }
   /// New elements are not initialised.
   void resize(std::uint32_t count) {
-    if (count > capacity_) set_capacity(std::max<std::size_t>(count, grown()));
+    if (count > capacity_) set_capacity(std::max<std::size_t>(count, next_capacity()));
     size_ = count;
   }
   void push_back(const T& value) {
-    if (size_ == capacity_) set_capacity(grown());
+    if (size_ == capacity_) set_capacity(next_capacity());
     data_[size_++] = value;
   }
   void release() noexcept {
@@ -76,14 +76,14 @@ class Pool {
   }
 
  private:
-  [[nodiscard]] std::size_t grown() const {
+  [[nodiscard]] std::size_t next_capacity() const {
     // An array smaller than a huge page is copied when it grows, and its pages are new each time.
     const std::size_t doubled = 2 * capacity_ + 16;
     if (doubled * sizeof(T) < kHugePage) return doubled;
     // Grows by whole huge pages: memory first used as small pages stays in them.
     const std::size_t eighth = capacity_ + capacity_ / 8;
-    const std::size_t whole = eighth * sizeof(T) / kHugePage * kHugePage / sizeof(T);
-    return whole > capacity_ ? whole : whole + kHugePage / sizeof(T);
+    const std::size_t whole_pages = eighth * sizeof(T) / kHugePage * kHugePage / sizeof(T);
+    return whole_pages > capacity_ ? whole_pages : whole_pages + kHugePage / sizeof(T);
   }
   void set_capacity(std::size_t count) {
     void* moved = data_ == nullptr ? allocate_pages(count * sizeof(T))

@@ -9,7 +9,7 @@
 
 #include <terrace/base/portable_math.hpp>
 
-#include "interpolation/check_heights.hpp"
+#include "check_input.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -50,7 +50,7 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
   // about 1, so that only results that are sizes themselves can overflow.
   std::array<Vector, 3> edge;
   int exponent = 0;
-  const auto take_edges = [&](double unit) {
+  const auto compute_edges = [&](double unit) {
     double largest = 0;
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t k = 0; k < 2; ++k) {
@@ -62,8 +62,8 @@ TriangleQuality triangle_quality(const Delaunay2<Coord>& triangulation, const He
     return std::isfinite(largest);
   };
   int quarters = 0;
-  if (!take_edges(1)) {  // differences of finite doubles may overflow
-    take_edges(0.25);
+  if (!compute_edges(1)) {  // differences of finite doubles may overflow
+    compute_edges(0.25);
     quarters = 2;
   }
   TriangleQuality result;

@@ -9,13 +9,11 @@
 
 #include "delaunay3/access.hpp"
 #include "shape/criterion.hpp"
-#include "shape/flood.hpp"
+#include "shape/extract_surface.hpp"
 #include "shape/lids.hpp"
 #include "shape/nearby.hpp"
-#include "shape/outside.hpp"
+#include "shape/peel.hpp"
 #include "shape/poles.hpp"
-#include "shape/published.hpp"
-#include "shape/rescue.hpp"
 #include "shape/state.hpp"
 
 namespace terrace::tri {
@@ -137,7 +135,7 @@ ShapeSurface BasicShape3<Triangulation>::surface_without_lids(
   ShapeSurface result = surface(triangulation);
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
-  shape::leave_out_lids(mesh, result);
+  shape::remove_lids(mesh, result);
   return result;
 }
 

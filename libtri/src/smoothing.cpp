@@ -8,8 +8,8 @@
 
 #include <terrace/base/stop_check.hpp>
 
+#include "check_input.hpp"
 #include "delaunay2/access.hpp"
-#include "interpolation/check_heights.hpp"
 #include "interpolation/place.hpp"
 
 namespace terrace::tri {
@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t kOutside = 0xFFFFFFFFu;
 
 /// The second step of Taubin's method: 1 / strength + 1 / step = pass band.
-double back_step(const SmoothingOptions& options) {
+double second_step(const SmoothingOptions& options) {
   return -options.strength / (1 - options.pass_band * options.strength);
 }
 
@@ -36,7 +36,7 @@ void check(const SmoothingOptions& options) {
   require(options.pass_band > 0 && options.pass_band < 1,
           "pass_band " + std::to_string(options.pass_band) + " is not in 0 < pass_band < 1");
   // The roughest component, of eigenvalue 2, must not grow.
-  const double growth = (1 - 2 * options.strength) * (1 - 2 * back_step(options));
+  const double growth = (1 - 2 * options.strength) * (1 - 2 * second_step(options));
   require(std::abs(growth) <= 1, "strength " + std::to_string(options.strength) +
                                      " is too large for this method; use at most 0.6");
 }
@@ -46,9 +46,9 @@ void check(const SmoothingOptions& options) {
 struct Rows {
   std::vector<std::uint32_t> vertex;
   std::size_t moving = 0;
-  std::vector<std::size_t> begin;  ///< start of row i in the following arrays; one extra at the end
+  std::vector<std::size_t> begin;  ///< start of row i in the following arrays. One extra at the end
   std::vector<std::uint32_t> neighbour;
-  std::vector<double> weight;  ///< >= 0; the sum per row is 1
+  std::vector<double> weight;  ///< >= 0. The sum per row is 1
 };
 
 /// Scales the vectors from a vertex to its neighbours to at most 1, which does not change angles.
@@ -70,7 +70,7 @@ void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
 /// Computes the weights of the neighbours of a vertex at the origin: the sum of the cotangents of
 /// the two angles opposite to an edge, which is twice the common side of the Voronoi cells divided
 /// by the edge's length. Returns false if they are NaN.
-bool weigh(const std::vector<planar::Query>& at, std::vector<double>& weights) {
+bool compute_weights(const std::vector<planar::Query>& at, std::vector<double>& weights) {
   weights.assign(at.size(), 0);
   for (std::size_t i = 0; i < at.size(); ++i) {
     const std::size_t next = i + 1 == at.size() ? 0 : i + 1;
@@ -98,7 +98,7 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
   rows.vertex.erase(std::unique(rows.vertex.begin(), rows.vertex.end()), rows.vertex.end());
   std::vector<std::uint32_t> row(mesh.point.size(), kOutside);
   for (const std::uint32_t v : rows.vertex) row[v] = 0;
-  std::vector<std::uint32_t> staying;
+  std::vector<std::uint32_t> fixed;
   std::vector<std::uint32_t> moving;
   std::vector<planar::Query> at;
   std::vector<double> weights;
@@ -109,7 +109,7 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
     at.clear();
     const std::size_t first = rows.neighbour.size();
     if (inside) {
-      planar::for_triangles_round(mesh, v, [&](std::uint32_t t, std::uint32_t i) {
+      planar::for_each_triangle_at(mesh, v, [&](std::uint32_t t, std::uint32_t i) {
         const std::uint32_t u = mesh.triangle[t].corner[planar::next_index(i)];
         inside = inside && u != planar::kGhost && row[u] != kOutside;
         at.push_back(planar::to_query(mesh.point[u]));
@@ -118,11 +118,11 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
     }
     if (inside) {
       scale(planar::to_query(mesh.point[v]), at);
-      inside = weigh(at, weights);
+      inside = compute_weights(at, weights);
     }
     if (!inside) {
       rows.neighbour.resize(first);
-      staying.push_back(v);
+      fixed.push_back(v);
       continue;
     }
     rows.weight.insert(rows.weight.end(), weights.begin(), weights.end());
@@ -131,7 +131,7 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
   }
   rows.vertex = moving;
   rows.moving = moving.size();
-  rows.vertex.insert(rows.vertex.end(), staying.begin(), staying.end());
+  rows.vertex.insert(rows.vertex.end(), fixed.begin(), fixed.end());
   for (std::uint32_t i = 0; i < rows.vertex.size(); ++i) row[rows.vertex[i]] = i;
   for (std::uint32_t& u : rows.neighbour) u = row[u];
   return rows;
@@ -140,8 +140,8 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
 /// Computes next = height + step * (mean of neighbours - height) for rows that move. count(d)
 /// weights a neighbour that is higher by d.
 template <class Count>
-void take_step(const Rows& rows, double step, std::vector<double>& height,
-               std::vector<double>& next, Count count, base::StopTicks& ticks) {
+void apply_step(const Rows& rows, double step, std::vector<double>& height,
+                std::vector<double>& next, Count count, base::StopTicks& ticks) {
   for (std::size_t i = 0; i < rows.moving; ++i) {
     ticks(4 * (rows.begin[i + 1] - rows.begin[i]));
     double sum = 0;
@@ -178,16 +178,16 @@ std::vector<HeightChange> smooth(const Delaunay2<Coord>& triangulation, const He
   const auto all = [](double) { return 1.0; };
   const auto similar = [&](double difference) {
     const double part = difference / options.edge_height;
-    const double rest = 1 - part * part;
-    return rest > 0 ? rest * rest : 0;
+    const double complement = 1 - part * part;
+    return complement > 0 ? complement * complement : 0;
   };
   for (unsigned i = 0; i < options.iterations; ++i) {
     if (options.method == Smoothing::kBilateral) {
-      take_step(rows, options.strength, height, next, similar, ticks);
+      apply_step(rows, options.strength, height, next, similar, ticks);
     } else {
-      take_step(rows, options.strength, height, next, all, ticks);
+      apply_step(rows, options.strength, height, next, all, ticks);
       if (options.method == Smoothing::kTaubin)
-        take_step(rows, back_step(options), height, next, all, ticks);
+        apply_step(rows, second_step(options), height, next, all, ticks);
     }
   }
   std::vector<HeightChange> changes;

@@ -63,10 +63,10 @@ void expect_equal_to_cgal(const std::vector<std::array<Coord, 2>>& points) {
   Delaunay2<Coord> triangulation;
   triangulation.build(points);
   EXPECT_EQ(find_fault(triangulation), "");
-  std::vector<Kernel2::Point_2> theirs;
+  std::vector<Kernel2::Point_2> cgal_points;
   for (const auto& p : points)
-    theirs.emplace_back(static_cast<double>(p[0]), static_cast<double>(p[1]));
-  const Oracle2 oracle(theirs.begin(), theirs.end());
+    cgal_points.emplace_back(static_cast<double>(p[0]), static_cast<double>(p[1]));
+  const Oracle2 oracle(cgal_points.begin(), cgal_points.end());
   EXPECT_EQ(triangulation.vertex_count(), oracle.number_of_vertices());
   EXPECT_TRUE(triangles_of(triangulation) == triangles_of(oracle));
 }
@@ -187,7 +187,7 @@ TEST(Delaunay2RealFiles, SameTrianglesAsCgal) {
       std::string text = contents(entry.path());
       std::size_t limit = 100'000;
       if (std::string(folder) == "cdt") {
-        // The first line has the numbers of points and edges; the points follow.
+        // The first line has the numbers of points and edges. The points follow.
         limit = static_cast<std::size_t>(std::strtoul(text.c_str(), nullptr, 10));
         text.erase(0, text.find('\n'));
       }

@@ -38,7 +38,7 @@ TEST(Delaunay2Growth, RemovingLargeSetsKeepsTheRest) {
   constexpr std::int32_t kSide = 300;
   Delaunay2<std::int32_t> triangulation;
   const VertexId first = triangulation.build_grid(0, 0, 1, kSide, kSide);
-  const std::uint64_t whole = triangulation.hash();
+  const std::uint64_t full_hash = triangulation.hash();
   const auto in_square = [](std::int32_t x, std::int32_t y) {
     return x >= 5 && y >= 5 && x < kSide - 5 && y < kSide - 5;
   };
@@ -54,12 +54,12 @@ TEST(Delaunay2Growth, RemovingLargeSetsKeepsTheRest) {
     }
     triangulation.remove(set);
     EXPECT_EQ(find_fault(triangulation), "");
-    Delaunay2<std::int32_t> rest;
-    rest.build(kept);
-    EXPECT_EQ(triangulation.hash(), rest.hash());
+    Delaunay2<std::int32_t> remaining;
+    remaining.build(kept);
+    EXPECT_EQ(triangulation.hash(), remaining.hash());
     triangulation.insert(removed, {});
     EXPECT_EQ(find_fault(triangulation), "");
-    EXPECT_EQ(triangulation.hash(), whole);
+    EXPECT_EQ(triangulation.hash(), full_hash);
   };
   ASSERT_TRUE(triangulation.alive(first));
   check(in_square);

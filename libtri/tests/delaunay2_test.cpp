@@ -397,7 +397,7 @@ TEST(Delaunay2, LatticeSetsEqualInsertionOneByOne) {
     }
     std::vector<Point> points(blob.begin(), blob.end());
     std::shuffle(points.begin(), points.end(), random);
-    // A coarse triangulation surrounds it; some of its vertices are in the blob too.
+    // A coarse triangulation surrounds it. Some of its vertices are in the blob too.
     std::vector<Point> base{{at[0] > 100 ? at[0] - 100 : 0, at[1] > 90 ? at[1] - 90 : 0},
                             {at[0] + 200, at[1] > 50 ? at[1] - 50 : 0},
                             {at[0] + 90, at[1] + 170}};

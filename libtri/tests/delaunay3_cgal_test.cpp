@@ -28,8 +28,8 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
       const auto points = make_points3<TypeParam>(kind, count, 31);
       Delaunay3<TypeParam> triangulation;
       triangulation.build(points);
-      const auto theirs = to_cgal(points);
-      expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
+      const auto cgal_points = to_cgal(points);
+      expect_equal_to_cgal(triangulation, Oracle3(cgal_points.begin(), cgal_points.end()));
     }
   }
 }
@@ -49,8 +49,8 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
       triangulation.remove(std::span<const VertexId>(going));
       std::vector<std::array<TypeParam, 3>> left;
       for (const VertexId v : triangulation.all_vertices()) left.push_back(triangulation.point(v));
-      const auto theirs = to_cgal(left);
-      expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
+      const auto cgal_points = to_cgal(left);
+      expect_equal_to_cgal(triangulation, Oracle3(cgal_points.begin(), cgal_points.end()));
     }
   }
 }
@@ -75,8 +75,8 @@ TEST(Delaunay3Cgal, SameTetrahedraWhenPointsLeaveTheLattice) {
       points.push_back(p);
       between.push_back(triangulation.insert(p).vertex);
     }
-    const auto theirs = to_cgal(points);
-    expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
+    const auto cgal_points = to_cgal(points);
+    expect_equal_to_cgal(triangulation, Oracle3(cgal_points.begin(), cgal_points.end()));
     std::sort(between.begin(), between.end());
     between.erase(std::unique(between.begin(), between.end()), between.end());
     triangulation.remove(std::span<const VertexId>(between));

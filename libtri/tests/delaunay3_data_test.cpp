@@ -26,7 +26,7 @@ class Delaunay3DataTest : public ::testing::Test {
     folder_ = folder;
   }
 
-  /// Points of the scan; empty if it does not exist.
+  /// Points of the scan, or empty if it does not exist.
   [[nodiscard]] DoublePoints scan(const std::string& name) const {
     std::ifstream file(folder_ / "scan" / name, std::ios::binary);
     if (!file) return {};
@@ -58,8 +58,8 @@ template <class Coord>
 void expect_same_as_cgal(const std::vector<std::array<Coord, 3>>& points) {
   Delaunay3<Coord> triangulation;
   triangulation.build(points, 2);
-  const auto theirs = to_cgal(points);
-  expect_equal_to_cgal(triangulation, Oracle3(theirs.begin(), theirs.end()));
+  const auto cgal_points = to_cgal(points);
+  expect_equal_to_cgal(triangulation, Oracle3(cgal_points.begin(), cgal_points.end()));
 }
 
 TEST_F(Delaunay3DataTest, ScansMatchCgal) {
@@ -89,8 +89,8 @@ TEST_F(Delaunay3DataTest, NumbersOfPointSetFilesMatchCgal) {
       text << file.rdbuf();
       std::string numbers = text.str();
       for (char& c : numbers) {
-        const bool of_number = (c >= '0' && c <= '9') || c == '-' || c == '.' || c == 'e';
-        if (!of_number) c = ' ';
+        const bool is_number = (c >= '0' && c <= '9') || c == '-' || c == '.' || c == 'e';
+        if (!is_number) c = ' ';
       }
       // Any three consecutive numbers are a point, whether they are coordinates, indices of edges
       // or anything else.
@@ -134,24 +134,24 @@ void expect_no_history(const std::vector<std::array<Coord, 3>>& points, std::uin
   }
   EXPECT_EQ(grown.hash(), hash);
 
-  // Parts of space are removed and reinserted; the state in between is checked too.
+  // Parts of space are removed and reinserted. The state in between is checked too.
   for (int round = 0; round < 3; ++round) {
     std::vector<VertexId> going;
-    std::vector<std::array<Coord, 3>> gone, left;
+    std::vector<std::array<Coord, 3>> removed, left;
     const std::size_t axis = random() % 3;
     const auto border = points[random() % points.size()][axis];
     for (const VertexId v : grown.all_vertices()) {
       const auto p = grown.point(v);
       const bool goes = round == 2 ? random() % 2 == 0 : p[axis] < border;
       if (goes) going.push_back(v);
-      (goes ? gone : left).push_back(p);
+      (goes ? removed : left).push_back(p);
     }
     grown.remove(std::span<const VertexId>(going));
-    Delaunay3<Coord> rest;
-    rest.build(left);
-    EXPECT_EQ(grown.hash(), rest.hash());
-    EXPECT_EQ(grown.tetrahedron_count(), rest.tetrahedron_count());
-    grown.insert(gone, {});
+    Delaunay3<Coord> remaining;
+    remaining.build(left);
+    EXPECT_EQ(grown.hash(), remaining.hash());
+    EXPECT_EQ(grown.tetrahedron_count(), remaining.tetrahedron_count());
+    grown.insert(removed, {});
     EXPECT_EQ(grown.hash(), hash);
   }
   EXPECT_EQ(find_fault(grown), "");

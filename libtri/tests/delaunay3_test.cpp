@@ -425,9 +425,9 @@ TYPED_TEST(Delaunay3Test, NeighboursAgreeWithTetrahedra) {
         if (v != corners[i]) joined[corners[i]].insert(v);
       const TetrahedronId other = triangulation.neighbours(t)[i];
       if (other == kNoTetrahedron) continue;
-      const auto theirs = triangulation.vertices(other);
+      const auto mate_corners = triangulation.vertices(other);
       for (std::size_t k = 0; k < 4; ++k)
-        ASSERT_EQ(std::count(theirs.begin(), theirs.end(), corners[k]), k == i ? 0 : 1);
+        ASSERT_EQ(std::count(mate_corners.begin(), mate_corners.end(), corners[k]), k == i ? 0 : 1);
     }
   }
   std::vector<VertexId> around;

@@ -26,7 +26,7 @@ using SurfaceCoords = testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(DynamicSurfaceOf, SurfaceCoords);
 
 // Any points are added and removed. The deltas must be complete, and the surface must equal the
-// surface of a shape that follows the same changes; from scratch it must equal a new object's.
+// surface of a shape that follows the same changes. From scratch it must equal a new object's.
 TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
   using Coord = TypeParam;
   for (const PointSet3 kind : kPointSets3) {
@@ -80,21 +80,21 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
       ASSERT_EQ(drawn.triangles(),
                 faces_of(shape.surface_without_lids(triangulation), triangulation));
       // A triangle that is reported as removed and as added has a new corner.
-      std::set<std::array<VertexId, 3>> gone(changes.removed_corners.begin(),
-                                             changes.removed_corners.end());
+      std::set<std::array<VertexId, 3>> last_corners(changes.removed_corners.begin(),
+                                                     changes.removed_corners.end());
       for (const TriangleId t : changes.added_triangles) {
         const auto corners = surface.vertices(t);
-        const bool fresh = std::any_of(corners.begin(), corners.end(), [&](VertexId v) {
+        const bool is_new = std::any_of(corners.begin(), corners.end(), [&](VertexId v) {
           return std::count(changes.added_vertices.begin(), changes.added_vertices.end(), v) > 0;
         });
-        ASSERT_TRUE(fresh || gone.count(corners) == 0);
+        ASSERT_TRUE(is_new || last_corners.count(corners) == 0);
       }
       if (!scratch) continue;
-      std::vector<std::array<Coord, 3>> there;
-      for (const VertexId v : surface.all_vertices()) there.push_back(surface.point(v));
-      DynamicSurface<Coord> again;
-      again.build(there);
-      ASSERT_EQ(surface.hash(), again.hash());
+      std::vector<std::array<Coord, 3>> live_points;
+      for (const VertexId v : surface.all_vertices()) live_points.push_back(surface.point(v));
+      DynamicSurface<Coord> rebuilt;
+      rebuilt.build(live_points);
+      ASSERT_EQ(surface.hash(), rebuilt.hash());
     }
   }
 }
@@ -123,12 +123,12 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesNextToCoarseParts) {
   typename DynamicSurface<Coord>::Changes changes;
   typename Delaunay3<Coord>::Changes tetrahedra;
   std::size_t differing = 0, large = 0;
-  std::array<double, 2> work{}, gone{};  // of the fine points, then of the coarse ones
+  std::array<double, 2> work{}, removed{};  // of the fine points, then of the coarse ones
   for (int step = 0; step < 12; ++step) {
     // Removes a fine patch, small or large, or a few of the coarse points, and adds it again.
-    const bool of_coarse = step % 3 == 2;
+    const bool use_coarse = step % 3 == 2;
     const double reach = step % 3 == 0 ? 0x1p16 : step % 3 == 1 ? 0x1p18 : 0x1p18;
-    const auto middle = of_coarse ? coarse[random() % 25] : fine[random() % fine.size()];
+    const auto middle = use_coarse ? coarse[random() % 25] : fine[random() % fine.size()];
     std::vector<VertexId> patch;
     std::vector<std::array<Coord, 3>> points;
     for (const VertexId v : surface.all_vertices()) {
@@ -138,14 +138,14 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesNextToCoarseParts) {
         square += d * d;
       }
       const bool is_coarse = !(surface.point(v)[2] > 0x1p20);
-      if (square > reach * reach || is_coarse != of_coarse) continue;
+      if (square > reach * reach || is_coarse != use_coarse) continue;
       patch.push_back(v);
       points.push_back(surface.point(v));
     }
-    work[of_coarse] += static_cast<double>(surface.removal_work(patch));
-    gone[of_coarse] += static_cast<double>(patch.size());
-    for (const bool back : {false, true}) {
-      if (back) {
+    work[use_coarse] += static_cast<double>(surface.removal_work(patch));
+    removed[use_coarse] += static_cast<double>(patch.size());
+    for (const bool is_reverse : {false, true}) {
+      if (is_reverse) {
         surface.insert(points, {});
         triangulation.insert(points, {});
       } else {
@@ -155,7 +155,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesNextToCoarseParts) {
       surface.take_changes(changes);
       triangulation.take_changes(tetrahedra);
       shape.update_nearby(triangulation, tetrahedra);
-      large += shape::far_reaching(tetrahedra) &&
+      large += shape::reaches_far(tetrahedra) &&
                2 * tetrahedra.added_tetrahedra.size() < triangulation.tetrahedron_count();
       ASSERT_NO_FATAL_FAILURE(drawn.apply(changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
@@ -173,8 +173,8 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesNextToCoarseParts) {
   }
   EXPECT_GT(large, 0u);
   // The estimate for a coarse point must exceed that for a fine one.
-  EXPECT_GE(work[0], gone[0]);
-  EXPECT_GT(work[1] / gone[1], 1.25 * work[0] / gone[0]);
+  EXPECT_GE(work[0], removed[0]);
+  EXPECT_GT(work[1] / removed[1], 1.25 * work[0] / removed[0]);
   EXPECT_LE(differing, 12 * surface.triangle_count() / 1000);
 }
 
@@ -226,12 +226,12 @@ TYPED_TEST(DynamicSurfaceOf, OmitsTransientChanges) {
 
 /// Builds a surface at once from the points of a model.
 template <class Coord>
-DynamicSurface<Coord> made_at_once(const MultiresolutionModel<DynamicSurface<Coord>>& model) {
-  std::vector<std::array<Coord, 3>> there;
+DynamicSurface<Coord> build_at_once(const MultiresolutionModel<DynamicSurface<Coord>>& model) {
+  std::vector<std::array<Coord, 3>> live_points;
   for (const VertexId v : model.triangulation().all_vertices())
-    there.push_back(model.triangulation().point(v));
+    live_points.push_back(model.triangulation().point(v));
   DynamicSurface<Coord> surface;
-  surface.build(there);
+  surface.build(live_points);
   return surface;
 }
 
@@ -251,7 +251,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsViews) {
     ViewControl<T> control(counts(world.source), load_root(world.source));
     const T& surface = control.model().triangulation();
     Drawn<TypeParam> drawn(surface);
-    ASSERT_EQ(surface.hash(), made_at_once(control.model()).hash());
+    ASSERT_EQ(surface.hash(), build_at_once(control.model()).hash());
     for (int views = 0; views < 6; ++views) {
       const View view = world.view();
       const ClusterSet goal =
@@ -276,14 +276,14 @@ TYPED_TEST(DynamicSurfaceOf, FollowsViews) {
       ASSERT_NO_FATAL_FAILURE(drawn.check());
       ASSERT_EQ(expanded_set(control), goal);
       ASSERT_EQ(find_fault(surface.tetrahedra()), "");
-      const T fresh = made_at_once(control.model());
-      ASSERT_EQ(surface.tetrahedra().hash(), fresh.tetrahedra().hash());
+      const T rebuilt_model = build_at_once(control.model());
+      ASSERT_EQ(surface.tetrahedra().hash(), rebuilt_model.tetrahedra().hash());
       const auto& rest = control.restore(1 + static_cast<unsigned>(below(world.random, 3)));
       ASSERT_TRUE(rest.changes.added_vertices.empty());
       ASSERT_TRUE(rest.reassigned.empty());
       ASSERT_NO_FATAL_FAILURE(drawn.apply(rest.changes));
       ASSERT_NO_FATAL_FAILURE(drawn.check());
-      ASSERT_EQ(surface.hash(), fresh.hash());
+      ASSERT_EQ(surface.hash(), rebuilt_model.hash());
       ASSERT_TRUE(control.restore().changes.added_triangles.empty());
       if (goal.size() > 3 && goal.size() + 3 < tree.parents.size()) ++mixed;
     }
@@ -304,7 +304,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsRegions) {
   const auto apply = [&](const auto& delta) {
     ASSERT_NO_FATAL_FAILURE(drawn.apply(delta.changes));
     ASSERT_NO_FATAL_FAILURE(drawn.check());
-    ASSERT_EQ(model.triangulation().tetrahedra().hash(), made_at_once(model).tetrahedra().hash());
+    ASSERT_EQ(model.triangulation().tetrahedra().hash(), build_at_once(model).tetrahedra().hash());
   };
   ASSERT_NO_FATAL_FAILURE(apply(model.refine(half, 0)));
   EXPECT_GT(model.point_count(), 1200u);
@@ -313,7 +313,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsRegions) {
   ASSERT_NO_FATAL_FAILURE(apply(model.set_level(0)));
   EXPECT_EQ(model.point_count(), 3000u);
   ASSERT_NO_FATAL_FAILURE(apply(model.restore()));
-  EXPECT_EQ(model.triangulation().hash(), made_at_once(model).hash());
+  EXPECT_EQ(model.triangulation().hash(), build_at_once(model).hash());
   EXPECT_GT(model.triangulation().triangle_count(), 5900u);
   ModelOptions options;
   options.deltas = false;

@@ -8,7 +8,7 @@
 
 #include "delaunay2/access.hpp"
 #include "metrics.hpp"
-#include "model/model.hpp"
+#include "model/multiresolution.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "multiresolution_oracle.hpp"
 #include "points.hpp"
@@ -93,9 +93,9 @@ TEST(EllipticalMetric2, RandomOperationsEqualRebuild) {
         for (const VertexId v : triangulation.all_vertices())
           left.push_back(triangulation.point(v));
         std::shuffle(left.begin(), left.end(), random);
-        Elliptical2 fresh(maps[seed]);
-        fresh.build(left);
-        ASSERT_EQ(triangulation.hash(), fresh.hash()) << "step " << step;
+        Elliptical2 rebuilt(maps[seed]);
+        rebuilt.build(left);
+        ASSERT_EQ(triangulation.hash(), rebuilt.hash()) << "step " << step;
       }
     }
   }
@@ -243,9 +243,9 @@ TEST(EllipticalModel, HasLevelsOfDetail) {
       ASSERT_EQ(model.triangulation().hash(), coarse);
 
       // The metric may be passed to the model.
-      MultiresolutionModel<Elliptical2> given(source, {}, {}, Elliptical2(kSlanted));
-      ASSERT_EQ(given.triangulation().hash(), coarse);
-      ASSERT_EQ(given.triangulation().metric().map(), kSlanted);
+      MultiresolutionModel<Elliptical2> with_metric(source, {}, {}, Elliptical2(kSlanted));
+      ASSERT_EQ(with_metric.triangulation().hash(), coarse);
+      ASSERT_EQ(with_metric.triangulation().metric().map(), kSlanted);
     }
   }
 }

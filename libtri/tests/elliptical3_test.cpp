@@ -71,22 +71,22 @@ TEST(EllipticalMetric3, IntegerPointsAndMapsGiveDelaunay3OfMappedPoints) {
       Elliptical3 elliptical(m);
       Delaunay3<double> plain;
       const auto vertices = elliptical.build(points);
-      const auto others = plain.build(mapped);
+      const auto plain_ids = plain.build(mapped);
       // Equal vertices, compared by the points from which they were made.
-      std::vector<Corners3> wanted;
+      std::vector<Corners3> expected;
       std::vector<Space> original(plain.vertex_slots());
       for (std::size_t i = 0; i < points.size(); ++i) {
-        original[slot(others[i])] = points[i];
+        original[slot(plain_ids[i])] = points[i];
         ASSERT_EQ(elliptical.point(vertices[i]), points[i]);
       }
       for (const TetrahedronId t : plain.all_tetrahedra()) {
         Corners3 corners;
         for (std::size_t i = 0; i < 4; ++i) corners[i] = original[slot(plain.vertices(t)[i])];
         std::sort(corners.begin(), corners.end());
-        wanted.push_back(corners);
+        expected.push_back(corners);
       }
-      std::sort(wanted.begin(), wanted.end());
-      ASSERT_TRUE(tetrahedra_of(elliptical) == wanted);
+      std::sort(expected.begin(), expected.end());
+      ASSERT_TRUE(tetrahedra_of(elliptical) == expected);
     }
   }
 }
@@ -133,9 +133,9 @@ TEST(EllipticalMetric3, RandomOperationsEqualRebuild) {
         for (const VertexId v : triangulation.all_vertices())
           left.push_back(triangulation.point(v));
         std::shuffle(left.begin(), left.end(), random);
-        Elliptical3 fresh(maps[seed]);
-        fresh.build(left);
-        ASSERT_EQ(triangulation.hash(), fresh.hash()) << "step " << step;
+        Elliptical3 rebuilt(maps[seed]);
+        rebuilt.build(left);
+        ASSERT_EQ(triangulation.hash(), rebuilt.hash()) << "step " << step;
       }
     }
   }
@@ -289,9 +289,9 @@ TEST(EllipticalModel3, HasLevelsOfDetail) {
         ASSERT_EQ(model.triangulation().hash(), scratch.hash());
       }
       model.set_level(0);
-      Elliptical3 whole(map);
-      whole.build(points);
-      ASSERT_EQ(model.triangulation().hash(), whole.hash());
+      Elliptical3 mesh(map);
+      mesh.build(points);
+      ASSERT_EQ(model.triangulation().hash(), mesh.hash());
       model.set_level(Detail::kTop);
       ASSERT_EQ(model.triangulation().hash(), coarse);
       ASSERT_EQ(model.triangulation().metric().map(), map);

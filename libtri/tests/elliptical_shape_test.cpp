@@ -76,14 +76,14 @@ TEST(EllipticalShape, IntegerPointsAndMapsGiveTheShapeOfMappedPoints) {
           std::sort(result.begin(), result.end());
           return result;
         };
-        std::vector<Corners3> ours, theirs;
+        std::vector<Corners3> ours, plain_corners;
         for (const TetrahedronId t : shape.kept_tetrahedra())
           ours.push_back(corners([&](VertexId v) { return elliptical.point(v); }, elliptical, t));
         for (const TetrahedronId t : other.kept_tetrahedra())
-          theirs.push_back(corners([&](VertexId v) { return original[slot(v)]; }, plain, t));
+          plain_corners.push_back(corners([&](VertexId v) { return original[slot(v)]; }, plain, t));
         std::sort(ours.begin(), ours.end());
-        std::sort(theirs.begin(), theirs.end());
-        ASSERT_TRUE(ours == theirs);
+        std::sort(plain_corners.begin(), plain_corners.end());
+        ASSERT_TRUE(ours == plain_corners);
       }
     }
   }
@@ -105,9 +105,9 @@ TEST(EllipticalShape, FollowsTheModel) {
                               ? model.refine(box, static_cast<unsigned>(below(random, 2)))
                               : model.coarsen(box, 1 + static_cast<unsigned>(below(random, 2)));
       shape.update(model.triangulation(), delta.changes);
-      Shape3<double, EllipticalMetric3> again;
-      again.restore(model.triangulation());
-      ASSERT_EQ(shape.kept_tetrahedra(), again.kept_tetrahedra());
+      Shape3<double, EllipticalMetric3> repeated;
+      repeated.restore(model.triangulation());
+      ASSERT_EQ(shape.kept_tetrahedra(), repeated.kept_tetrahedra());
     }
   }
 }
@@ -146,12 +146,12 @@ TEST(EllipticalShape, StretchedTorusKeepsItsHoleOnlyInTheMetric) {
   const double euclidean = measure(restore_surface(points).surface).volume;
   options.metric = ellipsoid_map({1, 30, 1});
   const SurfaceMeasures measures = measure(restore_surface(points, options).surface);
-  const double wanted = kTurn * kTurn / 2 * 0.16 * 30;
+  const double expected = kTurn * kTurn / 2 * 0.16 * 30;
   EXPECT_TRUE(measures.closed);
   EXPECT_EQ(measures.components, 1u);
   EXPECT_EQ(measures.euler_characteristic, 0);
-  EXPECT_NEAR(measures.volume, wanted, 0.02 * wanted);
-  EXPECT_GT(std::abs(euclidean - wanted), 0.1 * wanted);
+  EXPECT_NEAR(measures.volume, expected, 0.02 * expected);
+  EXPECT_GT(std::abs(euclidean - expected), 0.1 * expected);
 }
 
 TEST(EllipticalShape, SmallestEllipsoidFilterAgreesWithTheExactTest) {

@@ -230,8 +230,8 @@ long double squared(const Facet& facet, const Point3& p) {
     inside = inside && dot(normal, cross(edge, to)) >= 0;
     const long double length = dot(edge, edge);
     const long double t = length > 0 ? std::clamp(dot(edge, to) / length, 0.0L, 1.0L) : 0.0L;
-    const Vector off{to[0] - t * edge[0], to[1] - t * edge[1], to[2] - t * edge[2]};
-    least = std::min(least, dot(off, off));
+    const Vector offset{to[0] - t * edge[0], to[1] - t * edge[1], to[2] - t * edge[2]};
+    least = std::min(least, dot(offset, offset));
   }
   if (inside) {
     const long double height = dot(normal, from(facet[0], p));
@@ -310,11 +310,12 @@ std::set<Point3> places_of_corners(const std::multiset<Facet>& facets) {
   for (const Facet& f : facets) corners.insert(f.begin(), f.end());
   return corners;
 }
-std::vector<Facet> without(const std::multiset<Facet>& facets, const std::multiset<Facet>& others) {
-  std::vector<Facet> rest;
+std::vector<Facet> difference(const std::multiset<Facet>& facets,
+                              const std::multiset<Facet>& others) {
+  std::vector<Facet> remaining;
   std::set_difference(facets.begin(), facets.end(), others.begin(), others.end(),
-                      std::back_inserter(rest));
-  return rest;
+                      std::back_inserter(remaining));
+  return remaining;
 }
 
 /// Checks which vertices joined `to` and where they started on `from`, by definition: tests all
@@ -327,8 +328,8 @@ void check_came(const Slides& slides, const std::multiset<Facet>& from,
                       std::inserter(came, came.end()));
   ASSERT_EQ(std::set<Point3>(slides.end.begin(), slides.end.end()), came);
   ASSERT_EQ(slides.size(), came.size());
-  const std::vector<Facet> gone = without(from, to), fresh = without(to, from);
-  std::vector<Facet> changed = gone;
+  const std::vector<Facet> removed_facets = difference(from, to), fresh = difference(to, from);
+  std::vector<Facet> changed = removed_facets;
   changed.insert(changed.end(), fresh.begin(), fresh.end());
   for (std::size_t i = 0; i < slides.size(); ++i) {
     // The connected part, found by moving from corner to corner.
@@ -341,7 +342,7 @@ void check_came(const Slides& slides, const std::multiset<Facet>& from,
       }
     }
     std::vector<Facet> replaced;
-    for (const Facet& f : gone)
+    for (const Facet& f : removed_facets)
       if (part.count(f[0])) replaced.push_back(f);
     const Point3 &start = slides.start[i], &end = slides.end[i];
     if (replaced.empty()) {
@@ -407,9 +408,9 @@ TYPED_TEST(Geomorphs, InSpaceCollapseMirrorsExpand) {
     collapsed.make(model, model.collapse(id));
     if (facets_of(model.triangulation()) != start) continue;
     const auto by_place = [](const Slides& slides) {
-      std::map<Point3, Point3> ways;
-      for (std::size_t i = 0; i < slides.size(); ++i) ways[slides.end[i]] = slides.start[i];
-      return ways;
+      std::map<Point3, Point3> moves;
+      for (std::size_t i = 0; i < slides.size(); ++i) moves[slides.end[i]] = slides.start[i];
+      return moves;
     };
     for (const auto& [one, other] :
          {std::pair{expanded.added, collapsed.removed},
@@ -427,7 +428,7 @@ TYPED_TEST(Geomorphs, InSpaceCollapseMirrorsExpand) {
   EXPECT_GT(compared, 100u);
 }
 
-/// The end of each anchor must be on its triangle, which must exist; over the plane also on
+/// The end of each anchor must be on its triangle, which must exist. Over the plane it is also on
 /// `after`, at its x and y.
 template <class T>
 void check_anchors(const T& surface, const std::vector<Anchor>& anchors, const auto& height) {
@@ -535,14 +536,14 @@ TYPED_TEST(Geomorphs, PartsConsistOfTouchingTriangles) {
       morph.make(model, delta);
       // Corners by their position: those of removed triangles from the lists, others from the
       // surface.
-      std::map<VertexId, Point3> gone;
+      std::map<VertexId, Point3> removed_points;
       for (std::size_t i = 0; i < delta.changes.removed_vertices.size(); ++i) {
         const auto& p = delta.changes.removed_points[i];
-        gone[delta.changes.removed_vertices[i]] = {
+        removed_points[delta.changes.removed_vertices[i]] = {
             static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
       }
       const auto place = [&](VertexId v, bool before) -> Point3 {
-        if (before && gone.count(v)) return gone.at(v);
+        if (before && removed_points.count(v)) return removed_points.at(v);
         const auto p = model.triangulation().point(v);
         return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
       };

@@ -9,7 +9,7 @@
 
 #include "grid_windows.hpp"
 #include "terrace/tri/grid_tin.hpp"
-#include "tin/by_path.hpp"
+#include "tin/instruction_set.hpp"
 
 namespace {
 
@@ -27,7 +27,7 @@ TEST(GridTinCheck, FindsErrorsEverywhere) {
     EXPECT_EQ(check.max_error, 7);
     EXPECT_NEAR(check.rms_error, 7.0 / 4, 1e-12);
     EXPECT_EQ(check.covered, 16U);
-    EXPECT_EQ(check.turned, 0U);
+    EXPECT_EQ(check.inverted, 0U);
   }
 }
 
@@ -50,12 +50,14 @@ TEST(GridTinCheck, CountsUncoveredSamples) {
   EXPECT_EQ(check.uncovered, 0U);
 }
 
-TEST(GridTinCheck, CountsTurnedTriangles) {
+TEST(GridTinCheck, CountsInvertedTriangles) {
   const std::vector<double> heights(16, 0.0);
   EXPECT_EQ(
-      check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 3, 2}}).turned, 1U);
+      check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 3, 2}}).inverted,
+      1U);
   EXPECT_EQ(
-      check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 0, 2}}).turned, 1U);
+      check_grid_tin<double>({4, 4, heights}, kSquare, Triangles{{0, 1, 2}, {0, 0, 2}}).inverted,
+      1U);
 }
 
 TEST(GridTinCheck, AcceptsCornersOffTheLattice) {
@@ -81,31 +83,34 @@ TEST(GridTinCheck, AcceptsCornersOffTheLattice) {
 
 /// A window of relief, with gaps for even seeds, and triangles across it that overlap each other
 /// and its sides.
-struct Tangle {
+struct CrossingTriangles {
   OwnedWindow<float> owned;
   std::vector<Point3> points;
   Triangles triangles;
 };
 
-Tangle tangle(std::uint32_t columns, std::uint32_t rows, std::uint64_t seed) {
-  Tangle result{make_window<float>(Relief::kNoise, seed % 2 == 0 ? Gaps::kBlobs : Gaps::kNone,
-                                   columns, rows, seed),
-                {},
-                {}};
+CrossingTriangles make_crossing_triangles(std::uint32_t columns, std::uint32_t rows,
+                                          std::uint64_t seed) {
+  CrossingTriangles result{
+      make_window<float>(Relief::kNoise, seed % 2 == 0 ? Gaps::kBlobs : Gaps::kNone, columns, rows,
+                         seed),
+      {},
+      {}};
   std::mt19937_64 random(seed);
-  const auto place = [&](std::uint32_t count) {
+  const auto coordinate = [&](std::uint32_t count) {
     return static_cast<double>(random() % (64 * (count + 3))) / 64 - 1.5;
   };
   for (int i = 0; i < 12; ++i)
-    result.points.push_back({place(columns), place(rows), static_cast<double>(random() % 1000)});
+    result.points.push_back(
+        {coordinate(columns), coordinate(rows), static_cast<double>(random() % 1000)});
   for (std::uint32_t i = 0; i + 2 < 12; ++i) result.triangles.push_back({i, i + 1, i + 2});
   return result;
 }
 
 void compare_with_all(std::uint32_t columns, std::uint32_t rows, std::uint64_t seed) {
   SCOPED_TRACE("seed " + std::to_string(seed) + ", " + std::to_string(columns) + " columns");
-  const auto [owned, points, triangles] = tangle(columns, rows, seed);
-  double most = 0;
+  const auto [owned, points, triangles] = make_crossing_triangles(columns, rows, seed);
+  double expected_error = 0;
   std::size_t covered = 0, missing = 0;
   for (std::uint32_t y = 0; y < rows; ++y) {
     for (std::uint32_t x = 0; x < columns; ++x) {
@@ -121,14 +126,14 @@ void compare_with_all(std::uint32_t columns, std::uint32_t rows, std::uint64_t s
         if (sum == 0 || w[0] / sum < 0 || w[1] / sum < 0 || w[2] / sum < 0) continue;
         in_any = true;
         const double plane = (w[0] * a[2] + w[1] * b[2] + w[2] * c[2]) / sum;
-        if (std::isfinite(z)) most = std::max(most, std::fabs(plane - z));
+        if (std::isfinite(z)) expected_error = std::max(expected_error, std::fabs(plane - z));
       }
       covered += in_any && std::isfinite(z) ? 1 : 0;
       missing += in_any && !std::isfinite(z) ? 1 : 0;
     }
   }
   const GridTinCheck check = check_grid_tin<float>(owned.window(), points, triangles);
-  EXPECT_NEAR(check.max_error, most, 1e-6 * (1 + most));
+  EXPECT_NEAR(check.max_error, expected_error, 1e-6 * (1 + expected_error));
   EXPECT_EQ(check.covered, covered);
   EXPECT_EQ(check.nodata_covered, missing);
 }
@@ -143,16 +148,16 @@ TEST(GridTinCheck, AgreesWithBruteForce) {
 }
 
 template <class T>
-void expect_same_on_every_processor(const GridWindow<T>& window, const Tangle& any) {
+void expect_same_on_every_processor(const GridWindow<T>& window, const CrossingTriangles& input) {
   for (const double tolerance : {0.0, 0.3}) {
-    const GridTinCheck expected = tin::check_grid_tin_by(
-        window, any.points, any.triangles, tolerance, terrace::base::SimdPath::portable);
+    const GridTinCheck expected = tin::check_grid_tin_with(
+        window, input.points, input.triangles, tolerance, terrace::base::SimdPath::portable);
     EXPECT_GT(expected.covered, 0U);
     for (const terrace::base::SimdPath set :
          {terrace::base::SimdPath::avx2, terrace::base::SimdPath::avx512}) {
       if (!terrace::base::supports(set)) continue;
       const GridTinCheck check =
-          tin::check_grid_tin_by(window, any.points, any.triangles, tolerance, set);
+          tin::check_grid_tin_with(window, input.points, input.triangles, tolerance, set);
       EXPECT_EQ(check.max_error, expected.max_error);
       EXPECT_EQ(check.rms_error, expected.rms_error);
       EXPECT_EQ(check.covered, expected.covered);
@@ -165,10 +170,10 @@ void expect_same_on_every_processor(const GridWindow<T>& window, const Tangle& a
 TEST(GridTinCheck, SameBitsOnEveryProcessor) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const Tangle any = tangle(seed % 3 == 0 ? 11 : 150, 33, seed);
-    expect_same_on_every_processor(any.owned.window(), any);
-    const std::vector<double> heights(any.owned.heights.begin(), any.owned.heights.end());
-    expect_same_on_every_processor<double>({any.owned.columns, any.owned.rows, heights}, any);
+    const CrossingTriangles input = make_crossing_triangles(seed % 3 == 0 ? 11 : 150, 33, seed);
+    expect_same_on_every_processor(input.owned.window(), input);
+    const std::vector<double> heights(input.owned.heights.begin(), input.owned.heights.end());
+    expect_same_on_every_processor<double>({input.owned.columns, input.owned.rows, heights}, input);
   }
 }
 
@@ -187,7 +192,7 @@ TEST(GridTinCheck, RejectsInvalidArguments) {
   }
 }
 
-// The tests of all instruction sets skip those that the machine lacks; this test reports it.
+// The tests of all instruction sets skip those that the machine lacks. This test reports it.
 TEST(InstructionSets, Avx2IsTested) {
   if (!terrace::base::supports(terrace::base::SimdPath::avx2))
     GTEST_SKIP() << "the processor lacks AVX2";

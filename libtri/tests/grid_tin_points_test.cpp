@@ -28,7 +28,7 @@ TEST(GridTin, BestOfPoints) {
   for (std::size_t count = 31; count < 60; ++count) {
     const GridTin tin = grid_tin_of_points(owned.window(), count, options);
     const GridVertex& v = tin.vertices.back();
-    double there = 0;
+    double error_at_vertex = 0;
     for (std::size_t i = 0; i < before.triangles.size(); ++i) {
       const Corners t = corners_of(before, i);
       const std::array<std::int64_t, 2> p{v.column, v.row};
@@ -37,9 +37,9 @@ TEST(GridTin, BestOfPoints) {
       double sum = 0;
       for (std::size_t k = 0; k < 3; ++k)
         sum += static_cast<double>(w[k]) * before.vertices[before.triangles[i][k]].height;
-      there = std::fabs(v.height - sum / static_cast<double>(w[0] + w[1] + w[2]));
+      error_at_vertex = std::fabs(v.height - sum / static_cast<double>(w[0] + w[1] + w[2]));
     }
-    EXPECT_NEAR(there, before.check.max_error, 1e-2);
+    EXPECT_NEAR(error_at_vertex, before.check.max_error, 1e-2);
     before = tin;
   }
 }

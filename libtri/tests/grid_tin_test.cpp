@@ -11,7 +11,7 @@
 #include <terrace/base/simd.hpp>
 
 #include "grid_tin_oracle.hpp"
-#include "tin/by_path.hpp"
+#include "tin/instruction_set.hpp"
 
 namespace {
 
@@ -28,13 +28,13 @@ void expect_within_bounds(std::uint32_t columns, std::uint32_t rows, std::uint64
       std::size_t before = std::numeric_limits<std::size_t>::max();
       for (const TinQuality quality : kQualities) {
         const GridTin tin = make(owned, bound, quality);
-        const double most = brute_force(owned, tin, gaps != Gaps::kNone);
-        EXPECT_LE(most, bound);
-        EXPECT_NEAR(tin.check.max_error, most, 1e-9 * bound);
+        const double largest_error = brute_force(owned, tin, gaps != Gaps::kNone);
+        EXPECT_LE(largest_error, bound);
+        EXPECT_NEAR(tin.check.max_error, largest_error, 1e-9 * bound);
         EXPECT_LE(tin.check.max_error, bound);
         EXPECT_EQ(tin.check.uncovered_inner, 0U);
         EXPECT_EQ(tin.check.nodata_covered, 0U);
-        EXPECT_EQ(tin.check.turned, 0U);
+        EXPECT_EQ(tin.check.inverted, 0U);
         if (gaps == Gaps::kNone) {
           EXPECT_LE(tin.triangles.size(), before);
         }
@@ -96,14 +96,14 @@ TEST(GridTin, SameBytesOnEveryProcessor) {
         GridTinOptions options;
         options.max_error = bound_for(relief);
         options.quality = quality;
-        const auto all_paths = [&](const auto& any) {
-          const GridSides sides = settle_sides(any.window(), options.max_error);
+        const auto all_paths = [&](const auto& input) {
+          const GridSides sides = settle_sides(input.window(), options.max_error);
           const GridTin expected =
-              tin::make_grid_tin(any.window(), sides, options, terrace::base::SimdPath::portable);
+              tin::make_grid_tin(input.window(), sides, options, terrace::base::SimdPath::portable);
           for (const terrace::base::SimdPath set :
                {terrace::base::SimdPath::avx2, terrace::base::SimdPath::avx512}) {
             if (!terrace::base::supports(set)) continue;
-            const GridTin found = tin::make_grid_tin(any.window(), sides, options, set);
+            const GridTin found = tin::make_grid_tin(input.window(), sides, options, set);
             EXPECT_EQ(found.vertices, expected.vertices);
             EXPECT_EQ(found.triangles, expected.triangles);
           }

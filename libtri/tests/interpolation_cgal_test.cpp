@@ -119,10 +119,10 @@ TYPED_TEST(InterpolationCgalTest, SameNaturalNeighbourCoordinates) {
       std::vector<VertexWeight> ours;
       for (const Point2& query : make_queries(triangulation, 70, count)) {
         SCOPED_TRACE(std::to_string(query[0]) + ", " + std::to_string(query[1]));
-        const Weights theirs = weights_of(oracle, query);
+        const Weights cgal_weights = weights_of(oracle, query);
         weights_at(triangulation, query, Interpolation::kNaturalNeighbour, ours);
-        ASSERT_EQ(ours.empty(), theirs.empty());
-        Weights difference = theirs;
+        ASSERT_EQ(ours.empty(), cgal_weights.empty());
+        Weights difference = cgal_weights;
         for (const auto& [vertex, weight] : ours)
           difference[query_at(triangulation, vertex)] -= weight;
         for (const auto& [point, value] : difference) {

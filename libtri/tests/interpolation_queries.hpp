@@ -31,30 +31,31 @@ std::vector<Point2> make_queries(const Delaunay2<Coord>& triangulation, std::siz
   if (vertices.empty()) return {{0, 0}, {1, 2}};
   std::vector<TriangleId> triangles;
   for (const TriangleId t : triangulation.all_triangles()) triangles.push_back(t);
-  const auto any = [&] { return vertices[random() % vertices.size()]; };
+  const auto random_vertex = [&] { return vertices[random() % vertices.size()]; };
   const auto mix = [](const Point2& a, const Point2& b, double part) {
     return Point2{a[0] * (1 - part) + b[0] * part, a[1] * (1 - part) + b[1] * part};
   };
   std::vector<Point2> queries;
   for (std::size_t i = 0; i < count; ++i) {
-    Point2 p = mix(any(), any(), to_unit(random()));
+    Point2 p = mix(random_vertex(), random_vertex(), to_unit(random()));
     const double tiny = std::ldexp(1.0, -static_cast<int>(random() % 50));
     switch (i % 7) {
       case 0:
-        p = mix(p, any(), to_unit(random()));
+        p = mix(p, random_vertex(), to_unit(random()));
         break;
       case 1:
-        p = any();
+        p = random_vertex();
         if (random() % 2 == 0) break;
         for (double& c : p)
           c = std::nextafter(c, random() % 2 == 0 ? -std::numeric_limits<double>::infinity()
                                                   : std::numeric_limits<double>::infinity());
         break;
       case 2:
-        p = mix(p, any(), tiny);  // near an edge or diagonal
+        p = mix(p, random_vertex(), tiny);  // near an edge or diagonal
         break;
       case 3:
-        p = {any()[0], any()[1]};  // cocircular or collinear with vertices of a raster
+        p = {random_vertex()[0],
+             random_vertex()[1]};  // cocircular or collinear with vertices of a raster
         break;
       default:
         if (triangles.empty()) break;

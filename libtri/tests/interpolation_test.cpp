@@ -139,7 +139,7 @@ TYPED_TEST(InterpolationTest, NearestIsNearest) {
 }
 
 TYPED_TEST(InterpolationTest, WeightsDoNotDependOnCocircularDiagonals) {
-  // In a mirrored set the perturbation chooses the other diagonals; the weights must not change.
+  // In a mirrored set the perturbation chooses the other diagonals. The weights must not change.
   Delaunay2<TypeParam> grid;
   grid.build_grid(0, 0, 7, 12, 12);
   Delaunay2<TypeParam> mirrored;
@@ -193,7 +193,7 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
         }
       }
     }
-    // Crosses the circles themselves; lattice points are on many of them.
+    // Crosses the circles themselves. Lattice points are on many of them.
     for (int x = 10; x < 90; ++x) {
       queries.push_back({x - step / 2, 0.5 * x + 13});
       queries.push_back({x + step / 2, 0.5 * x + 13});
@@ -294,16 +294,16 @@ TYPED_TEST(InterpolationTest, GradientsAreDerivatives) {
   for (int i = 0; i < 400; ++i)
     queries.push_back({60 + 850 * to_unit(random()), 60 + 850 * to_unit(random())});
   const double step = 1e-4;
-  std::vector<Point2> around;
+  std::vector<Point2> neighbours;
   for (const Point2& p : queries)
     for (const Point2& d : {Point2{step, 0}, {-step, 0}, {0, step}, {0, -step}})
-      around.push_back({p[0] + d[0], p[1] + d[1]});
+      neighbours.push_back({p[0] + d[0], p[1] + d[1]});
   for (const bool natural : {false, true}) {
     const auto gradients =
         gradients_at(triangulation, heights, queries,
                      natural ? GradientFrom::kNaturalNeighbours : GradientFrom::kTriangles);
     const auto values =
-        heights_at(triangulation, heights, around,
+        heights_at(triangulation, heights, neighbours,
                    natural ? Interpolation::kNaturalNeighbour : Interpolation::kLinear);
     for (std::size_t i = 0; i < queries.size(); ++i) {
       const double x = (values[4 * i] - values[4 * i + 1]) / (2 * step);

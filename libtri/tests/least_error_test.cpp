@@ -21,14 +21,14 @@ struct Outcome {
 
 Outcome search(std::uint64_t most, const VertexCount& count, const VertexCount& estimate) {
   Outcome outcome;
-  outcome.found =
-      least_error({.most = most, .range = kRange, .estimate = estimate, .run = [&](double bound) {
-                     EXPECT_GE(bound, 0.0);
-                     EXPECT_LE(bound, kRange);
-                     ++outcome.runs;
-                     outcome.bound = bound;
-                     return outcome.vertices = count(bound);
-                   }});
+  outcome.found = least_error(
+      {.max_vertices = most, .range = kRange, .estimate = estimate, .run = [&](double bound) {
+         EXPECT_GE(bound, 0.0);
+         EXPECT_LE(bound, kRange);
+         ++outcome.runs;
+         outcome.bound = bound;
+         return outcome.vertices = count(bound);
+       }});
   return outcome;
 }
 
@@ -44,18 +44,18 @@ TEST(LeastError, UsesNearlyAllVertices) {
     const VertexCount count = relief(1e7, power);
     for (const std::uint64_t most : {1000U, 20'000U, 1'000'000U, 5'000'000U}) {
       SCOPED_TRACE(std::to_string(power) + ", " + std::to_string(most));
-      const auto wanted = static_cast<double>(most);
-      if (count(kRange) > wanted) continue;
+      const auto limit = static_cast<double>(most);
+      if (count(kRange) > limit) continue;
       const Outcome plain = search(most, count, {});
       EXPECT_TRUE(plain.found);
-      EXPECT_LE(plain.vertices, wanted);
-      EXPECT_GE(plain.vertices, 0.98 * wanted);
+      EXPECT_LE(plain.vertices, limit);
+      EXPECT_GE(plain.vertices, 0.98 * limit);
       EXPECT_LE(plain.runs, 12);
       // The estimate is 40 % too high and has another slope.
       const VertexCount estimate = [&](double bound) { return 1.4 * std::pow(count(bound), 1.02); };
       const Outcome estimated = search(most, count, estimate);
-      EXPECT_LE(estimated.vertices, wanted);
-      EXPECT_GE(estimated.vertices, 0.98 * wanted);
+      EXPECT_LE(estimated.vertices, limit);
+      EXPECT_GE(estimated.vertices, 0.98 * limit);
       EXPECT_LE(estimated.runs, 3);
     }
   }
@@ -64,15 +64,15 @@ TEST(LeastError, UsesNearlyAllVertices) {
 TEST(LeastError, CountsBeyondTheLimitMayBeEstimates) {
   const VertexCount count = relief(1e6, 1.7);
   for (const std::uint64_t most : {5'000U, 100'000U}) {
-    const auto wanted = static_cast<double>(most);
-    const VertexCount rough = [&](double bound) {
+    const auto limit = static_cast<double>(most);
+    const VertexCount rough_count = [&](double bound) {
       const double vertices = count(bound);
-      return vertices <= wanted ? vertices : std::max(wanted + 1, 0.6 * vertices);
+      return vertices <= limit ? vertices : std::max(limit + 1, 0.6 * vertices);
     };
     for (const VertexCount& estimate : {VertexCount{}, count}) {
-      const Outcome outcome = search(most, rough, estimate);
-      EXPECT_LE(outcome.vertices, wanted);
-      EXPECT_GE(outcome.vertices, 0.98 * wanted);
+      const Outcome outcome = search(most, rough_count, estimate);
+      EXPECT_LE(outcome.vertices, limit);
+      EXPECT_GE(outcome.vertices, 0.98 * limit);
     }
   }
 }
@@ -108,11 +108,12 @@ TEST(LeastError, FailsIfEvenTheFlattestMeshHasTooMany) {
 
 TEST(LeastError, FlatGroundTakesOneRun) {
   int runs = 0;
-  EXPECT_TRUE(least_error({.most = 4, .range = 0.0, .estimate = {}, .run = [&](double bound) {
-                             EXPECT_EQ(bound, 0.0);
-                             ++runs;
-                             return 4.0;
-                           }}));
+  EXPECT_TRUE(
+      least_error({.max_vertices = 4, .range = 0.0, .estimate = {}, .run = [&](double bound) {
+                     EXPECT_EQ(bound, 0.0);
+                     ++runs;
+                     return 4.0;
+                   }}));
   EXPECT_EQ(runs, 1);
 }
 
@@ -121,7 +122,7 @@ TEST(LeastError, TriesNoBoundBelowTheLeast) {
   for (const VertexCount& estimate : {VertexCount{}, count}) {
     for (const double least : {0.1, 40.0, kRange}) {
       double last = 0.0;
-      EXPECT_TRUE(least_error({.most = 500'000,
+      EXPECT_TRUE(least_error({.max_vertices = 500'000,
                                .least = least,
                                .range = kRange,
                                .estimate = estimate,

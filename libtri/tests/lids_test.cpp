@@ -43,7 +43,7 @@ Seen<Coord> seen(const ShapeSurface& surface, const Delaunay3<Coord>& triangulat
   return {faces_of(surface, triangulation), surface.open};
 }
 
-/// Computes the visible part of the closed surface by the definition; `share` is the share of the
+/// Computes the visible part of the closed surface by the definition. `share` is the share of the
 /// lids.
 template <class Coord>
 Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& triangulation,
@@ -57,15 +57,15 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
   };
   std::map<VertexId, Wide> spacing;
   for (const VertexId v : closed.vertices) {
-    std::vector<VertexId> around;
-    triangulation.adjacent(v, around);
+    std::vector<VertexId> neighbours;
+    triangulation.adjacent(v, neighbours);
     std::vector<Wide> lengths;
-    for (const VertexId other : around) lengths.push_back(length(v, other));
+    for (const VertexId other : neighbours) lengths.push_back(length(v, other));
     std::sort(lengths.begin(), lengths.end());
     spacing[v] = lengths.at(2);
   }
   Seen<Coord> all, others;
-  Wide of_lids = 0, of_all = 0;
+  Wide lid_area = 0, total_area = 0;
   for (const auto& face : closed.surface.faces) {
     std::array<VertexId, 3> v;
     typename Drawn<Coord>::Points p;
@@ -86,13 +86,13 @@ Seen<Coord> by_definition(const ShapeSurface& closed, const Delaunay3<Coord>& tr
       const std::size_t i = (k + 1) % 3, j = (k + 2) % 3;
       square += (s[i] * t[j] - s[j] * t[i]) * (s[i] * t[j] - s[j] * t[i]);
     }
-    of_all += std::sqrt(square);
-    of_lids += lid ? std::sqrt(square) : 0;
+    total_area += std::sqrt(square);
+    lid_area += lid ? std::sqrt(square) : 0;
     lids += lid;
     all.triangles.insert(Drawn<Coord>::from_least(p));
     if (!lid) others.triangles.insert(Drawn<Coord>::from_least(p));
   }
-  share = of_all > 0 ? static_cast<double>(of_lids / of_all) : 0.0;
+  share = total_area > 0 ? static_cast<double>(lid_area / total_area) : 0.0;
   others.open = share > 0.1;
   return others.open ? others : all;
 }
@@ -128,9 +128,9 @@ TYPED_TEST(Lids, MatchTheDefinition) {
     double share = 0.0;
     std::size_t lids = 0;
     const auto expected = by_definition(shape.surface(triangulation), triangulation, share, lids);
-    const ShapeSurface without = shape.surface_without_lids(triangulation);
-    const auto found = seen(without, triangulation);
-    EXPECT_EQ(without.lids, lids);
+    const ShapeSurface without_lids = shape.surface_without_lids(triangulation);
+    const auto found = seen(without_lids, triangulation);
+    EXPECT_EQ(without_lids.lids, lids);
     if (std::abs(share - 0.1) < 1e-4) return;  // areas are cut to 18 bits
     ASSERT_EQ(found, expected) << share;
     open += found.open;
@@ -162,9 +162,9 @@ TEST(LidsTest, DoNotDependOnScale) {
     for (Point3& p : scaled)
       for (double& c : p) c = std::ldexp(c, exponent);
     const RestoredSurface found = restore_surface(scaled);
-    const std::array<std::size_t, 2> now{found.surface.faces.size(), found.open ? 1U : 0U};
-    if (exponent == 0) wanted = now;
-    EXPECT_EQ(now, wanted);
+    const std::array<std::size_t, 2> current{found.surface.faces.size(), found.open ? 1U : 0U};
+    if (exponent == 0) wanted = current;
+    EXPECT_EQ(current, wanted);
     DynamicSurface<double> live;
     live.build(scaled);
     EXPECT_EQ(live.triangle_count(), wanted[0]);
@@ -217,12 +217,12 @@ struct Followed {
     ++answers[expected.open];
     turns += before != expected.open;
     if (!scratch) return;
-    std::vector<std::array<Coord, 3>> there;
-    for (const VertexId v : surface.all_vertices()) there.push_back(surface.point(v));
-    DynamicSurface<Coord> again;
-    again.build(there);
-    ASSERT_EQ(surface.hash(), again.hash());
-    ASSERT_EQ(surface.open(), again.open());
+    std::vector<std::array<Coord, 3>> live_points;
+    for (const VertexId v : surface.all_vertices()) live_points.push_back(surface.point(v));
+    DynamicSurface<Coord> rebuilt;
+    rebuilt.build(live_points);
+    ASSERT_EQ(surface.hash(), rebuilt.hash());
+    ASSERT_EQ(surface.open(), rebuilt.open());
   }
 };
 
@@ -272,28 +272,28 @@ TYPED_TEST(Lids, FollowScansThatCloseAndOpenAgain) {
     Followed<Coord> live;
     live.insert(bowl);
     ASSERT_NO_FATAL_FAILURE(live.check(true));
-    const std::uint64_t of_bowl = live.surface.hash();
+    const std::uint64_t bowl_hash = live.surface.hash();
     ASSERT_TRUE(live.surface.open());
-    for (const std::size_t pieces : {std::size_t{1}, std::size_t{13}}) {
-      for (std::size_t begin = 0; begin < cap.size(); begin += (cap.size() - 1) / pieces + 1) {
+    for (const std::size_t step_count : {std::size_t{1}, std::size_t{13}}) {
+      for (std::size_t begin = 0; begin < cap.size(); begin += (cap.size() - 1) / step_count + 1) {
         live.insert(std::span(cap).subspan(
-            begin, std::min((cap.size() - 1) / pieces + 1, cap.size() - begin)));
+            begin, std::min((cap.size() - 1) / step_count + 1, cap.size() - begin)));
         ASSERT_NO_FATAL_FAILURE(live.check(false));
       }
       EXPECT_FALSE(live.surface.open());
-      std::vector<VertexId> gone;
+      std::vector<VertexId> removed;
       for (const VertexId v : live.surface.all_vertices()) {
         if (!(static_cast<double>(live.surface.point(v)[2]) > 0x1.3p20)) continue;
-        gone.push_back(v);
-        if (gone.size() < 400 / pieces) continue;
-        live.remove(gone);
-        gone.clear();
+        removed.push_back(v);
+        if (removed.size() < 400 / step_count) continue;
+        live.remove(removed);
+        removed.clear();
         ASSERT_NO_FATAL_FAILURE(live.check(false));
       }
-      live.remove(gone);
+      live.remove(removed);
       ASSERT_NO_FATAL_FAILURE(live.check(true));
       EXPECT_TRUE(live.surface.open());
-      EXPECT_EQ(live.surface.hash(), of_bowl);
+      EXPECT_EQ(live.surface.hash(), bowl_hash);
     }
     EXPECT_GE(live.turns, 5u);
   }
@@ -327,14 +327,14 @@ void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& ran
     if (step % 4 != 3) continue;
     ASSERT_NO_FATAL_FAILURE(drawn.apply(model.restore(2).changes));
     ASSERT_NO_FATAL_FAILURE(drawn.check());
-    std::vector<Surface3::Point> there;
-    for (const VertexId v : surface.all_vertices()) there.push_back(surface.point(v));
-    Delaunay3<std::int32_t> fresh;
-    fresh.build(there);
+    std::vector<Surface3::Point> live_points;
+    for (const VertexId v : surface.all_vertices()) live_points.push_back(surface.point(v));
+    Delaunay3<std::int32_t> new_mesh;
+    new_mesh.build(live_points);
     Shape3<std::int32_t> shape;
-    shape.restore(fresh);
+    shape.restore(new_mesh);
     ASSERT_EQ((Seen<std::int32_t>{drawn.triangles(), surface.open()}),
-              seen(shape.surface_without_lids(fresh), fresh));
+              seen(shape.surface_without_lids(new_mesh), new_mesh));
     ++answers[surface.open()];
   }
 }
@@ -359,7 +359,7 @@ TEST(LidsDataTest, FollowExpandedClustersOfRealScans) {
   if (folder == nullptr) GTEST_SKIP() << "TERRACE_DATA is not set";
   struct Scan {
     const char* file;
-    double cut;  ///< share of the height that is left; 1: all
+    double cut;  ///< share of the height that is left. 1 means all
   };
   std::array<std::size_t, 2> answers{};
   for (const Scan& scan : {Scan{"bunny_range/bun000.ply.gz", 1.0}, Scan{"armadillo_tm.ply", 1.0},

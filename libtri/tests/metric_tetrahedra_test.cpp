@@ -104,7 +104,7 @@ class Check {
   /// Checks all guarantees. Returns the number of tetrahedra that did not exist before.
   std::size_t run(std::size_t stuck, const LinearMap3& given) {
     is_a_tetrahedralisation();
-    const auto old = sorted(before_), fresh = sorted(after_);
+    const auto old_corners = sorted(before_), new_corners = sorted(after_);
     const auto mixed = [&](const std::vector<Corners3>& all) {
       std::vector<Corners3> result;
       for (const Corners3& t : all)
@@ -113,11 +113,11 @@ class Check {
           result.push_back(t);
       return result;
     };
-    EXPECT_TRUE(mixed(old) == mixed(fresh)) << "something changed where regions meet";
+    EXPECT_TRUE(mixed(old_corners) == mixed(new_corners)) << "something changed where regions meet";
     EXPECT_EQ(facets_not_delaunay(), stuck);
     std::size_t changed = 0;
-    for (const Corners3& t : fresh) {
-      if (std::binary_search(old.begin(), old.end(), t)) continue;
+    for (const Corners3& t : new_corners) {
+      if (std::binary_search(old_corners.begin(), old_corners.end(), t)) continue;
       ++changed;
       EXPECT_NE(field_(t[0]), given);
     }
@@ -183,13 +183,13 @@ class Check {
     bool can = true;
     for (std::size_t k = 0; k < 3; ++k) {
       const Space &a = facet[(k + 1) % 3], &b = facet[(k + 2) % 3], &c = facet[k];
-      const int of_e = EllipticalKernel::orientation(d, a, b, e);
-      const int of_c = EllipticalKernel::orientation(d, a, b, c);
-      if (of_e == of_c) continue;
+      const int orientation_e = EllipticalKernel::orientation(d, a, b, e);
+      const int orientation_c = EllipticalKernel::orientation(d, a, b, c);
+      if (orientation_e == orientation_c) continue;
       ++in_the_way;
       const auto& ring = edges_.at({std::min(a, b), std::max(a, b)});
       for (const std::size_t n : ring) can = can && in_region(n, map);
-      if (of_e != 0) {
+      if (orientation_e != 0) {
         can = can && ring.size() == 3;
       } else {
         // Closed around the edge, or both outer facets are on the hull and coplanar.
@@ -249,10 +249,10 @@ TYPED_TEST(MetricTetrahedraTest, DependOnThePointsAlone) {
     std::shuffle(points.begin(), points.end(), random);
     Delaunay3<TypeParam> other;
     std::vector<VertexId> guests;
-    const auto others = make_points3<TypeParam>(kind, 100, 43);
-    for (std::size_t i = 0; i < others.size(); ++i) {
+    const auto other_points = make_points3<TypeParam>(kind, 100, 43);
+    for (std::size_t i = 0; i < other_points.size(); ++i) {
       other.insert(points[2 * i]);
-      if (const auto [v, created] = other.insert(others[i]); created) guests.push_back(v);
+      if (const auto [v, created] = other.insert(other_points[i]); created) guests.push_back(v);
     }
     other.remove(std::span<const VertexId>(guests));
     for (const auto& p : points) other.insert(p);

@@ -131,10 +131,10 @@ TYPED_TEST(MetricTriangles, DependOnThePointsAlone) {
     std::shuffle(points.begin(), points.end(), random);
     Delaunay2<TypeParam> other;
     std::vector<VertexId> guests;
-    const auto others = make_points<TypeParam>(kind, 200, 43);
-    for (std::size_t i = 0; i < others.size(); ++i) {
+    const auto other_points = make_points<TypeParam>(kind, 200, 43);
+    for (std::size_t i = 0; i < other_points.size(); ++i) {
       other.insert(points[2 * i]);
-      if (const auto [v, created] = other.insert(others[i]); created) guests.push_back(v);
+      if (const auto [v, created] = other.insert(other_points[i]); created) guests.push_back(v);
     }
     other.remove(std::span<const VertexId>(guests));
     for (const auto& p : points) other.insert(p);
@@ -149,13 +149,13 @@ TYPED_TEST(MetricTriangles, CoverTheSelectedTriangles) {
     Delaunay2<TypeParam> triangulation;
     triangulation.build(points);
     const MetricField2 field = three_regions(points);
-    const auto takes_part = [](TriangleId id) { return slot(id) % 7 != 3; };
+    const auto filter = [](TriangleId id) { return slot(id) % 7 != 3; };
     std::vector<Corners> before;
     for (const TriangleId id : triangulation.all_triangles()) {
-      if (takes_part(id)) before.push_back(corners_of(triangulation, triangulation.vertices(id)));
+      if (filter(id)) before.push_back(corners_of(triangulation, triangulation.vertices(id)));
     }
     std::sort(before.begin(), before.end());
-    check(before, corners_of_all(triangulation, metric_triangles(triangulation, field, takes_part)),
+    check(before, corners_of_all(triangulation, metric_triangles(triangulation, field, filter)),
           field);
     if (this->HasFailure()) return;
   }

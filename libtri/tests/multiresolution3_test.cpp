@@ -52,7 +52,7 @@ std::vector<std::array<Coord, 3>> present(MemorySource& source,
   return points;
 }
 
-/// A cluster that is expanded or can be; the root if there is none.
+/// A cluster that is expanded or can be, or the root if there is none.
 template <class Coord>
 ClusterId any_cluster(const MultiresolutionModel<Delaunay3<Coord>>& model, ClusterId root,
                       std::mt19937_64& random) {
@@ -106,9 +106,9 @@ TYPED_TEST(Multiresolution3D, DependsOnExpandedClustersAloneAndTheShapeFollows) 
         scratch.build(points);
         ASSERT_EQ(model.triangulation().hash(), scratch.hash());
         shape.update(model.triangulation(), delta->changes);
-        Shape3<Coord> again;
-        again.restore(model.triangulation());
-        ASSERT_EQ(shape.kept_tetrahedra(), again.kept_tetrahedra());
+        Shape3<Coord> repeated;
+        repeated.restore(model.triangulation());
+        ASSERT_EQ(shape.kept_tetrahedra(), repeated.kept_tetrahedra());
       }
       model.set_level(Detail::kTop);
       Delaunay3<Coord> coarse;

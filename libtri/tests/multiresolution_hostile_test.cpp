@@ -78,7 +78,7 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     std::uint64_t ordinal = 0;
     while (source.levels[level][ordinal].positions.size() < 2) ++ordinal;
     const ClusterId id = cluster_id(level, ordinal);
-    const MemorySource good = source;
+    const MemorySource valid = source;
     StandInModel model(source);
     spoil(source, id);
     try {
@@ -90,7 +90,7 @@ void expect_refused(const std::function<void(MemorySource&, ClusterId)>& spoil, 
     }
     const std::vector<ClusterId> none = model.expanded();
     EXPECT_TRUE(none.empty());
-    source.levels = good.levels;
+    source.levels = valid.levels;
     ASSERT_NO_FATAL_FAILURE(check_model(model, source, {}));
     // The failure must leave nothing behind.
     ASSERT_NO_THROW(model.set_level(0));

@@ -109,7 +109,7 @@ Expectation<Point> expect(MemorySource& source, const ClusterSet& expanded) {
                         static_cast<typename Point::value_type>(p[1])};
       const PointId point_id{id, i};
       const auto [at, fresh] = result.vertices.try_emplace(point);
-      if (fresh || stands_before(point_id, at->second.id)) {
+      if (fresh || takes_precedence(point_id, at->second.id)) {
         at->second.id = point_id;
         at->second.height = p[2];
       }

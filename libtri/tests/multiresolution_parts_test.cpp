@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "model/map.hpp"
+#include "model/cluster_map.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
@@ -12,11 +12,11 @@ namespace {
 
 TEST(PointId, HigherLevelThenSmallerIdRepresents) {
   const PointId coarse{cluster_id(2, 9), 5}, fine{cluster_id(0, 1), 0};
-  EXPECT_TRUE(stands_before(coarse, fine));
-  EXPECT_FALSE(stands_before(fine, coarse));
-  EXPECT_TRUE(stands_before({cluster_id(1, 3), 8}, {cluster_id(1, 4), 0}));
-  EXPECT_TRUE(stands_before({cluster_id(1, 3), 7}, {cluster_id(1, 3), 8}));
-  EXPECT_FALSE(stands_before(coarse, coarse));
+  EXPECT_TRUE(takes_precedence(coarse, fine));
+  EXPECT_FALSE(takes_precedence(fine, coarse));
+  EXPECT_TRUE(takes_precedence({cluster_id(1, 3), 8}, {cluster_id(1, 4), 0}));
+  EXPECT_TRUE(takes_precedence({cluster_id(1, 3), 7}, {cluster_id(1, 3), 8}));
+  EXPECT_FALSE(takes_precedence(coarse, coarse));
 }
 
 TEST(Box, IsClosed) {

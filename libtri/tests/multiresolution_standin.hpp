@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "model/model.hpp"
+#include "model/multiresolution.hpp"
 #include "terrace/tri/delaunay2.hpp"
 #include "view/control.hpp"
 

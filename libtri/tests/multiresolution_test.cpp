@@ -245,10 +245,10 @@ TYPED_TEST(Multiresolution, RepeatedStepsChangeNothing) {
   const ClusterId id = expandable(model, source).front();
   EXPECT_TRUE(model.collapse(id).changes.removed_vertices.empty());
   EXPECT_EQ(model.expand(id).changes.added_vertices.size(), source.at(id).positions.size());
-  const auto& again = model.expand(id);
-  EXPECT_TRUE(again.changes.added_vertices.empty());
-  EXPECT_TRUE(again.changes.removed_triangles.empty());
-  EXPECT_TRUE(again.changes.added_triangles.empty());
+  const auto& repeated = model.expand(id);
+  EXPECT_TRUE(repeated.changes.added_vertices.empty());
+  EXPECT_TRUE(repeated.changes.removed_triangles.empty());
+  EXPECT_TRUE(repeated.changes.added_triangles.empty());
 }
 
 TYPED_TEST(Multiresolution, WithoutDeltasTheModelIsTheSame) {

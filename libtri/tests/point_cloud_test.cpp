@@ -21,37 +21,37 @@ TEST(PointCloud, BehavesLikeAMap) {
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
     PointCloud set;
-    std::map<VertexId, Point3> there, before;
+    std::map<VertexId, Point3> live_points, before;
     set.start_journal();
     for (int round = 0; round < 60; ++round) {
-      if (random() % 3 != 0 || there.empty()) {
+      if (random() % 3 != 0 || live_points.empty()) {
         std::vector<Point3> points(random() % 20);
         for (Point3& p : points) p = {double(random() % 4), double(random() % 4), 1.0};
         std::vector<PointCloud::Insertion> results(points.size());
         set.insert(points, results);
         for (std::size_t i = 0; i < points.size(); ++i) {
           EXPECT_TRUE(results[i].created);
-          EXPECT_TRUE(there.emplace(results[i].vertex, points[i]).second);
+          EXPECT_TRUE(live_points.emplace(results[i].vertex, points[i]).second);
         }
       } else {
-        std::vector<VertexId> gone;
-        for (const auto& [vertex, point] : there) {
-          if (random() % 2 == 0) gone.push_back(vertex);
+        std::vector<VertexId> removed;
+        for (const auto& [vertex, point] : live_points) {
+          if (random() % 2 == 0) removed.push_back(vertex);
         }
-        for (const VertexId vertex : gone) there.erase(vertex);
-        set.remove(gone);
+        for (const VertexId vertex : removed) live_points.erase(vertex);
+        set.remove(removed);
       }
-      ASSERT_EQ(set.vertex_count(), there.size());
+      ASSERT_EQ(set.vertex_count(), live_points.size());
       std::map<VertexId, Point3> seen;
-      PointCloud fresh;
+      PointCloud rebuilt;
       std::vector<Point3> points;
       for (const VertexId vertex : set.all_vertices()) {
         seen[vertex] = set.point(vertex);
         points.insert(points.begin(), set.point(vertex));
       }
-      ASSERT_EQ(seen, there);
-      fresh.build(points);
-      EXPECT_EQ(fresh.hash(), set.hash());
+      ASSERT_EQ(seen, live_points);
+      rebuilt.build(points);
+      EXPECT_EQ(rebuilt.hash(), set.hash());
       if (round % 5 != 0) continue;
       PointCloud::Changes changes;
       set.take_changes(changes);
@@ -62,9 +62,9 @@ TEST(PointCloud, BehavesLikeAMap) {
         before.erase(at);
       }
       for (const VertexId vertex : changes.added_vertices) {
-        ASSERT_TRUE(before.emplace(vertex, there.at(vertex)).second);
+        ASSERT_TRUE(before.emplace(vertex, live_points.at(vertex)).second);
       }
-      ASSERT_EQ(before, there);
+      ASSERT_EQ(before, live_points);
     }
   }
 }

@@ -15,8 +15,8 @@
 #include "delaunay2/double_kernel.hpp"
 #include "point_tin_oracle.hpp"
 #include "terrace/tri/point_tin.hpp"
-#include "tin/by_path.hpp"
-#include "tin/rows/places.hpp"
+#include "tin/instruction_set.hpp"
+#include "tin/rows/padded_samples.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -264,11 +264,11 @@ TEST(PointRows, HaveAsFewTrianglesAsPointTins) {
                    std::to_string(static_cast<int>(quality)));
       const PointTinOptions options = options_of(error, quality);
       const PointTin tin = point_tin(grid.rows(), frame, options);
-      const PointTin of_points = point_tin(x, y, grid.z, frame, options);
+      const PointTin from_points = point_tin(x, y, grid.z, frame, options);
       // Sweeps insert points before removal, which leaves a few per cent less here.
-      const double most = quality == TinQuality::kRemoval ? 1.08 : 1.04;
+      const double max_ratio = quality == TinQuality::kRemoval ? 1.08 : 1.04;
       EXPECT_LE(static_cast<double>(tin.triangles.size()),
-                most * static_cast<double>(of_points.triangles.size()));
+                max_ratio * static_cast<double>(from_points.triangles.size()));
       if (quality == TinQuality::kRemoval) {
         EXPECT_GT(tin.removed, tin.inserted / 5);
         EXPECT_EQ(tin.vertices.size(), frame.size() + tin.inserted - tin.removed);
@@ -297,18 +297,18 @@ TEST(PointRows, AllInstructionSetsGiveTheSame) {
       ASSERT_TRUE(tin::rows::padded_samples(grid.rows(), frame));
       ASSERT_TRUE(tin::rows::padded_samples(turned, frame));
       const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
-      const auto of_rows = [&](base::SimdPath set) {
+      const auto from_rows = [&](base::SimdPath set) {
         return tin::rows::make_tin(grid.rows(), frame, options, set);
       };
-      const auto of_turned = [&](base::SimdPath set) {
+      const auto from_turned = [&](base::SimdPath set) {
         return tin::rows::make_tin(turned, frame, options, set);
       };
-      EXPECT_GT(of_rows(base::SimdPath::portable).triangles.size(), 100u);
-      EXPECT_GT(of_turned(base::SimdPath::portable).triangles.size(), 100u);
+      EXPECT_GT(from_rows(base::SimdPath::portable).triangles.size(), 100u);
+      EXPECT_GT(from_turned(base::SimdPath::portable).triangles.size(), 100u);
       for (const base::SimdPath set : {base::SimdPath::avx2, base::SimdPath::avx512}) {
         if (!base::supports(set)) continue;
-        expect_same(of_rows(base::SimdPath::portable), of_rows(set));
-        expect_same(of_turned(base::SimdPath::portable), of_turned(set));
+        expect_same(from_rows(base::SimdPath::portable), from_rows(set));
+        expect_same(from_turned(base::SimdPath::portable), from_turned(set));
       }
     }
   }
@@ -400,9 +400,9 @@ TEST(PointRows, AcceptIrregularPlacesAndFrames) {
   check_framed_mesh(part, triangle);
   check_errors(Places(even), even.z, part, 1.0);
   EXPECT_GT(part.errors.uncovered, 0u);
-  PointTinOptions few = options;
-  few.max_points = 50;
-  EXPECT_LE(point_tin(even.rows(), frame, few).vertices.size(), 50u);
+  PointTinOptions limited = options;
+  limited.max_points = 50;
+  EXPECT_LE(point_tin(even.rows(), frame, limited).vertices.size(), 50u);
   PointTinOptions free = options;
   free.lattice.reset();
   check_errors(Places(even), even.z, point_tin(even.rows(), {}, free), 1.0);
@@ -412,7 +412,7 @@ TEST(PointRows, RejectBadInput) {
   Grid grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
   const std::vector<Point3> frame = make_frame(1000, 1, 16);
   const PointTinOptions options = options_of(1.0, TinQuality::kGreedy);
-  const auto refused = [&](const std::string& what) {
+  const auto expect_refused = [&](const std::string& what) {
     try {
       static_cast<void>(point_tin(grid.rows(), frame, options));
     } catch (const std::invalid_argument& error) {
@@ -421,23 +421,23 @@ TEST(PointRows, RejectBadInput) {
     return false;
   };
   grid.z[37] = std::numeric_limits<double>::infinity();
-  EXPECT_TRUE(refused("z of sample 37"));
+  EXPECT_TRUE(expect_refused("z of sample 37"));
   grid.z.pop_back();
-  EXPECT_TRUE(refused("row and column"));
+  EXPECT_TRUE(expect_refused("row and column"));
   grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
   grid.x[3] = kMissing;
-  EXPECT_TRUE(refused("x of sample"));
+  EXPECT_TRUE(expect_refused("x of sample"));
   PointTinOptions bad = options;
   bad.max_error = -1;
-  const Grid good = make_grid({10, 10, 1000, 0}, 0.0, 15);
-  const Places places(good);
+  const Grid valid_grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
+  const Places places(valid_grid);
   EXPECT_THROW(
-      static_cast<void>(point_tin(SampleGrid{7, places.x, places.y, good.z}, frame, options)),
+      static_cast<void>(point_tin(SampleGrid{7, places.x, places.y, valid_grid.z}, frame, options)),
       std::invalid_argument);
-  EXPECT_THROW(
-      static_cast<void>(point_tin(SampleGrid{10, places.x, good.y, good.z}, frame, options)),
-      std::invalid_argument);
-  EXPECT_THROW(static_cast<void>(point_tin(SampleGrid{0, {}, {}, good.z}, frame, options)),
+  EXPECT_THROW(static_cast<void>(
+                   point_tin(SampleGrid{10, places.x, valid_grid.y, valid_grid.z}, frame, options)),
+               std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(point_tin(SampleGrid{0, {}, {}, valid_grid.z}, frame, options)),
                std::invalid_argument);
   EXPECT_THROW(static_cast<void>(point_tin(grid.rows(), frame, bad)), std::invalid_argument);
 }

@@ -125,7 +125,7 @@ TEST(PointTin, KeepsTheErrorOnALattice) {
 
 /// With few different integers many positions are collinear or cocircular.
 TEST(PointTin, IntegerPredicatesAgreeWithThoseOfDoubles) {
-  using tin::points::Kernel, tin::points::Place2, tin::points::WholeKernel;
+  using tin::points::Kernel, tin::points::Place2, tin::points::SmallIntegerKernel;
   std::mt19937_64 random(9);
   std::array<std::size_t, 2> ties{};
   for (const std::uint64_t size : {4u, 30u, 1000u, 32768u}) {
@@ -139,11 +139,11 @@ TEST(PointTin, IntegerPredicatesAgreeWithThoseOfDoubles) {
         }
       }
       const int side = Kernel::orientation(p[0], p[1], p[2]);
-      ASSERT_EQ(WholeKernel::orientation(p[0], p[1], p[2]), side);
+      ASSERT_EQ(SmallIntegerKernel::orientation(p[0], p[1], p[2]), side);
       ties[0] += side == 0 ? 1 : 0;
       if (side <= 0) continue;
       const int inside = Kernel::in_circle(p[0], p[1], p[2], p[3]);
-      ASSERT_EQ(WholeKernel::in_circle(p[0], p[1], p[2], p[3]), inside);
+      ASSERT_EQ(SmallIntegerKernel::in_circle(p[0], p[1], p[2], p[3]), inside);
       ties[1] += inside == 0 ? 1 : 0;
     }
   }

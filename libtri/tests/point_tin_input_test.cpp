@@ -47,11 +47,12 @@ TEST(PointTin, HandlesDuplicates) {
     EXPECT_LE(measure_surface(cloud.x, cloud.y, cloud.z, close.vertices, close.triangles).largest,
               5);
     options.max_error = 1;
-    const PointTin apart = make(cloud, {}, options);
-    EXPECT_EQ(apart.stuck, 1u);
-    EXPECT_GE(apart.errors.largest, 2.5);
-    EXPECT_EQ(measure_surface(cloud.x, cloud.y, cloud.z, apart.vertices, apart.triangles).largest,
-              apart.errors.largest);
+    const PointTin separate = make(cloud, {}, options);
+    EXPECT_EQ(separate.stuck, 1u);
+    EXPECT_GE(separate.errors.largest, 2.5);
+    EXPECT_EQ(
+        measure_surface(cloud.x, cloud.y, cloud.z, separate.vertices, separate.triangles).largest,
+        separate.errors.largest);
   }
   options = {};
   options.duplicates = PointDuplicates::kError;
@@ -109,14 +110,14 @@ TEST(PointTin, HandlesHugeAndTinyCoordinates) {
 TEST(PointTin, RefusesBadInput) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const Cloud cloud{{0, 10, 10, 0}, {0, 0, 10, 10}, {0, 0, 0, 0}};
-  const auto with = [&](std::vector<double> Cloud::*axis, double value) {
+  const auto with_value = [&](std::vector<double> Cloud::*axis, double value) {
     Cloud bad = cloud;
     (bad.*axis)[2] = value;
     return refused([&] { make(bad, {}, {}); });
   };
-  EXPECT_NE(with(&Cloud::x, nan).find("x of sample 2"), std::string::npos);
-  EXPECT_NE(with(&Cloud::y, HUGE_VAL).find("y of sample 2"), std::string::npos);
-  EXPECT_NE(with(&Cloud::z, 1e200).find("z of sample 2"), std::string::npos);
+  EXPECT_NE(with_value(&Cloud::x, nan).find("x of sample 2"), std::string::npos);
+  EXPECT_NE(with_value(&Cloud::y, HUGE_VAL).find("y of sample 2"), std::string::npos);
+  EXPECT_NE(with_value(&Cloud::z, 1e200).find("z of sample 2"), std::string::npos);
   EXPECT_NE(refused([&] { (void)point_tin(cloud.x, cloud.y, {}, {}, {}); }), "accepted");
   const auto options = [&](auto change) {
     PointTinOptions bad;

@@ -29,7 +29,7 @@ class PolesOracle {
     for (const TetrahedronId t : triangulation.all_tetrahedra()) {
       const ShapeCorners corners = shape_corners(triangulation, t);
       all_.insert(corners);
-      for (std::size_t i = 0; i < 4; ++i) beside_[facet(corners, i)].push_back(corners);
+      for (std::size_t i = 0; i < 4; ++i) by_facet_[facet(corners, i)].push_back(corners);
       for (const ShapePoint& p : corners) star_[p].push_back(corners);
       centre_[corners] = centre_of(corners);
     }
@@ -46,7 +46,7 @@ class PolesOracle {
  private:
   using Facet = std::array<ShapePoint, 3>;
   using Node = std::optional<ShapeCorners>;  ///< nullopt: beyond the hull
-  /// Defect, corners, whether it is of a vertex; then the nodes and whether they are unlike.
+  /// Defect, corners, whether it is of a vertex. Then the nodes and whether they are unlike.
   struct Statement {
     double defect;
     std::vector<ShapePoint> corners;
@@ -76,7 +76,7 @@ class PolesOracle {
       if (j != i) result[k++] = t[j];
     return result;
   }
-  /// Relative to the first corner; nullopt if flat up to rounding.
+  /// Relative to the first corner, or nullopt if flat up to rounding.
   static std::optional<ShapePoint> centre_of(const ShapeCorners& t) {
     const ShapePoint b = minus(t[1], t[0]), c = minus(t[2], t[0]), d = minus(t[3], t[0]);
     const double volume6 = dot(b, cross(c, d));
@@ -106,9 +106,9 @@ class PolesOracle {
     return std::isnan(cosine) ? 1.0 : std::max(0.0, std::min(2.0, 1.0 - cosine));
   }
   [[nodiscard]] double defect_of(const Facet& f) const {
-    const auto& beside = beside_.at(f);
-    const std::optional<ShapePoint> u = to_centre(beside[0], f[0]);
-    return defect(u, beside.size() == 2 ? to_centre(beside[1], f[0]) : normal_.at(f));
+    const auto& owners = by_facet_.at(f);
+    const std::optional<ShapePoint> u = to_centre(owners[0], f[0]);
+    return defect(u, owners.size() == 2 ? to_centre(owners[1], f[0]) : normal_.at(f));
   }
 
   template <class Coord>
@@ -117,7 +117,7 @@ class PolesOracle {
       const ShapeCorners corners = shape_corners(triangulation, t);
       for (std::size_t i = 0; i < 4; ++i) {
         const Facet f = facet(corners, i);
-        if (beside_.at(f).size() == 2) continue;
+        if (by_facet_.at(f).size() == 2) continue;
         ShapePoint n = cross(minus(f[1], f[0]), minus(f[2], f[0]));
         // Checks exactly that the fourth corner is behind, using the triangulation's order of the
         // corners.
@@ -127,13 +127,13 @@ class PolesOracle {
           for (std::size_t axis = 0; axis < 3; ++axis)
             ordered[k][axis] = static_cast<double>(p[axis]) + 0.0;
         }
-        std::array<ShapePoint, 4> mine{f[0], f[1], f[2], corners[i]};
+        std::array<ShapePoint, 4> own_corners{f[0], f[1], f[2], corners[i]};
         int swaps = 0;
         for (std::size_t k = 0; k < 4; ++k) {
-          const auto at =
-              std::find(mine.begin() + static_cast<std::ptrdiff_t>(k), mine.end(), ordered[k]);
-          if (at != mine.begin() + static_cast<std::ptrdiff_t>(k)) {
-            std::iter_swap(at, mine.begin() + static_cast<std::ptrdiff_t>(k));
+          const auto at = std::find(own_corners.begin() + static_cast<std::ptrdiff_t>(k),
+                                    own_corners.end(), ordered[k]);
+          if (at != own_corners.begin() + static_cast<std::ptrdiff_t>(k)) {
+            std::iter_swap(at, own_corners.begin() + static_cast<std::ptrdiff_t>(k));
             ++swaps;
           }
         }
@@ -146,12 +146,12 @@ class PolesOracle {
   }
 
   void make_statements() {
-    for (const auto& [f, beside] : beside_)
+    for (const auto& [f, owners] : by_facet_)
       statements_.push_back({defect_of(f),
                              {f.begin(), f.end()},
                              false,
-                             beside[0],
-                             beside.size() == 2 ? Node(beside[1]) : std::nullopt});
+                             owners[0],
+                             owners.size() == 2 ? Node(owners[1]) : std::nullopt});
     for (const auto& entry : star_) {
       const auto v = entry.first;
       ShapePoint direction{};
@@ -181,9 +181,9 @@ class PolesOracle {
       const Node second =
           largest([&](const ShapeCorners& t) { return dot(*to_centre(t, v), direction) < 0.0; });
       if (!second) continue;
-      ShapePoint back = *to_centre(*second, v);
-      for (double& c : back) c = -c;
-      statements_.push_back({2.0 * defect(direction, back), {v}, true, first, second});
+      ShapePoint second_vector = *to_centre(*second, v);
+      for (double& c : second_vector) c = -c;
+      statements_.push_back({2.0 * defect(direction, second_vector), {v}, true, first, second});
     }
     std::sort(statements_.begin(), statements_.end());
   }
@@ -225,8 +225,8 @@ class PolesOracle {
       if (node && is_inside) inside.insert(*node);
   }
 
-  [[nodiscard]] Node across(const ShapeCorners& t, std::size_t i) const {
-    for (const ShapeCorners& other : beside_.at(facet(t, i)))
+  [[nodiscard]] Node neighbour(const ShapeCorners& t, std::size_t i) const {
+    for (const ShapeCorners& other : by_facet_.at(facet(t, i)))
       if (other != t) return other;
     return std::nullopt;
   }
@@ -257,7 +257,7 @@ class PolesOracle {
         int differing = 0;
         for (std::size_t i = 0; i < 4; ++i) {
           const double weight = 2.0 - defect_of(facet(t, i));
-          const bool differs = is_inside(across(t, i)) != is_inside(t);
+          const bool differs = is_inside(neighbour(t, i)) != is_inside(t);
           differing += differs;
           terms.push_back(differs ? weight : -weight);
         }
@@ -273,7 +273,7 @@ class PolesOracle {
         continue;
       flip(*best);
       for (std::size_t i = 0; i < 4; ++i)
-        if (const Node other = across(*best, i)) pending.insert(*other);
+        if (const Node other = neighbour(*best, i)) pending.insert(*other);
     }
   }
   void sculpt() {
@@ -284,7 +284,7 @@ class PolesOracle {
       std::optional<std::tuple<double, ShapePoint, Facet, ShapeCorners>> best;
       for (const ShapeCorners& t : all_) {
         for (std::size_t i = 0; i < 4; ++i) {
-          if (!off.contains(t[i]) || is_inside(across(t, i)) == is_inside(t)) continue;
+          if (!off.contains(t[i]) || is_inside(neighbour(t, i)) == is_inside(t)) continue;
           const Facet f = facet(t, i);
           const std::tuple candidate{defect_of(f), t[i], f, t};
           if (!best || candidate < *best) best = candidate;
@@ -296,7 +296,7 @@ class PolesOracle {
   }
 
   ShapeSet all_;
-  std::map<Facet, std::vector<ShapeCorners>> beside_;
+  std::map<Facet, std::vector<ShapeCorners>> by_facet_;
   std::map<ShapePoint, std::vector<ShapeCorners>> star_;
   std::map<ShapeCorners, std::optional<ShapePoint>> centre_;
   std::map<Facet, ShapePoint> normal_;  ///< of the hull, outward

@@ -10,7 +10,7 @@
 #include "delaunay3/access.hpp"
 #include "points3.hpp"
 #include "poles_oracle.hpp"
-#include "shape/outside.hpp"
+#include "shape/extract_surface.hpp"
 #include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
@@ -78,7 +78,7 @@ void expect_solid(const RestoredSurface& found, std::size_t points, std::size_t 
   EXPECT_TRUE(measured.closed);
   EXPECT_FALSE(found.open);
   EXPECT_EQ(found.surface.points.size(), points);
-  EXPECT_EQ(found.points_off, 0u);
+  EXPECT_EQ(found.unused_points, 0u);
   EXPECT_EQ(found.parts.components, components);
   EXPECT_EQ(found.parts.euler_characteristic, euler);
   EXPECT_EQ(measured.non_manifold_edges, 0u);
@@ -109,15 +109,15 @@ TEST(PolesTest, RestoresAThinPlateOfRandomSamples) {
     points.push_back({x, y, i % 2 == 0 ? 0.0 : 0.05});
   }
   for (int i = 0; i < 1200; ++i) {
-    const double along = unit(), z = 0.05 * unit();
+    const double position = unit(), z = 0.05 * unit();
     const double end = i % 2 == 0 ? 0.0 : 1.0;
-    points.push_back(i % 4 < 2 ? Point3{along, end, z} : Point3{end, along, z});
+    points.push_back(i % 4 < 2 ? Point3{position, end, z} : Point3{end, position, z});
   }
   const RestoredSurface found = restore_surface(points);
   EXPECT_TRUE(measure(found.surface).closed);
   EXPECT_EQ(found.parts.components, 1u);
   EXPECT_EQ(found.parts.euler_characteristic, 2);
-  EXPECT_LE(found.points_off, 7u);
+  EXPECT_LE(found.unused_points, 7u);
   EXPECT_NEAR(measure(found.surface).volume, 0.05, 0.002);
 }
 
@@ -185,7 +185,7 @@ TEST(PolesTest, LidsOfAClosedSurfaceStay) {
 
 TEST(PolesTest, TouchingPartsAreSeparated) {
   // Cubes of two units. The second shares an edge with the first, the third a corner with the
-  // second; the fourth shares a face with the second, an edge with the third and a corner with the
+  // second. The fourth shares a face with the second, an edge with the third and a corner with the
   // first.
   const std::array<std::array<std::int32_t, 3>, 4> lows{
       {{0, 0, 0}, {2, 2, 0}, {4, 4, 2}, {2, 2, 2}}};
@@ -269,11 +269,11 @@ TEST(PolesTest, NearbyUpdatesFollowChanges) {
       }
       triangulation.take_changes(changes);
       shape.update_nearby(triangulation, changes);
-      Shape3<double> again;
-      again.restore(triangulation);
+      Shape3<double> repeated;
+      repeated.restore(triangulation);
       std::size_t kept = 0;
       for (const TetrahedronId t : triangulation.all_tetrahedra()) {
-        wrong += shape.kept(t) != again.kept(t);
+        wrong += shape.kept(t) != repeated.kept(t);
         kept += shape.kept(t);
         ++compared;
       }
@@ -285,10 +285,10 @@ TEST(PolesTest, NearbyUpdatesFollowChanges) {
     }
     EXPECT_LE(wrong, compared / 1000);
     // Occasionally the whole ball.
-    Shape3<double> again;
-    again.restore(triangulation);
+    Shape3<double> repeated;
+    repeated.restore(triangulation);
     shape.restore(triangulation);
-    EXPECT_EQ(shape.kept_tetrahedra(), again.kept_tetrahedra());
+    EXPECT_EQ(shape.kept_tetrahedra(), repeated.kept_tetrahedra());
   }
 }
 

@@ -74,11 +74,11 @@ class DrawnTriangles {
 /// The triangulation of all points at once has the same hash, so plain() is Delaunay.
 template <class Coord>
 std::uint64_t hash_at_once(const RegionalDelaunay2<Coord>& triangles) {
-  std::vector<std::array<Coord, 2>> there;
-  for (const VertexId v : triangles.all_vertices()) there.push_back(triangles.point(v));
-  Delaunay2<Coord> fresh;
-  fresh.build(there);
-  return fresh.hash();
+  std::vector<std::array<Coord, 2>> live_points;
+  for (const VertexId v : triangles.all_vertices()) live_points.push_back(triangles.point(v));
+  Delaunay2<Coord> rebuilt;
+  rebuilt.build(live_points);
+  return rebuilt.hash();
 }
 
 // Any points are added and removed, in one region or several, some in the slots of others. The
@@ -150,8 +150,8 @@ TYPED_TEST(RegionalDelaunay, ReportsNetChanges) {
   std::size_t reported = 0;
   for (const auto& p : last) {
     triangles.insert({&p, 1}, inserted);
-    for (const bool back : {false, true}) {
-      if (back) triangles.remove(std::vector<VertexId>{inserted[0].vertex});
+    for (const bool is_reverse : {false, true}) {
+      if (is_reverse) triangles.remove(std::vector<VertexId>{inserted[0].vertex});
       triangles.take_changes(changes);
       reported += changes.added_triangles.size();
       std::set<std::array<VertexId, 3>> gone(changes.removed_corners.begin(),
@@ -162,10 +162,10 @@ TYPED_TEST(RegionalDelaunay, ReportsNetChanges) {
   }
   EXPECT_LT(reported, 100u * 40u);
   // Transient changes are not reported.
-  std::vector<typename T::Insertion> many(100);
-  triangles.insert(last, many);
+  std::vector<typename T::Insertion> insertions(100);
+  triangles.insert(last, insertions);
   std::vector<VertexId> vertices;
-  for (const auto& one : many) vertices.push_back(one.vertex);
+  for (const auto& one : insertions) vertices.push_back(one.vertex);
   triangles.remove(vertices);
   triangles.take_changes(changes);
   EXPECT_TRUE(changes.added_vertices.empty() && changes.removed_vertices.empty());

@@ -41,9 +41,9 @@ TEST(RestoreTest, RestoresASphere) {
   ASSERT_EQ(found.input.size(), points.size());
   for (std::size_t i = 0; i < points.size(); ++i)
     ASSERT_EQ(found.surface.points[i], points[found.input[i]]);
-  const RestoredSurface again = restore_surface(points);
-  EXPECT_TRUE(again.surface.faces == found.surface.faces);
-  EXPECT_TRUE(again.surface.points == found.surface.points);
+  const RestoredSurface repeated = restore_surface(points);
+  EXPECT_TRUE(repeated.surface.faces == found.surface.faces);
+  EXPECT_TRUE(repeated.surface.points == found.surface.points);
 }
 
 TEST(RestoreTest, RoundedPointsGiveTheSameSurface) {
@@ -117,15 +117,15 @@ std::string message(std::span<const Point3> points, const RestoreOptions& option
 
 TEST(RestoreTest, ErrorsNameBadInput) {
   std::vector<Point3> points = sphere(10);
-  const auto names = [&](const char* what, auto&& change) {
+  const auto expect_named = [&](const char* what, auto&& change) {
     RestoreOptions options;
     change(options);
     EXPECT_NE(message(points, options).find(what), std::string::npos) << message(points, options);
   };
-  names("quantise_bits", [](auto& options) { options.quantise_bits = 31; });
-  names("edge lengths", [](auto& options) { options.shape.edge_factor = 0; });
+  expect_named("quantise_bits", [](auto& options) { options.quantise_bits = 31; });
+  expect_named("edge lengths", [](auto& options) { options.shape.edge_factor = 0; });
   points[7][1] = std::numeric_limits<double>::quiet_NaN();
-  names("point 7", [](auto&) {});
+  expect_named("point 7", [](auto&) {});
 }
 
 }  // namespace

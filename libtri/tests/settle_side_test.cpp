@@ -15,9 +15,9 @@ namespace {
 using namespace terrace::tri;
 using Line = std::vector<double>;
 
-std::vector<std::uint32_t> settle(const Line& line, const Line& beside, const Line& other,
+std::vector<std::uint32_t> settle(const Line& line, const Line& neighbour_line, const Line& other,
                                   double bound) {
-  return settle_side<double>(line, beside, other, bound);
+  return settle_side<double>(line, neighbour_line, other, bound);
 }
 
 TEST(SettleSide, KeepsOnlyTheEndsOfStraightLines) {
@@ -42,12 +42,12 @@ TEST(SettleSide, EndsDataAtVertices) {
 
 TEST(SettleSide, NeighbouringMissingDataMakesVertices) {
   const Line line(7, 1.0);
-  Line beside = line;
-  beside[3] = kNoHeight;
+  Line neighbour_line = line;
+  neighbour_line[3] = kNoHeight;
   const std::vector<std::uint32_t> expected{0, 2, 3, 4, 6};
-  EXPECT_EQ(settle(line, beside, {}, 1), expected);
-  EXPECT_EQ(settle(line, {}, beside, 1), expected);
-  EXPECT_EQ(settle(line, beside, line, 1), settle(line, line, beside, 1));
+  EXPECT_EQ(settle(line, neighbour_line, {}, 1), expected);
+  EXPECT_EQ(settle(line, {}, neighbour_line, 1), expected);
+  EXPECT_EQ(settle(line, neighbour_line, line, 1), settle(line, line, neighbour_line, 1));
 }
 
 TEST(SettleSide, KeepsTheBound) {
@@ -73,8 +73,8 @@ TEST(SettleSide, KeepsTheBound) {
       for (std::uint32_t i = a + 1; i < b; ++i) {
         ASSERT_EQ(std::isfinite(line[i]), has);
         if (!has) continue;
-        const double there = line[a] + (line[b] - line[a]) * (i - a) / (b - a);
-        EXPECT_LE(std::fabs(line[i] - there), bound);
+        const double interpolated = line[a] + (line[b] - line[a]) * (i - a) / (b - a);
+        EXPECT_LE(std::fabs(line[i] - interpolated), bound);
       }
     }
   }

@@ -46,14 +46,14 @@ void expect_bunny(const Delaunay3<Coord>& triangulation, const Surface& original
   Shape3<Coord> shape;
   shape.restore(triangulation);
   const SurfaceMeasures measured = measure(shape.surface(triangulation).surface);
-  const SurfaceMeasures wanted = measure(original);
+  const SurfaceMeasures expected = measure(original);
   EXPECT_TRUE(measured.closed);
   EXPECT_EQ(measured.components, 1u);
   EXPECT_EQ(measured.border_edges, 0u);
   EXPECT_EQ(measured.vertices, triangulation.vertex_count());
   // The openings are in a hollow base, and there are several ways of closing them.
   const double volume = measure(with_openings_closed(original)).volume;
-  EXPECT_NEAR(measured.area * scale * scale / wanted.area, 1.0, 0.03);
+  EXPECT_NEAR(measured.area * scale * scale / expected.area, 1.0, 0.03);
   EXPECT_NEAR(measured.volume * scale * scale * scale / volume, 1.0, 0.02);
   EXPECT_NEAR(shape.volume(triangulation) / measured.volume, 1.0, 1e-9);
   EXPECT_EQ(measured.euler_characteristic, 2);
@@ -86,7 +86,7 @@ struct Model {
   std::size_t off;  ///< maximum number of points that are not on the surface
   std::size_t components;
   std::size_t touching;  ///< maximum number of edges in four faces or more
-  double volume;         ///< relative difference from the model; 0: the file has no faces
+  double volume;         ///< relative difference from the model. 0 means that the file has no faces
 };
 
 TEST_F(ShapeDataTest, ClosedModelsAreRestoredFromTheirPoints) {
@@ -102,7 +102,7 @@ TEST_F(ShapeDataTest, ClosedModelsAreRestoredFromTheirPoints) {
     const SurfaceMeasures measured = measure(found.surface);
     EXPECT_TRUE(measured.closed);
     EXPECT_FALSE(found.open);
-    EXPECT_LE(found.points_off, model.off);
+    EXPECT_LE(found.unused_points, model.off);
     EXPECT_EQ(found.parts.components, model.components);
     EXPECT_EQ(found.parts.euler_characteristic, 2);
     EXPECT_LE(measured.non_manifold_edges, model.touching);
@@ -114,16 +114,16 @@ TEST_F(ShapeDataTest, ClosedModelsAreRestoredFromTheirPoints) {
     // In another order, with another history of slots.
     Surface shuffled = original;
     std::shuffle(shuffled.points.begin(), shuffled.points.end(), std::mt19937_64(1));
-    const RestoredSurface again = restore_surface(shuffled.points);
-    EXPECT_EQ(again.surface.faces.size(), found.surface.faces.size());
-    EXPECT_EQ(face_set(again.surface), face_set(found.surface));
+    const RestoredSurface repeated = restore_surface(shuffled.points);
+    EXPECT_EQ(repeated.surface.faces.size(), found.surface.faces.size());
+    EXPECT_EQ(face_set(repeated.surface), face_set(found.surface));
   }
 }
 
 TEST_F(ShapeDataTest, DragonIsWholeExceptForCrumbs) {
   const Surface original = scan("dragon_vrip_res2.ply.gz");
   const RestoredSurface found = restore_surface(original.points);
-  EXPECT_LE(found.points_off, 2u);
+  EXPECT_LE(found.unused_points, 2u);
   EXPECT_LE(found.parts.components, 2u);
   EXPECT_NEAR(measure(found.surface).volume / measure(original).volume, 1.0, 0.001);
 }
@@ -141,7 +141,7 @@ TEST_F(ShapeDataTest, OpenScansAreDetectedAndLeftOpen) {
     const SurfaceMeasures measured = measure(found.surface);
     EXPECT_TRUE(found.open);
     EXPECT_GT(measured.border_edges, 0u);
-    EXPECT_LE(static_cast<double>(found.points_off),
+    EXPECT_LE(static_cast<double>(found.unused_points),
               0.001 * static_cast<double>(original.points.size()));
   }
 }
@@ -162,11 +162,11 @@ TEST_F(ShapeDataTest, NearbyUpdatesOfClustersOfAHundredPoints) {
     std::vector<VertexId> all;
     for (const VertexId v : triangulation.all_vertices()) all.push_back(v);
     for (int cluster = 0; cluster < 8 / TERRACE_TEST_SHARE; ++cluster) {
-      std::vector<VertexId> near{all[random() % all.size()]}, around;
+      std::vector<VertexId> near{all[random() % all.size()]}, neighbours;
       while (!triangulation.alive(near[0])) near[0] = all[random() % all.size()];
       for (std::size_t i = 0; near.size() < 100; ++i) {
-        triangulation.adjacent(near[i], around);
-        for (const VertexId v : around)
+        triangulation.adjacent(near[i], neighbours);
+        for (const VertexId v : neighbours)
           if (near.size() < 100 && std::find(near.begin(), near.end(), v) == near.end())
             near.push_back(v);
       }
@@ -180,10 +180,10 @@ TEST_F(ShapeDataTest, NearbyUpdatesOfClustersOfAHundredPoints) {
         }
         triangulation.take_changes(changes);
         shape.update_nearby(triangulation, changes);
-        Shape3<double> again;
-        again.restore(triangulation, 2);
+        Shape3<double> repeated;
+        repeated.restore(triangulation, 2);
         for (const TetrahedronId t : triangulation.all_tetrahedra())
-          wrong += shape.kept(t) != again.kept(t);
+          wrong += shape.kept(t) != repeated.kept(t);
       }
     }
     EXPECT_LE(wrong, static_cast<std::size_t>(at_most));

@@ -78,15 +78,15 @@ TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
       SCOPED_TRACE(terrace::tri::name(kind) + ", " + name(options));
       Shape3<TypeParam> shape(options);
       shape.restore(triangulation);
-      std::set<VertexId> seen;
+      std::set<VertexId> used;
       for (const TetrahedronId t : shape.kept_tetrahedra())
-        for (const VertexId v : triangulation.vertices(t)) seen.insert(v);
+        for (const VertexId v : triangulation.vertices(t)) used.insert(v);
       if (options.keep_vertices) {
-        EXPECT_EQ(seen.size(), triangulation.vertex_count());
+        EXPECT_EQ(used.size(), triangulation.vertex_count());
       } else {
-        EXPECT_EQ(seen.size() + shape.lost_vertices().size(), triangulation.vertex_count());
+        EXPECT_EQ(used.size() + shape.lost_vertices().size(), triangulation.vertex_count());
         if (options.criterion == ShapeCriterion::kEdgeLength) {
-          EXPECT_EQ(seen.size(), 0u);
+          EXPECT_EQ(used.size(), 0u);
         }
       }
     }
@@ -104,13 +104,13 @@ TYPED_TEST(ShapeLawTest, DependsOnThePointsAlone) {
       std::shuffle(points.begin(), points.end(), random);
       Delaunay3<TypeParam> grown;
       for (const auto& p : make_points3<TypeParam>(PointSet3::kFiveBits, 40, 77)) grown.insert(p);
-      std::vector<VertexId> others;
-      for (const VertexId v : grown.all_vertices()) others.push_back(v);
+      std::vector<VertexId> temporary;
+      for (const VertexId v : grown.all_vertices()) temporary.push_back(v);
       const std::size_t half = points.size() / 2;
       grown.insert(std::span(points).first(half), {});
-      std::set<std::array<TypeParam, 3>> wanted(points.begin(), points.end());
-      std::erase_if(others, [&](VertexId v) { return wanted.contains(grown.point(v)); });
-      grown.remove(others);
+      std::set<std::array<TypeParam, 3>> final_points(points.begin(), points.end());
+      std::erase_if(temporary, [&](VertexId v) { return final_points.contains(grown.point(v)); });
+      grown.remove(temporary);
       grown.insert(std::span(points).subspan(half), {});
       ASSERT_EQ(grown.hash(), built.hash());
       for (const ShapeOptions& options : all_options()) {
@@ -131,17 +131,17 @@ TEST(ShapeTest, IntegersAndDoublesGiveTheSame) {
     for (const auto& p : points)
       doubles.push_back(
           {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])});
-    Delaunay3<std::int32_t> of_integers;
-    of_integers.build(points);
-    Delaunay3<double> of_doubles;
-    of_doubles.build(doubles);
+    Delaunay3<std::int32_t> integer_mesh;
+    integer_mesh.build(points);
+    Delaunay3<double> double_mesh;
+    double_mesh.build(doubles);
     for (const ShapeOptions& options : all_options()) {
       SCOPED_TRACE(terrace::tri::name(kind) + ", " + name(options));
       Shape3<std::int32_t> one(options);
-      one.restore(of_integers);
+      one.restore(integer_mesh);
       Shape3<double> other(options);
-      other.restore(of_doubles);
-      ASSERT_EQ(kept_set(of_integers, one), kept_set(of_doubles, other));
+      other.restore(double_mesh);
+      ASSERT_EQ(kept_set(integer_mesh, one), kept_set(double_mesh, other));
     }
   }
 }
@@ -168,10 +168,10 @@ TYPED_TEST(ShapeLawTest, UpdateEqualsRestore) {
         do {
           std::vector<VertexId> alive;
           for (const VertexId v : triangulation.all_vertices()) alive.push_back(v);
-          const std::uint64_t what = random() % 20;
-          if (what == 0) {
+          const std::uint64_t operation = random() % 20;
+          if (operation == 0) {
             triangulation.clear();
-          } else if (what < 10 || alive.empty()) {
+          } else if (operation < 10 || alive.empty()) {
             const std::size_t begin = random() % points.size();
             const std::size_t count =
                 std::min<std::size_t>(1 + random() % 50, points.size() - begin);
@@ -189,11 +189,11 @@ TYPED_TEST(ShapeLawTest, UpdateEqualsRestore) {
         for (auto& shape : shapes) {
           SCOPED_TRACE("step " + std::to_string(step) + ", " + name(shape.options()));
           shape.update(triangulation, changes);
-          Shape3<TypeParam> anew(shape.options());
-          anew.restore(triangulation);
-          ASSERT_EQ(shape.kept_tetrahedra(), anew.kept_tetrahedra());
-          ASSERT_EQ(shape.kept_count(), anew.kept_count());
-          ASSERT_EQ(shape.lost_vertices(), anew.lost_vertices());
+          Shape3<TypeParam> restored(shape.options());
+          restored.restore(triangulation);
+          ASSERT_EQ(shape.kept_tetrahedra(), restored.kept_tetrahedra());
+          ASSERT_EQ(shape.kept_count(), restored.kept_count());
+          ASSERT_EQ(shape.lost_vertices(), restored.lost_vertices());
         }
       }
     }

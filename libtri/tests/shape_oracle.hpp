@@ -91,7 +91,7 @@ class ShapeOracle {
     for (const TetrahedronId t : triangulation.all_tetrahedra()) {
       const ShapeCorners corners = shape_corners(triangulation, t);
       kept.insert(corners);
-      for (std::size_t i = 0; i < 4; ++i) beside_[facet(corners, i)].push_back(corners);
+      for (std::size_t i = 0; i < 4; ++i) by_facet_[facet(corners, i)].push_back(corners);
     }
     all_ = kept;
     if (options.rule == ShapeRule::kFlood) {
@@ -115,7 +115,7 @@ class ShapeOracle {
     return result;
   }
   [[nodiscard]] bool open(const ShapeCorners& t, std::size_t i) const {
-    for (const ShapeCorners& other : beside_.at(facet(t, i)))
+    for (const ShapeCorners& other : by_facet_.at(facet(t, i)))
       if (other != t && kept.contains(other)) return false;
     return true;
   }
@@ -135,9 +135,9 @@ class ShapeOracle {
         }
       }
     }
-    lost = bare();
+    lost = uncovered_vertices();
   }
-  [[nodiscard]] std::set<ShapePoint> bare() const {
+  [[nodiscard]] std::set<ShapePoint> uncovered_vertices() const {
     std::set<ShapePoint> result;
     for (const ShapeCorners& t : all_) result.insert(t.begin(), t.end());
     for (const ShapeCorners& t : kept)
@@ -145,15 +145,16 @@ class ShapeOracle {
     return result;
   }
   void rescue() {
-    for (std::set<ShapePoint> without = bare(); !without.empty(); without = bare()) {
+    for (std::set<ShapePoint> uncovered = uncovered_vertices(); !uncovered.empty();
+         uncovered = uncovered_vertices()) {
       std::optional<std::tuple<bool, double, ShapeCorners>> best;
       for (const ShapeCorners& t : all_) {
-        if (std::none_of(t.begin(), t.end(), [&](const auto& p) { return without.contains(p); }))
+        if (std::none_of(t.begin(), t.end(), [&](const auto& p) { return uncovered.contains(p); }))
           continue;
-        bool alone = true;
+        bool is_isolated = true;
         for (std::size_t i = 0; i < 4; ++i)
-          for (const ShapeCorners& other : beside_.at(facet(t, i)))
-            if (kept.contains(other)) alone = false;
+          for (const ShapeCorners& other : by_facet_.at(facet(t, i)))
+            if (kept.contains(other)) is_isolated = false;
         double longest2 = 0;
         for (const ShapePoint& p : t) {
           for (const ShapePoint& q : t) {
@@ -161,7 +162,7 @@ class ShapeOracle {
             longest2 = std::max(longest2, x * x + y * y + z * z);
           }
         }
-        const std::tuple candidate{alone, longest2, t};
+        const std::tuple candidate{is_isolated, longest2, t};
         if (!best || candidate < *best) best = candidate;
       }
       kept.insert(std::get<2>(*best));
@@ -181,24 +182,25 @@ class ShapeOracle {
         if (stays) continue;
         kept.erase(t);
         if (options_.keep_vertices) {
-          const auto without = bare();
-          if (std::any_of(t.begin(), t.end(), [&](const auto& p) { return without.contains(p); })) {
+          const auto uncovered = uncovered_vertices();
+          if (std::any_of(t.begin(), t.end(),
+                          [&](const auto& p) { return uncovered.contains(p); })) {
             kept.insert(t);
             continue;
           }
         }
         for (std::size_t i = 0; i < 4; ++i)
-          for (const ShapeCorners& other : beside_.at(facet(t, i)))
+          for (const ShapeCorners& other : by_facet_.at(facet(t, i)))
             if (kept.contains(other)) next.insert(other);
       }
       round = next;
     }
-    lost = bare();
+    lost = uncovered_vertices();
   }
 
   ShapeOptions options_;
   ShapeSet all_;
-  std::map<Facet, std::vector<ShapeCorners>> beside_;
+  std::map<Facet, std::vector<ShapeCorners>> by_facet_;
 };
 
 }  // namespace terrace::tri

@@ -77,15 +77,15 @@ SurfaceMeasures restored(const Points& points, const ShapeOptions& options = {})
   EXPECT_NEAR(shape.volume(triangulation), measured.volume, 1e-9 * measured.volume);
 
   double step = 0.0;
-  Delaunay3<std::int32_t> of_integers;
-  of_integers.build(quantised(points, step));
+  Delaunay3<std::int32_t> integer_mesh;
+  integer_mesh.build(quantised(points, step));
   Shape3<std::int32_t> other(options);
-  other.restore(of_integers);
-  const SurfaceMeasures again = measure(other.surface(of_integers).surface);
-  EXPECT_TRUE(again.closed);
-  EXPECT_EQ(again.euler_characteristic, measured.euler_characteristic);
-  EXPECT_NEAR(again.volume * step * step * step, measured.volume, 1e-3 * measured.volume);
-  EXPECT_NEAR(again.area * step * step, measured.area, 1e-3 * measured.area);
+  other.restore(integer_mesh);
+  const SurfaceMeasures repeated = measure(other.surface(integer_mesh).surface);
+  EXPECT_TRUE(repeated.closed);
+  EXPECT_EQ(repeated.euler_characteristic, measured.euler_characteristic);
+  EXPECT_NEAR(repeated.volume * step * step * step, measured.volume, 1e-3 * measured.volume);
+  EXPECT_NEAR(repeated.area * step * step, measured.area, 1e-3 * measured.area);
   return measured;
 }
 

@@ -96,12 +96,12 @@ TYPED_TEST(SmoothingTest, MovesOnlyInnerVerticesOfTheRegion) {
                                   p[1] <= box.max[1]);
     }
     std::vector<VertexId> expected;
-    std::vector<VertexId> around;
+    std::vector<VertexId> neighbours;
     for (const VertexId v : region) {
       const auto p = triangulation.point(v);
-      triangulation.adjacent(v, around);
+      triangulation.adjacent(v, neighbours);
       if (p[0] > 0 && p[1] > 0 && p[0] < 95 && p[1] < 95 &&
-          std::all_of(around.begin(), around.end(), in_region))
+          std::all_of(neighbours.begin(), neighbours.end(), in_region))
         expected.push_back(v);
     }
     for (const Smoothing method : kSmoothings) {

@@ -71,13 +71,13 @@ TEST(ViewBudget, MemoryIsNeverExceeded) {
         if (!first || d.want > demands.at(*first).want) first = id;
       }
       if (!first) continue;
-      std::size_t less = room;
+      std::size_t remaining = room;
       for (const ClusterId other : open) {
         if (demands.at(other).keep < 0.999 * options.collapse_below * demands.at(*first).want) {
-          less += world.source.at(other).positions.size();
+          remaining += world.source.at(other).positions.size();
         }
       }
-      ASSERT_LT(less, world.source.at(*first).positions.size()) << to_string(*first);
+      ASSERT_LT(remaining, world.source.at(*first).positions.size()) << to_string(*first);
     }
   }
   EXPECT_GT(full, 50u);
@@ -90,7 +90,7 @@ TEST(ViewBudget, InterruptionsDoNotMatterUnderALimitOfPoints) {
     TRACE(world);
     ViewOptions options;
     options.max_points = world.source.root().positions.size() + below(world.random, 200);
-    Control whole(counts(world.source), load_root(world.source), options);
+    Control unlimited(counts(world.source), load_root(world.source), options);
     Control cut(counts(world.source), load_root(world.source), options);
     // Everything is given beforehand, so that both see the same clusters.
     for (const auto& [id, parent] : WholeTree(world.source).parents) {
@@ -107,16 +107,16 @@ TEST(ViewBudget, InterruptionsDoNotMatterUnderALimitOfPoints) {
         }
         if (!member) request.head_child = child;
       }
-      ASSERT_TRUE(whole.give(load(world.source, request)));
+      ASSERT_TRUE(unlimited.give(load(world.source, request)));
       ASSERT_TRUE(cut.give(load(world.source, request)));
     }
     for (int views = 0; views < 6; ++views) {
       const View view = world.view();
-      settle(whole, world.source, view);
+      settle(unlimited, world.source, view);
       StepBudget budget;
       budget.operations = 1 + below(world.random, 2);
       settle(cut, world.source, view, budget);
-      ASSERT_EQ(expanded_set(cut), expanded_set(whole));
+      ASSERT_EQ(expanded_set(cut), expanded_set(unlimited));
     }
   }
 }
@@ -131,9 +131,9 @@ TEST(ViewBudget, RequestsEvictedClustersAgain) {
   ViewOptions options;
   options.max_cached_bytes = 8000;  // a few clusters
   Control control(counts(world.source), load_root(world.source), options);
-  View fine;
-  fine.ground_error = 1e-3;
-  std::set<ClusterId> asked, again;
+  View close_view;
+  close_view.ground_error = 1e-3;
+  std::set<ClusterId> requested, requested_twice;
   const auto run = [&](const View& view, std::set<ClusterId>& ids) {
     for (;;) {
       const auto& step = control.step(view);
@@ -143,26 +143,26 @@ TEST(ViewBudget, RequestsEvictedClustersAgain) {
       for (const ViewRequest& r : wanted) control.give(load(world.source, r));
     }
   };
-  run(fine, asked);
-  EXPECT_EQ(expanded_set(control), asked);
-  run({}, again);
-  EXPECT_TRUE(again.empty());
+  run(close_view, requested);
+  EXPECT_EQ(expanded_set(control), requested);
+  run({}, requested_twice);
+  EXPECT_TRUE(requested_twice.empty());
   EXPECT_EQ(control.model().expanded_count(), 0u);
-  run(fine, again);
-  EXPECT_EQ(expanded_set(control), asked);
-  EXPECT_GT(again.size(), asked.size() / 2);
-  EXPECT_LT(again.size(), asked.size()) << "nothing was kept";
+  run(close_view, requested_twice);
+  EXPECT_EQ(expanded_set(control), requested);
+  EXPECT_GT(requested_twice.size(), requested.size() / 2);
+  EXPECT_LT(requested_twice.size(), requested.size()) << "nothing was kept";
 }
 
 TEST(ViewBudget, RequestsNothingTwiceIfThereIsRoom) {
   World world(11, Shape::random, 500);
   Control control(counts(world.source), load_root(world.source));
-  View fine;
-  fine.ground_error = 1e-3;
-  settle(control, world.source, fine);
+  View close_view;
+  close_view.ground_error = 1e-3;
+  settle(control, world.source, close_view);
   settle(control, world.source, {});
   for (;;) {
-    const auto& step = control.step(fine);
+    const auto& step = control.step(close_view);
     ASSERT_TRUE(step.requests.empty());
     if (step.settled) break;
   }
@@ -174,15 +174,15 @@ TEST(ViewBudget, RejectsClustersLargerThanTheCache) {
   ViewOptions options;
   options.max_cached_bytes = 100;
   Control control(counts(world.source), load_root(world.source), options);
-  View fine;
-  fine.ground_error = 1e-3;
-  const auto& step = control.step(fine);
+  View close_view;
+  close_view.ground_error = 1e-3;
+  const auto& step = control.step(close_view);
   EXPECT_TRUE(step.wanted.empty());
   EXPECT_GT(step.blocked, 0u);
   EXPECT_GT(step.worst, 1.0);
   EXPECT_TRUE(step.settled);
   Control other(counts(world.source), load_root(world.source));
-  EXPECT_FALSE(control.give(load(world.source, other.step(fine).wanted.front())));
+  EXPECT_FALSE(control.give(load(world.source, other.step(close_view).wanted.front())));
   EXPECT_EQ(control.cached_bytes(), 0u);
 }
 
@@ -233,15 +233,15 @@ TEST(ViewBudget, RecoversFromAStall) {
   StepBudget budget;
   budget.seconds = 0.01;
   budget.clock = [&] { return time += tick; };
-  View fine, none;
-  fine.ground_error = 1e-3;
-  settle(control, world.source, fine, budget);
+  View close_view, none;
+  close_view.ground_error = 1e-3;
+  settle(control, world.source, close_view, budget);
   settle(control, world.source, none, budget);
   tick = 1.0;
-  control.step(fine, budget);
+  control.step(close_view, budget);
   control.step(none, budget);
   tick = 1e-5;
-  EXPECT_LT(settle(control, world.source, fine, budget), 60);
+  EXPECT_LT(settle(control, world.source, close_view, budget), 60);
 }
 
 // For outlines: the same view with a smaller error for clusters that may show one.
@@ -253,7 +253,7 @@ TEST(ViewSilhouette, RefinesWhereAnOutlineMayShow) {
     View view;
     view.camera = world.camera();
     view.pixel_error = 300.0;
-    std::set<ClusterId> asked;
+    std::set<ClusterId> requested;
     ViewOptions plain, none, all, half;
     none.silhouette = all.silhouette = half.silhouette = 0.2;
     const bool perspective = view.camera->perspective;
@@ -264,7 +264,7 @@ TEST(ViewSilhouette, RefinesWhereAnOutlineMayShow) {
     };
     all.cone = [](ClusterId, const ClusterRecord&) { return NormalCone{{0, 0, 1}, 180.0}; };
     half.cone = [&](ClusterId id, const ClusterRecord& record) {
-      EXPECT_TRUE(asked.insert(id).second) << "requested twice";
+      EXPECT_TRUE(requested.insert(id).second) << "requested twice";
       EXPECT_EQ(record.members, world.source.at(id).positions.size());
       return NormalCone{{0, 0, 1}, ordinal_of(id) % 2 ? 180.0 : 0.0};
     };

@@ -68,7 +68,7 @@ TYPED_TEST(ViewControlOf, EndsInTheStateOfTheRule) {
 // must never be requested.
 TEST(ViewControl, RecordsMayComeLater) {
   using T = Delaunay2<std::int32_t>;
-  std::size_t asked = 0, known_later = 0;
+  std::size_t requested = 0, known_later = 0;
   for (std::uint64_t seed = 1; seed <= 25; ++seed) {
     for (const Shape shape : kWorldShapes) {
       World world(seed, shape);
@@ -77,7 +77,7 @@ TEST(ViewControl, RecordsMayComeLater) {
       const ViewOptions options = random_options(world);
       ViewControl<T> control(counts(world.source), load_root(world.source), options);
       ClusterSet bounded, read;
-      const auto with_bounds = [&](GivenCluster cluster) {
+      const auto with_bounds = [&](LoadedCluster cluster) {
         const std::size_t level = level_of(cluster.cluster);
         for (std::size_t i = 0; i < cluster.child_records.size(); ++i) {
           ClusterRecord& record = cluster.child_records[i];
@@ -120,12 +120,12 @@ TEST(ViewControl, RecordsMayComeLater) {
         ASSERT_NO_FATAL_FAILURE(check_model(control.model(), world.source, goal));
       }
       control.give_record(cluster_id(0, 1u << 30), {});  // of a cluster that does not exist
-      asked += read.size();
+      requested += read.size();
       known_later += bounded.size();
     }
   }
-  EXPECT_GT(asked, 200u);
-  EXPECT_LT(asked, known_later);
+  EXPECT_GT(requested, 200u);
+  EXPECT_LT(requested, known_later);
 }
 
 // However steps are interrupted, and in whatever portions clusters arrive, the triangulation must
@@ -137,11 +137,11 @@ TEST(ViewControl, InterruptedStepsEndInTheSameState) {
       World world(seed, shape);
       TRACE(world);
       const ViewOptions options = random_options(world);
-      ViewControl<T> whole(counts(world.source), load_root(world.source), options);
+      ViewControl<T> unlimited(counts(world.source), load_root(world.source), options);
       ViewControl<T> cut(counts(world.source), load_root(world.source), options);
       for (int views = 0; views < 4; ++views) {
         const View view = world.view();
-        settle(whole, world.source, view);
+        settle(unlimited, world.source, view);
         for (int steps = 0;; ++steps) {
           ASSERT_LT(steps, 20000);
           StepBudget budget;
@@ -154,8 +154,8 @@ TEST(ViewControl, InterruptedStepsEndInTheSameState) {
             if (below(world.random, 3) != 0) cut.give(load(world.source, r));
           }
         }
-        ASSERT_EQ(expanded_set(cut), expanded_set(whole));
-        ASSERT_EQ(cut.model().triangulation().hash(), whole.model().triangulation().hash());
+        ASSERT_EQ(expanded_set(cut), expanded_set(unlimited));
+        ASSERT_EQ(cut.model().triangulation().hash(), unlimited.model().triangulation().hash());
       }
     }
   }
@@ -203,7 +203,7 @@ TEST(ViewControl, JitterChangesNothing) {
     view.pixel_error = 20.0 + 100.0 * unit(world.random);
     const double x = world.box.min[0] + unit(world.random) * world.extent();
     const double y = world.box.min[1] + unit(world.random) * world.extent();
-    // No box is nearer than this; the view turns by the same ratio.
+    // No box is nearer than this. The view turns by the same ratio.
     const double least = height - world.box.max[2];
     const double tremble = 0.02 * least;
     view.camera = looking_down(x, y, height);
@@ -259,18 +259,18 @@ TEST(ViewControl, RequestsClustersOnce) {
   }
   TRACE(world);
   ViewControl2<std::int32_t> control(counts(world.source), load_root(world.source));
-  View fine, none;
-  fine.ground_error = 0.0;
-  std::set<ClusterId> asked;
+  View close_view, none;
+  close_view.ground_error = 0.0;
+  std::set<ClusterId> requested;
   for (int steps = 0; steps < 300; ++steps) {
-    const auto& step = control.step(fine);
+    const auto& step = control.step(close_view);
     for (const ViewRequest& r : step.requests) {
-      EXPECT_TRUE(asked.insert(r.cluster).second) << to_string(r.cluster) << " twice";
+      EXPECT_TRUE(requested.insert(r.cluster).second) << to_string(r.cluster) << " twice";
     }
     EXPECT_TRUE(std::is_sorted(
         step.wanted.begin(), step.wanted.end(),
         [](const ViewRequest& a, const ViewRequest& b) { return a.importance > b.importance; }));
-    for (const ViewRequest& r : step.wanted) EXPECT_TRUE(asked.count(r.cluster));
+    for (const ViewRequest& r : step.wanted) EXPECT_TRUE(requested.count(r.cluster));
     EXPECT_TRUE(step.withdrawn.empty());
     if (step.wanted.empty()) break;
     // One at a time, the least important first.
@@ -280,20 +280,20 @@ TEST(ViewControl, RequestsClustersOnce) {
   for (const auto& [id, parent] : WholeTree(world.source).parents) {
     if (world.source.at(id).record.error > 0.0) useful.insert(id);
   }
-  EXPECT_EQ(asked, useful);
+  EXPECT_EQ(requested, useful);
 
   // From the start again: requested, withdrawn, requested again, forgotten, requested again.
   ViewControl2<std::int32_t> other(counts(world.source), load_root(world.source));
-  const std::size_t first = other.step(fine).requests.size();
+  const std::size_t first = other.step(close_view).requests.size();
   ASSERT_GT(first, 0u);
-  EXPECT_TRUE(other.step(fine).requests.empty());
+  EXPECT_TRUE(other.step(close_view).requests.empty());
   EXPECT_EQ(other.step(none).withdrawn.size(), first);
   EXPECT_TRUE(other.step(none).withdrawn.empty());
-  EXPECT_EQ(other.step(fine).requests.size(), first);
-  const ClusterId lost = other.step(fine).wanted.front().cluster;
-  other.forget(lost);
-  ASSERT_EQ(other.step(fine).requests.size(), 1u);
-  EXPECT_EQ(other.step(fine).wanted.front().cluster, lost);
+  EXPECT_EQ(other.step(close_view).requests.size(), first);
+  const ClusterId failed_cluster = other.step(close_view).wanted.front().cluster;
+  other.forget(failed_cluster);
+  ASSERT_EQ(other.step(close_view).requests.size(), 1u);
+  EXPECT_EQ(other.step(close_view).wanted.front().cluster, failed_cluster);
 }
 
 TEST(ViewControl, PinsOverride) {
@@ -302,9 +302,9 @@ TEST(ViewControl, PinsOverride) {
     TRACE(world);
     const WholeTree tree(world.source);
     ViewControl2<std::int32_t> control(counts(world.source), load_root(world.source));
-    View fine, none;
-    fine.ground_error = 1e-3;
-    settle(control, world.source, fine);
+    View close_view, none;
+    close_view.ground_error = 1e-3;
+    settle(control, world.source, close_view);
     const ClusterSet all = expanded_set(control);
     if (all.empty()) continue;
     auto any = all.begin();
@@ -321,13 +321,13 @@ TEST(ViewControl, PinsOverride) {
     EXPECT_EQ(expanded_set(control), chain);
 
     control.pin(id, ViewControl2<std::int32_t>::Pin::collapsed);
-    settle(control, world.source, fine);
-    ClusterSet rest = all;
-    std::erase_if(rest, [&](ClusterId c) { return c == id || tree.is_below(c, id); });
-    EXPECT_EQ(expanded_set(control), rest);
+    settle(control, world.source, close_view);
+    ClusterSet remaining = all;
+    std::erase_if(remaining, [&](ClusterId c) { return c == id || tree.is_below(c, id); });
+    EXPECT_EQ(expanded_set(control), remaining);
 
     control.unpin(id);
-    settle(control, world.source, fine);
+    settle(control, world.source, close_view);
     EXPECT_EQ(expanded_set(control), all);
     settle(control, world.source, none);
     EXPECT_EQ(control.model().expanded_count(), 0u);
@@ -353,11 +353,11 @@ TEST(ViewControl, PinnedFromTheStart) {
 TEST(ViewControl, ReportsFaultyClusters) {
   World world(5, Shape::random);
   ViewControl2<std::int32_t> control(counts(world.source), load_root(world.source));
-  View fine;
-  fine.ground_error = 1e-3;
-  const ViewRequest request = control.step(fine).wanted.front();
-  const GivenCluster good = load(world.source, request);
-  GivenCluster bad = good;
+  View close_view;
+  close_view.ground_error = 1e-3;
+  const ViewRequest request = control.step(close_view).wanted.front();
+  const LoadedCluster good = load(world.source, request);
+  LoadedCluster bad = good;
   bad.positions.push_back({0, 0, 0});
   if (level_of(bad.cluster) > 0) {
     EXPECT_THROW(control.give(bad), HierarchyError) << "no child for the new member";
@@ -365,21 +365,22 @@ TEST(ViewControl, ReportsFaultyClusters) {
   bad.children.resize(bad.children.size() + level_of(bad.cluster));
   if (level_of(bad.cluster) > 0) bad.child_records.emplace_back();
   EXPECT_TRUE(control.give(bad));
-  const auto& step = control.step(fine);
+  const auto& step = control.step(close_view);
   ASSERT_EQ(step.faults.size(), 1u);
   EXPECT_EQ(step.faults[0].cluster, request.cluster);
   EXPECT_NE(step.faults[0].what.find("its record claims"), std::string::npos);
   EXPECT_FALSE(control.model().is_expanded(request.cluster));
-  EXPECT_TRUE(control.step(fine).faults.empty());
-  for (const ViewRequest& r : control.step(fine).wanted) EXPECT_NE(r.cluster, request.cluster);
+  EXPECT_TRUE(control.step(close_view).faults.empty());
+  for (const ViewRequest& r : control.step(close_view).wanted)
+    EXPECT_NE(r.cluster, request.cluster);
   bad = good;
   if (!bad.positions.empty()) {
     bad.positions[0][0] = 0.5;
     control.give(bad);
-    EXPECT_EQ(control.step(fine).faults.size(), 1u);
+    EXPECT_EQ(control.step(close_view).faults.size(), 1u);
   }
   control.give(good);
-  control.step(fine);
+  control.step(close_view);
   EXPECT_TRUE(control.model().is_expanded(request.cluster));
   EXPECT_EQ(find_fault(control.model().triangulation()), "");
 }
@@ -411,10 +412,10 @@ TEST(ViewControl, RejectsInvalidOptions) {
   EXPECT_THROW(control.step({}, budget), std::invalid_argument);
   EXPECT_TRUE(control.step({}).settled);
 
-  GivenCluster not_root = load_root(world.source);
+  LoadedCluster not_root = load_root(world.source);
   not_root.cluster = cluster_id(0, 0);
   EXPECT_THROW((ViewControl2<std::int32_t>(counts(world.source), not_root)), HierarchyError);
-  GivenCluster above = load_root(world.source);
+  LoadedCluster above = load_root(world.source);
   above.cluster = cluster_id(world.source.top() + 1, 0);
   EXPECT_THROW(control.give(above), HierarchyError);
 }

@@ -55,7 +55,7 @@ Pose pose_of(const Point3& eye, double turn, double tilt) {
 // the matrix maps it to.
 TEST(Camera, MatrixAndPoseAgree) {
   std::mt19937_64 random(1);
-  int seen = 0;
+  int visible = 0;
   for (int i = 0; i < 200; ++i) {
     SCOPED_TRACE(i);
     const Point3 eye{1e6 * unit(random), 1e6 * unit(random), 1000.0 * unit(random)};
@@ -74,17 +74,17 @@ TEST(Camera, MatrixAndPoseAgree) {
                   2 / (extent * aspect), 0, 0, 0, 0, 2 / extent, 0, 0, 0, 0, -0.001, 0, 0, 0, 0, 1};
     const Matrix matrix = product(projection, view_matrix(eye, turn, tilt));
     const Pose pose = pose_of(eye, turn, tilt);
-    const Camera made = perspective ? perspective_camera(pose, fov, aspect, height)
-                                    : orthographic_camera(pose, extent, aspect, height);
-    const Camera taken = matrix_camera(matrix, height);
-    ASSERT_EQ(made.perspective, taken.perspective);
-    ASSERT_NEAR(taken.pixels / made.pixels, 1.0, 1e-9);
+    const Camera from_pose = perspective ? perspective_camera(pose, fov, aspect, height)
+                                         : orthographic_camera(pose, extent, aspect, height);
+    const Camera from_matrix = matrix_camera(matrix, height);
+    ASSERT_EQ(from_pose.perspective, from_matrix.perspective);
+    ASSERT_NEAR(from_matrix.pixels / from_pose.pixels, 1.0, 1e-9);
     if (!perspective) {
-      ASSERT_NEAR(taken.height / made.height, 1.0, 1e-9);
+      ASSERT_NEAR(from_matrix.height / from_pose.height, 1.0, 1e-9);
     }
     for (std::size_t k = 0; k < 3; ++k) {
-      ASSERT_NEAR(made.position[k], taken.position[k], 1e-3);
-      ASSERT_NEAR(std::abs(made.direction[k]), std::abs(taken.direction[k]), 1e-9);
+      ASSERT_NEAR(from_pose.position[k], from_matrix.position[k], 1e-3);
+      ASSERT_NEAR(std::abs(from_pose.direction[k]), std::abs(from_matrix.direction[k]), 1e-9);
     }
     for (int j = 0; j < 300; ++j) {
       Point3 p = eye;
@@ -97,12 +97,12 @@ TEST(Camera, MatrixAndPoseAgree) {
       const double edge = std::min(clip[3] - std::abs(clip[0]), clip[3] - std::abs(clip[1]));
       if (std::abs(edge) < 1e-6) continue;
       const bool inside = edge > 0.0;
-      seen += inside;
-      ASSERT_EQ(sees(made, p), inside);
-      ASSERT_EQ(sees(taken, p), inside);
+      visible += inside;
+      ASSERT_EQ(sees(from_pose, p), inside);
+      ASSERT_EQ(sees(from_matrix, p), inside);
     }
   }
-  EXPECT_GT(seen, 500);
+  EXPECT_GT(visible, 500);
 }
 
 // An off-centre projection must be as sharp as a centred one.
@@ -199,7 +199,7 @@ TEST(ViewMeasure, DemandNeverGrowsInward) {
   EXPECT_GT(in_view, 500);
 }
 
-// Level ground seen from above shows no outline; seen from the side, or if the cone is wide, it
+// Level ground seen from above shows no outline. Seen from the side, or if the cone is wide, it
 // may. Random normals and lines of sight check that an outline is never missed.
 TEST(ViewMeasure, OutlinesAreNeverMissed) {
   ViewOptions options;
@@ -236,8 +236,8 @@ TEST(ViewMeasure, OutlinesAreNeverMissed) {
       record.box.max[k] += 4.0 * forward[k] + unit(random);
     }
     const NormalCone cone{direction(), 60.0 * unit(random)};
-    const double without = measured(v, {}, {record}).want[0];
-    const double with = measured(v, options, {record}, &cone).want[0];
+    const double without_cone = measured(v, {}, {record}).want[0];
+    const double with_cone = measured(v, options, {record}, &cone).want[0];
     bool outline = false;
     for (int j = 0; j < 500 && !outline; ++j) {
       Point3 sight = v.camera->direction;
@@ -254,11 +254,11 @@ TEST(ViewMeasure, OutlinesAreNeverMissed) {
       const double pi = std::acos(-1.0);
       outline = std::abs(std::asin(along)) <= cone.half_angle_degrees * pi / 180.0;
     }
-    if (outline && without > 0.0) {
-      ASSERT_EQ(with, 4.0 * without);
+    if (outline && without_cone > 0.0) {
+      ASSERT_EQ(with_cone, 4.0 * without_cone);
       ++outlines;
     }
-    plains += with == without;
+    plains += with_cone == without_cone;
   }
   EXPECT_GT(outlines, 30);
   EXPECT_GT(plains, 30);

@@ -24,25 +24,26 @@ inline void fill_errors(MemorySource& source) {
                         std::vector<Point3>& below) -> void {
     const unsigned level = level_of(id);
     MemorySource::Cluster& cluster = source.at(id);
-    std::vector<Point3> mine = cluster.positions;
+    std::vector<Point3> own_positions = cluster.positions;
     for (std::size_t i = 0; level > 0 && i < cluster.positions.size(); ++i) {
       const auto* first = cluster.children.data() + i * level;
       const std::vector<std::uint64_t> ordinals(first, first + level);
-      self(self, cluster_id(level - 1, ordinals.back()), &cluster.positions[i], ordinals, mine);
+      self(self, cluster_id(level - 1, ordinals.back()), &cluster.positions[i], ordinals,
+           own_positions);
     }
     if (head && level > 0) {
       const std::vector<std::uint64_t> ordinals(head_children.begin(),
                                                 head_children.begin() + level);
-      self(self, cluster_id(level - 1, ordinals.back()), head, ordinals, mine);
+      self(self, cluster_id(level - 1, ordinals.back()), head, ordinals, own_positions);
     }
     if (head) {
       cluster.record.error = 0.0;
-      for (const Point3& p : mine) {
+      for (const Point3& p : own_positions) {
         const double d = std::hypot(p[0] - (*head)[0], p[1] - (*head)[1], p[2] - (*head)[2]);
         cluster.record.error = std::max(cluster.record.error, d);
       }
     }
-    below.insert(below.end(), mine.begin(), mine.end());
+    below.insert(below.end(), own_positions.begin(), own_positions.end());
   };
   std::vector<Point3> all;
   walk(walk, cluster_id(source.top(), 0), nullptr, {}, all);

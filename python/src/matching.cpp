@@ -79,7 +79,7 @@ py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
     options.check_stop = stop_check(stop);
     return match_large(points, options);
   });
-  return py::make_tuple(with_missing(made.mate, matching::kNobody), made.cost, made.dual_bound,
+  return py::make_tuple(with_missing(made.mate, matching::kNone), made.cost, made.dual_bound,
                         made.optimal);
 }
 
@@ -117,7 +117,7 @@ py::tuple match_by_halving(const Array<double>& given, bool distances, const std
     }
     return result;
   });
-  return py::make_tuple(with_missing(made.mate, matching::kNobody), made.cost, made.iterations,
+  return py::make_tuple(with_missing(made.mate, matching::kNone), made.cost, made.iterations,
                         to_array(std::move(steps)));
 }
 
@@ -156,7 +156,7 @@ py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
     bound = result.dual_bound();
     return result;
   });
-  return py::make_tuple(with_missing(made.mate, matching::kNobody), made.cost, bound, true);
+  return py::make_tuple(with_missing(made.mate, matching::kNone), made.cost, bound, true);
 }
 
 }  // namespace

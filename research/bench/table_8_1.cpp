@@ -12,7 +12,7 @@
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
-#include "model/model.hpp"
+#include "model/multiresolution.hpp"
 #include "multiresolution_hierarchy.hpp"
 #include "setting.hpp"
 

@@ -19,8 +19,8 @@
 #include "delaunay3/access.hpp"
 #include "delaunay3/double_kernel.hpp"
 #include "delaunay3/int_kernel.hpp"
+#include "delaunay3/operations.hpp"
 #include "delaunay3/predicates.hpp"
-#include "delaunay3/remove.hpp"
 #include "delaunay3/wrap/wrap.hpp"
 
 namespace terrace::research {

@@ -53,7 +53,7 @@ class DenseSolver {
       for (const std::uint32_t row : reduce_rows(first)) augment(row);
       if (rows_ > columns_) {
         shift_labels(first);
-        retiring_ = true;
+        may_unassign_ = true;
         for (std::size_t i = first; i < rows_; ++i) augment(static_cast<std::uint32_t>(i));
       }
     }
@@ -72,12 +72,13 @@ class DenseSolver {
 
   /// Returns the first column of `costs` with this value of cost - label, preferably one without a
   /// row.
-  std::uint32_t column_at(const Cost* costs, Number value, bool look_for_free,
-                          std::uint32_t except) const {
+  std::uint32_t column_at(const Cost* costs, Number value, bool prefer_free,
+                          std::uint32_t excluded) const {
     std::uint32_t found = kUnassigned;
     for (std::size_t j = 0; j < columns_; ++j) {
-      if (static_cast<Number>(costs[j]) - result_.column_dual[j] != value || j == except) continue;
-      if (!look_for_free || row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
+      if (static_cast<Number>(costs[j]) - result_.column_dual[j] != value || j == excluded)
+        continue;
+      if (!prefer_free || row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
       if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
     }
     return found;
@@ -87,7 +88,7 @@ class DenseSolver {
   /// second best is as good. A row that loses its column searches again. With real costs the steps
   /// get ever smaller, so their number is bounded. Returns the rows that remain.
   std::vector<std::uint32_t> reduce_rows(std::size_t count) {
-    std::vector<std::uint32_t> left;
+    std::vector<std::uint32_t> unassigned;
     std::size_t steps = kReductionSteps * count;
     for (std::size_t i = 0; i < count; ++i) {
       std::uint32_t row = static_cast<std::uint32_t>(i);
@@ -101,7 +102,7 @@ class DenseSolver {
         const std::uint32_t owner = row_of_[column];
         const bool free = owner == kUnassigned;
         if (!free && (steps == 0 || !(least < second))) {
-          left.push_back(row);
+          unassigned.push_back(row);
           break;
         }
         if (steps != 0) --steps;
@@ -109,7 +110,7 @@ class DenseSolver {
           const Number label = result_.column_dual[column] - (second - least);
           // Rounding can absorb the difference. Further steps would then make no progress.
           if (!free && !(label < result_.column_dual[column])) {
-            left.push_back(row);
+            unassigned.push_back(row);
             break;
           }
           result_.column_dual[column] = label;
@@ -121,9 +122,10 @@ class DenseSolver {
         row = owner;
       }
     }
-    return left;
+    return unassigned;
   }
 
+  /// Shifts all labels so that the labels of rows are at most 0.
   void shift_labels(std::size_t count) {
     Number highest = result_.row_dual[0];
     for (std::size_t i = 1; i < count; ++i) highest = std::max(highest, result_.row_dual[i]);
@@ -131,6 +133,7 @@ class DenseSolver {
     for (Number& label : result_.column_dual) label += highest;
   }
 
+  /// Returns the first column at the least distance, preferably one without a row.
   std::uint32_t nearest_column(Number least) const {
     std::uint32_t found = kUnassigned;
     for (std::size_t b = 0; b < block_least_.size(); ++b) {
@@ -138,7 +141,6 @@ class DenseSolver {
       const std::size_t end = std::min(columns_, (b + 1) * kScanBlock);
       for (std::size_t j = b * kScanBlock; j < end; ++j) {
         if (distance_[j] != least) continue;
-        // Among equally near columns a free one ends the search at once.
         if (row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
         if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
       }
@@ -146,30 +148,32 @@ class DenseSolver {
     return found;
   }
 
+  /// Gives row `start` a column by the shortest augmenting path, or leaves one row unassigned if
+  /// that is cheaper and allowed.
   void augment(std::uint32_t start) {
-    std::fill(distance_.begin(), distance_.end(), kFar<Number>);
+    std::fill(distance_.begin(), distance_.end(), kUnreachable<Number>);
     settled_.clear();
     auto& labels = result_.column_dual;
-    std::uint32_t row = start, sink = kUnassigned, leaver = kUnassigned;
-    Number reached = 0, leave_at = kFar<Number>;
-    if (retiring_) {
-      leaver = start;
-      leave_at = -result_.row_dual[start];
+    std::uint32_t row = start, sink = kUnassigned, released_row = kUnassigned;
+    Number path_length = 0, release_distance = kUnreachable<Number>;
+    if (may_unassign_) {
+      released_row = start;
+      release_distance = -result_.row_dual[start];
     }
     for (;;) {
       ticks_(columns_);
-      const Number base = reached - result_.row_dual[row];
+      const Number base = path_length - result_.row_dual[row];
       const Number least = kernels_.relax(source_(row), labels.data(), columns_, base, row,
                                           distance_.data(), previous_.data(), block_least_.data());
-      if (retiring_ && base < leave_at) {
-        leave_at = base;
-        leaver = row;
+      if (may_unassign_ && base < release_distance) {
+        release_distance = base;
+        released_row = row;
       }
-      if (retiring_ && leave_at <= least) {
-        reached = leave_at;
+      if (may_unassign_ && release_distance <= least) {
+        path_length = release_distance;
         break;
       }
-      reached = least;
+      path_length = least;
       const std::uint32_t j = nearest_column(least);
       if (row_of_[j] == kUnassigned) {
         sink = j;
@@ -177,22 +181,22 @@ class DenseSolver {
       }
       settled_.push_back({j, least, labels[j]});
       labels[j] = kSettled<Number>;
-      distance_[j] = kFar<Number>;
+      distance_[j] = kUnreachable<Number>;
       row = row_of_[j];
     }
     // Labels of the tree's rows rise and labels of its columns fall, which makes the path's edges
     // tight.
-    result_.row_dual[start] += reached;
+    result_.row_dual[start] += path_length;
     for (const Settled& s : settled_) {
-      const Number fall = reached - s.distance;
-      result_.row_dual[row_of_[s.column]] += fall;
-      labels[s.column] = s.label - fall;
+      const Number decrease = path_length - s.distance;
+      result_.row_dual[row_of_[s.column]] += decrease;
+      labels[s.column] = s.label - decrease;
     }
     std::uint32_t j = sink;
     if (sink == kUnassigned) {
-      j = std::exchange(result_.column[leaver], kUnassigned);
-      result_.row_dual[leaver] = 0;
-      if (leaver == start) return;
+      j = std::exchange(result_.column[released_row], kUnassigned);
+      result_.row_dual[released_row] = 0;
+      if (released_row == start) return;
     }
     for (;;) {
       const auto i = static_cast<std::uint32_t>(previous_[j]);
@@ -208,7 +212,7 @@ class DenseSolver {
   Rows& source_;
   base::StopTicks ticks_;
   const ScanKernels<Cost>& kernels_;
-  bool retiring_ = false;
+  bool may_unassign_ = false;
   BasicAssignment<Number> result_;
   std::vector<std::uint32_t> row_of_;
   std::vector<Number> distance_;
@@ -246,12 +250,12 @@ IntegerAssignment assign(std::span<const std::int32_t> costs, std::size_t rows, 
 Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fill_row) {
   check_sizes(rows, columns);
   std::vector<double> buffer(columns);
-  std::size_t held = rows;
+  std::size_t buffered_row = rows;
   const auto row = [&](std::size_t i) {
-    if (i != held) {
+    if (i != buffered_row) {
       fill_row(i, buffer);
       check_row<double>(buffer, i);
-      held = i;
+      buffered_row = i;
     }
     return static_cast<const double*>(buffer.data());
   };

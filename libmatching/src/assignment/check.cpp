@@ -15,7 +15,7 @@ LabelOf<Cost> check_all(const BasicAssignment<LabelOf<Cost>>& assignment,
   check_matrix(costs, rows, columns);
   OptimalityCheck<LabelOf<Cost>> optimality(assignment, rows, columns);
   for (std::size_t i = 0; i < rows; ++i) {
-    for (std::size_t j = 0; j < columns; ++j) optimality.see(i, j, costs[i * columns + j]);
+    for (std::size_t j = 0; j < columns; ++j) optimality.add_entry(i, j, costs[i * columns + j]);
   }
   return optimality.worst();
 }
@@ -45,7 +45,7 @@ double check_rows(const Assignment& assignment, std::size_t rows, std::size_t co
   for (std::size_t i = 0; i < rows; ++i) {
     fill_row(i, costs);
     check_row<double>(costs, i);
-    for (std::size_t j = 0; j < columns; ++j) optimality.see(i, j, costs[j]);
+    for (std::size_t j = 0; j < columns; ++j) optimality.add_entry(i, j, costs[j]);
   }
   return optimality.worst();
 }

@@ -12,7 +12,7 @@
 
 namespace terrace::matching {
 
-/// Measures how far an assignment violates the conditions of optimality; see check().
+/// Measures how far an assignment violates the conditions of optimality. See check().
 template <class Number>
 class OptimalityCheck {
  public:
@@ -30,7 +30,7 @@ class OptimalityCheck {
       const std::uint32_t j = assignment.column[i];
       if (j == kUnassigned) {
         if (rows <= columns) fail(i, "has no column");
-        demand_zero(assignment.row_dual[i]);
+        require_zero(assignment.row_dual[i]);
         continue;
       }
       if (j >= columns) fail(i, "has a column out of range");
@@ -42,26 +42,28 @@ class OptimalityCheck {
       throw std::invalid_argument("check: only " + std::to_string(count) + " rows have a column");
     }
     if (rows <= columns) {
-      for (const Number label : assignment.column_dual) demand_not_above(label);
+      for (const Number label : assignment.column_dual) require_nonpositive(label);
       for (std::size_t j = 0; j < columns; ++j) {
-        if (!used[j]) demand_zero(assignment.column_dual[j]);
+        if (!used[j]) require_zero(assignment.column_dual[j]);
       }
     } else {
-      for (const Number label : assignment.row_dual) demand_not_above(label);
+      for (const Number label : assignment.row_dual) require_nonpositive(label);
     }
   }
 
-  void see(std::size_t i, std::size_t j, Number cost) {
+  /// Checks one entry of the matrix. Every entry of a chosen pair must be added once.
+  void add_entry(std::size_t i, std::size_t j, Number cost) {
     const Number slack = cost - assignment_.row_dual[i] - assignment_.column_dual[j];
-    demand_not_above(-slack);
+    require_nonpositive(-slack);
     if (assignment_.column[i] == j) {
-      demand_zero(slack);
+      require_zero(slack);
       sum_ += cost;
     }
   }
 
+  /// Returns the largest violation so far, including that of the cost.
   Number worst() {
-    demand_zero(sum_ - assignment_.cost);
+    require_zero(sum_ - assignment_.cost);
     return worst_;
   }
 
@@ -70,10 +72,10 @@ class OptimalityCheck {
     throw std::invalid_argument("check: row " + std::to_string(row) + " " + what);
   }
   // `!(x <= y)` also catches NaN, which then stays in the result.
-  void demand_not_above(Number value) {
+  void require_nonpositive(Number value) {
     if (worst_ == worst_ && !(value <= worst_)) worst_ = value;
   }
-  void demand_zero(Number value) { demand_not_above(value < 0 ? -value : value); }
+  void require_zero(Number value) { require_nonpositive(value < 0 ? -value : value); }
 
   const BasicAssignment<Number>& assignment_;
   Number worst_ = 0, sum_ = 0;

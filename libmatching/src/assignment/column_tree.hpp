@@ -27,7 +27,7 @@ double distance_between(const std::array<double, D>& a, const std::array<double,
 
 /// A kd-tree of the columns that finds those with the least distance minus label.
 ///
-/// Columns are numbered by their position in the tree; original() returns the caller's number. Each
+/// Columns are numbered by their position in the tree. original() returns the caller's number. Each
 /// node holds the largest label below it.
 template <std::size_t D>
 class ColumnTree {
@@ -46,7 +46,7 @@ class ColumnTree {
   const Point& point(std::uint32_t column) const { return points_[column]; }
 
   /// Hides a column from the next call of nearest().
-  void hide(std::uint32_t column) { mark_[column] = round_ + 1; }
+  void exclude(std::uint32_t column) { mark_[column] = round_ + 1; }
 
   /// Appends to `found`, in no particular order, the `count` columns with the least distance -
   /// label among those that are not hidden and below `limit`, or all of them if there are fewer.
@@ -68,7 +68,8 @@ class ColumnTree {
     return best;
   }
 
-  void take(std::uint32_t column) {
+  /// Excludes a column from nearest_free().
+  void mark_taken(std::uint32_t column) {
     taken_[column] = 1;
     for (std::uint32_t n = leaf_[column];; n = nodes_[n].parent) {
       --nodes_[n].free;
@@ -76,9 +77,9 @@ class ColumnTree {
     }
   }
 
-  /// Must be called after the label of a column fell. Lowers the label bounds of the nodes above
-  /// it, up to the first one that does not change.
-  void lowered(const std::vector<double>& labels, std::uint32_t column) {
+  /// Lowers the label bounds of the nodes above a column whose label fell, up to the first node
+  /// that does not change.
+  void update_label(const std::vector<double>& labels, std::uint32_t column) {
     std::uint32_t n = leaf_[column];
     const auto first = labels.begin() + nodes_[n].begin, last = labels.begin() + nodes_[n].end;
     for (double label = *std::max_element(first, last); label < nodes_[n].label;) {
@@ -108,7 +109,7 @@ class ColumnTree {
 
   void build(std::span<const Point> points, std::uint32_t parent, std::size_t begin,
              std::size_t end) {
-    const auto me = static_cast<std::uint32_t>(nodes_.size());
+    const auto index = static_cast<std::uint32_t>(nodes_.size());
     Node node;
     for (std::size_t k = begin; k < end; ++k) node.box.include(points[original_[k]]);
     node.begin = static_cast<std::uint32_t>(begin);
@@ -117,7 +118,7 @@ class ColumnTree {
     node.parent = parent;
     nodes_.push_back(node);
     if (end - begin <= kLeaf) {
-      leaf_.resize(end, me);
+      leaf_.resize(end, index);
       return;
     }
     const base::Box<D>& box = node.box;
@@ -134,21 +135,21 @@ class ColumnTree {
       const double x = points[a][widest], y = points[b][widest];
       return x != y ? x < y : a < b;
     });
-    build(points, me, begin, middle);
-    nodes_[me].right = static_cast<std::uint32_t>(nodes_.size());
-    build(points, me, middle, end);
+    build(points, index, begin, middle);
+    nodes_[index].right = static_cast<std::uint32_t>(nodes_.size());
+    build(points, index, middle, end);
   }
 
   void descend_nearest(const Point& p, const std::vector<double>& labels, std::size_t count,
                        double limit, std::uint32_t n) {
     const Node& node = nodes_[n];
-    const auto bar = [&] { return best_.size() < count ? limit : best_.front().key; };
+    const auto cutoff = [&] { return best_.size() < count ? limit : best_.front().key; };
     if (node.right == 0) {
       for (std::uint32_t j = node.begin; j < node.end; ++j) {
         if (mark_[j] == round_) continue;
         const double distance = distance_between(p, points_[j]);
         const double key = distance - labels[j];
-        if (!(key < bar())) continue;
+        if (!(key < cutoff())) continue;
         const bool full = best_.size() == count;
         if (full) {
           std::pop_heap(best_.begin(), best_.end());
@@ -171,8 +172,8 @@ class ColumnTree {
       std::swap(near, far);
       std::swap(to_near, to_far);
     }
-    if (to_near < bar()) descend_nearest(p, labels, count, limit, near);
-    if (to_far < bar()) descend_nearest(p, labels, count, limit, far);
+    if (to_near < cutoff()) descend_nearest(p, labels, count, limit, near);
+    if (to_far < cutoff()) descend_nearest(p, labels, count, limit, far);
   }
 
   void descend_free(const Point& p, std::uint32_t n, Candidate& best) const {

@@ -61,7 +61,8 @@ struct Scaled {
       }
     }
   }
-  double back(double value) const { return std::ldexp(value, exponent); }
+  /// Converts a length of the scaled points back to the unit of the input.
+  double unscale(double value) const { return std::ldexp(value, exponent); }
 };
 
 /// The lists of candidates for SparseSolver, filled from a tree of the columns.
@@ -73,9 +74,9 @@ class NearCandidates {
   NearCandidates(const Points<D>& rows, ColumnTree<D>& tree, std::size_t columns)
       : rows_(rows), tree_(tree), lists_(rows.size()), threshold_(rows.size()) {
     const std::vector<double> labels(columns, 0.0);
-    const double all = std::numeric_limits<double>::infinity();
+    const double no_limit = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < rows.size(); ++i)
-      threshold_[i] = tree_.nearest(rows[i], labels, kFirstCandidates, all, lists_[i]);
+      threshold_[i] = tree_.nearest(rows[i], labels, kFirstCandidates, no_limit, lists_[i]);
     step_ = threshold_;
     // Keeps steps finite if a row has all columns from the start, and positive if all its first
     // columns are at distance 0.
@@ -89,22 +90,22 @@ class NearCandidates {
     std::vector<Candidate>& list = lists_[row];
     std::erase_if(list,
                   [&](const Candidate& c) { return c.cost - labels[c.column] > threshold_[row]; });
-    const std::size_t before = list.size(), count = std::max(kMoreCandidates, before);
-    for (const Candidate& c : list) tree_.hide(c.column);
+    const std::size_t previous_size = list.size(), count = std::max(kMoreCandidates, previous_size);
+    for (const Candidate& c : list) tree_.exclude(c.column);
     // If many columns are equally near, the number of columns limits the batch. Otherwise the
     // distance does.
-    const double aim = std::min(limit, threshold_[row] + step_[row]);
-    const double reached = tree_.nearest(rows_[row], labels, count, aim, list);
+    const double search_limit = std::min(limit, threshold_[row] + step_[row]);
+    const double reached = tree_.nearest(rows_[row], labels, count, search_limit, list);
     // A step that adds no column grows, because rounding may have swallowed it.
-    if (list.size() == before) step_[row] *= 2;
+    if (list.size() == previous_size) step_[row] *= 2;
     threshold_[row] = std::max(threshold_[row], reached);
-    return before;
+    return previous_size;
   }
   Candidate nearest_free(std::size_t row) const { return tree_.nearest_free(rows_[row]); }
-  void lowered(const std::vector<double>& labels, std::uint32_t column) {
-    tree_.lowered(labels, column);
+  void on_label_decrease(const std::vector<double>& labels, std::uint32_t column) {
+    tree_.update_label(labels, column);
   }
-  void taken(std::uint32_t column) { tree_.take(column); }
+  void on_assigned(std::uint32_t column) { tree_.mark_taken(column); }
 
  private:
   const Points<D>& rows_;
@@ -140,19 +141,20 @@ Assignment assign_sets(std::span<const std::array<double, D>> rows,
   if (rows.size() <= columns.size()) {
     result = assign_wide<D>(scaled.rows, scaled.columns, check_stop);
   } else {
-    Assignment turned = assign_wide<D>(scaled.columns, scaled.rows, check_stop);
+    Assignment transposed_result = assign_wide<D>(scaled.columns, scaled.rows, check_stop);
     result.column.assign(rows.size(), kUnassigned);
     for (std::size_t j = 0; j < columns.size(); ++j)
-      result.column[turned.column[j]] = static_cast<std::uint32_t>(j);
-    result.row_dual = std::move(turned.column_dual);
-    result.column_dual = std::move(turned.row_dual);
+      result.column[transposed_result.column[j]] = static_cast<std::uint32_t>(j);
+    result.row_dual = std::move(transposed_result.column_dual);
+    result.column_dual = std::move(transposed_result.row_dual);
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     if (result.column[i] == kUnassigned) continue;
-    result.cost += scaled.back(distance_between(scaled.rows[i], scaled.columns[result.column[i]]));
+    result.cost +=
+        scaled.unscale(distance_between(scaled.rows[i], scaled.columns[result.column[i]]));
   }
   for (auto* labels : {&result.row_dual, &result.column_dual}) {
-    for (double& label : *labels) label = scaled.back(label);
+    for (double& label : *labels) label = scaled.unscale(label);
   }
   return result;
 }
@@ -164,7 +166,8 @@ double check_sets(const Assignment& assignment, std::span<const std::array<doubl
   OptimalityCheck<double> optimality(assignment, rows.size(), columns.size());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (std::size_t j = 0; j < columns.size(); ++j)
-      optimality.see(i, j, scaled.back(distance_between(scaled.rows[i], scaled.columns[j])));
+      optimality.add_entry(i, j,
+                           scaled.unscale(distance_between(scaled.rows[i], scaled.columns[j])));
   }
   return optimality.worst();
 }

@@ -15,12 +15,12 @@ namespace terrace::matching {
 template <class Cost>
 using LabelOf = std::conditional_t<std::is_integral_v<Cost>, std::int64_t, double>;
 
-/// kFar is larger than every distance. kSettled is the label that keeps a settled column settled:
-/// base + c - kSettled is at least kFar for any cost c.
+/// kUnreachable is larger than every distance. kSettled is the label that keeps a settled column
+/// settled: base + c - kSettled is at least kUnreachable for any cost c.
 template <class Number>
-inline constexpr Number kFar = std::numeric_limits<Number>::infinity();
+inline constexpr Number kUnreachable = std::numeric_limits<Number>::infinity();
 template <>
-inline constexpr std::int64_t kFar<std::int64_t> = std::int64_t{1} << 61;
+inline constexpr std::int64_t kUnreachable<std::int64_t> = std::int64_t{1} << 61;
 template <class Number>
 inline constexpr Number kSettled = -std::numeric_limits<Number>::infinity();
 template <>
@@ -40,7 +40,7 @@ struct ScanKernels {
   Number (*relax)(const Cost* costs, const Number* labels, std::size_t columns, Number base,
                   std::int64_t row, Number* distance, std::int64_t* previous, Number* block_least);
   /// Computes the two least values of costs[j] - labels[j]. They are equal if two columns tie. A
-  /// missing value is kFar.
+  /// missing value is kUnreachable.
   void (*least_two)(const Cost* costs, const Number* labels, std::size_t columns, Number* first,
                     Number* second);
 };

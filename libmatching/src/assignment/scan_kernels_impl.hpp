@@ -54,21 +54,21 @@ LabelOf<Cost> relax(const Cost* costs, const LabelOf<Cost>* labels, std::size_t 
   using V = typename Vector<Number>::Type;
   const V bases = all(base);
   const auto rows = all(row);
-  Number least = kFar<Number>;
+  Number least = kUnreachable<Number>;
   for (std::size_t begin = 0; begin < columns; begin += kScanBlock) {
     const std::size_t end = begin + kScanBlock < columns ? begin + kScanBlock : columns;
-    V lanes = all(kFar<Number>);
+    V lanes = all(kUnreachable<Number>);
     std::size_t j = begin;
     for (; j + kLanes <= end; j += kLanes) {
       const V through = (bases + load_costs<Number>(costs + j)) - load(labels + j);
-      const V before = load(distance + j);
-      const auto nearer = through < before;
-      const V now = nearer ? through : before;
-      store(distance + j, now);
+      const V old_distance = load(distance + j);
+      const auto nearer = through < old_distance;
+      const V new_distance = nearer ? through : old_distance;
+      store(distance + j, new_distance);
       store(previous + j, nearer ? rows : load(previous + j));
-      lanes = now < lanes ? now : lanes;
+      lanes = new_distance < lanes ? new_distance : lanes;
     }
-    Number block = kFar<Number>;
+    Number block = kUnreachable<Number>;
     for (; j < end; ++j) {
       const Number through = (base + static_cast<Number>(costs[j])) - labels[j];
       if (through < distance[j]) {
@@ -89,7 +89,7 @@ void least_two(const Cost* costs, const LabelOf<Cost>* labels, std::size_t colum
                LabelOf<Cost>* first, LabelOf<Cost>* second) {
   using Number = LabelOf<Cost>;
   using V = typename Vector<Number>::Type;
-  V first_lanes = all(kFar<Number>), second_lanes = first_lanes;
+  V first_lanes = all(kUnreachable<Number>), second_lanes = first_lanes;
   std::size_t j = 0;
   for (; j + kLanes <= columns; j += kLanes) {
     const V value = load_costs<Number>(costs + j) - load(labels + j);
@@ -98,7 +98,7 @@ void least_two(const Cost* costs, const LabelOf<Cost>* labels, std::size_t colum
     first_lanes = below ? value : first_lanes;
     second_lanes = other < second_lanes ? other : second_lanes;
   }
-  Number a = kFar<Number>, b = a;
+  Number a = kUnreachable<Number>, b = a;
   const auto take = [&](Number value) {
     if (value < a) {
       b = a;

@@ -36,8 +36,8 @@ struct EdgeLists {
     return candidates(row).size();
   }
   static Candidate nearest_free(std::size_t) { return {kUnassigned, 0.0}; }
-  static void lowered(const std::vector<double>&, std::size_t) {}
-  static void taken(std::size_t) {}
+  static void on_label_decrease(const std::vector<double>&, std::size_t) {}
+  static void on_assigned(std::size_t) {}
 };
 
 void check_edge(std::size_t k, std::uint32_t column, std::size_t columns, double cost) {
@@ -153,12 +153,12 @@ Assignment solve(EdgeLists lists, const base::StopCheck& check_stop) {
     result = solve_wide(lists, "row", check_stop);
   } else {
     EdgeLists wide = transposed(lists);
-    Assignment turned = solve_wide(wide, "column", check_stop);
+    Assignment transposed_result = solve_wide(wide, "column", check_stop);
     result.column.assign(lists.rows(), kUnassigned);
     for (std::size_t j = 0; j < lists.columns; ++j)
-      result.column[turned.column[j]] = static_cast<std::uint32_t>(j);
-    result.row_dual = std::move(turned.column_dual);
-    result.column_dual = std::move(turned.row_dual);
+      result.column[transposed_result.column[j]] = static_cast<std::uint32_t>(j);
+    result.row_dual = std::move(transposed_result.column_dual);
+    result.column_dual = std::move(transposed_result.row_dual);
   }
   for (std::size_t i = 0; i < lists.rows(); ++i) {
     double cost = 0;
@@ -177,9 +177,9 @@ double check_lists(const Assignment& assignment, const EdgeLists& lists) {
       throw std::invalid_argument("check: row " + std::to_string(i) +
                                   " has a column that is not among its entries");
     }
-    if (found) optimality.see(i, column, cost);
+    if (found) optimality.add_entry(i, column, cost);
     for (const Candidate& c : lists.candidates(i)) {
-      if (c.column != column) optimality.see(i, c.column, c.cost);
+      if (c.column != column) optimality.add_entry(i, c.column, c.cost);
     }
   }
   return optimality.worst();

@@ -28,11 +28,12 @@ struct Offer {
 /// raise. The rounds only bring the labels near the optimal ones, so that the following searches
 /// grow small trees. The proof does not depend on them, and the number of bids is bounded.
 ///
-/// look(row) returns an Offer. fell(column) is called after the column's label fell. The labels
-/// must be feasible at the start for some row labels, as 0 is. They stay feasible because they only
-/// fall.
+/// best_offer(row) returns the Offer of a row. on_decrease(column) is called after the column's
+/// label decreased. The labels must be feasible at the start for some row labels, as 0 is. They
+/// stay feasible because they only fall.
 template <class Number, class Look, class Fell>
-void bid(std::size_t rows, std::vector<Number>& labels, const Look& look, const Fell& fell) {
+void bid(std::size_t rows, std::vector<Number>& labels, const Look& best_offer,
+         const Fell& on_decrease) {
   // With few rows the trees are small anyway, and without bidding simple numbers stay simple.
   constexpr std::size_t kFewRows = 100, kRounds = 5, kBidsPerRow = 20;
   // The first minimum raise, as a multiple of the mean distance between a row's two best columns.
@@ -40,7 +41,7 @@ void bid(std::size_t rows, std::vector<Number>& labels, const Look& look, const 
   if (rows < kFewRows) return;
   Number gaps = 0;
   for (std::size_t i = 0; i < rows; ++i) {
-    const Offer<Number> offer = look(static_cast<std::uint32_t>(i));
+    const Offer<Number> offer = best_offer(static_cast<std::uint32_t>(i));
     gaps += (offer.second - offer.least) / static_cast<Number>(rows);
   }
   Number raise = kFirstRaise * gaps;
@@ -51,15 +52,16 @@ void bid(std::size_t rows, std::vector<Number>& labels, const Look& look, const 
     for (std::size_t i = 0; i < rows && bids != 0; ++i) {
       auto row = static_cast<std::uint32_t>(i);
       for (; row != kUnassigned && bids != 0; --bids) {
-        const Offer<Number> offer = look(row);
+        const Offer<Number> offer = best_offer(row);
         labels[offer.column] -= (offer.second - offer.least) + raise;
-        fell(offer.column);
+        on_decrease(offer.column);
         row = std::exchange(row_of[offer.column], row);
       }
     }
   }
 }
 
+/// A column that a row may get, and the cost of the pair.
 struct Candidate {
   std::uint32_t column;
   double cost;
@@ -75,8 +77,8 @@ struct Candidate {
 ///     columns below it to the list, from the returned position on. Columns that are not below the
 ///     old threshold may leave the list;
 ///   Candidate nearest_free(row): some near free column, or kUnassigned if it knows none;
-///   void lowered(labels, column): called when a label fell;
-///   void taken(column): called when a column gets its first row.
+///   void on_label_decrease(labels, column): called after a label decreased;
+///   void on_assigned(column): called when a column gets its first row.
 /// Labels of columns start at 0 and only fall. With rows < columns, they fall only for columns that
 /// have a row.
 template <class Source>
@@ -103,7 +105,7 @@ class SparseSolver {
     if (Source::kComplete && rows_ == row_of_.size()) {
       bid(
           rows_, result_.column_dual, [&](std::uint32_t row) { return offer(row); },
-          [&](std::uint32_t column) { source_.lowered(result_.column_dual, column); });
+          [&](std::uint32_t column) { source_.on_label_decrease(result_.column_dual, column); });
     }
     for (const std::uint32_t row : reduce_rows()) {
       if (!augment(row)) return false;
@@ -165,7 +167,7 @@ class SparseSolver {
   /// Augmenting row reduction as in DenseSolver. The threshold stands in for all columns that are
   /// not candidates.
   std::vector<std::uint32_t> reduce_rows() {
-    std::vector<std::uint32_t> left;
+    std::vector<std::uint32_t> unassigned;
     auto& labels = result_.column_dual;
     std::size_t steps = kReductionSteps * rows_;
     for (std::size_t i = 0; i < rows_; ++i) {
@@ -188,33 +190,33 @@ class SparseSolver {
         result_.row_dual[row] = std::min(least, second);
         if (column == kUnassigned || second < least) {
           if (column == kUnassigned && second == kInfinity) result_.row_dual[row] = 0.0;
-          left.push_back(row);
+          unassigned.push_back(row);
           break;
         }
         const std::uint32_t owner = row_of_[column];
         const double label =
             second == kInfinity ? labels[column] : labels[column] - (second - least);
         if (owner != kUnassigned && (steps == 0 || !(label < labels[column]))) {
-          left.push_back(row);
+          unassigned.push_back(row);
           break;
         }
         if (steps != 0) --steps;
         if (label < labels[column]) {
           labels[column] = label;
           result_.row_dual[row] = cost - label;
-          source_.lowered(labels, column);
+          source_.on_label_decrease(labels, column);
         }
         row_of_[column] = row;
         result_.column[row] = column;
         if (owner == kUnassigned) {
-          source_.taken(column);
+          source_.on_assigned(column);
         } else {
           result_.column[owner] = kUnassigned;
         }
         row = owner;
       }
     }
-    return left;
+    return unassigned;
   }
 
   void reach_free(std::uint32_t row, std::uint32_t column, double distance) {
@@ -244,8 +246,8 @@ class SparseSolver {
       previous_[c.column] = row;
       push({through, c.column, false});
     }
-    const double absent = base + source_.threshold(row);
-    if (source_.threshold(row) < limit && absent < bound_) push({absent, row, true});
+    const double unlisted = base + source_.threshold(row);
+    if (source_.threshold(row) < limit && unlisted < bound_) push({unlisted, row, true});
   }
 
   bool augment(std::uint32_t start) {
@@ -284,12 +286,12 @@ class SparseSolver {
     // tight.
     result_.row_dual[start] += bound_;
     for (const Settled& s : settled_) {
-      const double fall = bound_ - s.distance;
-      result_.row_dual[row_of_[s.column]] += fall;
-      labels[s.column] -= fall;
-      source_.lowered(labels, s.column);
+      const double decrease = bound_ - s.distance;
+      result_.row_dual[row_of_[s.column]] += decrease;
+      labels[s.column] -= decrease;
+      source_.on_label_decrease(labels, s.column);
     }
-    source_.taken(sink_);
+    source_.on_assigned(sink_);
     std::uint32_t j = sink_;
     for (std::uint32_t i = sink_row_;;) {
       row_of_[j] = i;

@@ -71,7 +71,7 @@ class KdTree {
   struct Node {
     base::Box<D> box;
     std::uint32_t begin, end;
-    std::uint32_t right;  // 0: a leaf; the left child is the next node
+    std::uint32_t right;  // 0: a leaf. The left child is the next node
   };
 
   explicit KdTree(std::vector<Point> points) : points_(std::move(points)) {
@@ -88,8 +88,8 @@ class KdTree {
     return sum;
   }
 
-  /// The k points nearest to point i (excluding i), nearest first, in `found`; fewer if there are
-  /// fewer. Ties are in the order in which the tree is walked.
+  /// Stores the k points nearest to point i (excluding i) in `found`, nearest first. Stores fewer
+  /// if there are fewer. Ties are in the order in which the tree is walked.
   void nearest(std::uint32_t i, std::size_t k,
                std::vector<std::pair<double, std::uint32_t>>& found) const {
     found.clear();

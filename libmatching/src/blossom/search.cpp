@@ -21,7 +21,7 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
   };
   delta_ = 0;
   bound_ = limit == kNever ? kNever : limit + 1;
-  left_out_ = false;
+  dropped_events_ = false;
   label_plus(root);
   scan_queue();
   constexpr std::size_t kTicksOfEvent = 64;
@@ -37,7 +37,7 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
       delta_ = event.time;
       if (nodes_[top(event.a)].mate == kNone) {
         augment(v.key_from, event.a);
-        end_tree();
+        dissolve_tree();
         return Outcome::augmented;
       }
       grow(event.a);
@@ -52,19 +52,19 @@ Solver::Outcome Solver::search(std::uint32_t root, std::int64_t limit) {
     }
     scan_queue();
   }
-  if (left_out_) {
+  if (dropped_events_) {
     delta_ = limit;
-    end_tree();
+    dissolve_tree();
     return Outcome::stopped;
   }
   collect_witness();
-  end_tree();
+  dissolve_tree();
   return Outcome::impossible;
 }
 
 void Solver::push(std::int64_t time, std::uint32_t a, std::uint32_t b) {
   if (time >= bound_) {
-    left_out_ = true;
+    dropped_events_ = true;
     return;
   }
   if (time > kLimit) {
@@ -123,12 +123,12 @@ void Solver::scan(std::uint32_t vertex) {
     if (w.key == kNever) keyed_.push_back(arc.to);
     w.key = key;
     w.key_from = vertex;
-    if (w.label == Label::free) offer(arc.to);
+    if (w.label == Label::free) schedule_grow(arc.to);
   }
 }
 
 // Schedules the time at which a free vertex's best edge becomes tight, so that the tree can grow.
-void Solver::offer(std::uint32_t vertex) {
+void Solver::schedule_grow(std::uint32_t vertex) {
   const Vertex& w = vertices_[vertex];
   const std::int64_t time = w.key - w.potential;
   push(time, vertex, kGrow);
@@ -158,7 +158,7 @@ void Solver::augment(std::uint32_t from, std::uint32_t to) {
   }
 }
 
-void Solver::end_tree() {
+void Solver::dissolve_tree() {
   for (const std::uint32_t node : labelled_) {
     Node& x = nodes_[node];
     if (x.parent != kNone || x.label == Label::free) continue;

@@ -11,9 +11,10 @@
 
 namespace terrace::matching::blossom {
 
-Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late, base::StopTicks ticks)
+Solver::Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t last_vertex,
+               base::StopTicks ticks)
     : n_(n),
-      late_(late),
+      last_vertex_(last_vertex),
       ticks_(ticks),
       edges_(std::move(edges)),
       vertices_(n),
@@ -36,10 +37,10 @@ void Solver::index_arcs() {
   }
   for (std::uint32_t v = 0; v < n_; ++v) arc_begin_[v + std::size_t{1}] += arc_begin_[v];
   arcs_.resize(2 * edges_.size());
-  std::vector<std::size_t> fill(arc_begin_.begin(), arc_begin_.end() - 1);
+  std::vector<std::size_t> next_arc(arc_begin_.begin(), arc_begin_.end() - 1);
   for (const Edge& e : edges_) {
-    arcs_[fill[e.i]++] = {e.cost, e.j};
-    arcs_[fill[e.j]++] = {e.cost, e.i};
+    arcs_[next_arc[e.i]++] = {e.cost, e.j};
+    arcs_[next_arc[e.j]++] = {e.cost, e.i};
   }
 }
 
@@ -53,14 +54,14 @@ void Solver::start_duals() {
   for (std::uint32_t v = 0; v < n_; ++v) {
     std::int64_t least = std::numeric_limits<std::int64_t>::max();
     for (const Arc& arc : arcs_of(v)) {
-      if (arc.to != late_) least = std::min(least, arc.cost);
+      if (arc.to != last_vertex_) least = std::min(least, arc.cost);
     }
-    // Costs are even. The late vertex starts so low that no search reaches it.
+    // Costs are even. The last vertex starts so low that no search reaches it.
     if (least != std::numeric_limits<std::int64_t>::max()) vertices_[v].potential = least / 2;
-    if (v == late_) vertices_[v].potential = -kLimit / 4;
+    if (v == last_vertex_) vertices_[v].potential = -kLimit / 4;
   }
   for (std::uint32_t v = 0; v < n_; ++v) {
-    if (v == late_ || nodes_[v].mate != kNone || arcs_of(v).empty()) continue;
+    if (v == last_vertex_ || nodes_[v].mate != kNone || arcs_of(v).empty()) continue;
     std::int64_t slack = std::numeric_limits<std::int64_t>::max();
     std::uint32_t partner = kNone;
     for (const Arc& arc : arcs_of(v)) {
@@ -79,10 +80,10 @@ void Solver::start_duals() {
 }
 
 std::uint32_t Solver::solve() {
-  if (!std::exchange(started_, true)) start_duals();
-  std::uint32_t exposed = 0;
+  if (!std::exchange(has_duals_, true)) start_duals();
+  std::uint32_t exposed_count = 0;
   for (std::uint32_t x = 0; x < node_count(); ++x) {
-    if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed;
+    if (in_use(x) && nodes_[x].parent == kNone && nodes_[x].mate == kNone) ++exposed_count;
   }
   const auto is_exposed = [&](std::uint32_t v) { return nodes_[top(v)].mate == kNone; };
   // Trees stop at a limit that grows from pass to pass. The exposed vertices thus rise about
@@ -90,24 +91,25 @@ std::uint32_t Solver::solve() {
   // limit.
   std::int64_t limit = first_limit();
   while (true) {
-    const bool unlimited = exposed <= 2 || limit > kLimit / 16;
-    const std::uint32_t before = exposed;
+    const bool unlimited = exposed_count <= 2 || limit > kLimit / 16;
+    const std::uint32_t previous_count = exposed_count;
     for (std::uint32_t v = 0; v < n_; ++v) {
       ticks_();
       // Only the base of an exposed blossom is its root, so each pass searches from the blossom
       // once.
       if (!is_exposed(v) || nodes_[top(v)].base != v) continue;
-      const bool last = exposed == 2 && late_ != kNone && is_exposed(late_);
-      if (v == late_ && !last) continue;
-      // When only two are exposed, the search starts at the late vertex, whose tree is one edge.
-      const std::uint32_t root = top(last ? late_ : v);
+      const bool only_last =
+          exposed_count == 2 && last_vertex_ != kNone && is_exposed(last_vertex_);
+      if (v == last_vertex_ && !only_last) continue;
+      // When only two are exposed, the search starts at the last vertex, whose tree is one edge.
+      const std::uint32_t root = top(only_last ? last_vertex_ : v);
       const Outcome outcome =
-          search(root, unlimited || last ? std::numeric_limits<std::int64_t>::max() : limit);
+          search(root, unlimited || only_last ? std::numeric_limits<std::int64_t>::max() : limit);
       if (outcome == Outcome::impossible) return nodes_[root].base;
-      if (outcome == Outcome::augmented) exposed -= 2;
+      if (outcome == Outcome::augmented) exposed_count -= 2;
     }
-    if (exposed == 0) return kNone;
-    limit += exposed < before ? limit / 8 + 1 : limit;
+    if (exposed_count == 0) return kNone;
+    limit += exposed_count < previous_count ? limit / 8 + 1 : limit;
   }
 }
 
@@ -117,7 +119,7 @@ std::int64_t Solver::first_limit() const {
   for (std::uint32_t v = 0; v < n_; ++v) {
     std::int64_t least = kLimit;
     for (std::size_t k = arc_begin_[v]; k < arc_begin_[v + std::size_t{1}]; ++k) {
-      if (arcs_[k].to != late_) least = std::min(least, arcs_[k].cost);
+      if (arcs_[k].to != last_vertex_) least = std::min(least, arcs_[k].cost);
     }
     sum += least == kLimit ? 0.0 : static_cast<double>(least);
   }
@@ -128,7 +130,7 @@ std::vector<std::uint32_t> Solver::mates() {
   std::vector<std::uint32_t> mate(n_, kNone), open;
   // Each part of a blossom is a range of the blossom's list of vertices.
   std::vector<std::uint32_t> position(n_, 0);
-  const auto holds = [&](std::uint32_t node, std::uint32_t vertex) {
+  const auto contains = [&](std::uint32_t node, std::uint32_t vertex) {
     const Node& x = nodes_[node];
     return position[x.first] <= position[vertex] && position[vertex] <= position[x.last];
   };
@@ -149,7 +151,7 @@ std::vector<std::uint32_t> Solver::mates() {
       }
       const std::vector<Part>& cycle = parts(x);
       std::uint32_t exit = 0;
-      while (!holds(cycle[exit].node, nodes_[x].base)) ++exit;
+      while (!contains(cycle[exit].node, nodes_[x].base)) ++exit;
       match_parts(x, exit);
       for (const Part& part : parts(x)) open.push_back(part.node);
     }
@@ -161,12 +163,12 @@ Matching proof_of(Solver& solver) {
   const std::uint32_t n = solver.vertex_count();
   Matching result;
   result.mate = solver.mates();
-  std::vector<std::uint32_t> number(solver.node_count(), kNobody);
+  std::vector<std::uint32_t> number(solver.node_count(), kNone);
   std::uint32_t used = 0;
   for (std::uint32_t b = n; b < solver.node_count(); ++b) {
     if (solver.in_use(b)) number[b] = used++;
   }
-  const auto numbered = [&](std::uint32_t node) { return node == kNone ? kNobody : number[node]; };
+  const auto numbered = [&](std::uint32_t node) { return node == kNone ? kNone : number[node]; };
   result.blossom_dual.resize(used);
   result.blossom_parent.resize(used);
   for (std::uint32_t b = n; b < solver.node_count(); ++b) {
@@ -178,19 +180,19 @@ Matching proof_of(Solver& solver) {
   result.vertex_blossom.resize(n);
   // A potential is the sum of the vertex's own dual and the duals of the blossoms around it. The
   // sums are computed once per blossom, because nests may be deep.
-  std::vector<std::int64_t> around(solver.node_count(), -1);
+  std::vector<std::int64_t> enclosing_duals(solver.node_count(), -1);
   std::vector<std::uint32_t> chain;
   for (std::uint32_t v = 0; v < n; ++v) {
     chain.clear();
     std::uint32_t b = solver.parent(v);
-    while (b != kNone && around[b] < 0) {
+    while (b != kNone && enclosing_duals[b] < 0) {
       chain.push_back(b);
       b = solver.parent(b);
     }
-    std::int64_t sum = b == kNone ? 0 : around[b];
+    std::int64_t sum = b == kNone ? 0 : enclosing_duals[b];
     for (; !chain.empty(); chain.pop_back()) {
       sum += solver.blossom_dual(chain.back());
-      around[chain.back()] = sum;
+      enclosing_duals[chain.back()] = sum;
     }
     result.vertex_dual[v] = solver.potential(v) - sum;
     result.vertex_blossom[v] = numbered(solver.parent(v));
@@ -198,16 +200,16 @@ Matching proof_of(Solver& solver) {
   return result;
 }
 
-std::string unmatchable(const Solver& solver, std::uint32_t vertex) {
+std::string unmatchable_message(const Solver& solver, std::uint32_t vertex) {
   const std::vector<std::uint32_t>& witness = solver.witness();
   std::string text = "the graph has no perfect matching: vertex " + std::to_string(vertex) +
                      " cannot be matched; removing the " + std::to_string(witness.size()) +
                      " vertices {";
-  const std::size_t shown = std::min<std::size_t>(witness.size(), 8);
-  for (std::size_t k = 0; k < shown; ++k) {
+  const std::size_t listed = std::min<std::size_t>(witness.size(), 8);
+  for (std::size_t k = 0; k < listed; ++k) {
     text += (k == 0 ? "" : ", ") + std::to_string(witness[k]);
   }
-  if (shown < witness.size()) text += ", ...";
+  if (listed < witness.size()) text += ", ...";
   return text + "} leaves " + std::to_string(witness.size() + 1) +
          " components of odd size; add edges between these";
 }

@@ -13,7 +13,6 @@
 
 namespace terrace::matching::blossom {
 
-inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 /// Bound of all potentials, chosen so that sums of three fit into 64 bits.
 inline constexpr std::int64_t kLimit = std::int64_t{1} << 60;
 
@@ -27,7 +26,7 @@ struct Edge {
 /// alternating tree at a time. Edges may be added between two solutions.
 ///
 /// A *node* is a vertex (id below n) or a blossom (id n and above). A node without a parent is a
-/// *top* node; only top nodes are matched, labelled and in the tree. The *potential* of a vertex is
+/// *top* node. Only top nodes are matched, labelled and in the tree. The *potential* of a vertex is
 /// its own dual plus the duals of all blossoms around it. So between different top nodes the slack
 /// of an edge is cost - potential(i) - potential(j), whatever the nesting.
 ///
@@ -36,10 +35,10 @@ struct Edge {
 /// the same way. A dual change of the whole tree is then one addition to `delta_`.
 class Solver {
  public:
-  /// Takes n vertices and edges (ends below n, i != j, |cost| below kLimit / 4). Vertex `late`, if
-  /// given, may have edges to all others. It is matched last, so that its many edges are not
-  /// scanned repeatedly.
-  Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t late = kNone,
+  /// Takes n vertices and edges (ends below n, i != j, |cost| below kLimit / 4). Vertex
+  /// `last_vertex`, if given, may have edges to all others. It is matched last, so that its many
+  /// edges are not scanned repeatedly.
+  Solver(std::uint32_t n, std::vector<Edge> edges, std::uint32_t last_vertex = kNone,
          base::StopTicks ticks = {});
 
   /// Computes a perfect matching of least weight.
@@ -55,14 +54,14 @@ class Solver {
   /// set has vertices.
   const std::vector<std::uint32_t>& witness() const { return witness_; }
 
-  /// The partner of each vertex; kNone where exposed.
+  /// The partner of each vertex, or kNone where exposed.
   std::vector<std::uint32_t> mates();
 
   std::uint32_t vertex_count() const { return n_; }
   std::uint32_t node_count() const { return static_cast<std::uint32_t>(nodes_.size()); }
   std::int64_t potential(std::uint32_t vertex) const { return vertices_[vertex].potential; }
   std::uint32_t parent(std::uint32_t node) const { return nodes_[node].parent; }
-  /// Returns the dual of a blossom in use; 0 for vertices.
+  /// Returns the dual of a blossom in use, or 0 for vertices.
   std::int64_t blossom_dual(std::uint32_t node) const { return nodes_[node].dual; }
   bool in_use(std::uint32_t node) const { return nodes_[node].first != kNone; }
   std::size_t edge_count() const { return edges_.size(); }
@@ -121,10 +120,10 @@ class Solver {
   void leave_minus(std::uint32_t node);
   void scan(std::uint32_t vertex);
   void scan_queue();
-  void offer(std::uint32_t vertex);
+  void schedule_grow(std::uint32_t vertex);
   void grow(std::uint32_t vertex);
   void augment(std::uint32_t from, std::uint32_t to);
-  void end_tree();
+  void dissolve_tree();
   void collect_witness();
 
   void shrink(std::uint32_t u, std::uint32_t v);
@@ -146,7 +145,7 @@ class Solver {
     std::uint32_t to;
   };
 
-  std::uint32_t n_, late_;
+  std::uint32_t n_, last_vertex_;
   base::StopTicks ticks_;
   std::vector<Edge> edges_;
   std::vector<std::size_t> arc_begin_;
@@ -156,14 +155,14 @@ class Solver {
   std::vector<Node> nodes_;
   std::vector<std::vector<Part>> parts_;
   std::vector<std::uint32_t> spare_;  // blossoms not in use
-  bool started_ = false;
+  bool has_duals_ = false;
 
   // The current tree.
   std::int64_t delta_ = 0;
-  // Events at or after this delta are dropped: an augmentation or the limit comes first. left_out_
-  // records whether any event was dropped.
+  // Events at or after this delta are dropped: an augmentation or the limit comes first.
+  // dropped_events_ records whether any event was dropped.
   std::int64_t bound_ = 0;
-  bool left_out_ = false;
+  bool dropped_events_ = false;
   std::vector<Event> heap_;
   std::vector<std::uint32_t> labelled_, keyed_, queue_;
   std::uint32_t stamp_ = 0;
@@ -175,6 +174,6 @@ class Solver {
 Matching proof_of(Solver& solver);
 
 /// Returns the error message for a vertex that solve() could not match.
-std::string unmatchable(const Solver& solver, std::uint32_t vertex);
+std::string unmatchable_message(const Solver& solver, std::uint32_t vertex);
 
 }  // namespace terrace::matching::blossom

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "tree/check_tree.hpp"
+#include "tree/check.hpp"
 
 namespace terrace::matching {
 namespace {

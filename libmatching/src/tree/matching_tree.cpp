@@ -21,10 +21,10 @@ namespace {
   throw std::invalid_argument("make_matching_tree: " + what);
 }
 
-/// Thrown to abandon the work after the caller has stopped it.
-struct Stopped {};
+/// Thrown to end the work after `progress` returned false or another thread failed.
+struct StopRequested {};
 
-// Between these limits, squares neither overflow nor underflow.
+/// Returns the distance of two points. Scales them first if squares would overflow or underflow.
 template <std::size_t D>
 double distance(const std::array<double, D>& p, const std::array<double, D>& q) {
   double largest = 0.0;
@@ -39,7 +39,8 @@ double distance(const std::array<double, D>& p, const std::array<double, D>& q) 
   return std::ldexp(std::sqrt(sum), shift);
 }
 
-// The result never leaves the segment between p and q, so pairs of equal points stay in place.
+/// Returns the weighted mean of two points. The result never leaves the segment between them, so
+/// pairs of equal points stay in place.
 template <std::size_t D>
 std::array<double, D> midpoint(const std::array<double, D>& p, double p_weight,
                                const std::array<double, D>& q, double q_weight) {
@@ -77,8 +78,8 @@ class Builder {
       std::uint32_t level = 0;
       for (const Node& root : roots) level = std::max(level, root.level);
       const auto first = n - static_cast<std::uint32_t>(groups.count());
-      tree_.root = join(roots, first, level, threads(), true).number;
-    } catch (const Stopped&) {
+      tree_.root = merge(roots, first, level, threads(), true).number;
+    } catch (const StopRequested&) {
       return {};
     }
     return std::move(tree_);
@@ -94,19 +95,19 @@ class Builder {
 
   void check_sizes() const {
     const std::size_t n = points_.size();
-    const auto differ = [&](std::size_t size, const char* what, const char* one) {
+    const auto check_size = [&](std::size_t size, const char* what, const char* one) {
       if (size == 0 || size == n) return;
       refuse_tree(std::to_string(size) + " " + what + " for " + std::to_string(n) +
                   " points; give one " + one + " per point, or leave them out");
     };
-    differ(options_.labels.size(), "labels", "label");
-    differ(options_.weights.size(), "weights", "weight");
-    // The tree, the clusters, and the data kept per node of a level.
+    check_size(options_.labels.size(), "labels", "label");
+    check_size(options_.weights.size(), "weights", "weight");
+    // The tree, the clusters, and the data of each node of a level.
     const double needed = static_cast<double>(n) *
                           (sizeof(MatchingTreeRow) + 2.0 * sizeof(Point) + 4 * sizeof(double));
     const bool fits =
         options_.memory_limit == 0 || needed <= static_cast<double>(options_.memory_limit);
-    if (n < kNobody / 2 && fits) return;
+    if (n < kNone / 2 && fits) return;
     refuse_tree("the tree of " + std::to_string(n) + " points would need about " +
                 std::to_string(static_cast<std::uint64_t>(needed / (1024.0 * 1024.0))) +
                 " MiB, and at most 2^31 - 2 points are possible; build trees of parts");
@@ -147,20 +148,20 @@ class Builder {
     });
     const unsigned clusters =
         static_cast<unsigned>(std::min<std::size_t>(threads(), groups.count()));
-    const unsigned for_each = threads() / clusters;
+    const unsigned threads_per_cluster = threads() / clusters;
     std::atomic<std::size_t> next{0};
     std::vector<std::exception_ptr> failures(clusters);
     const auto work = [&](unsigned t) {
       try {
-        for (std::size_t k = next++; k < by_size.size() && !ended_; k = next++) {
+        for (std::size_t k = next++; k < by_size.size() && !stopped_; k = next++) {
           const std::uint32_t g = by_size[k];
-          std::vector<Node> nodes = leaves(groups.group(g));
-          roots[g] = join(nodes, groups.begin[g] - g, 0, for_each, t == 0);
+          std::vector<Node> nodes = make_leaves(groups.group(g));
+          roots[g] = merge(nodes, groups.begin[g] - g, 0, threads_per_cluster, t == 0);
         }
-      } catch (const Stopped&) {
-        // Stopped by the caller, or because another thread has failed.
+      } catch (const StopRequested&) {
+        // The caller or a failure of another thread ended the work.
       } catch (...) {
-        ended_ = true;
+        stopped_ = true;
         failures[t] = std::current_exception();
       }
     };
@@ -176,10 +177,10 @@ class Builder {
     for (const std::exception_ptr& failure : failures) {
       if (failure) std::rethrow_exception(failure);
     }
-    if (ended_) throw Stopped();
+    if (stopped_) throw StopRequested();
   }
 
-  std::vector<Node> leaves(std::span<const std::uint32_t> group) const {
+  std::vector<Node> make_leaves(std::span<const std::uint32_t> group) const {
     std::vector<Node> nodes;
     nodes.reserve(group.size());
     for (const std::uint32_t i : group) {
@@ -190,22 +191,22 @@ class Builder {
   }
 
   /// Matches repeatedly until one node is left and returns it. Writes rows from `row` on.
-  Node join(std::vector<Node>& nodes, std::uint32_t row, std::uint32_t level, unsigned threads,
-            bool callers_thread) {
+  Node merge(std::vector<Node>& nodes, std::uint32_t row, std::uint32_t level, unsigned threads,
+             bool callers_thread) {
     while (nodes.size() > 1) {
       ++level;
       const std::vector<std::uint32_t> mate = match(nodes, threads);
-      std::size_t kept = 0;
+      std::size_t remaining = 0;
       const std::uint32_t first = row;
       if (options_.check_stop) options_.check_stop();
       for (std::uint32_t i = 0; i < nodes.size(); ++i) {
-        if (mate[i] == kNobody) {
-          nodes[kept++] = nodes[i];
+        if (mate[i] == kNone) {
+          nodes[remaining++] = nodes[i];
         } else if (i < mate[i]) {
-          nodes[kept++] = pair(nodes[i], nodes[mate[i]], row++, level);
+          nodes[remaining++] = make_parent(nodes[i], nodes[mate[i]], row++, level);
         }
       }
-      nodes.resize(kept);
+      nodes.resize(remaining);
       report(row - first, callers_thread);
     }
     return nodes.front();
@@ -225,9 +226,9 @@ class Builder {
       refuse_tree("the matcher returned " + std::to_string(mate.size()) + " partners for " +
                   std::to_string(nodes.size()) + " nodes");
     }
-    std::size_t alone = 0;
+    std::size_t unmatched = 0;
     for (std::uint32_t i = 0; i < mate.size(); ++i) {
-      if (mate[i] == kNobody && ++alone <= mate.size() % 2) continue;
+      if (mate[i] == kNone && ++unmatched <= mate.size() % 2) continue;
       if (mate[i] < mate.size() && mate[i] != i && mate[mate[i]] == i) continue;
       refuse_tree("the matcher did not pair node " + std::to_string(i) + " of " +
                   std::to_string(mate.size()) + " mutually");
@@ -235,33 +236,33 @@ class Builder {
     return mate;
   }
 
-  Node pair(const Node& p, const Node& q, std::uint32_t row, std::uint32_t level) {
-    const double apart = distance(p.position, q.position);
-    if (!std::isfinite(apart)) {
+  Node make_parent(const Node& p, const Node& q, std::uint32_t row, std::uint32_t level) {
+    const double length = distance(p.position, q.position);
+    if (!std::isfinite(length)) {
       refuse_tree("nodes " + std::to_string(p.number) + " and " + std::to_string(q.number) +
                   " are farther apart than a double can represent; scale the points");
     }
-    const Node made{static_cast<std::uint32_t>(points_.size()) + row, p.size + q.size, level,
-                    p.weight + q.weight, midpoint(p.position, p.weight, q.position, q.weight)};
-    tree_.rows[row] = {std::min(p.number, q.number), std::max(p.number, q.number), apart, made.size,
-                       level};
-    tree_.positions[row] = made.position;
-    return made;
+    const Node parent{static_cast<std::uint32_t>(points_.size()) + row, p.size + q.size, level,
+                      p.weight + q.weight, midpoint(p.position, p.weight, q.position, q.weight)};
+    tree_.rows[row] = {std::min(p.number, q.number), std::max(p.number, q.number), length,
+                       parent.size, level};
+    tree_.positions[row] = parent.position;
+    return parent;
   }
 
   void report(std::size_t rows, bool callers_thread) {
     const std::size_t done = done_ += rows;
     if (callers_thread && options_.progress && !options_.progress(done, tree_.rows.size())) {
-      ended_ = true;
+      stopped_ = true;
     }
-    if (ended_) throw Stopped();
+    if (stopped_) throw StopRequested();
   }
 
   std::span<const Point> points_;
   const MatchingTreeOptions<Point>& options_;
   MatchingTree<Point> tree_;
   std::atomic<std::size_t> done_{0};
-  std::atomic<bool> ended_{false};
+  std::atomic<bool> stopped_{false};
 };
 
 }  // namespace

@@ -33,10 +33,10 @@ double squared_distance(const AnyBox& box, const std::array<double, D>& p) {
 
 /// Calls leaf(node) for each leaf whose squared distance is at most bound(), nearer leaves first.
 template <std::size_t D, class Bound, class Leaf>
-void walk_near(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
+void walk_near(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& in_frame,
                Bound&& bound, Leaf&& leaf) {
   walk(
-      tree, [&](const HierarchyNode<D>& node) { return squared_distance(node, framed); },
+      tree, [&](const HierarchyNode<D>& node) { return squared_distance(node, in_frame); },
       [&](double distance) { return distance * kSlack <= bound(); }, leaf);
 }
 
@@ -48,24 +48,24 @@ using Candidate = std::pair<double, std::uint32_t>;
 /// slot.
 template <std::size_t D, class Squared>
 std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
-                                     const std::array<double, D>& framed, Squared&& squared) {
-  Candidate best{std::numeric_limits<double>::infinity(), kNobody};
+                                     const std::array<double, D>& in_frame, Squared&& squared) {
+  Candidate best{std::numeric_limits<double>::infinity(), kNone};
   const std::uint32_t* order = tree.order().data();
   walk_near(
-      tree, framed, [&] { return best.first; },
+      tree, in_frame, [&] { return best.first; },
       [&](const HierarchyNode<D>& leaf) {
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
           const double d = squared(slot);
           if (d <= best.first) best = std::min(best, Candidate{d, order[slot]});
         }
       });
-  if (best.second == kNobody) return std::nullopt;
+  if (best.second == kNone) return std::nullopt;
   return Neighbour{best.second, std::sqrt(best.first) / tree.frame().scale};
 }
 
 /// Writes the k nearest primitives to `found`.
 template <std::size_t D, class Squared>
-void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& framed,
+void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& in_frame,
                  std::size_t k, Squared&& squared, std::vector<Neighbour>& found) {
   found.clear();
   k = std::min(k, tree.order().size());
@@ -77,7 +77,7 @@ void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double
   const std::uint32_t* order = tree.order().data();
   double bound = std::numeric_limits<double>::infinity();
   walk_near(
-      tree, framed, [&] { return bound; },
+      tree, in_frame, [&] { return bound; },
       [&](const HierarchyNode<D>& leaf) {
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
           const Neighbour candidate{order[slot], squared(slot)};

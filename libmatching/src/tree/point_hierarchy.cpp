@@ -27,19 +27,22 @@ double squared_distance(const std::array<double, D>& p, const std::array<double,
 
 double dot(const Point3& p, const Point3& q) { return p[0] * q[0] + p[1] * q[1] + p[2] * q[2]; }
 
-// Starts from the point of the ray nearest to the centre, which keeps distant balls accurate (E.
-// Haines et al., "Precision improvements for ray/sphere intersection", 2019).
-std::optional<double> meets(const tree::FramedRay& ray, const Point3& centre, double radius) {
-  const Point3& along = ray.direction;
-  const Point3 to{centre[0] - ray.origin[0], centre[1] - ray.origin[1], centre[2] - ray.origin[2]};
-  const double length2 = dot(along, along), middle = dot(to, along) / length2;
-  const Point3 aside{to[0] - middle * along[0], to[1] - middle * along[1],
-                     to[2] - middle * along[2]};
-  const double half2 = radius * radius - dot(aside, aside);
+/// Returns the least t in the ray's range at which the ray is in or on a ball. Starts from the
+/// point of the ray nearest to the centre, which keeps distant balls accurate (E. Haines et al.,
+/// "Precision improvements for ray/sphere intersection", 2019).
+std::optional<double> intersect_ball(const tree::TransformedRay& ray, const Point3& centre,
+                                     double radius) {
+  const Point3& direction = ray.direction;
+  const Point3 offset{centre[0] - ray.origin[0], centre[1] - ray.origin[1],
+                      centre[2] - ray.origin[2]};
+  const double length2 = dot(direction, direction), middle = dot(offset, direction) / length2;
+  const Point3 perpendicular{offset[0] - middle * direction[0], offset[1] - middle * direction[1],
+                             offset[2] - middle * direction[2]};
+  const double half2 = radius * radius - dot(perpendicular, perpendicular);
   if (!(half2 >= 0.0)) return std::nullopt;
-  const double half = std::sqrt(half2 / length2);
-  if (middle + half < ray.t_min || middle - half > ray.t_max) return std::nullopt;
-  return std::max(middle - half, ray.t_min);
+  const double half_chord = std::sqrt(half2 / length2);
+  if (middle + half_chord < ray.t_min || middle - half_chord > ray.t_max) return std::nullopt;
+  return std::max(middle - half_chord, ray.t_min);
 }
 
 }  // namespace
@@ -56,19 +59,19 @@ PointHierarchy<D>::PointHierarchy(std::span<const TreeChildren> rows, std::span<
 
 template <std::size_t D>
 std::optional<Neighbour> PointHierarchy<D>::nearest(const Point& query) const {
-  const tree::FramedPlace<D> place(query, tree_.frame());
-  return tree::nearest_one(tree_, place.framed, [&](std::uint32_t slot) {
-    return squared_distance(points_[slot], place.scaled);
+  const tree::QueryPoint<D> point(query, tree_.frame());
+  return tree::nearest_one(tree_, point.in_frame, [&](std::uint32_t slot) {
+    return squared_distance(points_[slot], point.scaled);
   });
 }
 
 template <std::size_t D>
 void PointHierarchy<D>::nearest(const Point& query, std::size_t k,
                                 std::vector<Neighbour>& found) const {
-  const tree::FramedPlace<D> place(query, tree_.frame());
+  const tree::QueryPoint<D> point(query, tree_.frame());
   tree::nearest_few(
-      tree_, place.framed, k,
-      [&](std::uint32_t slot) { return squared_distance(points_[slot], place.scaled); }, found);
+      tree_, point.in_frame, k,
+      [&](std::uint32_t slot) { return squared_distance(points_[slot], point.scaled); }, found);
 }
 
 template <std::size_t D>
@@ -81,20 +84,20 @@ std::optional<RayHit> PointHierarchy<D>::hit(const Ray& ray, double radius) cons
           "the radius is " + std::to_string(radius) +
           "; it must be finite, not negative, and comparable to the coordinates");
     }
-    const tree::FramedRay framed(ray, tree_.frame(), radius);
+    const tree::TransformedRay transformed(ray, tree_.frame(), radius);
     const RayHit best =
-        tree::walk_ray(tree_, framed, [&](const HierarchyNode<3>& leaf, RayHit& first) {
+        tree::walk_ray(tree_, transformed, [&](const HierarchyNode<3>& leaf, RayHit& first) {
           for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
-            const std::optional<double> met = meets(framed, points_[slot], scaled);
-            if (!met) continue;
+            const std::optional<double> entry = intersect_ball(transformed, points_[slot], scaled);
+            if (!entry) continue;
             const std::optional<double> t =
-                framed.moved_into({points_[slot], points_[slot]}, tree_.frame(), *met);
+                transformed.clamp_to_box({points_[slot], points_[slot]}, tree_.frame(), *entry);
             if (!t) continue;
             const std::uint32_t index = tree_.order()[slot];
             if (*t < first.t || (*t == first.t && index < first.index)) first = {index, *t};
           }
         });
-    if (best.index != kNobody) return RayHit{best.index, framed.callers_t(best.t)};
+    if (best.index != kNone) return RayHit{best.index, transformed.input_t(best.t)};
   }
   return std::nullopt;
 }

@@ -18,19 +18,19 @@ namespace terrace::matching::tree {
 
 /// A ray in the units of the primitives, scaled so that the largest coordinate of its direction is
 /// between 1/2 and 1, with the values that box tests need.
-class FramedRay {
+class TransformedRay {
  public:
   /// margin: how far outside a box the ray may be and still hit the primitives in it, in the
   /// caller's unit.
-  FramedRay(const Ray& ray, const HierarchyFrame<3>& frame, double margin = 0.0) {
-    const FramedPlace<3> place(ray.origin, frame);
-    origin = place.scaled;
-    framed_origin_ = place.framed;
-    double largest = 0.0, far = frame.reach;
+  TransformedRay(const Ray& ray, const HierarchyFrame<3>& frame, double margin = 0.0) {
+    const QueryPoint<3> query(ray.origin, frame);
+    origin = query.scaled;
+    frame_origin_ = query.in_frame;
+    double largest = 0.0, largest_coordinate = frame.reach;
     for (std::size_t d = 0; d < 3; ++d) {
       if (!std::isfinite(ray.direction[d])) fail("direction is not finite");
       largest = std::max(largest, std::abs(ray.direction[d]));
-      far = std::max(far, std::abs(framed_origin_[d]));
+      largest_coordinate = std::max(largest_coordinate, std::abs(frame_origin_[d]));
     }
     if (largest == 0.0) fail("direction has length 0");
     if (std::isnan(ray.t_min) || std::isnan(ray.t_max)) fail("t_min or t_max is not a number");
@@ -41,19 +41,20 @@ class FramedRay {
     }
     t_min = ray.t_min * unit_;
     t_max = ray.t_max * unit_;
-    // Hits have errors of about 2^-51 of all coordinates involved.
-    const double wide = margin * frame.scale + 0x1p-48 * (far + margin * frame.scale);
+    // The error of a hit is about 2^-51 of the largest coordinate involved.
+    const double tolerance =
+        margin * frame.scale + 0x1p-48 * (largest_coordinate + margin * frame.scale);
     for (std::size_t d = 0; d < 3; ++d) {
       direction[d] = std::ldexp(ray.direction[d], -exponent);
       inverse_[d] = 1.0 / direction[d];
-      backward_[d] = std::signbit(direction[d]);
-      for_lo_[d] = framed_origin_[d] + wide;
-      for_hi_[d] = framed_origin_[d] - wide;
+      negative_[d] = std::signbit(direction[d]);
+      origin_for_min_[d] = frame_origin_[d] + tolerance;
+      origin_for_max_[d] = frame_origin_[d] - tolerance;
     }
   }
 
-  /// Converts t of this ray to the caller's t.
-  [[nodiscard]] double callers_t(double t) const { return t / unit_; }
+  /// Converts t of this ray to t of the ray that was passed in.
+  [[nodiscard]] double input_t(double t) const { return t / unit_; }
 
   struct Range {
     double enter, leave;
@@ -64,31 +65,31 @@ class FramedRay {
   /// of the direction is 0 and the origin is on the box's border, 0 times infinity is ignored: that
   /// axis excludes nothing.
   template <class AnyBox>
-  [[nodiscard]] Range within(const AnyBox& box, double last) const {
+  [[nodiscard]] Range clip(const AnyBox& box, double last) const {
     Range range{t_min, last};
     for (std::size_t d = 0; d < 3; ++d) {
-      const double lo = (static_cast<double>(box.min[d]) - for_lo_[d]) * inverse_[d];
-      const double hi = (static_cast<double>(box.max[d]) - for_hi_[d]) * inverse_[d];
-      const double enter = backward_[d] ? hi : lo;
-      const double leave = backward_[d] ? lo : hi;
+      const double lo = (static_cast<double>(box.min[d]) - origin_for_min_[d]) * inverse_[d];
+      const double hi = (static_cast<double>(box.max[d]) - origin_for_max_[d]) * inverse_[d];
+      const double enter = negative_[d] ? hi : lo;
+      const double leave = negative_[d] ? lo : hi;
       range.enter = enter > range.enter ? enter : range.enter;
       range.leave = leave < range.leave ? leave : range.leave;
     }
     return range;
   }
 
-  /// Moves the t of a hit to the nearest t at which the ray is inside the primitive's box; nullopt
-  /// if there is none. So an earlier hit never makes the walk skip a node around this one, and all
-  /// trees give the same answer. The change is a few roundings, except for triangles seen nearly
-  /// edge-on. The box's coordinates are in the units of the primitives.
-  [[nodiscard]] std::optional<double> moved_into(base::Box3 box, const HierarchyFrame<3>& frame,
-                                                 double t) const {
+  /// Moves the t of a hit to the nearest t at which the ray is inside the primitive's box, or
+  /// nullopt if there is none. So an earlier hit never makes the walk skip a node around this one,
+  /// and all trees give the same answer. The change is a few roundings, except for triangles seen
+  /// nearly edge-on. The box's coordinates are in the units of the primitives.
+  [[nodiscard]] std::optional<double> clamp_to_box(base::Box3 box, const HierarchyFrame<3>& frame,
+                                                   double t) const {
     for (std::size_t d = 0; d < 3; ++d) {
       box.min[d] -= frame.centre[d];
       box.max[d] -= frame.centre[d];
     }
     constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    const Range range = within(box, kInfinity);
+    const Range range = clip(box, kInfinity);
     if (range.empty()) return std::nullopt;
     return std::clamp(t, range.enter, range.leave);
   }
@@ -101,24 +102,24 @@ class FramedRay {
     throw std::invalid_argument(std::string("a ray's ") + what);
   }
 
-  Point3 framed_origin_, inverse_, for_lo_, for_hi_;
-  std::array<bool, 3> backward_;
+  Point3 frame_origin_, inverse_, origin_for_min_, origin_for_max_;
+  std::array<bool, 3> negative_;
   double unit_;
 };
 
 /// Calls leaf(node, best) for each leaf that the ray enters no later than the best hit so far,
-/// nearer leaves first. leaf() lowers best.t, which is in the ray's own t.
+/// nearer leaves first. leaf() lowers best.t, which is in units of the transformed ray.
 template <class Leaf>
-RayHit walk_ray(const BoundingVolumeHierarchy<3>& tree, const FramedRay& ray, Leaf&& leaf) {
-  constexpr double kMissed = std::numeric_limits<double>::infinity();
-  RayHit best{kNobody, ray.t_max};
+RayHit walk_ray(const BoundingVolumeHierarchy<3>& tree, const TransformedRay& ray, Leaf&& leaf) {
+  constexpr double kMiss = std::numeric_limits<double>::infinity();
+  RayHit best{kNone, ray.t_max};
   walk(
       tree,
       [&](const HierarchyNode<3>& node) {
-        const auto range = ray.within(node, best.t);
-        return range.empty() ? kMissed : range.enter;
+        const auto range = ray.clip(node, best.t);
+        return range.empty() ? kMiss : range.enter;
       },
-      [&](double enter) { return enter < kMissed && enter <= best.t; },
+      [&](double enter) { return enter < kMiss && enter <= best.t; },
       [&](const HierarchyNode<3>& node) { leaf(node, best); });
   return best;
 }

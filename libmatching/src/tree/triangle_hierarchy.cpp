@@ -31,12 +31,12 @@ class TriangleTest {
     y_ = (z_ + 2) % 3;
     shear_x_ = direction[x_] / direction[z_];
     shear_y_ = direction[y_] / direction[z_];
-    stretch_ = 1.0 / direction[z_];
+    scale_z_ = 1.0 / direction[z_];
   }
 
-  /// Returns t of the crossing. The signs of u, v and w are correct, or 0, for the sheared corners,
-  /// because products are rounded monotonically. So at a shared edge one of the two triangles is
-  /// hit.
+  /// Returns t of the intersection, or nullopt. The signs of u, v and w are correct, or 0, for the
+  /// sheared corners, because products are rounded monotonically. So at a shared edge one of the
+  /// two triangles is hit.
   [[nodiscard]] std::optional<double> operator()(const Corners& corners) const {
     std::array<double, 3> x, y, z;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -50,30 +50,31 @@ class TriangleTest {
     if ((u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0)) return std::nullopt;
     const double sum = u + v + w;
     if (sum == 0.0) return std::nullopt;
-    return stretch_ * ((u * z[0] + v * z[1] + w * z[2]) / sum);
+    return scale_z_ * ((u * z[0] + v * z[1] + w * z[2]) / sum);
   }
 
  private:
   Point3 origin_;
   std::size_t x_ = 0, y_ = 0, z_ = 0;
-  double shear_x_, shear_y_, stretch_;
+  double shear_x_, shear_y_, scale_z_;
 };
 
 inline Point3 difference(const Point3& p, const Point3& q) {
   return {p[0] - q[0], p[1] - q[1], p[2] - q[2]};
 }
 
-inline double inner(const Point3& p, const Point3& q) {
+inline double dot(const Point3& p, const Point3& q) {
   return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
 }
 
 /// Returns the squared distance of a point to the segment from p to q.
 inline double squared_distance(const Point3& place, const Point3& p, const Point3& q) {
-  const Point3 side = difference(q, p), to = difference(place, p);
-  const double length2 = inner(side, side);
-  const double share = length2 > 0.0 ? std::clamp(inner(to, side) / length2, 0.0, 1.0) : 0.0;
-  const Point3 aside{to[0] - share * side[0], to[1] - share * side[1], to[2] - share * side[2]};
-  return inner(aside, aside);
+  const Point3 side = difference(q, p), offset = difference(place, p);
+  const double length2 = dot(side, side);
+  const double share = length2 > 0.0 ? std::clamp(dot(offset, side) / length2, 0.0, 1.0) : 0.0;
+  const Point3 perpendicular{offset[0] - share * side[0], offset[1] - share * side[1],
+                             offset[2] - share * side[2]};
+  return dot(perpendicular, perpendicular);
 }
 
 /// Returns the squared distance of a point to a triangle: to its plane if the foot is inside,
@@ -82,16 +83,17 @@ inline double squared_distance(const Point3& place, const Point3& p, const Point
 inline double squared_distance(const Point3& place, const Corners& corners) {
   const Point3 first = difference(corners[1], corners[0]);
   const Point3 second = difference(corners[2], corners[0]);
-  const Point3 to = difference(place, corners[0]);
-  const double aa = inner(first, first), ab = inner(first, second), bb = inner(second, second);
-  const double at = inner(first, to), bt = inner(second, to), area2 = aa * bb - ab * ab;
+  const Point3 offset = difference(place, corners[0]);
+  const double aa = dot(first, first), ab = dot(first, second), bb = dot(second, second);
+  const double at = dot(first, offset), bt = dot(second, offset), area2 = aa * bb - ab * ab;
   const double u = bb * at - ab * bt, v = aa * bt - ab * at;
   double least = std::numeric_limits<double>::infinity();
   if (area2 > 0.0 && u > 0.0 && v > 0.0 && u + v < area2) {
     const double s = u / area2, t = v / area2;
-    const Point3 aside{to[0] - s * first[0] - t * second[0], to[1] - s * first[1] - t * second[1],
-                       to[2] - s * first[2] - t * second[2]};
-    least = inner(aside, aside);
+    const Point3 perpendicular{offset[0] - s * first[0] - t * second[0],
+                               offset[1] - s * first[1] - t * second[1],
+                               offset[2] - s * first[2] - t * second[2]};
+    least = dot(perpendicular, perpendicular);
     if (area2 > 1e-8 * aa * bb) return least;
   }
   return std::min({least, squared_distance(place, corners[0], corners[1]),
@@ -125,10 +127,10 @@ std::vector<base::Box3> boxes_of(std::span<const Point3> corners,
   std::vector<base::Box3> boxes;
   boxes.reserve(triangles.size());
   for (std::size_t k = 0; k < triangles.size(); ++k) {
-    const tree::Corners own = corners_of(corners, triangles[k]);
-    boxes.push_back(base::box_of(own));
+    const tree::Corners triangle_corners = corners_of(corners, triangles[k]);
+    boxes.push_back(base::box_of(triangle_corners));
     // A box ignores NaN.
-    for (const Point3& p : own) {
+    for (const Point3& p : triangle_corners) {
       for (const double c : p) {
         if (std::isnan(c)) boxes.back().min[0] = c;
       }
@@ -166,27 +168,27 @@ TriangleHierarchy::TriangleHierarchy(std::span<const TreeChildren> rows,
 }
 
 std::optional<RayHit> TriangleHierarchy::hit(const Ray& ray) const {
-  const tree::FramedRay framed(ray, tree_.frame());
-  const tree::TriangleTest crossing(framed.origin, framed.direction);
+  const tree::TransformedRay transformed(ray, tree_.frame());
+  const tree::TriangleTest intersect(transformed.origin, transformed.direction);
   const RayHit best =
-      tree::walk_ray(tree_, framed, [&](const HierarchyNode<3>& leaf, RayHit& first) {
+      tree::walk_ray(tree_, transformed, [&](const HierarchyNode<3>& leaf, RayHit& first) {
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
-          const std::optional<double> met = crossing(corners_[slot]);
-          if (!met || *met < framed.t_min || *met > framed.t_max) continue;
+          const std::optional<double> t_plane = intersect(corners_[slot]);
+          if (!t_plane || *t_plane < transformed.t_min || *t_plane > transformed.t_max) continue;
           const std::optional<double> t =
-              framed.moved_into(base::box_of(corners_[slot]), tree_.frame(), *met);
+              transformed.clamp_to_box(base::box_of(corners_[slot]), tree_.frame(), *t_plane);
           if (!t) continue;
           const std::uint32_t index = tree_.order()[slot];
           if (*t < first.t || (*t == first.t && index < first.index)) first = {index, *t};
         }
       });
-  if (best.index == kNobody) return std::nullopt;
-  return RayHit{best.index, framed.callers_t(best.t)};
+  if (best.index == kNone) return std::nullopt;
+  return RayHit{best.index, transformed.input_t(best.t)};
 }
 
 std::optional<Neighbour> TriangleHierarchy::nearest(const Point3& query) const {
-  const tree::FramedPlace<3> place(query, tree_.frame());
-  return tree::nearest_one(tree_, place.framed, [&](std::uint32_t slot) {
+  const tree::QueryPoint<3> place(query, tree_.frame());
+  return tree::nearest_one(tree_, place.in_frame, [&](std::uint32_t slot) {
     // The result is never less than the distance to the box, which prunes nodes, whatever the
     // rounding.
     return std::max(tree::squared_distance(place.scaled, corners_[slot]),

@@ -22,37 +22,39 @@ template <class Entry>
 class WalkStack {
  public:
   explicit WalkStack(std::size_t depth) {
-    if (depth < few_.size()) return;
-    many_.resize(depth + 1);
-    at_ = many_.data();
+    if (depth < inline_.size()) return;
+    allocated_.resize(depth + 1);
+    entries_ = allocated_.data();
   }
   WalkStack(const WalkStack&) = delete;
   WalkStack& operator=(const WalkStack&) = delete;
 
-  void push(const Entry& entry) { at_[size_++] = entry; }
-  Entry pop() { return at_[--size_]; }
+  void push(const Entry& entry) { entries_[size_++] = entry; }
+  Entry pop() { return entries_[--size_]; }
   [[nodiscard]] bool empty() const { return size_ == 0; }
 
  private:
-  std::array<Entry, 64> few_;
-  std::vector<Entry> many_;
-  Entry* at_ = few_.data();
+  std::array<Entry, 64> inline_;
+  std::vector<Entry> allocated_;
+  Entry* entries_ = inline_.data();
   std::size_t size_ = 0;
 };
 
-/// A point in the units of the primitives and in the units of the boxes.
+/// A query point in the scale of the primitives (`scaled`) and in the frame of the boxes
+/// (`in_frame`). The constructor throws std::invalid_argument for a coordinate that is not finite
+/// or too large.
 template <std::size_t D>
-struct FramedPlace {
-  std::array<double, D> scaled, framed;
+struct QueryPoint {
+  std::array<double, D> scaled, in_frame;
 
-  FramedPlace(const std::array<double, D>& place, const HierarchyFrame<D>& frame) {
+  QueryPoint(const std::array<double, D>& point, const HierarchyFrame<D>& frame) {
     for (std::size_t d = 0; d < D; ++d) {
-      if (!std::isfinite(place[d])) {
+      if (!std::isfinite(point[d])) {
         throw std::invalid_argument("a query's coordinate " + std::to_string(d) +
                                     " is not finite; give a finite point");
       }
-      scaled[d] = place[d] * frame.scale;
-      framed[d] = scaled[d] - frame.centre[d];
+      scaled[d] = point[d] * frame.scale;
+      in_frame[d] = scaled[d] - frame.centre[d];
       if (std::abs(scaled[d]) > 0x1p460) {
         throw std::invalid_argument("a query's coordinate " + std::to_string(d) +
                                     " is too large for squared distances; scale all points");
@@ -61,12 +63,15 @@ struct FramedPlace {
   }
 };
 
-/// Walks down a hierarchy, the child with the lower key first. key(node) is a number that is not
-/// greater for a node than for what is inside it, infinity if there is nothing. reaches(key) is
-/// whether nodes of that key still matter; once false it stays false. Calls leaf(node) for each
-/// leaf that matters.
+/// Walks down a hierarchy, the child with the lower key first, and calls leaf(node) for each leaf
+/// that may contain a result.
+///
+/// key(node): a lower bound of the keys of everything inside the node, or infinity if it contains
+/// nothing of interest.
+/// may_contain(key): true if a node with this key may still contain a result. Once false for a key,
+/// it must stay false.
 template <std::size_t D, class Key, class Reaches, class Leaf>
-void walk(const BoundingVolumeHierarchy<D>& tree, Key&& key, Reaches&& reaches, Leaf&& leaf) {
+void walk(const BoundingVolumeHierarchy<D>& tree, Key&& key, Reaches&& may_contain, Leaf&& leaf) {
   const auto nodes = tree.nodes();
   if (nodes.empty()) return;
   struct Entry {
@@ -76,13 +81,13 @@ void walk(const BoundingVolumeHierarchy<D>& tree, Key&& key, Reaches&& reaches, 
   WalkStack<Entry> open(tree.depth());
   Entry at{key(nodes[0]), 0};
   while (true) {
-    if (reaches(at.key)) {
+    if (may_contain(at.key)) {
       const auto& node = nodes[at.node];
       if (node.count == 0) {
         Entry near{key(nodes[at.node + 1]), at.node + 1};
         Entry far{key(nodes[node.link]), node.link};
         if (far.key < near.key) std::swap(near, far);
-        if (reaches(far.key)) open.push(far);
+        if (may_contain(far.key)) open.push(far);
         at = near;
         continue;
       }

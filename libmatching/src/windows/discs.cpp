@@ -15,43 +15,44 @@ using blossom::KdTree;
 
 void Discs::start(std::size_t windows) {
   windows_.assign(windows, {});
-  window_.assign(radius_.size(), kNobody);
+  window_.assign(radius_.size(), kNone);
 }
 
-void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
-                 const PointMatching& matching) {
+void Discs::store(std::size_t w, std::span<const std::uint32_t> points,
+                  const PointMatching& matching) {
   const Matching& proof = matching.proof;
   const std::size_t blossoms = proof.blossom_dual.size();
   const double unit = std::ldexp(1.0, -1 - proof.exponent);
-  // If a point is left over, the blossoms around the vertex for nobody contain an even number of
+  // If a point is left over, the blossoms around the dummy vertex contain an even number of
   // points and cannot be used on their own.
   std::vector<bool> dropped(blossoms, false);
   if (proof.mate.size() > points.size()) {
-    for (std::uint32_t b = proof.vertex_blossom.back(); b != kNobody; b = proof.blossom_parent[b]) {
+    for (std::uint32_t b = proof.vertex_blossom.back(); b != kNone; b = proof.blossom_parent[b]) {
       dropped[b] = true;
     }
   }
   Window& window = windows_[w];
   // Blossoms are renumbered in the order in which the walks outward from the points reach them, the
   // outermost of each path first. Nests may be deep, so each blossom is visited only once.
-  std::vector<std::uint32_t> number(blossoms, kNobody), chain;
-  std::vector<double> around;  // for each moat: its width plus the widths of all moats around it
+  std::vector<std::uint32_t> number(blossoms, kNone), chain;
+  std::vector<double>
+      total_width;  // of each moat: its width plus the widths of all moats around it
   for (std::size_t k = 0; k < points.size(); ++k) {
     std::uint32_t b = proof.vertex_blossom[k];
-    for (; b != kNobody && !dropped[b] && number[b] == kNobody; b = proof.blossom_parent[b]) {
+    for (; b != kNone && !dropped[b] && number[b] == kNone; b = proof.blossom_parent[b]) {
       chain.push_back(b);
     }
-    std::uint32_t moat = b == kNobody || dropped[b] ? kNobody : number[b];
+    std::uint32_t moat = b == kNone || dropped[b] ? kNone : number[b];
     for (; !chain.empty(); chain.pop_back()) {
       const double width = unit * static_cast<double>(proof.blossom_dual[chain.back()]);
       window.sum += width;
-      around.push_back(moat == kNobody ? width : around[moat] + width);
+      total_width.push_back(moat == kNone ? width : total_width[moat] + width);
       window.moats.push_back({width, moat});
       moat = number[chain.back()] = static_cast<std::uint32_t>(window.moats.size() - 1);
     }
     const double disc = unit * static_cast<double>(proof.vertex_dual[k]);
     window.sum += disc;
-    radius_[points[k]] = moat == kNobody ? disc : disc + around[moat];
+    radius_[points[k]] = moat == kNone ? disc : disc + total_width[moat];
     moat_[points[k]] = moat;
     window_[points[k]] = static_cast<std::uint32_t>(w);
   }
@@ -59,32 +60,33 @@ void Discs::take(std::size_t w, std::span<const std::uint32_t> points,
 
 // A moat shrinks for all points inside it at once, outer moats first. The discs shrink by the rest.
 void Discs::shrink(const std::vector<double>& excess) {
-  // First collects, for each moat, the amount its points need; then the amount given by it and the
-  // moats around it.
-  std::vector<std::vector<double>> given(windows_.size());
-  for (std::size_t w = 0; w < windows_.size(); ++w) given[w].assign(windows_[w].moats.size(), 0.0);
+  // For each moat: first the reduction that its points need, then the sum of the reductions of the
+  // moat and the moats around it.
+  std::vector<std::vector<double>> reduction(windows_.size());
+  for (std::size_t w = 0; w < windows_.size(); ++w)
+    reduction[w].assign(windows_[w].moats.size(), 0.0);
   for (std::size_t i = 0; i < radius_.size(); ++i) {
-    if (moat_[i] == kNobody) continue;
-    double& need = given[window_[i]][moat_[i]];
+    if (moat_[i] == kNone) continue;
+    double& need = reduction[window_[i]][moat_[i]];
     need = std::max(need, excess[i]);
   }
   for (std::size_t w = 0; w < windows_.size(); ++w) {
     std::vector<Moat>& moats = windows_[w].moats;
     for (std::size_t m = moats.size(); m-- > 0;) {
-      if (moats[m].parent == kNobody) continue;
-      double& need = given[w][moats[m].parent];
-      need = std::max(need, given[w][m]);
+      if (moats[m].parent == kNone) continue;
+      double& need = reduction[w][moats[m].parent];
+      need = std::max(need, reduction[w][m]);
     }
     for (std::size_t m = 0; m < moats.size(); ++m) {
-      const double outward = moats[m].parent == kNobody ? 0.0 : given[w][moats[m].parent];
-      const double gives = std::clamp(given[w][m] - outward, 0.0, moats[m].width);
-      moats[m].width -= gives;
-      windows_[w].sum -= gives;
-      given[w][m] = outward + gives;
+      const double outward = moats[m].parent == kNone ? 0.0 : reduction[w][moats[m].parent];
+      const double shrinkage = std::clamp(reduction[w][m] - outward, 0.0, moats[m].width);
+      moats[m].width -= shrinkage;
+      windows_[w].sum -= shrinkage;
+      reduction[w][m] = outward + shrinkage;
     }
   }
   for (std::size_t i = 0; i < radius_.size(); ++i) {
-    const double moats = moat_[i] == kNobody ? 0.0 : given[window_[i]][moat_[i]];
+    const double moats = moat_[i] == kNone ? 0.0 : reduction[window_[i]][moat_[i]];
     const double disc = std::max(0.0, excess[i] - moats);
     windows_[window_[i]].sum -= disc;
     radius_[i] -= moats + disc;
@@ -108,63 +110,65 @@ class Excess {
         check_stop_(check_stop),
         order_(blossom::halving_order(points, base::StopTicks(check_stop))),
         tree_(sorted(points, order_)),
-        owner_(tree_.nodes().size()),
-        largest_(tree_.nodes().size()) {
-    for (std::size_t x = owner_.size(); x-- > 0;) {
+        common_window_(tree_.nodes().size()),
+        max_other_(tree_.nodes().size()) {
+    for (std::size_t x = common_window_.size(); x-- > 0;) {
       const auto& node = tree_.nodes()[x];
       if (node.right != 0) {
-        owner_[x] = owner_[x + 1] == owner_[node.right] ? owner_[x + 1] : kNobody;
+        common_window_[x] =
+            common_window_[x + 1] == common_window_[node.right] ? common_window_[x + 1] : kNone;
         continue;
       }
-      owner_[x] = window_[order_[node.begin]];
+      common_window_[x] = window_[order_[node.begin]];
       for (std::uint32_t k = node.begin; k < node.end; ++k) {
-        if (window_[order_[k]] != owner_[x]) owner_[x] = kNobody;
+        if (window_[order_[k]] != common_window_[x]) common_window_[x] = kNone;
       }
     }
   }
 
-  /// Returns each point's distance to its nearest neighbour, capped at `most`.
-  std::vector<double> nearest(std::span<const double> most) const {
+  /// Returns each point's distance to its nearest neighbour, capped at `limit`.
+  std::vector<double> nearest(std::span<const double> limit) const {
     std::vector<double> result(points_.size(), 0.0);
     for_each_chunk([&](std::uint32_t k, std::vector<std::uint32_t>&) {
       std::vector<std::pair<double, std::uint32_t>> found;
       tree_.nearest(k, 1, found);
       const std::uint32_t i = order_[k];
-      const double apart = found.empty() ? most[i] : distance(i, order_[found[0].second]);
-      result[i] = std::min(apart, most[i]);
+      const double spacing = found.empty() ? limit[i] : distance(i, order_[found[0].second]);
+      result[i] = std::min(spacing, limit[i]);
     });
     return result;
   }
 
-  /// Returns, for each point i, the largest share * (own[i] + others[j] - distance) over the points
-  /// j of other windows, or 0 if that is negative.
-  std::vector<double> operator()(std::span<const double> own, std::span<const double> others,
+  /// Returns, for each point i, the largest share * (radii[i] + other_radii[j] - distance) over the
+  /// points j of other windows, or 0 if that is negative.
+  std::vector<double> operator()(std::span<const double> radii, std::span<const double> other_radii,
                                  double share) {
     const auto& nodes = tree_.nodes();
     for (std::size_t x = nodes.size(); x-- > 0;) {
       const auto& node = nodes[x];
       if (node.right != 0) {
-        largest_[x] = std::max(largest_[x + 1], largest_[node.right]);
+        max_other_[x] = std::max(max_other_[x + 1], max_other_[node.right]);
         continue;
       }
-      largest_[x] = others[order_[node.begin]];
+      max_other_[x] = other_radii[order_[node.begin]];
       for (std::uint32_t k = node.begin; k < node.end; ++k) {
-        largest_[x] = std::max(largest_[x], others[order_[k]]);
+        max_other_[x] = std::max(max_other_[x], other_radii[order_[k]]);
       }
     }
     std::vector<double> result(points_.size(), 0.0);
     for_each_chunk([&](std::uint32_t k, std::vector<std::uint32_t>& open) {
       const std::uint32_t i = order_[k];
-      double most = 0.0;
+      double excess = 0.0;
       open.assign(1, 0);
       while (!open.empty()) {
         const std::uint32_t x = open.back();
         open.pop_back();
-        if (owner_[x] == window_[i]) continue;
+        if (common_window_[x] == window_[i]) continue;
         const auto& node = nodes[x];
-        const double apart = std::sqrt(node.box.squared_distance(points_[i])) * (1.0 - 1e-13);
-        const double least = metric_.distance ? metric_.factor * apart - metric_.offset : apart;
-        if (own[i] + largest_[x] - least <= most) continue;
+        const double euclidean = std::sqrt(node.box.squared_distance(points_[i])) * (1.0 - 1e-13);
+        const double least =
+            metric_.distance ? metric_.factor * euclidean - metric_.offset : euclidean;
+        if (radii[i] + max_other_[x] - least <= excess) continue;
         if (node.right != 0) {
           open.push_back(node.right);
           open.push_back(x + 1);
@@ -172,10 +176,11 @@ class Excess {
         }
         for (std::uint32_t at = node.begin; at < node.end; ++at) {
           const std::uint32_t j = order_[at];
-          if (window_[j] != window_[i]) most = std::max(most, own[i] + others[j] - distance(i, j));
+          if (window_[j] != window_[i])
+            excess = std::max(excess, radii[i] + other_radii[j] - distance(i, j));
         }
       }
-      result[i] = share * most;
+      result[i] = share * excess;
     });
     return result;
   }
@@ -214,8 +219,8 @@ class Excess {
   const base::StopCheck& check_stop_;
   std::vector<std::uint32_t> order_;
   KdTree<D> tree_;
-  std::vector<std::uint32_t> owner_;  // for each box: its window, if all its points are in the same
-  std::vector<double> largest_;       // for each box: the largest of `others` in it
+  std::vector<std::uint32_t> common_window_;  // of each box: the window of all its points, or kNone
+  std::vector<double> max_other_;             // of each box: the largest of `other_radii` in it
 };
 
 }  // namespace
@@ -232,8 +237,7 @@ double Discs::bound(std::span<const std::array<double, D>> points, const PointMe
   double sum = 0.0;
   for (const Window& window : windows_) sum += window.sum;
   if (radius_.size() % 2 == 0) return sum;
-  // The vertex for nobody is at distance 0 from all points, so leaving a point over costs its
-  // radius.
+  // The dummy vertex is at distance 0 from all points, so leaving a point over costs its radius.
   return sum - *std::max_element(radius_.begin(), radius_.end());
 }
 

@@ -19,13 +19,13 @@ namespace terrace::matching::windows {
 /// most their distance.
 class Discs {
  public:
-  explicit Discs(std::size_t points) : radius_(points, 0.0), moat_(points, kNobody) {}
+  explicit Discs(std::size_t points) : radius_(points, 0.0), moat_(points, kNone) {}
 
   /// Discards all windows and prepares for this many.
   void start(std::size_t windows);
   /// Stores the duals of window `w`, which contains these points. Different windows may be stored
   /// concurrently.
-  void take(std::size_t w, std::span<const std::uint32_t> points, const PointMatching& matching);
+  void store(std::size_t w, std::span<const std::uint32_t> points, const PointMatching& matching);
 
   /// Shrinks discs and moats until no pair from different windows is too close. Consumes the
   /// windows.
@@ -45,14 +45,14 @@ class Discs {
     std::uint32_t parent;  // the next moat outward
   };
   struct Window {
-    double sum = 0.0;         // of all discs and moats except the disc of the vertex for nobody
+    double sum = 0.0;         // of all discs and moats except the disc of the dummy vertex
     std::vector<Moat> moats;  // parents first
   };
 
   void shrink(const std::vector<double>& excess);
 
-  std::vector<double> radius_;       // for each point, moats included
-  std::vector<std::uint32_t> moat_;  // for each point: the innermost moat around it, in its window
+  std::vector<double> radius_;       // of each point, including its moats
+  std::vector<std::uint32_t> moat_;  // the innermost moat around each point, in its window
   std::vector<std::uint32_t> window_;
   std::vector<Window> windows_;
 };

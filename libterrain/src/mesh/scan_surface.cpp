@@ -191,7 +191,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   out.measures = tri::measure(surface.surface);
   if (!options.method) {
     set_parts(surface.parts, out);
-    out.samples_off = surface.points_off;
+    out.samples_off = surface.unused_points;
     out.open = surface.open;
     out.lids = surface.lids;
   } else if (!surface.input.empty() || surface.surface.faces.empty()) {

@@ -37,7 +37,7 @@ class FrameReader final : public ClusterReader {
       const auto members = static_cast<std::size_t>(request.members);
       // Above level 0, reading includes the records of the clusters below, which takes far longer.
       const std::size_t kind = tri::level_of(request.cluster) > 0 ? 1 : 0;
-      if (!meter_.has(members, kind) || missing_.size() >= kMostMissing) break;
+      if (!meter_.has_time(members, kind) || missing_.size() >= kMostMissing) break;
       auto lacking = lacking_.find(request.cluster);
       if (lacking == lacking_.end() || has_come(lacking->second.front())) {
         try {
@@ -147,20 +147,20 @@ tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
   return members;
 }
 
-tri::GivenCluster FramedSource::whole(const std::function<tri::GivenCluster()>& load) {
-  tri::GivenCluster cluster = load();
+tri::LoadedCluster FramedSource::whole(const std::function<tri::LoadedCluster()>& load) {
+  tri::LoadedCluster cluster = load();
   if (!missing_.empty()) throw stream::MissingBytes(missing_);
   return cluster;
 }
 
-tri::GivenCluster FramedSource::load(const tri::ViewRequest& request) {
+tri::LoadedCluster FramedSource::load(const tri::ViewRequest& request) {
   missing_pages_.clear();
   missing_.clear();
   if (bounds_) return tri::load(*this, request);
   return whole([&] { return tri::load(*this, request); });
 }
 
-tri::GivenCluster FramedSource::load_root() {
+tri::LoadedCluster FramedSource::load_root() {
   missing_pages_.clear();
   missing_.clear();
   return whole([&] { return tri::load_root(*this); });

@@ -39,8 +39,8 @@ class FramedSource final : public tri::ClusterSource {
 
   /// As tri::load() and tri::load_root(). Throws: stream::MissingBytes that lists all missing bytes
   /// that can be determined, not only the first.
-  tri::GivenCluster load(const tri::ViewRequest& request);
-  tri::GivenCluster load_root();
+  tri::LoadedCluster load(const tri::ViewRequest& request);
+  tri::LoadedCluster load_root();
   /// Reads the record itself. Throws: stream::MissingBytes.
   tri::ClusterRecord exact_record(tri::ClusterId id);
   /// Returns a number that clusters share if their records are in the same bytes.
@@ -55,7 +55,7 @@ class FramedSource final : public tri::ClusterSource {
   [[nodiscard]] std::vector<std::uint64_t> counts() const;
 
  private:
-  tri::GivenCluster whole(const std::function<tri::GivenCluster()>& load);
+  tri::LoadedCluster whole(const std::function<tri::LoadedCluster()>& load);
 
   const stream::Store& store_;
   StoreSource inner_;
@@ -76,7 +76,7 @@ double steady_seconds();
 
 class ClusterReader {
  public:
-  using Give = std::function<void(tri::GivenCluster)>;
+  using Give = std::function<void(tri::LoadedCluster)>;
   using GiveRecord = std::function<void(tri::ClusterId, const tri::ClusterRecord&)>;
 
   virtual ~ClusterReader() = default;

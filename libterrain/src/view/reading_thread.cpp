@@ -72,7 +72,7 @@ class ReadingThread final : public ClusterReader {
         const tri::ViewRequest request = queue_.front();
         queue_.pop_front();
         lock.unlock();
-        tri::GivenCluster cluster = source_.load(request);
+        tri::LoadedCluster cluster = source_.load(request);
         lock.lock();
         ready_.push_back(std::move(cluster));
       }
@@ -83,14 +83,14 @@ class ReadingThread final : public ClusterReader {
   }
 
   FramedSource& source_;
-  std::vector<tri::GivenCluster> taken_;
+  std::vector<tri::LoadedCluster> taken_;
   std::size_t next_ = 0;                          ///< the next of taken_ to pass on
   std::vector<tri::ViewRequest> asked_;           ///< not yet in queue_
   std::unordered_set<tri::ClusterId> withdrawn_;  ///< may still be in queue_
   std::mutex mutex_;                              ///< for the members below
   std::condition_variable wake_;
   std::deque<tri::ViewRequest> queue_;
-  std::vector<tri::GivenCluster> ready_;
+  std::vector<tri::LoadedCluster> ready_;
   std::exception_ptr failure_;
   bool stop_ = false;
   std::thread thread_;  ///< last, because it uses all other members

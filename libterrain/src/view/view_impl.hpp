@@ -40,8 +40,8 @@ struct StoreView<Shown>::Impl {
     assert((!std::is_integral_v<Shown> || store.schema().grid));
   }
 
-  tri::GivenCluster load_root() {
-    tri::GivenCluster root = source.load_root();
+  tri::LoadedCluster load_root() {
+    tri::LoadedCluster root = source.load_root();
     root_values = root.values;
     return root;
   }
@@ -72,7 +72,7 @@ const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& 
                                                                const std::array<double, 2>& after) {
   const double begin = steady_seconds();
   impl_->reader->bring(
-      seconds, [&](tri::GivenCluster cluster) { impl_->control.give(std::move(cluster)); },
+      seconds, [&](tri::LoadedCluster cluster) { impl_->control.give(std::move(cluster)); },
       [&](tri::ClusterId id, const tri::ClusterRecord& record) {
         impl_->control.give_record(id, record);
       });
@@ -164,7 +164,7 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
       near.max[2] = std::numeric_limits<double>::infinity();
       // It is usually one of the clusters that the corners represent.
       for (const tri::VertexId corner : corners) {
-        const auto record = control().stands_for(corner);
+        const auto record = control().represented_cluster(corner);
         if (record && record->box.intersects(near)) return false;
       }
       return !control().meets_collapsed(near);
@@ -186,7 +186,7 @@ std::span<const std::byte> StoreView<Shown>::attributes(tri::VertexId vertex) co
   if (tri::level_of(id.cluster) == model().top()) {
     return std::span(impl_->root_values).subspan(id.index * bytes, bytes);
   }
-  const tri::GivenCluster* const given = control().given(id.cluster);
+  const tri::LoadedCluster* const given = control().cached_cluster(id.cluster);
   if (given == nullptr) return {};
   return std::span(given->values).subspan(id.index * bytes, bytes);
 }

@@ -41,7 +41,7 @@ struct InMetric<double, EllipticalMetric2> {
 template <class Coord, class Metric>
 struct Delaunay2<Coord, Metric>::Impl : planar::InMetric<Coord, Metric> {
   using Base = planar::InMetric<Coord, Metric>;
-  explicit Impl(const Metric& given) : metric(given), form(given) {}
+  explicit Impl(const Metric& value) : metric(value), form(value) {}
   [[nodiscard]] typename Base::Scope scope() const { return typename Base::Scope(form); }
 
   Metric metric;

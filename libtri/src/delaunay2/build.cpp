@@ -4,16 +4,15 @@
 // coarse samples go first: every 32nd vertex, before that every 32nd of these, and so on. This
 // halves the work (after N. Amenta, S. Choi, G. Rote, "Incremental constructions con BRIO",
 // doi:10.1145/777792.777824, with fixed samples in place of random ones).
-#include "build.hpp"
-
 #include <algorithm>
 
+#include "curve_sort.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
-#include "hilbert.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 #include "walk.hpp"
 
 namespace terrace::tri::planar {
@@ -62,9 +61,9 @@ void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex) {
   mesh.last_vertex = vertex;
 }
 
-/// Sorts the vertices of all slots into mesh.line, the flat state; duplicates become aliases.
+/// Sorts the vertices of all slots into mesh.line, the flat state. Duplicates become aliases.
 template <class Kernel>
-void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
+void sort_on_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
   std::vector<std::uint32_t>& line = mesh.line;
   for (std::uint32_t v = begin; v < end; ++v) line.push_back(v);
   std::sort(line.begin(), line.end(), [&](std::uint32_t a, std::uint32_t b) {
@@ -72,23 +71,23 @@ void line_up(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
     return lexicographically_less(mesh.point[a], mesh.point[b]) ||
            (mesh.point[a] == mesh.point[b] && a < b);
   });
-  std::size_t kept = 0;
+  std::size_t unique_count = 0;
   for (const std::uint32_t v : line) {
-    if (kept > 0 && mesh.point[line[kept - 1]] == mesh.point[v]) {
-      mesh.incident[v] = kAlias | line[kept - 1];
+    if (unique_count > 0 && mesh.point[line[unique_count - 1]] == mesh.point[v]) {
+      mesh.incident[v] = kAlias | line[unique_count - 1];
     } else {
-      line[kept++] = v;
+      line[unique_count++] = v;
     }
   }
-  line.resize(kept);
+  line.resize(unique_count);
   mesh.last_vertex = line.front();
 }
 
 /// The first vertex not collinear with the ones before, or kNone. `second`: the first vertex that
 /// differs from vertex `begin`.
 template <class Kernel>
-std::uint32_t first_off_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
-                             std::uint32_t& second) {
+std::uint32_t find_first_off_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
+                                  std::uint32_t& second) {
   second = begin + 1;
   while (second < end && mesh.point[second] == mesh.point[begin]) ++second;
   for (std::uint32_t v = second + 1; v < end; ++v) {
@@ -102,9 +101,10 @@ std::uint32_t first_off_line(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint3
 template <class Kernel>
 void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::uint32_t begin,
                      std::uint32_t end) {
-  bool any = false;
-  for (std::uint32_t v = begin; v < end && !any; ++v) any = (mesh.incident[v] & kAlias) != 0;
-  if (!any) return;
+  bool has_duplicates = false;
+  for (std::uint32_t v = begin; v < end && !has_duplicates; ++v)
+    has_duplicates = (mesh.incident[v] & kAlias) != 0;
+  if (!has_duplicates) return;
   for (VertexId& v : vertex_of) {
     const std::uint32_t entry = mesh.incident[slot(v)];
     if ((entry & kAlias) != 0) v = VertexId{entry & ~kAlias};
@@ -127,9 +127,9 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   std::vector<VertexId> vertex_of = number_vertices(mesh, points, begin);
   const std::uint32_t end = mesh.point.size();
   std::uint32_t second = kNone;
-  const std::uint32_t third = first_off_line(mesh, begin, end, second);
+  const std::uint32_t third = find_first_off_line(mesh, begin, end, second);
   if (third == kNone) {
-    line_up(mesh, begin, end);
+    sort_on_line(mesh, begin, end);
   } else {
     mesh.triangle.reserve(2 * std::size_t{mesh.vertex_count} - 2);
     mesh.line = {begin, second};
@@ -137,19 +137,19 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
       std::swap(mesh.line[0], mesh.line[1]);
     make_fan(mesh, third);
     mesh.last_vertex = begin;
-    const auto insert_every = [&](std::uint32_t step, bool coarser_done) {
+    const auto insert_every = [&](std::uint32_t step, bool coarser_inserted) {
       for (std::uint32_t i = step; i < end - begin; i += step) {
         const std::uint32_t v = begin + i;
-        if (v == second || v == third || (coarser_done && i % (step * kSample) == 0)) continue;
+        if (v == second || v == third || (coarser_inserted && i % (step * kSample) == 0)) continue;
         insert_slot(mesh, v);
       }
     };
     std::uint32_t step = 1;
     while ((end - begin) / step > kSample * kSample) step *= kSample;
-    bool coarser_done = false;
+    bool coarser_inserted = false;
     for (; step > 0; step /= kSample) {
-      insert_every(step, coarser_done);
-      coarser_done = true;
+      insert_every(step, coarser_inserted);
+      coarser_inserted = true;
     }
   }
   resolve_aliases(mesh, vertex_of, begin, end);

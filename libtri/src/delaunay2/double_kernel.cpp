@@ -22,12 +22,12 @@ Epick::Point_2 cgal(const DoubleKernel::Point& p) { return {p[0], p[1]}; }
 template <std::size_t N>
 bool to_integers(const std::array<const DoubleKernel::Point*, N>& points,
                  std::array<IntKernel::Point, N>& result) {
-  constexpr double kWhole = 0x1p52;  ///< below this, differences of integers are exact
+  constexpr double kMaxExact = 0x1p52;  ///< below this, differences of integers are exact
   for (std::size_t k = 0; k < 2; ++k) {
-    double least = kWhole;
+    double least = kMaxExact;
     for (const DoubleKernel::Point* p : points) {
       const double at = (*p)[k];
-      if (!(std::abs(at) < kWhole) || static_cast<double>(static_cast<std::int64_t>(at)) != at)
+      if (!(std::abs(at) < kMaxExact) || static_cast<double>(static_cast<std::int64_t>(at)) != at)
         return false;
       least = std::min(least, at);
     }
@@ -43,16 +43,16 @@ bool to_integers(const std::array<const DoubleKernel::Point*, N>& points,
 }  // namespace
 
 int DoubleKernel::orientation_exact(const Point& a, const Point& b, const Point& c) {
-  std::array<IntKernel::Point, 3> whole;
-  if (to_integers<3>({&a, &b, &c}, whole))
-    return IntKernel::orientation(whole[0], whole[1], whole[2]);
+  std::array<IntKernel::Point, 3> integers;
+  if (to_integers<3>({&a, &b, &c}, integers))
+    return IntKernel::orientation(integers[0], integers[1], integers[2]);
   return Epick().orientation_2_object()(cgal(a), cgal(b), cgal(c));
 }
 
 int DoubleKernel::in_circle_exact(const Point& a, const Point& b, const Point& c, const Point& p) {
-  std::array<IntKernel::Point, 4> whole;
-  if (to_integers<4>({&a, &b, &c, &p}, whole))
-    return IntKernel::in_circle(whole[0], whole[1], whole[2], whole[3]);
+  std::array<IntKernel::Point, 4> integers;
+  if (to_integers<4>({&a, &b, &c, &p}, integers))
+    return IntKernel::in_circle(integers[0], integers[1], integers[2], integers[3]);
   return Epick().side_of_oriented_circle_2_object()(cgal(a), cgal(b), cgal(c), cgal(p));
 }
 

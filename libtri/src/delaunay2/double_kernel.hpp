@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-/// Exact predicates on doubles. One evaluation in double with an error bound nearly always decides;
-/// the remaining cases use integers if the coordinates are integers, otherwise CGAL.
+/// Exact predicates on doubles. One evaluation in double with an error bound nearly always decides.
+/// The remaining cases use integers if the coordinates are integers, otherwise CGAL.
 
 namespace terrace::tri::planar {
 
@@ -19,7 +19,7 @@ struct DoubleKernel {
     double cross;
     double dot;
   };
-  /// Rounded, for a first choice; exact predicates make the final decision.
+  /// Rounded, for a first choice. Exact predicates make the final decision.
   static Angle angle(const Point& apex, const Point& b, const Point& c) {
     const double bx = b[0] - apex[0];
     const double by = b[1] - apex[1];
@@ -34,7 +34,7 @@ struct DoubleKernel {
     const double right = (b[1] - a[1]) * (c[0] - a[0]);
     const double cross = left - right;
     // (3 + 16 u) u of J. R. Shewchuk, "Adaptive precision floating-point arithmetic and fast robust
-    // geometric predicates", doi:10.1007/PL00009321, rounded up; the last term covers products
+    // geometric predicates", doi:10.1007/PL00009321, rounded up. The last term covers products
     // that underflow.
     const double bound = 0x1.9p-52 * (std::abs(left) + std::abs(right)) + 0x1p-1000;
     // This is false for infinities and NaN, which result from overflow.
@@ -42,11 +42,11 @@ struct DoubleKernel {
     return orientation_exact(a, b, c);
   }
 
-  /// > 0 if p is inside the circle through the counter-clockwise a, b, c; 0 if on it. Uses the same
-  /// formula as IntKernel::in_circle().
+  /// > 0 if p is inside the circle through the counter-clockwise a, b, c, or 0 if on it. Uses the
+  /// same formula as IntKernel::in_circle().
   static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
-    const Sized at_a = sized_angle(a, b, c);
-    const Sized at_p = sized_angle(p, c, b);
+    const BoundedAngle at_a = bounded_angle(a, b, c);
+    const BoundedAngle at_p = bounded_angle(p, c, b);
     const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
     // Each term is a product of two rounded sums of two products of differences. Relative errors of
     // u = 2^-53 come from the differences (2 + 2), products (1 + 1), sums (1 + 1), the product and
@@ -64,13 +64,13 @@ struct DoubleKernel {
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
  private:
-  struct Sized {
+  struct BoundedAngle {
     double cross;
     double dot;
     double cross_size;  ///< sums of absolute values of the products
     double dot_size;
   };
-  static Sized sized_angle(const Point& apex, const Point& b, const Point& c) {
+  static BoundedAngle bounded_angle(const Point& apex, const Point& b, const Point& c) {
     const double bx = b[0] - apex[0];
     const double by = b[1] - apex[1];
     const double cx = c[0] - apex[0];

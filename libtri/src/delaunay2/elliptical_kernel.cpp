@@ -68,8 +68,8 @@ int EllipticalKernel::in_circle_exact(const Point& a, const Point& b, const Poin
 }
 
 int EllipticalKernel::compare_distance(const Point& p, const Point& a, const Point& b) {
-  const Sized to_a = sized_angle(p, a, a);
-  const Sized to_b = sized_angle(p, b, b);
+  const BoundedAngle to_a = bounded_angle(p, a, a);
+  const BoundedAngle to_b = bounded_angle(p, b, b);
   const double difference = to_a.dot - to_b.dot;
   const double size = to_a.dot_size + to_b.dot_size;
   // 9 u for each dot product, 1 u for the difference.

@@ -7,7 +7,7 @@
 #include "terrace/tri/metric.hpp"
 
 /// Exact predicates in an elliptical metric, on the original points: nothing is mapped, so nothing
-/// is rounded. Orientation and betweenness are the same in all linear metrics; only circles become
+/// is rounded. Orientation and betweenness are the same in all linear metrics. Only circles become
 /// ellipses, and distances become lengths of mapped vectors.
 
 namespace terrace::tri::planar {
@@ -32,26 +32,26 @@ class EllipticalKernel : public DoubleKernel {
  public:
   class Scope {
    public:
-    explicit Scope(const QuadraticForm& form) : before_(form_) { form_ = &form; }
-    ~Scope() { form_ = before_; }
+    explicit Scope(const QuadraticForm& form) : previous_(form_) { form_ = &form; }
+    ~Scope() { form_ = previous_; }
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
 
    private:
-    const QuadraticForm* before_;
+    const QuadraticForm* previous_;
   };
 
-  /// > 0 if p is inside the metric's ellipse through the counter-clockwise a, b, c; 0 if on it. As
-  /// in DoubleKernel::in_circle(), with two changes. The cross products of mapped vectors are those
-  /// of the vectors times the determinant of M, which does not change their signs. The dot products
-  /// are d^T Q e.
+  /// > 0 if p is inside the metric's ellipse through the counter-clockwise a, b, c, or 0 if on it.
+  /// As in DoubleKernel::in_circle(), with two changes. The cross products of mapped vectors are
+  /// those of the vectors times the determinant of M, which does not change their signs. The dot
+  /// products are d^T Q e.
   static int in_circle(const Point& a, const Point& b, const Point& c, const Point& p) {
-    const Sized at_a = sized_angle(a, b, c);
-    const Sized at_p = sized_angle(p, c, b);
+    const BoundedAngle at_a = bounded_angle(a, b, c);
+    const BoundedAngle at_p = bounded_angle(p, c, b);
     const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
     const double size = at_a.cross_size * at_p.dot_size + at_p.cross_size * at_a.dot_size;
     // In units of u = 2^-53: differences 2 + 2; for the dot products: products 1, sum of two 1,
-    // entries of Q 2, products with them 1, sums 2; for the cross products: products 1, sum 1; then
+    // entries of Q 2, products with them 1, sums 2; for the cross products: products 1, sum 1. Then
     // product 1 and sum 1. The total is 15 u of the sum of absolute values, which is itself
     // rounded, so 18 u is safe. Otherwise as in DoubleKernel.
     const double largest = at_a.dot_size + at_p.dot_size + at_a.cross_size + at_p.cross_size;
@@ -64,11 +64,11 @@ class EllipticalKernel : public DoubleKernel {
   static int compare_distance(const Point& p, const Point& a, const Point& b);
 
  private:
-  struct Sized {
+  struct BoundedAngle {
     double cross, dot;
     double cross_size, dot_size;  ///< sums of absolute values of the products
   };
-  static Sized sized_angle(const Point& apex, const Point& b, const Point& c) {
+  static BoundedAngle bounded_angle(const Point& apex, const Point& b, const Point& c) {
     const QuadraticForm& q = *form_;
     const double bx = b[0] - apex[0];
     const double by = b[1] - apex[1];

@@ -4,8 +4,8 @@
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 #include "predicates.hpp"
-#include "remove.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -34,12 +34,12 @@ class ApexChoice {
   }
 
  private:
-  // The candidate that no other candidate beats.
-  template <class Beaten>
-  std::uint32_t best(std::uint32_t first, std::uint32_t last, Beaten beaten) const {
+  // Returns the candidate that no other candidate beats.
+  template <class LosesTo>
+  std::uint32_t best(std::uint32_t first, std::uint32_t last, LosesTo loses_to) const {
     std::uint32_t result = first + 1;
     for (std::uint32_t m = first + 2; m < last; ++m)
-      if (beaten(result, m)) result = m;
+      if (loses_to(result, m)) result = m;
     return result;
   }
 
@@ -68,15 +68,15 @@ class ApexChoice {
   }
 
   // True if candidate m is inside the circle of the base and the best candidate so far.
-  bool beats(double cotangent, double least, std::uint32_t m, std::uint32_t so_far, const Point& b,
-             const Point& c) const {
+  bool beats(double cotangent, double least, std::uint32_t m, std::uint32_t best_so_far,
+             const Point& b, const Point& c) const {
     if constexpr (std::is_same_v<Kernel, IntKernel>) {
       // Both quotients are of exact integers, with three roundings each. (Integers meet floating
       // point only here; undecided cases are decided exactly.)
       const double margin = 0x1p-50 * (std::abs(cotangent) + std::abs(least));
       if (std::abs(cotangent - least) > margin) return cotangent < least;
     }
-    return inside_circle<Kernel>(point_[so_far], b, c, point_[m]);
+    return inside_circle<Kernel>(point_[best_so_far], b, c, point_[m]);
   }
 
   const std::uint32_t* vertex_;
@@ -93,11 +93,11 @@ void fill_hole(Mesh<Kernel>& mesh) {
   const auto count = static_cast<std::uint32_t>(hole.vertex.size());
   assert(hole.vertex.front() != kGhost && hole.vertex.back() != kGhost);
 
-  const auto close = [&](std::uint32_t edge, Side inner) {
+  const auto close_edge = [&](std::uint32_t edge, Side inner) {
     mesh.link(inner, hole.outer[edge]);
     mesh.incident[hole.vertex[edge]] = triangle_of(inner);
   };
-  close(count - 1, make_side(hole.slots.back(), 0));
+  close_edge(count - 1, make_side(hole.slots.back(), 0));
   hole.parts.clear();
   hole.parts.push_back({0, count - 1, hole.outer[count - 1]});
   while (!hole.parts.empty()) {
@@ -110,12 +110,12 @@ void fill_hole(Mesh<Kernel>& mesh) {
     mesh.triangle[t].corner = {hole.vertex[apex], hole.vertex[last], hole.vertex[first]};
     mesh.link(make_side(t, 0), mate);
     if (apex == first + 1) {
-      close(first, make_side(t, 1));
+      close_edge(first, make_side(t, 1));
     } else {
       hole.parts.push_back({first, apex, make_side(t, 1)});
     }
     if (last == apex + 1) {
-      close(apex, make_side(t, 2));
+      close_edge(apex, make_side(t, 2));
     } else {
       hole.parts.push_back({apex, last, make_side(t, 2)});
     }

@@ -44,7 +44,7 @@ class Inspection {
     const std::size_t free = mesh_.free_vertices.count();
     expect(alive + free + 1 == mesh_.point.size(), free, " free vertices, not ",
            mesh_.point.size() - 1 - alive);
-    expect((mesh_.last_vertex == kNone) == (alive == 0), "last vertex is not kept");
+    expect((mesh_.last_vertex == kNone) == (alive == 0), "last vertex is missing or superfluous");
     if (alive > 0) expect(mesh_.vertex_alive(mesh_.last_vertex), "last vertex is dead");
   }
 
@@ -100,12 +100,12 @@ class Inspection {
       const std::uint32_t k = index_of(at.mate[i]);
       expect(other < mesh_.triangle.size() && k < 3, "triangle ", t, " has no mate ", i);
       if (!fault_.empty()) return;
-      const Triangle& beyond = mesh_.triangle[other];
-      expect(beyond.mate[k] == make_side(t, i), "mates ", t, " and ", other, " differ");
-      expect(beyond.corner[next_index(k)] == at.corner[previous_index(i)] &&
-                 beyond.corner[previous_index(k)] == at.corner[next_index(i)],
+      const Triangle& neighbour = mesh_.triangle[other];
+      expect(neighbour.mate[k] == make_side(t, i), "mates ", t, " and ", other, " differ");
+      expect(neighbour.corner[next_index(k)] == at.corner[previous_index(i)] &&
+                 neighbour.corner[previous_index(k)] == at.corner[next_index(i)],
              "mates ", t, " and ", other, " have no common edge");
-      const std::uint32_t opposite = beyond.corner[k];
+      const std::uint32_t opposite = neighbour.corner[k];
       expect(opposite != at.corner[i], "triangles ", t, " and ", other, " are the same");
       if (fault_.empty() && opposite != kGhost)
         expect(!in_conflict<Kernel>(mesh_.point.data(), at, mesh_.point[opposite]), "vertex ",
@@ -119,7 +119,7 @@ class Inspection {
 
   void check_marks() {
     for (std::uint32_t v = 0; v < mesh_.mark.size(); ++v)
-      expect(mesh_.mark[v] == 0, "mark of vertex ", v, " was left");
+      expect(mesh_.mark[v] == 0, "mark of vertex ", v, " is not reset");
   }
 
   const Mesh<Kernel>& mesh_;

@@ -50,32 +50,32 @@ void make_fan(Mesh<Kernel>& mesh, std::uint32_t apex) {
   const auto edges = static_cast<std::uint32_t>(line.size()) - 1;
   std::vector<std::uint32_t> slots(2 * edges + 2);
   for (std::uint32_t& t : slots) t = mesh.new_triangle();
-  const auto finite = [&](std::uint32_t i) { return slots[i]; };
-  const auto beyond = [&](std::uint32_t i) { return slots[edges + i]; };
+  const auto finite_triangle = [&](std::uint32_t i) { return slots[i]; };
+  const auto ghost_triangle = [&](std::uint32_t i) { return slots[edges + i]; };
   const std::uint32_t first_end = slots[2 * edges];
   const std::uint32_t last_end = slots[2 * edges + 1];
   for (std::uint32_t i = 0; i < edges; ++i) {
-    mesh.triangle[finite(i)].corner = {apex, line[i], line[i + 1]};
-    mesh.triangle[beyond(i)].corner = {kGhost, line[i + 1], line[i]};
-    mesh.incident[line[i]] = finite(i);
+    mesh.triangle[finite_triangle(i)].corner = {apex, line[i], line[i + 1]};
+    mesh.triangle[ghost_triangle(i)].corner = {kGhost, line[i + 1], line[i]};
+    mesh.incident[line[i]] = finite_triangle(i);
   }
-  mesh.incident[line[edges]] = finite(edges - 1);
-  mesh.incident[apex] = finite(0);
+  mesh.incident[line[edges]] = finite_triangle(edges - 1);
+  mesh.incident[apex] = finite_triangle(0);
   mesh.incident[kGhost] = first_end;
   mesh.triangle[first_end].corner = {kGhost, line[0], apex};
   mesh.triangle[last_end].corner = {kGhost, apex, line[edges]};
 
   for (std::uint32_t i = 0; i < edges; ++i) {
-    mesh.link(make_side(finite(i), 0), make_side(beyond(i), 0));
+    mesh.link(make_side(finite_triangle(i), 0), make_side(ghost_triangle(i), 0));
     if (i == 0) continue;
-    mesh.link(make_side(finite(i), 2), make_side(finite(i - 1), 1));
-    mesh.link(make_side(beyond(i), 1), make_side(beyond(i - 1), 2));
+    mesh.link(make_side(finite_triangle(i), 2), make_side(finite_triangle(i - 1), 1));
+    mesh.link(make_side(ghost_triangle(i), 1), make_side(ghost_triangle(i - 1), 2));
   }
-  mesh.link(make_side(first_end, 0), make_side(finite(0), 2));
-  mesh.link(make_side(last_end, 0), make_side(finite(edges - 1), 1));
+  mesh.link(make_side(first_end, 0), make_side(finite_triangle(0), 2));
+  mesh.link(make_side(last_end, 0), make_side(finite_triangle(edges - 1), 1));
   mesh.link(make_side(first_end, 1), make_side(last_end, 2));
-  mesh.link(make_side(first_end, 2), make_side(beyond(0), 1));
-  mesh.link(make_side(last_end, 1), make_side(beyond(edges - 1), 2));
+  mesh.link(make_side(first_end, 2), make_side(ghost_triangle(0), 1));
+  mesh.link(make_side(last_end, 1), make_side(ghost_triangle(edges - 1), 2));
 }
 
 template <class Kernel>

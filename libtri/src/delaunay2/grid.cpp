@@ -2,9 +2,9 @@
 // Writes the complete grid directly. All corners of a cell are cocircular, and the perturbation
 // gives every cell the diagonal from lower right to upper left: of the four corners the upper right
 // one is raised most, so the circle through the other three does not contain it.
-#include "build.hpp"
 #include "double_kernel.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -30,12 +30,12 @@ struct GridNumbers {
   [[nodiscard]] std::uint32_t ghost(std::uint32_t number) const {
     return 2 * (columns - 1) * (rows - 1) + number;
   }
-  [[nodiscard]] std::uint32_t below(std::uint32_t i) const { return ghost(i); }
-  [[nodiscard]] std::uint32_t right_of(std::uint32_t j) const { return ghost(columns - 1 + j); }
-  [[nodiscard]] std::uint32_t above(std::uint32_t i) const {
+  [[nodiscard]] std::uint32_t ghost_below(std::uint32_t i) const { return ghost(i); }
+  [[nodiscard]] std::uint32_t ghost_right(std::uint32_t j) const { return ghost(columns - 1 + j); }
+  [[nodiscard]] std::uint32_t ghost_above(std::uint32_t i) const {
     return ghost(columns - 1 + rows - 1 + (columns - 2 - i));
   }
-  [[nodiscard]] std::uint32_t left_of(std::uint32_t j) const {
+  [[nodiscard]] std::uint32_t ghost_left(std::uint32_t j) const {
     return ghost(2 * (columns - 1) + rows - 1 + (rows - 2 - j));
   }
 };
@@ -56,16 +56,16 @@ void write_cells(const GridNumbers& grid, Triangle* triangle) {
       triangle[t + 1] = {{c, d, b}, {make_side(t, 0), right, above}};
     };
     const auto below = [&](std::uint32_t i) {
-      return j == 0 ? make_side(grid.below(i), 0) : make_side(grid.upper(i, j - 1), 2);
+      return j == 0 ? make_side(grid.ghost_below(i), 0) : make_side(grid.upper(i, j - 1), 2);
     };
     const auto above = [&](std::uint32_t i) {
-      return j == last_j ? make_side(grid.above(i), 0) : make_side(grid.lower(i, j + 1), 2);
+      return j == last_j ? make_side(grid.ghost_above(i), 0) : make_side(grid.lower(i, j + 1), 2);
     };
     const auto left = [&](std::uint32_t i) {
-      return i == 0 ? make_side(grid.left_of(j), 0) : make_side(grid.upper(i - 1, j), 1);
+      return i == 0 ? make_side(grid.ghost_left(j), 0) : make_side(grid.upper(i - 1, j), 1);
     };
     const auto right = [&](std::uint32_t i) {
-      return i == last_i ? make_side(grid.right_of(j), 0) : make_side(grid.lower(i + 1, j), 1);
+      return i == last_i ? make_side(grid.ghost_right(j), 0) : make_side(grid.lower(i + 1, j), 1);
     };
     for (std::uint32_t i = 0; i <= last_i; ++i) write(i, left(i), below(i), right(i), above(i));
   }
@@ -78,9 +78,9 @@ void write_ghosts(const GridNumbers& grid, Triangle* triangle) {
   // that edge.
   const auto write = [&](std::uint32_t a, std::uint32_t b, Side inner) {
     const std::uint32_t t = grid.ghost(number);
-    const std::uint32_t before = grid.ghost(number == 0 ? count - 1 : number - 1);
-    const std::uint32_t after = grid.ghost(number + 1 == count ? 0 : number + 1);
-    triangle[t] = {{kGhost, b, a}, {inner, make_side(before, 2), make_side(after, 1)}};
+    const std::uint32_t previous = grid.ghost(number == 0 ? count - 1 : number - 1);
+    const std::uint32_t next = grid.ghost(number + 1 == count ? 0 : number + 1);
+    triangle[t] = {{kGhost, b, a}, {inner, make_side(previous, 2), make_side(next, 1)}};
     ++number;
   };
   const std::uint32_t last_i = grid.columns - 2;

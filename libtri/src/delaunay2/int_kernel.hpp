@@ -37,7 +37,7 @@ struct IntKernel {
   /// > 0 if a, b, c turn left, 0 if they are collinear.
   static int orientation(Point a, Point b, Point c) { return sign(angle(a, b, c).cross); }
 
-  /// > 0 if p is inside the circle through the counter-clockwise a, b, c; 0 if on it.
+  /// > 0 if p is inside the circle through the counter-clockwise a, b, c, or 0 if on it.
   ///
   /// p is inside if the angles at a and at p over the chord bc add up to more than 180 degrees.
   /// That is the sign of sin(A + P), which takes 10 multiplications of short numbers. Deliberately
@@ -45,7 +45,7 @@ struct IntKernel {
   [[gnu::noinline]] static int in_circle(Point a, Point b, Point c, Point p) {
     const Angle at_a = angle(a, b, c);
     const Angle at_p = angle(p, c, b);
-    // 64 bits suffice for nearby points; WebAssembly has no wider products.
+    // 64 bits suffice for nearby points. WebAssembly has no wider products.
     const auto raised = [](std::int64_t value) {
       return static_cast<std::uint64_t>(value + kNear);
     };

@@ -1,20 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lattice.hpp"
-
 #include <algorithm>
 #include <cassert>
 
+#include "insert.hpp"
 #include "int_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
 
 /// The smallest set of points that is searched for a lattice.
-constexpr std::size_t kFewestOnLattice = 24;
+constexpr std::size_t kMinPoints = 24;
 /// Sets whose box has more than this many times as many nodes as points are not searched.
-constexpr std::int64_t kMostSparse = 8;
+constexpr std::int64_t kMaxNodesPerPoint = 8;
 /// At least one point in this many must have all eight neighbours.
-constexpr std::size_t kLeastInside = 4;
+constexpr std::size_t kPointsPerInnerPoint = 4;
 
 /// Set in Triangle::corner[0] while squares are cut out.
 constexpr std::uint32_t kCutOut = 0x80000000u;
@@ -38,14 +37,14 @@ class LatticeFill {
 
   void run() {
     lattice_.slots.clear();
-    lattice_.beyond.assign(4 * lattice_.filled.size(), kNone);
+    lattice_.outer_sides.assign(4 * lattice_.square_number.size(), kNone);
     for (const std::uint32_t square : lattice_.squares) {
-      if (lattice_.filled[square - 1] == 0 && beyond(square, kLeft) == kNone) {
+      if (lattice_.square_number[square - 1] == 0 && outer_side(square, kLeft) == kNone) {
         cut_out(at_left_side(square));
       }
     }
     lattice_.inserted.clear();
-    for (const std::uint32_t i : lattice_.inside) {
+    for (const std::uint32_t i : lattice_.inner_points) {
       std::uint32_t& vertex = lattice_.vertex[lattice_.node(points_[i])];
       const bool created = vertex == kNone;
       if (created) vertex = mesh_.new_vertex(points_[i]);
@@ -59,11 +58,11 @@ class LatticeFill {
   }
 
  private:
-  [[nodiscard]] Side& beyond(std::size_t square, SquareSide side) {
-    return lattice_.beyond[4 * square + side];
+  [[nodiscard]] Side& outer_side(std::size_t square, SquareSide side) {
+    return lattice_.outer_sides[4 * square + side];
   }
 
-  /// The triangle within a square whose left side is on the rim.
+  /// The triangle within a square at its left side, which is on the border of the region.
   [[nodiscard]] std::uint32_t at_left_side(std::uint32_t square) const {
     const std::uint32_t low = lattice_.vertex[square];
     const std::uint32_t high = lattice_.vertex[square + lattice_.columns];
@@ -79,7 +78,7 @@ class LatticeFill {
     }
   }
 
-  /// The squares at an edge of length 1. The first is on the left.
+  /// The squares at an edge of length 1. The one on the left is `inner`.
   [[nodiscard]] UnitSide squares_at(const Point& from, const Point& to) const {
     const std::size_t node = lattice_.node({std::min(from[0], to[0]), std::min(from[1], to[1])});
     if (from[1] == to[1]) {
@@ -108,8 +107,8 @@ class LatticeFill {
         lattice_.vertex[lattice_.node(from)] = corner[next_index(i)];
         if (std::abs(to[0] - from[0]) + std::abs(to[1] - from[1]) == 1) {
           const UnitSide unit = squares_at(from, to);
-          if (lattice_.filled[unit.outer] == 0) {
-            beyond(unit.inner, unit.side) = t.mate[i];
+          if (lattice_.square_number[unit.outer] == 0) {
+            outer_side(unit.inner, unit.side) = t.mate[i];
             continue;
           }
         }
@@ -119,38 +118,39 @@ class LatticeFill {
     }
   }
 
-  /// Both triangles of each square, as in grid.cpp.
+  /// Writes both triangles of each square, as in grid.cpp.
   void write() {
     for (std::uint32_t k = 0; k < lattice_.squares.size(); ++k) {
-      lattice_.filled[lattice_.squares[k]] = k + 1;
+      lattice_.square_number[lattice_.squares[k]] = k + 1;
     }
     const auto lower = [&](std::size_t square) {
-      return lattice_.slots[2 * (lattice_.filled[square] - 1)];
+      return lattice_.slots[2 * (lattice_.square_number[square] - 1)];
     };
     const auto upper = [&](std::size_t square) {
-      return lattice_.slots[2 * (lattice_.filled[square] - 1) + 1];
+      return lattice_.slots[2 * (lattice_.square_number[square] - 1) + 1];
     };
     Triangle* const triangle = mesh_.triangle.data();
-    const std::size_t up = lattice_.columns;
+    const std::size_t row_stride = lattice_.columns;
     for (const std::uint32_t square : lattice_.squares) {
-      // The mate of side i of the triangle `own`; a mate in the next square has the same index.
-      const auto mate = [&](SquareSide side, std::size_t next, std::uint32_t own, std::uint32_t i) {
-        if (lattice_.filled[next] != 0) {
+      // The mate of side i of triangle t. A mate in the next square has the same index.
+      const auto mate = [&](SquareSide side, std::size_t next, std::uint32_t t, std::uint32_t i) {
+        if (lattice_.square_number[next] != 0) {
           return make_side(side == kLeft || side == kBelow ? upper(next) : lower(next), i);
         }
-        const Side outer = beyond(square, side);
-        triangle[triangle_of(outer)].mate[index_of(outer)] = make_side(own, i);
+        const Side outer = outer_side(square, side);
+        triangle[triangle_of(outer)].mate[index_of(outer)] = make_side(t, i);
         return outer;
       };
       const std::uint32_t a = lattice_.vertex[square], b = lattice_.vertex[square + 1];
-      const std::uint32_t d = lattice_.vertex[square + up], c = lattice_.vertex[square + up + 1];
+      const std::uint32_t d = lattice_.vertex[square + row_stride],
+                          c = lattice_.vertex[square + row_stride + 1];
       const std::uint32_t low = lower(square), high = upper(square);
-      triangle[low] = {
-          {a, b, d},
-          {make_side(high, 0), mate(kLeft, square - 1, low, 1), mate(kBelow, square - up, low, 2)}};
+      triangle[low] = {{a, b, d},
+                       {make_side(high, 0), mate(kLeft, square - 1, low, 1),
+                        mate(kBelow, square - row_stride, low, 2)}};
       triangle[high] = {{c, d, b},
                         {make_side(low, 0), mate(kRight, square + 1, high, 1),
-                         mate(kAbove, square + up, high, 2)}};
+                         mate(kAbove, square + row_stride, high, 2)}};
       mesh_.incident[a] = mesh_.incident[b] = mesh_.incident[d] = low;
       mesh_.incident[c] = high;
     }
@@ -168,7 +168,7 @@ bool find_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> po
                   std::uint32_t head) {
   using Point = typename Kernel::Point;
   Lattice& lattice = mesh.lattice;
-  if (points.size() < kFewestOnLattice || mesh.flat) return false;
+  if (points.size() < kMinPoints || mesh.flat) return false;
   Point low = points[0], high = low;
   for (const Point& p : points) {
     for (std::size_t k = 0; k < 2; ++k) {
@@ -178,7 +178,7 @@ bool find_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> po
   }
   const std::int64_t width = std::int64_t{high[0]} - low[0] + 1;
   const std::int64_t height = std::int64_t{high[1]} - low[1] + 1;
-  if (height > kMostSparse * static_cast<std::int64_t>(points.size()) / width) return false;
+  if (height > kMaxNodesPerPoint * static_cast<std::int64_t>(points.size()) / width) return false;
 
   // A frame one node wide gives every node neighbours.
   lattice.low = {low[0] - 1, low[1] - 1};
@@ -193,41 +193,42 @@ bool find_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> po
   }
   if (head != kNone) {
     const Point& p = mesh.point[head];
-    const bool near = p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1];
-    if (near) {
+    const bool in_window = p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1];
+    if (in_window) {
       std::uint32_t& number = lattice.vertex[lattice.node(p)];
       if (number == kNone) number = static_cast<std::uint32_t>(points.size());
     }
   }
-  lattice.filled.assign(nodes, 0);
-  lattice.inside.clear();
-  lattice.outside.clear();
-  const std::size_t up = lattice.columns;
+  lattice.square_number.assign(nodes, 0);
+  lattice.inner_points.clear();
+  lattice.outer_points.clear();
+  const std::size_t row_stride = lattice.columns;
   for (std::uint32_t i = 0; i < points.size(); ++i) {
     const std::size_t node = lattice.node(points[i]);
-    bool all = true;
-    for (const std::size_t row : {node - up, node, node + up}) {
-      for (const std::size_t next : {row - 1, row, row + 1}) all &= lattice.vertex[next] != kNone;
+    bool has_all_neighbours = true;
+    for (const std::size_t row : {node - row_stride, node, node + row_stride}) {
+      for (const std::size_t next : {row - 1, row, row + 1})
+        has_all_neighbours &= lattice.vertex[next] != kNone;
     }
-    if (!all) {
-      lattice.outside.push_back(i);
+    if (!has_all_neighbours) {
+      lattice.outer_points.push_back(i);
       continue;
     }
-    lattice.inside.push_back(i);
-    for (const std::size_t square : {node - up - 1, node - up, node - 1, node}) {
-      lattice.filled[square] = 1;
+    lattice.inner_points.push_back(i);
+    for (const std::size_t square : {node - row_stride - 1, node - row_stride, node - 1, node}) {
+      lattice.square_number[square] = 1;
     }
   }
-  if (lattice.inside.size() < points.size() / kLeastInside) return false;
+  if (lattice.inner_points.size() < points.size() / kPointsPerInnerPoint) return false;
   lattice.squares.clear();
   for (std::uint32_t square = 0; square < nodes; ++square) {
-    if (lattice.filled[square] != 0) lattice.squares.push_back(square);
+    if (lattice.square_number[square] != 0) lattice.squares.push_back(square);
   }
   lattice.vertex.assign(nodes, kNone);
   if (head != kNone) {
     const Point& p = mesh.point[head];
-    const bool near = p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1];
-    if (near) lattice.vertex[lattice.node(p)] = head;
+    const bool in_window = p[0] >= low[0] && p[0] <= high[0] && p[1] >= low[1] && p[1] <= high[1];
+    if (in_window) lattice.vertex[lattice.node(p)] = head;
   }
   return true;
 }

@@ -62,10 +62,10 @@ inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
 /// In Mesh::incident: the slot is free.
 inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
 
-/// A simple polygon to be filled with triangles, see fill.hpp; scratch memory of removal.
+/// A simple polygon that removal fills with triangles, see fill.cpp. Scratch memory.
 template <class Point>
 struct Hole {
-  std::vector<std::uint32_t> vertex;  ///< counter-clockwise; may contain the ghost
+  std::vector<std::uint32_t> vertex;  ///< counter-clockwise. May contain the ghost
   std::vector<Point> point;           ///< points of `vertex`, in parallel
   /// outer[i]: the side beyond the edge from vertex[i] to the next vertex.
   std::vector<Side> outer;
@@ -78,7 +78,7 @@ struct Hole {
   std::vector<Part> parts;
 };
 
-/// The triangles that the removal of a set of vertices takes out, see remove_set.cpp; scratch
+/// The triangles that the removal of a set of vertices takes out, see remove_set.cpp. Scratch
 /// memory.
 struct Region {
   struct Edge {
@@ -93,7 +93,7 @@ struct Region {
   Pool<Side> rim;                      ///< edges that may be on the boundary
   Pool<Side> queue;
   // The boundary by loops: edge numbers, and the end of each loop among these.
-  std::vector<std::uint32_t> ordered;
+  std::vector<std::uint32_t> loop_edges;
   std::vector<std::size_t> loop_ends;
   std::vector<std::uint8_t> visited;  ///< by edge number
   std::vector<std::uint32_t> pinches;
@@ -105,18 +105,18 @@ struct Inserted {
   bool created;
 };
 
-/// A window of the integer lattice, see lattice.hpp; scratch memory. A node is the lower left
-/// corner of a square and has the same number.
+/// A window of the integer lattice, see lattice.cpp. A node is the lower left corner of a square
+/// and has the same number. Scratch memory.
 struct Lattice {
   std::array<std::int32_t, 2> low{};  ///< of node 0
   std::uint32_t columns = 0;
-  std::vector<std::uint32_t> vertex;           ///< by node; kNone: no vertex yet
-  std::vector<std::uint32_t> filled;           ///< by square: 0, or its number in `squares` plus 1
-  std::vector<std::uint32_t> squares;          ///< the squares to be filled
-  std::vector<std::uint32_t> inside, outside;  ///< numbers of points
-  std::vector<Inserted> inserted;              ///< for each of `inside`
-  std::vector<std::uint32_t> slots;            ///< of triangles, two for each of `squares`
-  std::vector<Side> beyond;                    ///< four for each square: the sides beyond its sides
+  std::vector<std::uint32_t> vertex;         ///< by node. kNone: no vertex yet
+  std::vector<std::uint32_t> square_number;  ///< by square: 0, or its number in `squares` plus 1
+  std::vector<std::uint32_t> squares;        ///< the squares to fill
+  std::vector<std::uint32_t> inner_points, outer_points;  ///< numbers of points
+  std::vector<Inserted> inserted;                         ///< for each of `inner_points`
+  std::vector<std::uint32_t> slots;  ///< of triangles, two for each of `squares`
+  std::vector<Side> outer_sides;     ///< four for each square: the sides beyond its sides
 
   [[nodiscard]] std::size_t node(const std::array<std::int32_t, 2>& p) const {
     return static_cast<std::size_t>(p[1] - low[1]) * columns +

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query.hpp"
-
 #include <algorithm>
 #include <cstring>
 
@@ -9,6 +7,7 @@
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 #include "walk.hpp"
 
 namespace terrace::tri::planar {
@@ -119,9 +118,9 @@ std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
   std::uint32_t best = start.corner[0];
   for (std::uint32_t i = 1; i < 3; ++i)
     if (nearer(mesh, p, start.corner[i], best)) best = start.corner[i];
-  for (std::uint32_t before = kNone; before != best;) {
-    before = best;
-    for_star(mesh, before, mesh.incident[before], [&](std::uint32_t t, std::uint32_t i) {
+  for (std::uint32_t previous = kNone; previous != best;) {
+    previous = best;
+    for_star(mesh, previous, mesh.incident[previous], [&](std::uint32_t t, std::uint32_t i) {
       const std::uint32_t v = mesh.triangle[t].corner[next_index(i)];
       if (v != kGhost && nearer(mesh, p, v, best)) best = v;
     });

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "remove.hpp"
-
 #include <algorithm>
 
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -56,12 +55,12 @@ bool collinear(const Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices
 template <class Point>
 void turn_ghost_inside(Hole<Point>& hole) {
   if (hole.vertex.front() != kGhost && hole.vertex.back() != kGhost) return;
-  const auto turn = [by = hole.vertex.front() == kGhost ? -1 : -2](auto& array) {
-    std::rotate(array.begin(), array.end() + by, array.end());
+  const auto rotate = [offset = hole.vertex.front() == kGhost ? -1 : -2](auto& array) {
+    std::rotate(array.begin(), array.end() + offset, array.end());
   };
-  turn(hole.vertex);
-  turn(hole.point);
-  turn(hole.outer);
+  rotate(hole.vertex);
+  rotate(hole.point);
+  rotate(hole.outer);
 }
 
 template <class Kernel>

@@ -2,7 +2,7 @@
 // Removes a set of vertices as one hole, after J. Skala, thesis, section 8.1, extended to the whole
 // set at once: all triangles at the vertices are taken out first. If they leave a simple disc (or
 // several), it is filled in one go. The thesis requires that a vertex is on the hole's boundary and
-// that no boundary vertex occurs twice; here these rules become one count (Euler's formula) and one
+// that no boundary vertex occurs twice. Here these rules become one count (Euler's formula) and one
 // comparison.
 //
 // Vertices that stay but are inside the hole (islands) or touch its boundary twice (pinches) are
@@ -13,7 +13,7 @@
 #include "elliptical_kernel.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
-#include "remove.hpp"
+#include "operations.hpp"
 #include "walk.hpp"
 
 namespace terrace::tri::planar {
@@ -24,17 +24,17 @@ constexpr std::size_t kMinSet = 4;
 /// Filling is quadratic at worst, so longer boundaries are not attempted.
 constexpr std::size_t kMaxBoundary = 4096;
 /// Scratch memory beyond this is released.
-constexpr std::size_t kMostScratch = std::size_t{1} << 20;
+constexpr std::size_t kMaxScratch = std::size_t{1} << 20;
 
 /// Values of Mesh::mark.
 constexpr std::uint8_t kKept = 0;
 constexpr std::uint8_t kRemoved = 1;
 constexpr std::uint8_t kOnBoundary = 2;
 
-/// Set in Triangle::corner[0], between flood() and dry(), for triangles of the region.
+/// Set in Triangle::corner[0], between flood() and unmark_region(), for triangles of the region.
 constexpr std::uint32_t kInRegion = 0x80000000u;
 
-/// In an entry of the queue, in place of the side through which the triangle was entered.
+/// In an entry of the queue: no side, because the triangle is a start of the flood.
 constexpr std::uint32_t kNoSide = 3;
 
 /// Arrays of the flood. Each triangle adds at most three entries to the queue and one to each of
@@ -54,14 +54,14 @@ struct Output {
  private:
   void grow(std::uint32_t entries) {
     size_ = entries + entries / 2;
-    const auto grown = [size = size_](auto& array) {
+    const auto resized = [size = size_](auto& array) {
       array.resize(size);
       return array.data();
     };
-    queue = grown(region_.queue);
-    triangles = grown(region_.triangles);
-    mixed = grown(region_.mixed);
-    rim = grown(region_.rim);
+    queue = resized(region_.queue);
+    triangles = resized(region_.triangles);
+    mixed = resized(region_.mixed);
+    rim = resized(region_.rim);
   }
 
   Region& region_;
@@ -70,7 +70,7 @@ struct Output {
 
 /// Finds the region left by removed vertices: all triangles at them, and the edges around these.
 /// Input: the vertices in region.removed, and Mesh::mark, which is kRemoved for them and kKept for
-/// all others. Fills region.triangles, .mixed and .boundary; marks the triangles with kInRegion.
+/// all others. Fills region.triangles, .mixed and .boundary. Marks the triangles with kInRegion.
 ///
 /// Floods the region across edges breadth-first, so that a triangle is fetched from memory long
 /// before its turn comes, and almost without branches, which could not be predicted. (Walking
@@ -98,24 +98,24 @@ void flood(Mesh<Kernel>& mesh) {
   for (std::size_t head = 0; head < tail; ++head) {
     out.make_room(tail + 3);
     const std::uint32_t t = triangle_of(out.queue[head]);
-    const std::uint32_t entered = index_of(out.queue[head]);
+    const std::uint32_t entry_side = index_of(out.queue[head]);
     Triangle& at = triangle[t];
-    const bool fresh = (at.corner[0] & kInRegion) == 0;
+    const bool first_visit = (at.corner[0] & kInRegion) == 0;
     const unsigned a = mark[at.corner[0] & ~kInRegion];
     const unsigned b = mark[at.corner[1]];
     const unsigned c = mark[at.corner[2]];
     at.corner[0] |= kInRegion;
     out.triangles[triangles] = t;
-    triangles += fresh ? 1 : 0;
+    triangles += first_visit ? 1 : 0;
     // The triangle across an edge with a removed vertex belongs to the region too.
-    push(at.mate[0], fresh & ((b | c) != 0) & (entered != 0));
-    push(at.mate[1], fresh & ((c | a) != 0) & (entered != 1));
-    push(at.mate[2], fresh & ((a | b) != 0) & (entered != 2));
+    push(at.mate[0], first_visit & ((b | c) != 0) & (entry_side != 0));
+    push(at.mate[1], first_visit & ((c | a) != 0) & (entry_side != 1));
+    push(at.mate[2], first_visit & ((a | b) != 0) & (entry_side != 2));
     const unsigned count = a + b + c;
     out.mixed[mixed] = t;
-    mixed += (fresh & (count < 3)) ? 1 : 0;
+    mixed += (first_visit & (count < 3)) ? 1 : 0;
     out.rim[rim] = make_side(t, b + 2 * c);
-    rim += (fresh & (count == 1)) ? 1 : 0;
+    rim += (first_visit & (count == 1)) ? 1 : 0;
   }
   region.triangles.resize(triangles);
   region.mixed.resize(mixed);
@@ -135,7 +135,7 @@ void flood(Mesh<Kernel>& mesh) {
 
 /// Removes kInRegion from the region's triangles.
 template <class Kernel>
-void dry(Mesh<Kernel>& mesh) {
+void unmark_region(Mesh<Kernel>& mesh) {
   for (const std::uint32_t t : span_of(mesh.region.triangles))
     mesh.triangle[t].corner[0] &= ~kInRegion;
 }
@@ -153,7 +153,7 @@ class SetRemoval {
   }
   ~SetRemoval() {
     for (const std::uint32_t v : region_.removed) mesh_.mark[v] = kKept;
-    if (region_.queue.bytes() > kMostScratch) region_ = {};
+    if (region_.queue.bytes() > kMaxScratch) region_ = {};
   }
   SetRemoval(const SetRemoval&) = delete;
   SetRemoval& operator=(const SetRemoval&) = delete;
@@ -162,23 +162,23 @@ class SetRemoval {
   bool run() {
     flood(mesh_);
     if (region_.boundary.size() > kMaxBoundary) {
-      dry(mesh_);
+      unmark_region(mesh_);
       return false;
     }
     for (int round = 0; !is_simple(); ++round) {
       restore_incident();
       if (round == 2 || !absorb()) {
-        dry(mesh_);
+        unmark_region(mesh_);
         return false;
       }
     }
-    dry(mesh_);
+    unmark_region(mesh_);
     if (survivors_collinear()) {
       restore_incident();
       return false;
     }
     fill_loops();
-    put_back();
+    reinsert_absorbed();
     return true;
   }
 
@@ -201,16 +201,16 @@ class SetRemoval {
   /// Orders the boundary edges into loops.
   void trace_loops() {
     const auto& boundary = region_.boundary;
-    region_.ordered.clear();
+    region_.loop_edges.clear();
     region_.loop_ends.clear();
     region_.visited.assign(boundary.size(), 0);
     for (std::uint32_t e = 0; e < boundary.size(); ++e) {
       if (region_.visited[e] != 0) continue;
       for (std::uint32_t at = e; region_.visited[at] == 0; at = mesh_.incident[boundary[at].to]) {
         region_.visited[at] = 1;
-        region_.ordered.push_back(at);
+        region_.loop_edges.push_back(at);
       }
-      region_.loop_ends.push_back(region_.ordered.size());
+      region_.loop_ends.push_back(region_.loop_edges.size());
     }
   }
 
@@ -224,36 +224,36 @@ class SetRemoval {
   bool absorb() {
     auto& removed = region_.removed;
     auto& pinches = region_.pinches;
-    const std::size_t before = removed.size();
-    const std::size_t most = requested_ / 4 + 8;
+    const std::size_t size_before = removed.size();
+    const std::size_t max_absorbed = requested_ / 4 + 8;
     std::sort(pinches.begin(), pinches.end());
     pinches.erase(std::unique(pinches.begin(), pinches.end()), pinches.end());
     for (const std::uint32_t v : pinches) {
-      if (v == kGhost || removed.size() - requested_ >= most) return false;
+      if (v == kGhost || removed.size() - requested_ >= max_absorbed) return false;
       mesh_.mark[v] = kRemoved;
       removed.push_back(v);
     }
     for (const Region::Edge& edge : region_.boundary)
       if (mesh_.mark[edge.from] == kKept) mesh_.mark[edge.from] = kOnBoundary;
-    const bool possible = absorb_islands(most);
+    const bool possible = absorb_islands(max_absorbed);
     for (const Region::Edge& edge : region_.boundary)
       if (mesh_.mark[edge.from] == kOnBoundary) mesh_.mark[edge.from] = kKept;
-    if (!possible || removed.size() == before) return false;
-    // All triangles of an island are already listed; only pinches add new ones.
+    if (!possible || removed.size() == size_before) return false;
+    // All triangles of an island are already listed. Only pinches add new ones.
     if (!pinches.empty()) {
-      dry(mesh_);
+      unmark_region(mesh_);
       flood(mesh_);
     }
     return true;
   }
 
-  bool absorb_islands(std::size_t most) {
+  bool absorb_islands(std::size_t max_absorbed) {
     auto& removed = region_.removed;
     for (const std::uint32_t t : span_of(region_.mixed)) {
       const auto& [a, b, c] = mesh_.triangle[t].corner;
       for (const std::uint32_t v : {a & ~kInRegion, b, c}) {
         if (mesh_.mark[v] != kKept) continue;
-        if (v == kGhost || removed.size() - requested_ >= most) return false;
+        if (v == kGhost || removed.size() - requested_ >= max_absorbed) return false;
         mesh_.mark[v] = kRemoved;
         removed.push_back(v);
       }
@@ -282,7 +282,7 @@ class SetRemoval {
       hole.point.clear();
       hole.outer.clear();
       for (std::size_t k = begin; k < end; ++k) {
-        const Region::Edge& edge = region_.boundary[region_.ordered[k]];
+        const Region::Edge& edge = region_.boundary[region_.loop_edges[k]];
         hole.vertex.push_back(edge.from);
         hole.point.push_back(mesh_.point[edge.from]);
         hole.outer.push_back(edge.outer);
@@ -301,7 +301,7 @@ class SetRemoval {
   }
 
   /// Reinserts the absorbed vertices.
-  void put_back() {
+  void reinsert_absorbed() {
     for (std::size_t k = requested_; k < region_.removed.size(); ++k) {
       const std::uint32_t v = region_.removed[k];
       const WalkEnd end = walk(mesh_, mesh_.point[v], mesh_.incident[mesh_.last_vertex]);

@@ -41,7 +41,7 @@ struct InMetric<double, EllipticalMetric3> {
 template <class Coord, class Metric>
 struct Delaunay3<Coord, Metric>::Impl : spatial::InMetric<Coord, Metric> {
   using Base = spatial::InMetric<Coord, Metric>;
-  explicit Impl(const Metric& given) : metric(given), form(given) {}
+  explicit Impl(const Metric& value) : metric(value), form(value) {}
   [[nodiscard]] typename Base::Scope scope() const { return typename Base::Scope(form); }
 
   Metric metric;

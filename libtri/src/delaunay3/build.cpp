@@ -1,26 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // Bulk construction numbers vertices along a Hilbert curve and inserts them one by one, each near
 // the previous one, coarse samples first. Two threads insert the fine samples, see
-// parts_insert.cpp.
-#include "build.hpp"
-
+// parallel_insert.cpp.
 #include <algorithm>
 #include <array>
 
-#include "../curve_sort.hpp"
+#include "curve_sort.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
-#include "hilbert.hpp"
 #include "insert.hpp"
 #include "int_kernel.hpp"
-#include "parts_insert.hpp"
+#include "operations.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
 
-/// Passes over fewer points are not divided into parts.
-constexpr std::uint32_t kInParts = 8192;
+/// Passes over fewer points use one thread.
+constexpr std::uint32_t kMinParallel = 8192;
 
 /// Puts points into slots begin, begin + 1, ... in Hilbert order. Returns the slot of each.
 template <class Kernel>
@@ -43,36 +40,39 @@ std::vector<VertexId> number_vertices(Mesh<Kernel>& mesh,
   return vertex_of;
 }
 
-/// Puts all slots from `begin` on into the flat state; mesh.basis spans their plane.
+/// Sorts the vertices of all slots into the flat state, whose plane mesh.basis spans. Duplicates
+/// become aliases.
 template <class Kernel>
-void wait_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
-  std::vector<std::uint32_t>& waiting = mesh.waiting;
-  for (std::uint32_t v = begin; v < end; ++v) waiting.push_back(v);
-  std::sort(waiting.begin(), waiting.end(), [&](std::uint32_t a, std::uint32_t b) {
+void sort_flat_vertices(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end) {
+  std::vector<std::uint32_t>& flat_vertices = mesh.flat_vertices;
+  for (std::uint32_t v = begin; v < end; ++v) flat_vertices.push_back(v);
+  std::sort(flat_vertices.begin(), flat_vertices.end(), [&](std::uint32_t a, std::uint32_t b) {
     mesh.ticks(4);
     const auto& p = mesh.vertex[a].point;
     const auto& q = mesh.vertex[b].point;
     return lexicographically_less(p, q) || (same_point(p, q) && a < b);
   });
-  std::size_t kept = 0;
-  for (const std::uint32_t v : waiting) {
-    if (kept > 0 && same_point(mesh.vertex[waiting[kept - 1]].point, mesh.vertex[v].point)) {
-      mesh.vertex[v].incident = kAlias | waiting[kept - 1];
+  std::size_t unique_count = 0;
+  for (const std::uint32_t v : flat_vertices) {
+    if (unique_count > 0 &&
+        same_point(mesh.vertex[flat_vertices[unique_count - 1]].point, mesh.vertex[v].point)) {
+      mesh.vertex[v].incident = kAlias | flat_vertices[unique_count - 1];
     } else {
-      waiting[kept++] = v;
+      flat_vertices[unique_count++] = v;
     }
   }
-  waiting.resize(kept);
-  mesh.last_vertex = waiting.front();
+  flat_vertices.resize(unique_count);
+  mesh.last_vertex = flat_vertices.front();
 }
 
 /// Frees the slots of duplicates and sets vertex_of to the vertices that represent them.
 template <class Kernel>
 void resolve_aliases(Mesh<Kernel>& mesh, std::vector<VertexId>& vertex_of, std::uint32_t begin,
                      std::uint32_t end) {
-  bool any = false;
-  for (std::uint32_t v = begin; v < end && !any; ++v) any = (mesh.vertex[v].incident & kAlias) != 0;
-  if (!any) return;
+  bool has_duplicates = false;
+  for (std::uint32_t v = begin; v < end && !has_duplicates; ++v)
+    has_duplicates = (mesh.vertex[v].incident & kAlias) != 0;
+  if (!has_duplicates) return;
   for (VertexId& v : vertex_of) {
     const std::uint32_t entry = mesh.vertex[slot(v)].incident;
     if ((entry & kAlias) != 0) v = VertexId{entry & ~kAlias};
@@ -94,20 +94,20 @@ void insert_all(Mesh<Kernel>& mesh, std::uint32_t begin, std::uint32_t end,
   const std::uint32_t count = end - begin;
   std::uint32_t step = 1;
   while (count / step > kFactor * kFactor) step *= kFactor;
-  std::vector<std::uint32_t> going;
+  std::vector<std::uint32_t> vertices;
   for (bool coarsest = true; step > 0; step /= kFactor, coarsest = false) {
-    going.clear();
-    if (!coarsest) going.reserve(count / step);
+    vertices.clear();
+    if (!coarsest) vertices.reserve(count / step);
     for (std::uint32_t k = 0; k < count; k += step) {
       if (!coarsest && k % (step * kFactor) == 0) continue;
       if (std::find(first.begin(), first.end(), begin + k) == first.end())
-        going.push_back(begin + k);
+        vertices.push_back(begin + k);
     }
     // With fewer points nearly all of space is close to the border between the parts.
-    if (count / step < kInParts) {
-      for (const std::uint32_t v : going) insert_slot(mesh, v, mesh.last_vertex);
+    if (count / step < kMinParallel) {
+      for (const std::uint32_t v : vertices) insert_slot(mesh, v, mesh.last_vertex);
     } else {
-      insert_in_parts(mesh, {begin, end, step}, going, threads);
+      insert_in_parallel(mesh, {begin, end, step}, vertices, threads);
     }
   }
 }
@@ -126,12 +126,12 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
   std::uint32_t apex = begin;
   for (; apex < end && extend_basis(mesh, mesh.basis, apex); ++apex) mesh.ticks(kTicksOfInsertion);
   if (apex == end) {
-    wait_all(mesh, begin, end);
+    sort_flat_vertices(mesh, begin, end);
   } else {
     // Uniformly distributed points have 6.77 tetrahedra each, including ghosts.
-    const std::size_t usual = 7 * std::size_t{mesh.vertex_count};
-    mesh.tetrahedron.reserve(usual);
-    mesh.mark.reserve(usual);
+    const std::size_t expected = 7 * std::size_t{mesh.vertex_count};
+    mesh.tetrahedron.reserve(expected);
+    mesh.mark.reserve(expected);
     const std::array<std::uint32_t, 4> first = {mesh.basis[0], mesh.basis[1], mesh.basis[2], apex};
     // Several threads cannot record. The journal is filled afterwards, as all slots were free
     // before.

@@ -22,7 +22,7 @@ class CavityInsertion {
   /// part is out of room.
   bool run(std::uint32_t vertex, std::uint32_t conflict) {
     bool possible = collect(mesh_.vertex[vertex].point, conflict);
-    if constexpr (!Part::kWhole) {
+    if constexpr (!Part::kIsEntireMesh) {
       out_of_room_ = possible && !part_.has_room(facet_count_);
       possible = possible && !out_of_room_;
     }
@@ -48,13 +48,13 @@ class CavityInsertion {
     const Conflicts<Kernel> conflicts(mesh_, p);
     inside_count_ = 0;
     facet_count_ = 0;
-    if constexpr (!Part::kWhole) {
+    if constexpr (!Part::kIsEntireMesh) {
       if (!part_.owns(tetrahedron[conflict])) return false;
     }
     if (cavity_.inside.size() < 5) cavity_.inside.resize(64);
     if (cavity_.facets.size() < 4) cavity_.facets.resize(64);
     cavity_.inside[inside_count_++] = conflict;
-    mark[conflict] = kTaken;
+    mark[conflict] = kCollected;
     for (std::size_t k = 0; k < inside_count_; ++k) {
       if (inside_count_ + 4 > cavity_.inside.size()) [[unlikely]]
         cavity_.inside.resize(2 * cavity_.inside.size());
@@ -64,7 +64,7 @@ class CavityInsertion {
       std::array<Verdict, 4> filtered;
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
-        if constexpr (!Part::kWhole) {
+        if constexpr (!Part::kIsEntireMesh) {
           // The other corners belong to t, which the part owns.
           if (!part_.owns(tetrahedron[other].corner[index_of(t.mate[i])])) return false;
         }
@@ -78,7 +78,7 @@ class CavityInsertion {
           const Tetrahedron& tested = tetrahedron[other];
           if (filtered[i] == Verdict::kIn ||
               (filtered[i] == Verdict::kOpen && conflicts.decide(tested))) {
-            mark[other] = kTaken;
+            mark[other] = kCollected;
             cavity_.inside[inside_count_++] = other;
             for (const Side mate : tested.mate) {
               __builtin_prefetch(&tetrahedron[tetrahedron_of(mate)]);
@@ -100,13 +100,13 @@ class CavityInsertion {
 
   /// Reuses the slots of the cavity, and allocates more or frees the rest.
   void take_slots() {
-    std::uint32_t gone = 0;
+    std::uint32_t ghosts = 0;
     for (std::size_t i = 0; i < inside_count_; ++i) {
       const std::uint32_t t = cavity_.inside[i];
-      if (has_ghost(mesh_.tetrahedron[t].corner)) ++gone;
+      if (has_ghost(mesh_.tetrahedron[t].corner)) ++ghosts;
       mesh_.record(t);
     }
-    part_.count(mesh_, gone, -static_cast<std::int64_t>(inside_count_));
+    part_.count(mesh_, ghosts, -static_cast<std::int64_t>(inside_count_));
     for (std::size_t i = 0; i < facet_count_; ++i)
       cavity_.facets[i].slot = i < inside_count_ ? cavity_.inside[i] : part_.new_tetrahedron(mesh_);
     for (std::size_t i = facet_count_; i < inside_count_; ++i)

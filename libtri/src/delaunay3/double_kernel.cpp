@@ -46,14 +46,14 @@ void DoubleKernel::Lattice::add(double c) {
   if (lowest >= exponent_) return;
   exponent_ = lowest;
   // All powers of the differences are then far from underflow and overflow.
-  exact_fifth_ = exponent_ < kLeast ? 0 : std::ldexp(kExactFifth, 10 * exponent_);
+  exact_fifth_ = exponent_ < kMinExponent ? 0 : std::ldexp(kExactFifth, 10 * exponent_);
 }
 
 int DoubleKernel::orientation_exact(const Point& a, const Point& b, const Point& c,
                                     const Point& d) {
-  std::array<IntKernel::Point, 4> whole;
-  if (to_integers<4>({&a, &b, &c, &d}, whole))
-    return IntKernel::orientation(whole[0], whole[1], whole[2], whole[3]);
+  std::array<IntKernel::Point, 4> integers;
+  if (to_integers<4>({&a, &b, &c, &d}, integers))
+    return IntKernel::orientation(integers[0], integers[1], integers[2], integers[3]);
   return Epick().orientation_3_object()(cgal(a), cgal(b), cgal(c), cgal(d));
 }
 
@@ -67,9 +67,9 @@ bool DoubleKernel::collinear(const Point& a, const Point& b, const Point& c) {
 
 int DoubleKernel::in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                             const Point& p) {
-  std::array<IntKernel::Point, 5> whole;
-  if (to_integers<5>({&a, &b, &c, &d, &p}, whole))
-    return IntKernel::in_sphere(whole[0], whole[1], whole[2], whole[3], whole[4]);
+  std::array<IntKernel::Point, 5> integers;
+  if (to_integers<5>({&a, &b, &c, &d, &p}, integers))
+    return IntKernel::in_sphere(integers[0], integers[1], integers[2], integers[3], integers[4]);
   return Epick().side_of_oriented_sphere_3_object()(cgal(a), cgal(b), cgal(c), cgal(d), cgal(p));
 }
 

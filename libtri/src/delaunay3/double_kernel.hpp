@@ -7,8 +7,8 @@
 
 #include "in_sphere.hpp"
 
-/// Exact predicates on doubles. One evaluation in double with an error bound nearly always decides;
-/// the remaining cases use integers if the coordinates are integers, otherwise CGAL.
+/// Exact predicates on doubles. One evaluation in double with an error bound nearly always decides.
+/// The remaining cases use integers if the coordinates are integers, otherwise CGAL.
 
 namespace terrace::tri::spatial {
 
@@ -50,17 +50,17 @@ struct DoubleKernel {
   class Lattice {
    public:
     void add(const Point& p) {
-      if (exponent_ < kLeast) return;
+      if (exponent_ < kMinExponent) return;
       for (const double c : p) add(c);
     }
     /// Sphere tests are exact if the fifth power of the largest square is below this.
     [[nodiscard]] double exact_fifth() const { return exact_fifth_; }
 
    private:
-    static constexpr int kLeast = -80;
-    static constexpr int kMost = 80;
+    static constexpr int kMinExponent = -80;
+    static constexpr int kMaxExponent = 80;
     void add(double c);
-    int exponent_ = kMost;
+    int exponent_ = kMaxExponent;
     double exact_fifth_ = kExactFifth * 0x1p800;
   };
 
@@ -97,7 +97,7 @@ struct DoubleKernel {
     double exact_fifth_;
   };
 
-  /// > 0 if p is inside the sphere through a, b, c, d, which are in order; 0 if on it.
+  /// > 0 if p is inside the sphere through a, b, c, d, which are in order, or 0 if on it.
   static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                        const Point& p);
 

@@ -61,8 +61,8 @@ bool small_difference(const Point& from, const Point& to, Triple<Int128>& result
     if (!(std::abs(to[k]) < 0x1p52 && std::abs(from[k]) < 0x1p52)) return false;
     const double difference = to[k] - from[k];  // exact if both are integers
     if (!(std::abs(difference) < kLimit)) return false;
-    const auto whole = static_cast<std::int64_t>(to[k]);
-    if (static_cast<double>(whole) != to[k] ||
+    const auto integers = static_cast<std::int64_t>(to[k]);
+    if (static_cast<double>(integers) != to[k] ||
         static_cast<double>(static_cast<std::int64_t>(from[k])) != from[k])
       return false;
     result[k] = static_cast<std::int64_t>(difference);
@@ -87,14 +87,14 @@ struct QuadraticForm::Exact {
   }
 
   /// The sign of the sum of q times the integers, component by component; 2 if unknown.
-  [[nodiscard]] int sign_of_sum(const std::array<Int128, 6>& whole) const {
+  [[nodiscard]] int sign_of_sum(const std::array<Int128, 6>& integers) const {
     double sum = 0, size = 0;
     bool zero = true;
     for (std::size_t k = 0; k < 6; ++k) {
-      if (is_zero[k] || whole[k] == 0) continue;
+      if (is_zero[k] || integers[k] == 0) continue;
       zero = false;
       if (std::abs(near[k]) < 0x1p-400) return 2;
-      const double term = near[k] * static_cast<double>(whole[k]);
+      const double term = near[k] * static_cast<double>(integers[k]);
       sum += term;
       size += std::abs(term);
     }
@@ -109,9 +109,9 @@ constinit thread_local const QuadraticForm* EllipticalKernel::form_ = nullptr;
 
 QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map()) {
   int exponent = 0;
-  double most = 0;
-  for (const double m : map_) most = std::max(most, std::abs(m));
-  std::frexp(most, &exponent);
+  double largest = 0;
+  for (const double m : map_) largest = std::max(largest, std::abs(m));
+  std::frexp(largest, &exponent);
   // Terms that underflow here are too small to matter to the filters.
   LinearMap3 near_one = map_;
   for (double& m : near_one) m = std::ldexp(m, -exponent);
@@ -140,8 +140,8 @@ QuadraticForm::QuadraticForm(const EllipticalMetric3& metric) : map_(metric.map(
   r12_ = CGAL::to_double(s12) / r11_;
   r22_ = root(Rational(s22 - s12 * s12 / s11));
   // Below this underflow would matter, and filters decide little anyway.
-  constexpr double kLeast = 0x1p-28;
-  if (!(std::min({r00_, r11_, r22_}) > kLeast)) {
+  constexpr double kMinDiagonal = 0x1p-28;
+  if (!(std::min({r00_, r11_, r22_}) > kMinDiagonal)) {
     r00_ = r01_ = r02_ = r11_ = r12_ = r22_ = 0;
     return;
   }
@@ -166,17 +166,18 @@ int EllipticalKernel::in_sphere(const Point& a, const Point& b, const Point& c, 
   const QuadraticForm::Exact& q = *form_->exact_;
   // Ties are frequent on grids and must be cheap there. The value is a sum over the entries of Q
   // times integers. At a tie most of these integers vanish one by one.
-  std::array<Triple<Int128>, 4> whole;
-  bool is_whole = true;
-  for (std::size_t i = 0; i < 4 && is_whole; ++i)
-    is_whole = small_difference(p, *corner[i], whole[i]);
-  if (is_whole) {
+  std::array<Triple<Int128>, 4> integers;
+  bool is_integer = true;
+  for (std::size_t i = 0; i < 4 && is_integer; ++i)
+    is_integer = small_difference(p, *corner[i], integers[i]);
+  if (is_integer) {
     std::array<Int128, 6> sum{};
     for (std::size_t i = 0; i < 4; ++i) {
-      Int128 minor = determinant(whole[(i + 1) & 3], whole[(i + 2) & 3], whole[(i + 3) & 3]);
+      Int128 minor =
+          determinant(integers[(i + 1) & 3], integers[(i + 2) & 3], integers[(i + 3) & 3]);
       if (i % 2 != 0) minor = -minor;
       for (std::size_t k = 0; k < 6; ++k) {
-        const Int128 product = whole[i][kRow[k]] * whole[i][kColumn[k]];
+        const Int128 product = integers[i][kRow[k]] * integers[i][kColumn[k]];
         sum[k] += minor * (kRow[k] == kColumn[k] ? product : 2 * product);
       }
     }

@@ -7,7 +7,7 @@
 #include "terrace/tri/metric.hpp"
 
 /// Exact predicates in an elliptical metric, on the original points: only the filters map
-/// differences. Orientation is the same in all linear metrics; only spheres become ellipsoids, and
+/// differences. Orientation is the same in all linear metrics. Only spheres become ellipsoids, and
 /// distances become lengths of mapped vectors.
 
 namespace terrace::tri::spatial {
@@ -24,7 +24,7 @@ class QuadraticForm {
  public:
   explicit QuadraticForm(const EllipticalMetric3& metric);
 
-  /// Upper bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates; otherwise it
+  /// Upper bound of the norm of |R| |R^-1|: 1 for axes along those of the coordinates. Otherwise it
   /// grows with the ratio of the longest semi-axis to the shortest. May be infinite.
   [[nodiscard]] double spread() const { return spread_; }
 
@@ -103,7 +103,8 @@ class EllipticalKernel : public DoubleKernel {
     double filter2_;
   };
 
-  /// > 0 if p is inside the metric's ellipsoid through a, b, c, d, which are in order; 0 if on it.
+  /// > 0 if p is inside the metric's ellipsoid through a, b, c, d, which are in order, or 0 if on
+  /// it.
   static int in_sphere(const Point& a, const Point& b, const Point& c, const Point& d,
                        const Point& p);
 
@@ -115,10 +116,10 @@ class EllipticalKernel : public DoubleKernel {
   static int angle(const Point& from, const Point& a, const Point& b);
 
   /// True if d is inside the metric's smallest ellipsoid that contains the triangle a, b, c, which
-  /// is not degenerate; d differs from its corners. Exact.
+  /// is not degenerate. d differs from its corners. Exact.
   static bool in_smallest_sphere(const Point& a, const Point& b, const Point& c, const Point& d);
 
-  /// The difference p - origin mapped by M, rounded; the same on every machine.
+  /// The difference p - origin mapped by M and rounded, with the same result on every machine.
   static Point by_map(const Point& p, const Point& origin) {
     const LinearMap3& m = form_->map_;
     const double x = p[0] - origin[0], y = p[1] - origin[1], z = p[2] - origin[2];

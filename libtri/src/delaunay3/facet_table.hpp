@@ -10,8 +10,8 @@
 
 namespace terrace::tri::spatial {
 
-/// A table of facets by their three corners (small numbers, in any order). Open addressing; every
-/// facet is looked up at most twice, so entries are never removed.
+/// A table of facets by their three corners (small numbers, in any order), with open addressing.
+/// Every facet is looked up at most twice, so entries are never removed.
 struct FacetEntry {
   std::uint64_t key;
   std::uint32_t facet;
@@ -33,7 +33,7 @@ class FacetTable {
     if (2 * count_ >= size_) [[unlikely]]
       grow();
     const std::uint64_t key = key_of(corner);
-    std::size_t i = home(key);
+    std::size_t i = first_slot(key);
     for (; memory_[i].key != 0; i = (i + 1) & (size_ - 1))
       if (memory_[i].key == key) return memory_[i].facet;
     memory_[i] = {key, facet};
@@ -46,12 +46,13 @@ class FacetTable {
   static std::uint64_t key_of(const std::array<std::uint32_t, 3>& corner) {
     const auto [low, high] = std::minmax(corner[0], corner[1]);
     const std::uint64_t least = std::min(low, corner[2]);
-    const std::uint64_t most = std::max(high, corner[2]);
-    const std::uint64_t middle = std::uint64_t{corner[0]} + corner[1] + corner[2] - least - most;
-    assert(most <= kMaxCorner);
-    return least << 42 | middle << 21 | most;
+    const std::uint64_t greatest = std::max(high, corner[2]);
+    const std::uint64_t middle =
+        std::uint64_t{corner[0]} + corner[1] + corner[2] - least - greatest;
+    assert(greatest <= kMaxCorner);
+    return least << 42 | middle << 21 | greatest;
   }
-  [[nodiscard]] std::size_t home(std::uint64_t key) const {
+  [[nodiscard]] std::size_t first_slot(std::uint64_t key) const {
     return static_cast<std::size_t>(key * 0x9E3779B97F4A7C15u >> shift_);
   }
   void resize(std::size_t size) {
@@ -60,12 +61,12 @@ class FacetTable {
     memory_.assign(size, {0, 0});
   }
   void grow() {
-    std::vector<FacetEntry> before(memory_.begin(),
-                                   memory_.begin() + static_cast<std::ptrdiff_t>(size_));
+    std::vector<FacetEntry> old_entries(memory_.begin(),
+                                        memory_.begin() + static_cast<std::ptrdiff_t>(size_));
     resize(2 * size_);
-    for (const FacetEntry& entry : before) {
+    for (const FacetEntry& entry : old_entries) {
       if (entry.key == 0) continue;
-      std::size_t i = home(entry.key);
+      std::size_t i = first_slot(entry.key);
       while (memory_[i].key != 0) i = (i + 1) & (size_ - 1);
       memory_[i] = entry;
     }

@@ -24,7 +24,7 @@ class Inspection {
       check_tetrahedra();
     }
     for (std::uint32_t t = 0; t < mesh_.mark.size(); ++t)
-      expect(mesh_.mark[t] == kUnknown, "mark of tetrahedron ", t, " was left");
+      expect(mesh_.mark[t] == kUnknown, "mark of tetrahedron ", t, " is not reset");
     return fault_;
   }
 
@@ -49,27 +49,28 @@ class Inspection {
     }
     expect(alive + free + 1 == mesh_.vertex.size(), "free list of vertices has ", free, ", not ",
            mesh_.vertex.size() - 1 - alive);
-    expect((mesh_.last_vertex == kNone) == (alive == 0), "last vertex is not kept");
+    expect((mesh_.last_vertex == kNone) == (alive == 0), "last vertex is missing or superfluous");
     if (alive > 0) expect(mesh_.vertex_alive(mesh_.last_vertex), "last vertex is dead");
     expect(mesh_.vertex[kGhost].incident == kNoIncident, "the ghost's vertex was written");
   }
 
   void check_flat() {
-    const auto& waiting = mesh_.waiting;
-    expect(waiting.size() == mesh_.vertex_count, waiting.size(), " vertices wait");
-    for (std::size_t i = 0; i < waiting.size(); ++i) {
-      expect(mesh_.vertex_alive(waiting[i]), "waiting vertex is dead");
-      expect(mesh_.vertex[waiting[i]].incident == kNoIncident, "flat vertex has a tetrahedron");
+    const auto& flat_vertices = mesh_.flat_vertices;
+    expect(flat_vertices.size() == mesh_.vertex_count, flat_vertices.size(), " flat vertices");
+    for (std::size_t i = 0; i < flat_vertices.size(); ++i) {
+      expect(mesh_.vertex_alive(flat_vertices[i]), "flat vertex is dead");
+      expect(mesh_.vertex[flat_vertices[i]].incident == kNoIncident,
+             "flat vertex has a tetrahedron");
       if (i > 0)
-        expect(lexicographically_less(mesh_.vertex[waiting[i - 1]].point,
-                                      mesh_.vertex[waiting[i]].point),
+        expect(lexicographically_less(mesh_.vertex[flat_vertices[i - 1]].point,
+                                      mesh_.vertex[flat_vertices[i]].point),
                "waiting list is not sorted at ", i);
     }
     for (const std::uint32_t v : mesh_.basis)
       expect(mesh_.vertex_alive(v), "vertex of the basis is dead");
     if (!fault_.empty()) return;
     std::vector<std::uint32_t> basis = mesh_.basis;
-    for (const std::uint32_t v : waiting) {
+    for (const std::uint32_t v : flat_vertices) {
       expect(extend_basis(mesh_, basis, v), "waiting vertex ", v, " is off the plane");
       expect(basis == mesh_.basis, "vertex ", v, " is off the basis");
     }
@@ -78,7 +79,7 @@ class Inspection {
   }
 
   void check_tetrahedra() {
-    expect(mesh_.waiting.empty() && mesh_.basis.empty(), "vertices wait, but it is not flat");
+    expect(mesh_.flat_vertices.empty() && mesh_.basis.empty(), "vertices wait, but it is not flat");
     std::uint32_t used = 0;
     std::uint32_t finite = 0;
     for (std::uint32_t t = 0; t < mesh_.tetrahedron.size(); ++t) {
@@ -131,16 +132,16 @@ class Inspection {
     const std::uint32_t k = index_of(at.mate[i]);
     expect(other < mesh_.tetrahedron.size(), "tetrahedron ", t, " has no mate ", i);
     if (!fault_.empty()) return;
-    const Tetrahedron& beyond = mesh_.tetrahedron[other];
-    expect(beyond.corner[0] != kFreeCorner, "mate ", i, " of ", t, " is free");
-    expect(beyond.mate[k] == make_side(t, i), "mates ", t, " and ", other, " differ");
+    const Tetrahedron& neighbour = mesh_.tetrahedron[other];
+    expect(neighbour.corner[0] != kFreeCorner, "mate ", i, " of ", t, " is free");
+    expect(neighbour.mate[k] == make_side(t, i), "mates ", t, " and ", other, " differ");
     auto facet = facet_of(at, i);
-    auto reversed = facet_of(beyond, k);
+    auto reversed = facet_of(neighbour, k);
     std::swap(reversed[0], reversed[1]);
     for (int turn = 0; turn < 3 && facet != reversed; ++turn)
       std::rotate(facet.begin(), facet.begin() + 1, facet.end());
     expect(facet == reversed, "mates ", t, " and ", other, " have no common facet");
-    const std::uint32_t opposite = beyond.corner[k];
+    const std::uint32_t opposite = neighbour.corner[k];
     expect(opposite != at.corner[i], "tetrahedra ", t, " and ", other, " are the same");
     if (!fault_.empty() || opposite == kGhost) return;
     const Conflicts<Kernel> conflicts(mesh_, mesh_.vertex[opposite].point);

@@ -23,7 +23,7 @@ auto by_point(const Mesh<Kernel>& mesh) {
 template <class Kernel>
 std::uint32_t find_basis(Mesh<Kernel>& mesh) {
   mesh.basis.clear();
-  for (const std::uint32_t v : mesh.waiting)
+  for (const std::uint32_t v : mesh.flat_vertices)
     if (!extend_basis(mesh, mesh.basis, v)) return v;
   return kNone;
 }
@@ -31,17 +31,17 @@ std::uint32_t find_basis(Mesh<Kernel>& mesh) {
 /// Inserts all waiting vertices. `apex`, one of them, is off the plane of the basis.
 template <class Kernel>
 void leave_flat(Mesh<Kernel>& mesh, std::uint32_t apex) {
-  const std::vector<std::uint32_t> waiting = std::move(mesh.waiting);
-  mesh.waiting = {};
+  const std::vector<std::uint32_t> flat_vertices = std::move(mesh.flat_vertices);
+  mesh.flat_vertices = {};
   const std::vector<std::uint32_t> basis = mesh.basis;
   make_first(mesh, apex);
   std::vector<typename Kernel::Point> points;
-  points.reserve(waiting.size());
-  for (const std::uint32_t v : waiting) points.push_back(mesh.vertex[v].point);
+  points.reserve(flat_vertices.size());
+  for (const std::uint32_t v : flat_vertices) points.push_back(mesh.vertex[v].point);
   const Pool<std::uint32_t> order = hilbert_order<typename Kernel::Point>(points);
   std::uint32_t hint = apex;
   visit_coarse_first(order.size(), [&](std::uint32_t k) {
-    const std::uint32_t v = waiting[order[k]];
+    const std::uint32_t v = flat_vertices[order[k]];
     if (v == apex || std::find(basis.begin(), basis.end(), v) != basis.end()) return;
     insert_vertex(mesh, v,
                   walk(mesh, mesh.vertex[v].point, mesh.vertex[hint].incident).tetrahedron);
@@ -53,13 +53,13 @@ void leave_flat(Mesh<Kernel>& mesh, std::uint32_t apex) {
 
 template <class Kernel>
 Inserted insert_flat(Mesh<Kernel>& mesh, const typename Kernel::Point& p) {
-  const auto at = std::lower_bound(mesh.waiting.begin(), mesh.waiting.end(), p,
+  const auto at = std::lower_bound(mesh.flat_vertices.begin(), mesh.flat_vertices.end(), p,
                                    [&](std::uint32_t v, const auto& value) {
                                      return lexicographically_less(mesh.vertex[v].point, value);
                                    });
-  if (at != mesh.waiting.end() && same_point(mesh.vertex[*at].point, p)) return {*at, false};
+  if (at != mesh.flat_vertices.end() && same_point(mesh.vertex[*at].point, p)) return {*at, false};
   const std::uint32_t vertex = mesh.new_vertex(p);
-  mesh.waiting.insert(at, vertex);
+  mesh.flat_vertices.insert(at, vertex);
   if (!extend_basis(mesh, mesh.basis, vertex)) leave_flat(mesh, vertex);
   mesh.last_vertex = vertex;
   return {vertex, true};
@@ -68,19 +68,19 @@ Inserted insert_flat(Mesh<Kernel>& mesh, const typename Kernel::Point& p) {
 template <class Kernel>
 void remove_flat(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
   if (vertices.size() == 1) {
-    mesh.waiting.erase(
-        std::lower_bound(mesh.waiting.begin(), mesh.waiting.end(), vertices[0], by_point(mesh)));
+    mesh.flat_vertices.erase(std::lower_bound(mesh.flat_vertices.begin(), mesh.flat_vertices.end(),
+                                              vertices[0], by_point(mesh)));
     mesh.free_vertex_slot(vertices[0]);
   } else {
     for (const std::uint32_t v : vertices) mesh.free_vertex_slot(v);
-    std::erase_if(mesh.waiting, [&](std::uint32_t v) { return !mesh.vertex_alive(v); });
+    std::erase_if(mesh.flat_vertices, [&](std::uint32_t v) { return !mesh.vertex_alive(v); });
   }
   for (const std::uint32_t v : mesh.basis) {
     if (mesh.vertex_alive(v)) continue;
     find_basis(mesh);
     break;
   }
-  mesh.last_vertex = mesh.waiting.empty() ? kNone : mesh.waiting.front();
+  mesh.last_vertex = mesh.flat_vertices.empty() ? kNone : mesh.flat_vertices.front();
 }
 
 template <class Kernel>
@@ -96,7 +96,7 @@ void restart(Mesh<Kernel>& mesh, std::vector<std::uint32_t> survivors) {
   for (const std::uint32_t v : survivors) mesh.vertex[v].incident = kNoIncident;
   std::sort(survivors.begin(), survivors.end(), by_point(mesh));
   mesh.last_vertex = survivors.empty() ? kNone : survivors.front();
-  mesh.waiting = std::move(survivors);
+  mesh.flat_vertices = std::move(survivors);
   const std::uint32_t apex = find_basis(mesh);
   if (apex != kNone) leave_flat(mesh, apex);
 }

@@ -24,7 +24,7 @@ void remove_flat(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 template <class Kernel>
 void restart(Mesh<Kernel>& mesh, std::vector<std::uint32_t> survivors);
 
-/// True if the vertices are coplanar; a ghost among them is skipped.
+/// True if the vertices are coplanar. A ghost among them is skipped.
 template <class Kernel>
 bool coplanar(const Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices);
 

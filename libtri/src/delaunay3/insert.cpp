@@ -11,8 +11,8 @@ namespace terrace::tri::spatial {
 
 template <class Kernel>
 void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t conflict) {
-  WholeMesh whole;
-  CavityInsertion<Kernel, WholeMesh>(mesh, mesh.cavity, whole).run(vertex, conflict);
+  WholeMesh mesh_as_part;
+  CavityInsertion<Kernel, WholeMesh>(mesh, mesh.cavity, mesh_as_part).run(vertex, conflict);
 }
 
 template <class Kernel>

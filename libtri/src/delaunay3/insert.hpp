@@ -5,7 +5,7 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "hilbert.hpp"
+#include "curve_sort.hpp"
 #include "mesh.hpp"
 
 namespace terrace::tri::spatial {
@@ -54,5 +54,25 @@ void insert_points(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> p
     done(order[k], inserted);
   });
 }
+
+/// Set in Vertex::incident during bulk construction if the point is a duplicate. The other bits are
+/// the vertex that represents it.
+inline constexpr std::uint32_t kAlias = kFreeVertexBit;
+
+/// Vertices begin, ..., end - 1 follow each other along a curve. Of these begin + step, begin + 2
+/// step, ... exist or are inserted next.
+struct Curve {
+  std::uint32_t begin, end, step;
+};
+
+/// Inserts some vertices of a curve, with at most two concurrent threads. The result, slots
+/// included, does not depend on the number of threads. Requires sorted vertices, which it reorders.
+template <class Kernel>
+void insert_in_parallel(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> vertices,
+                        unsigned threads);
+
+/// Inserts one vertex, walking from the vertex `hint`.
+template <class Kernel>
+void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint);
 
 }  // namespace terrace::tri::spatial

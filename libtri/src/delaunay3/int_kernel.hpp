@@ -51,7 +51,7 @@ struct IntKernel {
     return u.y * v.z == u.z * v.y && u.z * v.x == u.x * v.z && u.x * v.y == u.y * v.x;
   }
 
-  /// The property that all points of a mesh share; integers need none.
+  /// The property that all points of a mesh share. Integers need none.
   struct Lattice {
     static void add(const Point&) {}
   };
@@ -109,7 +109,7 @@ struct IntKernel {
     Lanes at_;
   };
 
-  /// > 0 if p is inside the sphere through a, b, c, d, which are in order; 0 if on it.
+  /// > 0 if p is inside the sphere through a, b, c, d, which are in order, or 0 if on it.
   [[gnu::noinline]] static int in_sphere(const Point& a, const Point& b, const Point& c,
                                          const Point& d, const Point& p) {
     const std::array<Vector, 4> r = {difference(a, p), difference(b, p), difference(c, p),

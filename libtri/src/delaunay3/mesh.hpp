@@ -82,13 +82,13 @@ inline constexpr std::uint32_t kToRemove = 0x7FFFFFF0u;
 inline constexpr std::uint32_t kRemoving = 0x7FFFFFF1u;
 /// An existing vertex without tetrahedra (all points are coplanar).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
-/// The slot is free; the other bits are the next free slot.
+/// The slot is free. The other bits are the next free slot.
 inline constexpr std::uint32_t kFreeVertexBit = 0x80000000u;
 
 /// Values of Mesh::mark.
 inline constexpr std::uint8_t kUnknown = 0;
-inline constexpr std::uint8_t kTaken = 1;  ///< in the cavity or hole
-inline constexpr std::uint8_t kKept = 2;   ///< tested and kept
+inline constexpr std::uint8_t kCollected = 1;  ///< in the cavity or hole
+inline constexpr std::uint8_t kKept = 2;       ///< tested and kept
 
 /// Scratch memory of insertion, see cavity_insert.hpp.
 struct Cavity {
@@ -128,7 +128,7 @@ struct Hole {
   struct Facet {
     /// Local numbers, in order with a corner inside the hole before them.
     std::array<std::uint32_t, 3> corner;
-    Side outer;  ///< the side beyond; kMatched once both tetrahedra exist
+    Side outer;  ///< the side beyond, or kMatched once both tetrahedra exist
   };
   static constexpr Side kMatched = 0xFFFFFFFFu;
 
@@ -174,7 +174,7 @@ struct Mesh {
   Pool<std::uint8_t> mark;  ///< kUnknown between operations
 
   /// While flat: all vertices in lexicographic order.
-  std::vector<std::uint32_t> waiting;
+  std::vector<std::uint32_t> flat_vertices;
   /// While flat: those of the waiting vertices that span their point, line or plane.
   std::vector<std::uint32_t> basis;
   bool flat = true;
@@ -300,7 +300,7 @@ struct Mesh {
 
   [[nodiscard]] std::size_t bytes() const {
     return vertex.bytes() + tetrahedron.bytes() + mark.bytes() + journal.bytes() + cavity.bytes() +
-           hole.bytes() + (waiting.capacity() + basis.capacity()) * sizeof(std::uint32_t);
+           hole.bytes() + (flat_vertices.capacity() + basis.capacity()) * sizeof(std::uint32_t);
   }
 };
 

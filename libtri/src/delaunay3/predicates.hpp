@@ -84,7 +84,7 @@ class Conflicts {
         point_(p),
         probe_(p, mesh.lattice) {}
 
-  /// The filter's verdict; kOpen for ghosts.
+  /// The filter's verdict, or kOpen for ghosts.
   [[gnu::always_inline]] Verdict filter(const Tetrahedron& t) const {
     const auto& [a, b, c, d] = t.corner;
     if (has_ghost(t.corner)) [[unlikely]]

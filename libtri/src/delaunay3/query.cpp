@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "query.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <type_traits>
@@ -10,6 +8,7 @@
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 #include "star.hpp"
 #include "walk.hpp"
 
@@ -19,12 +18,12 @@ namespace {
 template <class Kernel>
 Location3 locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p) {
   Location3 result;
-  if (mesh.waiting.empty()) return result;
-  auto at = std::lower_bound(mesh.waiting.begin(), mesh.waiting.end(), p,
+  if (mesh.flat_vertices.empty()) return result;
+  auto at = std::lower_bound(mesh.flat_vertices.begin(), mesh.flat_vertices.end(), p,
                              [&](std::uint32_t v, const auto& value) {
                                return lexicographically_less(mesh.vertex[v].point, value);
                              });
-  if (at == mesh.waiting.end()) --at;
+  if (at == mesh.flat_vertices.end()) --at;
   result.vertex = VertexId{*at};
   if (same_point(mesh.vertex[*at].point, p)) result.place = Place3::kVertex;
   return result;
@@ -118,15 +117,15 @@ std::uint32_t nearest(const Mesh<Kernel>& mesh, const typename Kernel::Point& p,
   if (mesh.vertex_count == 0) return kNone;
   if (mesh.flat)
     return *std::min_element(
-        mesh.waiting.begin(), mesh.waiting.end(),
+        mesh.flat_vertices.begin(), mesh.flat_vertices.end(),
         [&](std::uint32_t a, std::uint32_t b) { return nearer(mesh, p, a, b); });
   const WalkEnd end = walk(mesh, p, mesh.vertex[hint == kNone ? mesh.last_vertex : hint].incident);
   const Tetrahedron& start = mesh.tetrahedron[mesh.finite_side(end.tetrahedron)];
   std::uint32_t best = start.corner[0];
   for (const std::uint32_t v : start.corner)
     if (v != best && nearer(mesh, p, v, best)) best = v;
-  for (std::uint32_t before = kNone; before != best;) {
-    before = best;
+  for (std::uint32_t previous = kNone; previous != best;) {
+    previous = best;
     best = better_neighbour(mesh, p, best);
   }
   return best;
@@ -159,7 +158,7 @@ template <class Kernel>
 std::uint64_t hash(const Mesh<Kernel>& mesh) {
   std::uint64_t sum = 0;
   if (mesh.flat) {
-    for (const std::uint32_t v : mesh.waiting) sum += hash_point(0, mesh.vertex[v].point);
+    for (const std::uint32_t v : mesh.flat_vertices) sum += hash_point(0, mesh.vertex[v].point);
     return sum;
   }
   for (std::uint32_t t = 0; t < mesh.tetrahedron.size(); ++t) {

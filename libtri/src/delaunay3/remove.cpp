@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Removes vertices, one or a set: takes out all tetrahedra at them and fills the hole as a whole,
 // whatever its shape. It may contain vertices that stay (islands), have handles and pinches, or be
-// at the hull. A hole ends at facets beyond which a tetrahedron stays; holes that touch only in
+// at the hull. A hole ends at facets beyond which a tetrahedron stays. Holes that touch only in
 // edges or vertices are filled one after the other.
-#include "remove.hpp"
-
+#include "curve_sort.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "flat.hpp"
-#include "hilbert.hpp"
-#include "insert.hpp"
 #include "int_kernel.hpp"
+#include "operations.hpp"
 
 namespace terrace::tri::spatial {
 namespace {
@@ -52,7 +50,7 @@ class Removal {
   }
 
  private:
-  [[nodiscard]] bool to_go(std::uint32_t v) const {
+  [[nodiscard]] bool is_removed(std::uint32_t v) const {
     const std::uint32_t incident = mesh_.vertex[v].incident;
     return incident == kToRemove || incident == kRemoving;
   }
@@ -75,26 +73,26 @@ class Removal {
     hole_.point.assign(1, {});
     hole_.facets.clear();
     hole_.slots.clear();
-    take(start);
+    collect(start);
     for (std::size_t k = 0; k < hole_.slots.size(); ++k) {
       const Tetrahedron& t = mesh_.tetrahedron[hole_.slots[k]];
       std::array<std::uint32_t, 4> local;
-      unsigned going = 0;
+      unsigned removed_corners = 0;
       for (std::size_t i = 0; i < 4; ++i) {
         const std::uint32_t v = t.corner[i];
-        if (to_go(v)) {
+        if (is_removed(v)) {
           mesh_.vertex[v].incident = kRemoving;
-          going |= 1u << i;
+          removed_corners |= 1u << i;
         } else {
           local[i] = number(v);
         }
       }
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
-        if (mesh_.mark[other] == kTaken) continue;
-        if ((going & ~(1u << i)) != 0 ||
-            to_go(mesh_.tetrahedron[other].corner[index_of(t.mate[i])])) {
-          take(other);
+        if (mesh_.mark[other] == kCollected) continue;
+        if ((removed_corners & ~(1u << i)) != 0 ||
+            is_removed(mesh_.tetrahedron[other].corner[index_of(t.mate[i])])) {
+          collect(other);
         } else {
           const auto& f = kFacet[i];
           hole_.facets.push_back({{local[f[0]], local[f[1]], local[f[2]]}, t.mate[i]});
@@ -102,23 +100,24 @@ class Removal {
       }
     }
   }
-  void take(std::uint32_t t) {
-    mesh_.mark[t] = kTaken;
+  void collect(std::uint32_t t) {
+    mesh_.mark[t] = kCollected;
     mesh_.record(t);
     hole_.slots.push_back(t);
     for (const Side mate : mesh_.tetrahedron[t].mate)
       __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
   }
 
-  /// True if everything must be rebuilt: if no tetrahedron is left to start from; if the survivors
-  /// are coplanar, which requires that all of them are on this hole; or if a hole has so many
-  /// vertices that testing each of them for each facet would cost more than a rebuild.
+  /// True if everything must be rebuilt. That is the case if no tetrahedron is left to start from,
+  /// or if the survivors are coplanar, which requires that all of them are on this hole. It is also
+  /// the case if a hole has so many vertices that testing each of them for each facet would cost
+  /// more than a rebuild.
   [[nodiscard]] bool must_restart() const {
     if (hole_.facets.empty()) return true;
     const std::size_t vertices = hole_.vertex.size();
-    constexpr std::size_t kLooksPerInsertion = 2048;
+    constexpr std::size_t kTestsPerInsertion = 2048;
     if (vertices > FacetTable::kMaxCorner ||
-        vertices * vertices > kLooksPerInsertion * mesh_.vertex_count)
+        vertices * vertices > kTestsPerInsertion * mesh_.vertex_count)
       return true;
     return vertices - 1 + vertices_.size() == mesh_.vertex_count &&
            coplanar<Kernel>(mesh_, hole_.vertex);

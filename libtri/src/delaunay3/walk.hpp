@@ -15,12 +15,13 @@ struct WalkEnd {
 
 /// Allows reading all tetrahedra.
 struct Everywhere {
-  static constexpr bool kWhole = true;
+  static constexpr bool kIsEntireMesh = true;
 };
 
 /// Remembering visibility walk: goes from tetrahedron to tetrahedron through the first facet that
 /// separates the current one from p, and never tests the facet just crossed. The walk cannot cycle
-/// in a (perturbed) Delaunay triangulation. `start` may be a ghost. `part`: see parts_insert.cpp.
+/// in a (perturbed) Delaunay triangulation. `start` may be a ghost. `part`: see
+/// parallel_insert.cpp.
 template <class Kernel, class Part = Everywhere>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start,
              const Part& part = {}) {
@@ -38,7 +39,7 @@ WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uin
       break;
     }
     if (i == 4) return {at, false};
-    if constexpr (!Part::kWhole) {
+    if constexpr (!Part::kIsEntireMesh) {
       if (!part.may_read_beyond(t, i)) return {kNone, false};
     }
     at = tetrahedron_of(next);

@@ -49,7 +49,7 @@ struct Cavity {
   }
 };
 
-/// Finds the cavity of a query that is inside the hull, not a vertex and not on a hull edge; `root`
+/// Finds the cavity of a query that is inside the hull, not a vertex and not on a hull edge. `root`
 /// is a triangle that contains it. The circle test is exact and strict, so it takes all or none of
 /// several cocircular triangles. The cavity is therefore connected and star-shaped about the query.
 template <class Kernel>
@@ -67,22 +67,22 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
   if (cavity.pending.empty()) cavity.pending.resize(64);
   cavity.pending[0] = {first.mate[1], {2, 0, 0}};
   cavity.pending[1] = {first.mate[0], {1, 2, 0}};
-  std::size_t height = 2;
-  Cavity::Pending now{first.mate[2], {0, 1, 0}};
+  std::size_t depth = 2;
+  Cavity::Pending current{first.mate[2], {0, 1, 0}};
   while (true) {
-    const Triangle& t = triangle[triangle_of(now.side)];
+    const Triangle& t = triangle[triangle_of(current.side)];
     const bool inside =
         !has_ghost(t.corner) &&
         DoubleKernel::in_circle(to_query(point[t.corner[0]]), to_query(point[t.corner[1]]),
                                 to_query(point[t.corner[2]]), p) > 0;
-    const Cavity::Edge edge = now.edge;
+    const Cavity::Edge edge = current.edge;
     if (!inside) {
       cavity.rim.push_back(edge);
-      if (height == 0) return;
-      now = cavity.pending[--height];
+      if (depth == 0) return;
+      current = cavity.pending[--depth];
       continue;
     }
-    const std::uint32_t i = index_of(now.side);
+    const std::uint32_t i = index_of(current.side);
     const std::uint32_t apex = add_corner(t.corner[i]);
     const auto number = static_cast<std::uint32_t>(cavity.triangle.size());
     cavity.triangle.push_back({edge.from, apex, edge.to});
@@ -90,10 +90,10 @@ void find_cavity(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t root, C
     // Counter-clockwise, so the edge from -> apex comes first.
     const Side later = t.mate[previous_index(i)];
     __builtin_prefetch(&triangle[triangle_of(later)]);
-    if (height == cavity.pending.size()) [[unlikely]]
-      cavity.pending.resize(2 * height);
-    cavity.pending[height++] = {later, {apex, edge.to, number}};
-    now = {t.mate[next_index(i)], {edge.from, apex, number}};
+    if (depth == cavity.pending.size()) [[unlikely]]
+      cavity.pending.resize(2 * depth);
+    cavity.pending[depth++] = {later, {apex, edge.to, number}};
+    current = {t.mate[next_index(i)], {edge.from, apex, number}};
   }
 }
 
@@ -104,7 +104,7 @@ template <class Kernel>
 bool find_link(const Mesh<Kernel>& mesh, std::uint32_t vertex, Cavity& cavity) {
   cavity.clear();
   bool closed = true;
-  for_triangles_round(mesh, vertex, [&](std::uint32_t t, std::uint32_t i) {
+  for_each_triangle_at(mesh, vertex, [&](std::uint32_t t, std::uint32_t i) {
     const std::uint32_t v = mesh.triangle[t].corner[next_index(i)];
     closed = closed && v != kGhost;
     if (!closed) return;

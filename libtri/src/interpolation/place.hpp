@@ -25,12 +25,12 @@ inline const Query& to_query(const DoubleKernel::Point& p) { return p; }
 
 struct QueryPlace {
   enum Kind : std::uint8_t {
-    kNowhere,   ///< outside the hull
+    kOutside,   ///< outside the hull
     kVertex,    ///< on corner[0]
     kHullEdge,  ///< inside the hull edge of corner[0] and corner[1]
     kInside,    ///< in `triangle`, including its edges that are not on the hull
   };
-  Kind kind = kNowhere;
+  Kind kind = kOutside;
   std::array<std::uint32_t, 2> corner{};
   std::uint32_t triangle = kNone;  ///< a triangle that contains the query, unless flat or outside
 };
@@ -38,16 +38,16 @@ struct QueryPlace {
 /// All points are collinear, so the hull is the segment between the outermost.
 template <class Kernel>
 QueryPlace place_on_line(const Mesh<Kernel>& mesh, const Query& p) {
-  const auto after = std::partition_point(mesh.line.begin(), mesh.line.end(), [&](std::uint32_t v) {
+  const auto next = std::partition_point(mesh.line.begin(), mesh.line.end(), [&](std::uint32_t v) {
     return lexicographically_less(to_query(mesh.point[v]), p);
   });
-  if (after == mesh.line.end()) return {};
-  const Query b = to_query(mesh.point[*after]);
-  if (same_point(b, p)) return {QueryPlace::kVertex, {*after, kNone}, kNone};
-  if (after == mesh.line.begin()) return {};
-  const Query a = to_query(mesh.point[*(after - 1)]);
+  if (next == mesh.line.end()) return {};
+  const Query b = to_query(mesh.point[*next]);
+  if (same_point(b, p)) return {QueryPlace::kVertex, {*next, kNone}, kNone};
+  if (next == mesh.line.begin()) return {};
+  const Query a = to_query(mesh.point[*(next - 1)]);
   if (DoubleKernel::orientation(a, b, p) != 0) return {};
-  return {QueryPlace::kHullEdge, {*(after - 1), *after}, kNone};
+  return {QueryPlace::kHullEdge, {*(next - 1), *next}, kNone};
 }
 
 /// Like walk() in walk.hpp: finds the triangle that contains the query, or a ghost whose edge it
@@ -84,7 +84,7 @@ std::uint32_t walk_to(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t st
   }
 }
 
-/// `last`: the triangle to start from; set to the start of the next search.
+/// `last`: the triangle to start from. Set to the start of the next search.
 template <class Kernel>
 QueryPlace find_place(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& last) {
   if (mesh.flat) return place_on_line(mesh, p);
@@ -106,7 +106,7 @@ QueryPlace find_place(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& l
 /// Calls visit(t, i) for the triangles around a vertex counter-clockwise, including ghosts. Corner
 /// i of t is the vertex.
 template <class Kernel, class Visit>
-void for_triangles_round(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit visit) {
+void for_each_triangle_at(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit visit) {
   const std::uint32_t start = mesh.incident[vertex];
   std::uint32_t t = start;
   do {
@@ -116,8 +116,8 @@ void for_triangles_round(const Mesh<Kernel>& mesh, std::uint32_t vertex, Visit v
   } while (t != start);
 }
 
-/// The vertex nearest to the query; of equally near vertices the lexicographically smallest. The
-/// comment on nearest() in query.cpp explains why moving to better neighbours finds it.
+/// The vertex nearest to the query. Of equally near vertices it is the lexicographically smallest.
+/// The comment on nearest() in query.cpp explains why moving to better neighbours finds it.
 template <class Kernel>
 std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint32_t& last) {
   if (mesh.vertex_count == 0) return kNone;
@@ -140,9 +140,9 @@ std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint
   std::uint32_t best = corners[0];
   for (const std::uint32_t v : {corners[1], corners[2]})
     if (nearer(v, best)) best = v;
-  for (std::uint32_t before = kNone; before != best;) {
-    before = best;
-    for_triangles_round(mesh, before, [&](std::uint32_t t, std::uint32_t i) {
+  for (std::uint32_t previous = kNone; previous != best;) {
+    previous = best;
+    for_each_triangle_at(mesh, previous, [&](std::uint32_t t, std::uint32_t i) {
       const std::uint32_t v = mesh.triangle[t].corner[next_index(i)];
       if (v != kGhost && v != best && nearer(v, best)) best = v;
     });

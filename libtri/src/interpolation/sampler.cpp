@@ -10,6 +10,7 @@
 #include <CGAL/Exact_rational.h>
 #include <boost/multiprecision/gmp.hpp>
 
+#include "bounded_number.hpp"
 #include "voronoi_cell.hpp"
 
 namespace terrace::tri::planar {
@@ -20,17 +21,17 @@ template <>
 struct Rounded<Rational> {
   static constexpr bool kShortens = true;
   static double of(const Rational& value) { return CGAL::to_double(value); }
-  static Rational shortened(const Rational& value) {
+  static Rational shorten(const Rational& value) {
     using Integer = boost::multiprecision::mpz_int;
-    Integer above = numerator(value), below = denominator(value);
-    if (above == 0) return value;
+    Integer top = numerator(value), bottom = denominator(value);
+    if (top == 0) return value;
     const auto bits = [](const Integer& i) { return static_cast<int>(msb(abs(i))); };
-    if (bits(above) + bits(below) < 2 * kShortBits) return value;
-    const int shift = kShortBits + bits(below) - bits(above);
-    (shift > 0 ? above : below) <<= std::abs(shift);
+    if (bits(top) + bits(bottom) < 2 * kShortBits) return value;
+    const int shift = kShortBits + bits(bottom) - bits(top);
+    (shift > 0 ? top : bottom) <<= std::abs(shift);
     Integer scale = 1;
     scale <<= std::abs(shift);
-    const Integer quotient = above / below;
+    const Integer quotient = top / bottom;
     return shift > 0 ? Rational(quotient, scale) : Rational(Integer(quotient * scale));
   }
 };
@@ -67,7 +68,7 @@ bool barycentric(const Query& p, const std::array<Query, 3>& corner,
 
 /// Twice the area of a triangle, and that area times its gradient.
 template <class Number>
-struct Tilt {
+struct GradientSum {
   Number x = 0;
   Number y = 0;
   Number area = 0;
@@ -117,7 +118,8 @@ void Sampler<Kernel>::start_at(std::uint32_t vertex) {
 }
 
 template <class Kernel>
-std::span<const VertexWeight> Sampler<Kernel>::weigh(const Query& p, Interpolation method) {
+std::span<const VertexWeight> Sampler<Kernel>::compute_weights(const Query& p,
+                                                               Interpolation method) {
   weights_.clear();
   if (method == Interpolation::kNearest) {
     const std::uint32_t nearest = nearest_vertex(mesh_, p, last_);
@@ -126,7 +128,7 @@ std::span<const VertexWeight> Sampler<Kernel>::weigh(const Query& p, Interpolati
   }
   const QueryPlace place = find_place(mesh_, p, last_);
   switch (place.kind) {
-    case QueryPlace::kNowhere:
+    case QueryPlace::kOutside:
       break;
     case QueryPlace::kVertex:
       weights_.push_back({VertexId{place.corner[0]}, 1});
@@ -189,7 +191,7 @@ bool Sampler<Kernel>::measure(const Query& p) {
 
 template <class Kernel>
 template <class Number>
-bool Sampler<Kernel>::take_weights(const VoronoiCell<Number>& cell) {
+bool Sampler<Kernel>::compute_weights(const VoronoiCell<Number>& cell) {
   weights_.clear();
   for (std::size_t i = 0; i < cell.area.size(); ++i) {
     double weight = 0;
@@ -209,13 +211,13 @@ template <class Kernel>
 void Sampler<Kernel>::weigh_neighbours(const Query& p, std::uint32_t t) {
   find_cavity(mesh_, p, t, cavity_);
   if (measure(p)) {
-    take_weights(cell_);
+    compute_weights(cell_);
     return;
   }
   exact().bounded.measure(cavity_, p);
-  if (take_weights(exact().bounded)) return;
+  if (compute_weights(exact().bounded)) return;
   exact().cell.measure(cavity_, p);
-  take_weights(exact().cell);
+  compute_weights(exact().cell);
 }
 
 template <class Kernel>
@@ -245,7 +247,7 @@ template <class Kernel>
 void Sampler<Kernel>::find_triangles(const Query& p, const QueryPlace& place) {
   triangles_.clear();
   if (place.kind == QueryPlace::kVertex) {
-    for_triangles_round(mesh_, place.corner[0], [&](std::uint32_t t, std::uint32_t) {
+    for_each_triangle_at(mesh_, place.corner[0], [&](std::uint32_t t, std::uint32_t) {
       if (!has_ghost(mesh_.triangle[t].corner)) triangles_.push_back(t);
     });
     return;
@@ -253,18 +255,18 @@ void Sampler<Kernel>::find_triangles(const Query& p, const QueryPlace& place) {
   triangles_.push_back(place.triangle);
   const Triangle& t = mesh_.triangle[place.triangle];
   for (std::uint32_t i = 0; i < 3; ++i) {
-    const std::uint32_t beyond = triangle_of(t.mate[i]);
-    if (!has_ghost(mesh_.triangle[beyond].corner) &&
+    const std::uint32_t neighbour = triangle_of(t.mate[i]);
+    if (!has_ghost(mesh_.triangle[neighbour].corner) &&
         DoubleKernel::orientation(to_query(mesh_.point[t.corner[next_index(i)]]),
                                   to_query(mesh_.point[t.corner[previous_index(i)]]), p) == 0)
-      triangles_.push_back(beyond);
+      triangles_.push_back(neighbour);
   }
 }
 
 template <class Kernel>
 Gradient Sampler<Kernel>::gradient_of_triangles(const Heights& heights) {
-  Tilt<double> sum;
-  const auto add_all = [&](auto& tilt) {
+  GradientSum<double> sum;
+  const auto add_all = [&](auto& target) {
     for (const std::uint32_t t : triangles_) {
       std::array<Query, 3> corner;
       std::array<double, 3> height{};
@@ -274,14 +276,14 @@ Gradient Sampler<Kernel>::gradient_of_triangles(const Heights& heights) {
         height[i] = heights(VertexId{v});
         if (!std::isfinite(height[i])) return false;
       }
-      tilt.add(corner, height);
+      target.add(corner, height);
     }
     return true;
   };
   if (!add_all(sum)) return {};
   const bool accurate = sum.size * (4 * 0x1p-53 / kTolerance) < sum.area;
   if (accurate && sum.area > kLeastSquare && sum.size < kGreatestSquare) return sum.gradient();
-  Tilt<Rational> exact_sum;
+  GradientSum<Rational> exact_sum;
   add_all(exact_sum);
   return exact_sum.gradient();
 }
@@ -289,7 +291,7 @@ Gradient Sampler<Kernel>::gradient_of_triangles(const Heights& heights) {
 template <class Kernel>
 Gradient Sampler<Kernel>::gradient(const Query& p, const Heights& heights, GradientFrom from) {
   const QueryPlace place = find_place(mesh_, p, last_);
-  if (mesh_.flat || place.kind == QueryPlace::kNowhere) return {};
+  if (mesh_.flat || place.kind == QueryPlace::kOutside) return {};
   if (from == GradientFrom::kNaturalNeighbours) {
     if (place.kind == QueryPlace::kInside) {
       find_cavity(mesh_, p, place.triangle, cavity_);

@@ -11,7 +11,7 @@
 
 namespace terrace::tri::planar {
 
-/// Answers queries one after another; each search starts where the last one ended. For use by one
+/// Answers queries one after another. Each search starts where the last one ended. For use by one
 /// thread. Memory is kept between queries.
 template <class Kernel>
 class Sampler {
@@ -21,11 +21,11 @@ class Sampler {
   Sampler(Sampler&&) = delete;
   Sampler& operator=(Sampler&&) = delete;
 
-  /// Makes the next search start at this vertex; kNone: at the vertex last used by the
+  /// Makes the next search start at this vertex. kNone means the vertex last used by the
   /// triangulation.
   void start_at(std::uint32_t vertex);
   /// See weights_at().
-  std::span<const VertexWeight> weigh(const Query& p, Interpolation method);
+  std::span<const VertexWeight> compute_weights(const Query& p, Interpolation method);
   /// See gradients_at().
   Gradient gradient(const Query& p, const Heights& heights, GradientFrom from);
 
@@ -39,7 +39,7 @@ class Sampler {
   bool measure(const Query& p);
   /// Returns false if the numbers leave a weight undecided.
   template <class Number>
-  bool take_weights(const VoronoiCell<Number>& cell);
+  bool compute_weights(const VoronoiCell<Number>& cell);
   void divide_by_sum();
   /// centre: the vertex at p, or kNoVertex.
   Gradient gradient_of_cell(const Query& p, const Heights& heights, VertexId centre);

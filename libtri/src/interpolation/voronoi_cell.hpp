@@ -82,11 +82,11 @@ struct VoronoiCell {
   /// The point equidistant from the origin, b and c, which are counter-clockwise.
   Vector circumcentre(const Vector& b, const Vector& c);
   void measure(const Cavity& cavity, const Query& p, bool shortens);
-  static Vector shortened(const Vector& a) {
+  static Vector shorten(const Vector& a) {
     if constexpr (!Rounded<Number>::kShortens)
       return a;
     else
-      return {Rounded<Number>::shortened(a.x), Rounded<Number>::shortened(a.y)};
+      return {Rounded<Number>::shorten(a.x), Rounded<Number>::shorten(a.y)};
   }
 
   bool shortens_ = false;
@@ -146,11 +146,11 @@ void VoronoiCell<Number>::measure(const Cavity& cavity, const Query& p, bool sho
     const Vector u = circumcentre({number(b[0]) - ax, number(b[1]) - ay},
                                   {number(c[0]) - ax, number(c[1]) - ay});
     centre[i] = {at[ia].x + u.x, at[ia].y + u.y};
-    if (shortens) centre[i] = shortened(centre[i]);
+    if (shortens) centre[i] = shorten(centre[i]);
   }
   for (std::size_t i = 0; i < round.size(); ++i) {
     round[i] = circumcentre(at[cavity.rim[i].from], at[cavity.rim[i].to]);
-    if (shortens) round[i] = shortened(round[i]);
+    if (shortens) round[i] = shorten(round[i]);
     if constexpr (std::is_same_v<Number, double>) extent += square(round[i]);
   }
   const Vector* before = &round.back();
@@ -198,7 +198,7 @@ bool VoronoiCell<Number>::differentiate(const Cavity& cavity, bool on_vertex,
     const Vector& b = round[i];
     const Number ratio = ((b.y - a.y) * v.x - (b.x - a.x) * v.y) / (square(v) * total);
     slope_[corner] = {ratio * (a.x + b.x), ratio * (a.y + b.y)};
-    if (shortens_) slope_[corner] = shortened(slope_[corner]);
+    if (shortens_) slope_[corner] = shorten(slope_[corner]);
     sum.x += slope_[corner].x;
     sum.y += slope_[corner].y;
   }

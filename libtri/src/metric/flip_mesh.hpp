@@ -41,7 +41,7 @@ struct FlipMesh {
     link(make_side(t, 1), make_side(o, 1));
   }
 
-  /// Flips until no pending side violates the Delaunay condition, with ties broken as in Delaunay2;
+  /// Flips until no pending side violates the Delaunay condition, with ties broken as in Delaunay2.
   /// a flip adds the sides around it. Only edges for which may_flip(side, mate) is true are
   /// flipped. Calls flipping(t, o) before each flip of the edge between t and o. `point` is indexed
   /// by vertex slot.

@@ -13,9 +13,9 @@
 namespace terrace::tri {
 namespace {
 
-void check_semi_axis(double length, const std::string& which) {
+void check_semi_axis(double length, const std::string& axis_name) {
   if (length > 0.0 && std::isfinite(length) && std::isfinite(1.0 / length)) return;
-  throw std::invalid_argument("semi-axis " + which + " is " + std::to_string(length) +
+  throw std::invalid_argument("semi-axis " + axis_name + " is " + std::to_string(length) +
                               "; it must be positive and finite, in the unit of the points");
 }
 
@@ -76,8 +76,8 @@ LinearMap2 ellipse_map(double a, double b, const std::array<double, 2>& directio
                                 std::to_string(s) + ", is not a unit vector");
   }
   // The sum over the axes of e e^T / semi-axis.
-  const double off = c * s / a - s * c / b;
-  const LinearMap2 map{c * c / a + s * s / b, off, off, s * s / a + c * c / b};
+  const double off_diagonal = c * s / a - s * c / b;
+  const LinearMap2 map{c * c / a + s * s / b, off_diagonal, off_diagonal, s * s / a + c * c / b};
   check_metric(map, "the rounded map of an ellipse");
   return map;
 }
@@ -90,11 +90,11 @@ LinearMap2 plane_map(const LinearMap3& m) {
   }
   // Gram-Schmidt on the images of both axes.
   const double first = base::hypot(base::hypot(m[0], m[3]), m[6]);
-  const double along = (m[0] / first) * m[1] + (m[3] / first) * m[4] + (m[6] / first) * m[7];
-  const double across =
-      base::hypot(base::hypot(m[1] - along * (m[0] / first), m[4] - along * (m[3] / first)),
-                  m[7] - along * (m[6] / first));
-  const LinearMap2 map{first, along, 0.0, across};
+  const double shear = (m[0] / first) * m[1] + (m[3] / first) * m[4] + (m[6] / first) * m[7];
+  const double height =
+      base::hypot(base::hypot(m[1] - shear * (m[0] / first), m[4] - shear * (m[3] / first)),
+                  m[7] - shear * (m[6] / first));
+  const LinearMap2 map{first, shear, 0.0, height};
   check_metric(map, "the map of space, restricted to the plane,");
   return map;
 }

@@ -26,7 +26,7 @@ namespace {
 
 using namespace spatial;
 
-/// A copy of tetrahedra that can be flipped. It has no ghosts; kHullSide represents the outside.
+/// A copy of tetrahedra that can be flipped. It has no ghosts. kHullSide represents the outside.
 class Flips {
  public:
   explicit Flips(const base::StopCheck& check_stop) : ticks_(check_stop) {}
@@ -46,9 +46,9 @@ class Flips {
   }
   [[nodiscard]] std::uint32_t region_of(std::uint32_t t) const;
 
-  /// Flips the tetrahedra of a region, in the metric of the scope, until nothing changes. `own`:
-  /// the tetrahedra of the region at the start. Returns the number of stuck facets.
-  std::size_t settle(std::uint32_t number, const std::vector<std::uint32_t>& own);
+  /// Flips the tetrahedra of a region, in the metric of the scope, until nothing changes.
+  /// `members`: the tetrahedra of the region at the start. Returns the number of stuck facets.
+  std::size_t settle(std::uint32_t number, const std::vector<std::uint32_t>& members);
   [[nodiscard]] std::size_t flip_count() const { return flips_; }
 
  private:
@@ -65,7 +65,7 @@ class Flips {
   bool try_flip(std::uint32_t t, std::uint32_t i);
   bool flip_at_edge(std::uint32_t t, std::uint32_t i, std::uint32_t edge, bool coplanar);
   [[nodiscard]] std::uint32_t apex_beyond(std::uint32_t t, std::uint32_t corner) const;
-  void replace(std::span<const std::uint32_t> old, std::span<const Corners> fresh);
+  void replace(std::span<const std::uint32_t> old, std::span<const Corners> added);
   std::uint32_t new_slot();
 
   std::uint32_t number_ = 0;
@@ -102,9 +102,9 @@ bool Flips::is_delaunay(std::uint32_t t, std::uint32_t i) const {
                                           vertex[e].point, {});
 }
 
-std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>& own) {
+std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>& members) {
   number_ = number;
-  for (const std::uint32_t t : own) {
+  for (const std::uint32_t t : members) {
     ticks_(512);
     for (std::uint32_t i = 0; i < 4; ++i) {
       // Takes each facet from one side.
@@ -116,7 +116,7 @@ std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>
   std::vector<Pending> stuck;
   while (true) {
     stuck.clear();
-    const std::size_t before = flips_;
+    const std::size_t flips_before = flips_;
     while (!pending_.empty()) {
       const Pending next = pending_.top();
       pending_.pop();
@@ -127,7 +127,7 @@ std::size_t Flips::settle(std::uint32_t number, const std::vector<std::uint32_t>
       if (!try_flip(t, index_of(next.side))) stuck.push_back(next);
     }
     // A flip elsewhere may have freed a stuck facet.
-    if (flips_ == before) break;
+    if (flips_ == flips_before) break;
     for (const Pending& one : stuck) pending_.push(one);
   }
   // There may be duplicates.
@@ -184,14 +184,15 @@ bool Flips::flip_at_edge(std::uint32_t t, std::uint32_t i, std::uint32_t edge, b
     if (k != i && k != edge) ends[n++] = tetrahedron[t].corner[k];
   const auto [a, b] = ends;
   const std::uint32_t f = apex_beyond(t, c);
-  const auto beyond = [&](std::uint32_t from) {
+  const auto neighbour_of = [&](std::uint32_t from) {
     std::uint32_t k = 0;
     while (tetrahedron[from].corner[k] != c) ++k;
     return tetrahedron_of(tetrahedron[from].mate[k]);
   };
   if (!coplanar) {
     if (f != e) return false;
-    replace(std::array{t, o, beyond(t)}, std::array{Corners{c, d, e, a}, Corners{c, d, e, b}});
+    replace(std::array{t, o, neighbour_of(t)},
+            std::array{Corners{c, d, e, a}, Corners{c, d, e, b}});
     return true;
   }
   if (apex_beyond(o, c) != f) return false;
@@ -200,7 +201,7 @@ bool Flips::flip_at_edge(std::uint32_t t, std::uint32_t i, std::uint32_t edge, b
     return true;
   }
   if (region[f] != number_) return false;
-  replace(std::array{t, o, beyond(t), beyond(o)},
+  replace(std::array{t, o, neighbour_of(t), neighbour_of(o)},
           std::array{Corners{c, d, e, a}, Corners{c, d, e, b}, Corners{f, d, e, a},
                      Corners{f, d, e, b}});
   return true;
@@ -217,7 +218,7 @@ std::uint32_t Flips::new_slot() {
 }
 
 /// Replaces tetrahedra by others, with corners in any order, that fill the same space.
-void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners> fresh) {
+void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners> added) {
   struct Facet {
     Key key;
     Side side;
@@ -237,7 +238,7 @@ void Flips::replace(std::span<const std::uint32_t> old, std::span<const Corners>
     tetrahedron[t].corner = {kFreeCorner, free_, 0, 0};
     free_ = t;
   }
-  for (Corners corner : fresh) {
+  for (Corners corner : added) {
     const auto at = [&](std::size_t k) -> const auto& { return vertex[corner[k]].point; };
     const int turn = EllipticalKernel::orientation(at(0), at(1), at(2), at(3));
     assert(turn != 0);
@@ -273,7 +274,7 @@ template <class Triangulation>
 std::vector<LinearMap3> find_regions(const Triangulation& triangulation, const MetricField3& field,
                                      Flips& flips) {
   std::vector<LinearMap3> maps;
-  std::map<LinearMap3, std::uint32_t> known;
+  std::map<LinearMap3, std::uint32_t> map_index;
   std::uint32_t last = 0;
   for (const VertexId v : triangulation.all_vertices()) {
     const auto p = triangulation.point(v);
@@ -285,8 +286,8 @@ std::vector<LinearMap3> find_regions(const Triangulation& triangulation, const M
       // Checked before it becomes a key, because NaN has no order.
       check_metric(map, "the field of metrics: the map at " + std::to_string(place[0]) + ", " +
                             std::to_string(place[1]) + ", " + std::to_string(place[2]));
-      const auto [at, fresh] = known.try_emplace(map, static_cast<std::uint32_t>(maps.size()));
-      if (fresh) maps.push_back(map);
+      const auto [at, added] = map_index.try_emplace(map, static_cast<std::uint32_t>(maps.size()));
+      if (added) maps.push_back(map);
       last = at->second;
     }
     flips.region[slot(v)] = last;
@@ -317,12 +318,12 @@ void copy_tetrahedra(const Triangulation& triangulation, Flips& flips) {
       flips.tetrahedron[number[slot(id)]].corner[k] = slot(corners[k]);
   }
   for (const TetrahedronId id : triangulation.all_tetrahedra()) {
-    const auto beyond = triangulation.neighbours(id);
+    const auto neighbour_of = triangulation.neighbours(id);
     auto& t = flips.tetrahedron[number[slot(id)]];
     for (std::uint32_t i = 0; i < 4; ++i) {
       t.mate[i] = Flips::kHullSide;
-      if (beyond[i] == kNoTetrahedron) continue;
-      const std::uint32_t other = number[slot(beyond[i])];
+      if (neighbour_of[i] == kNoTetrahedron) continue;
+      const std::uint32_t other = number[slot(neighbour_of[i])];
       // From there, the facet is opposite to the corner that is not a corner of this tetrahedron.
       const auto& corner = flips.tetrahedron[other].corner;
       std::uint32_t k = 0;
@@ -347,12 +348,12 @@ void build_anew(const Triangulation& triangulation, const LinearMap3& map,
   Delaunay3<double, EllipticalMetric3> elliptical(map);
   elliptical.set_check_stop(check_stop);
   const std::vector<VertexId> built = elliptical.build(points);
-  std::vector<VertexId> given(elliptical.vertex_slots(), kNoVertex);
-  for (std::size_t i = 0; i < built.size(); ++i) given[slot(built[i])] = vertices[i];
+  std::vector<VertexId> vertex_of(elliptical.vertex_slots(), kNoVertex);
+  for (std::size_t i = 0; i < built.size(); ++i) vertex_of[slot(built[i])] = vertices[i];
   result.tetrahedra.reserve(elliptical.tetrahedron_count());
   for (const TetrahedronId t : elliptical.all_tetrahedra()) {
     auto corners = elliptical.vertices(t);
-    for (VertexId& v : corners) v = given[slot(v)];
+    for (VertexId& v : corners) v = vertex_of[slot(v)];
     result.tetrahedra.push_back(corners);
   }
 }
@@ -362,7 +363,7 @@ void build_anew(const Triangulation& triangulation, const LinearMap3& map,
 template <class Triangulation>
 MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation, const MetricField3& field,
                                    const base::StopCheck& check_stop) {
-  const LinearMap3 given = map_of(triangulation.metric());
+  const LinearMap3 own_map = map_of(triangulation.metric());
   MetricTetrahedra result;
   Flips flips(check_stop);
   flips.vertex.resize(triangulation.vertex_slots());
@@ -370,7 +371,7 @@ MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation, const Met
   flips.rank.resize(triangulation.vertex_slots());
   const std::vector<LinearMap3> maps = find_regions(triangulation, field, flips);
   if (triangulation.tetrahedron_count() == 0) return result;
-  if (maps.size() == 1 && maps[0] != given) {
+  if (maps.size() == 1 && maps[0] != own_map) {
     build_anew(triangulation, maps[0], check_stop, result);
     return result;
   }
@@ -379,7 +380,7 @@ MetricTetrahedra metric_tetrahedra(const Triangulation& triangulation, const Met
   std::vector<std::vector<std::uint32_t>> members(maps.size());
   for (std::uint32_t t = 0; t < flips.tetrahedron.size(); ++t) {
     const std::uint32_t region = flips.region_of(t);
-    if (region != Flips::kNoRegion && maps[region] != given) members[region].push_back(t);
+    if (region != Flips::kNoRegion && maps[region] != own_map) members[region].push_back(t);
   }
   for (std::uint32_t region = 0; region < maps.size(); ++region) {
     if (members[region].empty()) continue;

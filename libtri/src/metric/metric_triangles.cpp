@@ -19,17 +19,17 @@ constexpr std::uint32_t kNoRegion = 0xFFFFFFFFu;
 const LinearMap2& map_of(const Euclidean&) { return kIdentityMap<2>; }
 const LinearMap2& map_of(const EllipticalMetric2& metric) { return metric.map(); }
 
-/// A copy of triangles whose edges can be flipped. It has no ghosts; kNoMate represents the
+/// A copy of triangles whose edges can be flipped. It has no ghosts. kNoMate represents the
 /// outside.
 class Flips {
  public:
   template <class Triangulation>
-  Flips(const Triangulation& triangulation, const MetricField2& field,
-        const TriangleFilter& takes_part, const base::StopCheck& check_stop)
+  Flips(const Triangulation& triangulation, const MetricField2& field, const TriangleFilter& filter,
+        const base::StopCheck& check_stop)
       : ticks_(check_stop),
         point_(triangulation.vertex_slots()),
         region_(triangulation.vertex_slots(), kNoRegion) {
-    if (!takes_part) mesh_.triangle.reserve(triangulation.triangle_count());
+    if (!filter) mesh_.triangle.reserve(triangulation.triangle_count());
     // The dense number of each participating triangle.
     std::vector<std::uint32_t> number(triangulation.triangle_slots(), kNone);
     for (const TriangleId id : triangulation.all_triangles()) {
@@ -39,7 +39,7 @@ class Flips {
         const auto p = triangulation.point(v);
         point_[slot(v)] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
       }
-      if (takes_part && !takes_part(id)) continue;
+      if (filter && !filter(id)) continue;
       number[slot(id)] = static_cast<std::uint32_t>(mesh_.triangle.size());
       mesh_.triangle.push_back({{slot(corners[0]), slot(corners[1]), slot(corners[2])}, {}});
     }
@@ -47,9 +47,10 @@ class Flips {
       ticks_(64);
       if (number[slot(id)] == kNone) continue;
       Triangle& t = mesh_.triangle[number[slot(id)]];
-      const auto beyond = triangulation.neighbours(id);
+      const auto neighbours = triangulation.neighbours(id);
       for (std::uint32_t i = 0; i < 3; ++i) {
-        const std::uint32_t other = beyond[i] == kNoTriangle ? kNone : number[slot(beyond[i])];
+        const std::uint32_t other =
+            neighbours[i] == kNoTriangle ? kNone : number[slot(neighbours[i])];
         t.mate[i] = kNoMate;
         if (other == kNone) continue;
         // Seen from the other triangle the edge is reversed, so its first corner is this one's
@@ -68,7 +69,7 @@ class Flips {
     std::vector<std::vector<std::uint32_t>> members(maps_.size());
     for (std::uint32_t t = 0; t < mesh_.triangle.size(); ++t) {
       const std::uint32_t region = region_of(mesh_.triangle[t]);
-      if (region != kNoRegion && !done_[region]) members[region].push_back(t);
+      if (region != kNoRegion && !is_done_[region]) members[region].push_back(t);
     }
     for (std::uint32_t region = 0; region < maps_.size(); ++region) {
       if (members[region].empty()) continue;
@@ -104,8 +105,8 @@ class Flips {
  private:
   using Point = EllipticalKernel::Point;
 
-  void find_regions(const MetricField2& field, const LinearMap2& given) {
-    std::map<LinearMap2, std::uint32_t> known;
+  void find_regions(const MetricField2& field, const LinearMap2& own_map) {
+    std::map<LinearMap2, std::uint32_t> map_index;
     for (const Triangle& t : mesh_.triangle) {
       ticks_(256);
       for (const std::uint32_t v : t.corner) {
@@ -116,10 +117,11 @@ class Flips {
           // Checked before it becomes a key, because NaN has no order.
           check_metric(map, "the field of metrics: the map at " + std::to_string(point_[v][0]) +
                                 ", " + std::to_string(point_[v][1]));
-          const auto [at, fresh] = known.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
-          if (fresh) {
+          const auto [at, is_new] =
+              map_index.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
+          if (is_new) {
             maps_.push_back(map);
-            done_.push_back(map == given);
+            is_done_.push_back(map == own_map);
           }
           last_ = at->second;
         }
@@ -138,7 +140,7 @@ class Flips {
   std::vector<std::uint32_t> region_;  // by vertex slot: index in maps_
   FlipMesh mesh_;
   std::vector<LinearMap2> maps_;
-  std::vector<bool> done_;  // true for regions with the metric of the triangulation
+  std::vector<bool> is_done_;  // true for regions with the metric of the triangulation
   std::uint32_t last_ = 0;
   std::vector<Side> pending_;
 };
@@ -148,9 +150,9 @@ class Flips {
 template <class Triangulation>
 std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& triangulation,
                                                       const MetricField2& field,
-                                                      const TriangleFilter& takes_part,
+                                                      const TriangleFilter& filter,
                                                       const base::StopCheck& check_stop) {
-  Flips flips(triangulation, field, takes_part, check_stop);
+  Flips flips(triangulation, field, filter, check_stop);
   flips.run();
   return flips.result();
 }

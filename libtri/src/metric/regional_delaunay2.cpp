@@ -44,7 +44,7 @@ class RegionTable {
   explicit RegionTable(MetricField2 field) : field_(std::move(field)) {
     maps_.push_back(kIdentityMap<2>);
     forms_.emplace_back(kIdentityMap<2>);
-    known_.emplace(maps_.back(), kPlainRegion);
+    map_index_.emplace(maps_.back(), kPlainRegion);
   }
   /// Returns the number of the region at a position. Throws as metric_triangles() does.
   std::uint32_t at(const PlanePosition& p) {
@@ -54,8 +54,8 @@ class RegionTable {
     // Checked before it becomes a key, because NaN has no order.
     check_metric(map, "the field of metrics: the map at " + std::to_string(p[0]) + ", " +
                           std::to_string(p[1]));
-    const auto [at, fresh] = known_.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
-    if (fresh) {
+    const auto [at, is_new] = map_index_.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
+    if (is_new) {
       maps_.push_back(map);
       forms_.emplace_back(map);
     }
@@ -68,7 +68,7 @@ class RegionTable {
 
  private:
   MetricField2 field_;
-  std::map<LinearMap2, std::uint32_t> known_;
+  std::map<LinearMap2, std::uint32_t> map_index_;
   std::vector<LinearMap2> maps_;
   std::vector<planar::QuadraticForm> forms_;
   std::uint32_t last_ = kPlainRegion;
@@ -143,18 +143,18 @@ struct RegionalDelaunay2<Coord>::Impl {
     }
   };
   // Bits of `marks`.
-  static constexpr std::uint8_t kTouched = 1, kUnflipped = 2, kGone = 4, kKept = 8;
+  static constexpr std::uint8_t kTouched = 1, kUnflipped = 2, kRemoved = 4, kKept = 8;
   Changes changes;
-  std::vector<std::uint8_t> marks;             ///< by triangle slot; 0 between calls
-  std::vector<std::uint32_t> to, turn;         ///< by triangle slot; `to` is kNone between calls
-  std::vector<std::uint32_t> touched;          ///< slots that change
-  std::vector<Listed> before, after;           ///< the triangles in these slots
-  std::vector<std::uint32_t> unflipped, gone;  ///< slots
+  std::vector<std::uint8_t> marks;      ///< by triangle slot. 0 between calls
+  std::vector<std::uint32_t> to, turn;  ///< by triangle slot. `to` is kNone between calls
+  std::vector<std::uint32_t> touched;   ///< slots that change
+  std::vector<Listed> old_triangles, new_triangles;     ///< the triangles in these slots
+  std::vector<std::uint32_t> unflipped, removed_slots;  ///< slots
   std::vector<planar::Side> pending;
   std::vector<Edge> edges;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> to_flip;  ///< region, slot
-  std::vector<planar::Triangle> moved;
-  std::vector<bool> fresh;  ///< by vertex slot: new since the last call
+  std::vector<planar::Triangle> sorted;
+  std::vector<bool> is_new;  ///< by vertex slot: new since the last call
   std::vector<Insertion> inserted;
 
   static PlanePosition as_position(const Point& p) {
@@ -193,7 +193,7 @@ struct RegionalDelaunay2<Coord>::Impl {
     marks[t] |= kTouched;
     touched.push_back(t);
     const Triple& c = mesh.triangle[t].corner;
-    if (in_use(c)) before.push_back({c, t});
+    if (in_use(c)) old_triangles.push_back({c, t});
   }
   static bool in_use(const Triple& c) { return c[0] != planar::kFreeCorner; }
 
@@ -238,8 +238,8 @@ struct RegionalDelaunay2<Coord>::Impl {
     const planar::Triangle& triangle = mesh.triangle[t];
     const std::uint32_t p = triangle.corner[next_index(i)], q = triangle.corner[previous_index(i)];
     if (p == w || q == w) {
-      const planar::Side beyond = triangle.mate[p == w ? previous_index(i) : next_index(i)];
-      take((p == w) == left ? t : triangle_of(beyond));
+      const planar::Side neighbour = triangle.mate[p == w ? previous_index(i) : next_index(i)];
+      take((p == w) == left ? t : triangle_of(neighbour));
       return true;
     }
     const auto orientation = [&](std::uint32_t x, std::uint32_t y, std::uint32_t z) {
@@ -275,7 +275,7 @@ struct RegionalDelaunay2<Coord>::Impl {
       for (const std::uint32_t v : mesh.triangle[t].corner) incident[v] = t;
   }
 
-  /// The side of the triangle to the left of the edge from a to b if there is nothing beyond it;
+  /// The side of the triangle to the left of the edge from a to b if there is nothing beyond it, or
   /// kNoMate if there is no such edge on the hull.
   [[nodiscard]] planar::Side hull_side(std::uint32_t a, std::uint32_t b) const {
     if (incident[a] == planar::kNone || incident[b] == planar::kNone) return kNoMate;
@@ -300,33 +300,33 @@ struct RegionalDelaunay2<Coord>::Impl {
   /// Takes out the lost triangles. Sets `edges` to the sides around the holes and to the hull sides
   /// to which new triangles will be attached.
   void take_out() {
-    after.clear();
+    new_triangles.clear();
     for (const std::uint32_t t : unflipped)
-      after.push_back({from_least(mesh.triangle[t].corner), t});
-    std::sort(after.begin(), after.end());
+      new_triangles.push_back({from_least(mesh.triangle[t].corner), t});
+    std::sort(new_triangles.begin(), new_triangles.end());
     for (const auto& corners : changes.removed_corners) {
-      const Listed wanted{from_least(slots_of(corners)), 0};
-      const auto found = std::lower_bound(after.begin(), after.end(), wanted);
-      assert(found != after.end() && found->corners == wanted.corners);
-      marks[found->slot] |= kGone;
-      gone.push_back(found->slot);
+      const Listed key{from_least(slots_of(corners)), 0};
+      const auto found = std::lower_bound(new_triangles.begin(), new_triangles.end(), key);
+      assert(found != new_triangles.end() && found->corners == key.corners);
+      marks[found->slot] |= kRemoved;
+      removed_slots.push_back(found->slot);
     }
     for (const TriangleId id : changes.added_triangles) {
       const Triple c = slots_of(plain.vertices(id));
       for (std::uint32_t i = 0; i < 3; ++i) {
         const std::uint32_t u = c[next_index(i)], v = c[previous_index(i)];
-        if (!fresh[c[i]] || fresh[u] || fresh[v]) continue;
+        if (!is_new[c[i]] || is_new[u] || is_new[v]) continue;
         const planar::Side side = hull_side(v, u);
-        if (side != kNoMate && (marks[triangle_of(side)] & kGone) == 0)
+        if (side != kNoMate && (marks[triangle_of(side)] & kRemoved) == 0)
           edges.push_back({std::min(u, v), std::max(u, v), side});
       }
     }
-    for (const std::uint32_t t : gone)
+    for (const std::uint32_t t : removed_slots)
       for (const std::uint32_t v : mesh.triangle[t].corner) incident[v] = planar::kNone;
-    for (const std::uint32_t t : gone) {
+    for (const std::uint32_t t : removed_slots) {
       for (std::uint32_t i = 0; i < 3; ++i) {
         const planar::Side outer = mesh.triangle[t].mate[i];
-        if (outer == kNoMate || (marks[triangle_of(outer)] & kGone) != 0) continue;
+        if (outer == kNoMate || (marks[triangle_of(outer)] & kRemoved) != 0) continue;
         const std::uint32_t u = mesh.triangle[t].corner[next_index(i)];
         const std::uint32_t v = mesh.triangle[t].corner[previous_index(i)];
         edges.push_back({std::min(u, v), std::max(u, v), outer});
@@ -353,9 +353,9 @@ struct RegionalDelaunay2<Coord>::Impl {
   void put_in() {
     for (const TriangleId id : changes.added_triangles) {
       std::uint32_t t = 0;
-      if (!gone.empty()) {
-        t = gone.back();
-        gone.pop_back();
+      if (!removed_slots.empty()) {
+        t = removed_slots.back();
+        removed_slots.pop_back();
       } else {
         t = free.empty() ? static_cast<std::uint32_t>(mesh.triangle.size()) : free.take();
         if (t == mesh.triangle.size()) {
@@ -366,7 +366,7 @@ struct RegionalDelaunay2<Coord>::Impl {
         }
         touch(t);
       }
-      marks[t] &= static_cast<std::uint8_t>(~kGone);
+      marks[t] &= static_cast<std::uint8_t>(~kRemoved);
       if ((marks[t] & kUnflipped) == 0) {
         marks[t] |= kUnflipped;
         unflipped.push_back(t);
@@ -408,57 +408,59 @@ struct RegionalDelaunay2<Coord>::Impl {
     }
   }
 
-  /// Triangles that exist before and after return to their slots; the others take the remaining
+  /// Triangles that exist before and after return to their slots. The others take the remaining
   /// ones.
   void settle_slots() {
-    after.clear();
+    new_triangles.clear();
     for (const std::uint32_t t : touched)
       if (in_use(mesh.triangle[t].corner))
-        after.push_back({from_least(mesh.triangle[t].corner), t});
-    std::sort(before.begin(), before.end());
-    std::sort(after.begin(), after.end());
-    const auto has_fresh = [&](const Triple& c) {
-      return fresh[c[0]] || fresh[c[1]] || fresh[c[2]];
+        new_triangles.push_back({from_least(mesh.triangle[t].corner), t});
+    std::sort(old_triangles.begin(), old_triangles.end());
+    std::sort(new_triangles.begin(), new_triangles.end());
+    const auto has_new_vertex = [&](const Triple& c) {
+      return is_new[c[0]] || is_new[c[1]] || is_new[c[2]];
     };
-    auto old = before.begin();
-    for (const Listed& now : after) {
-      while (old != before.end() && *old < now) ++old;
-      if (old == before.end() || old->corners != now.corners || has_fresh(now.corners)) continue;
-      to[now.slot] = old->slot;
+    auto old = old_triangles.begin();
+    for (const Listed& current : new_triangles) {
+      while (old != old_triangles.end() && *old < current) ++old;
+      if (old == old_triangles.end() || old->corners != current.corners ||
+          has_new_vertex(current.corners))
+        continue;
+      to[current.slot] = old->slot;
       marks[old->slot] |= kKept;
     }
     if (journal.on()) {
-      for (const Listed& listed : before)
+      for (const Listed& listed : old_triangles)
         if ((marks[listed.slot] & kKept) == 0) journal.touch_cell(listed.slot, listed.corners);
     }
     std::sort(touched.begin(), touched.end());
     auto room = touched.begin();
-    for (const Listed& now : after) {
-      if (to[now.slot] == planar::kNone) {
+    for (const Listed& current : new_triangles) {
+      if (to[current.slot] == planar::kNone) {
         while ((marks[*room] & kKept) != 0) ++room;
-        to[now.slot] = *room;
+        to[current.slot] = *room;
         if (journal.on()) journal.touch_cell(*room, {planar::kFreeCorner, 0, 0});
         marks[*room] |= kKept;
       }
-      turn[now.slot] = least_index(mesh.triangle[now.slot].corner);
+      turn[current.slot] = least_index(mesh.triangle[current.slot].corner);
     }
     move_to_slots();
   }
   void move_to_slots() {
-    moved.clear();
-    for (const Listed& now : after) moved.push_back(mesh.triangle[now.slot]);
-    for (std::size_t n = 0; n < after.size(); ++n) {
-      const std::uint32_t t = after[n].slot, there = to[t];
-      planar::Triangle& triangle = mesh.triangle[there];
-      triangle.corner = after[n].corners;
+    sorted.clear();
+    for (const Listed& current : new_triangles) sorted.push_back(mesh.triangle[current.slot]);
+    for (std::size_t n = 0; n < new_triangles.size(); ++n) {
+      const std::uint32_t t = new_triangles[n].slot, target = to[t];
+      planar::Triangle& triangle = mesh.triangle[target];
+      triangle.corner = new_triangles[n].corners;
       for (std::uint32_t i = 0; i < 3; ++i) {
-        incident[triangle.corner[i]] = there;
-        const planar::Side mate = moved[n].mate[(i + turn[t]) % 3];
+        incident[triangle.corner[i]] = target;
+        const planar::Side mate = sorted[n].mate[(i + turn[t]) % 3];
         triangle.mate[i] = mate;
         if (mate == kNoMate) continue;
         const std::uint32_t other = triangle_of(mate), k = planar::index_of(mate);
         if (to[other] == planar::kNone) {
-          mesh.triangle[other].mate[k] = make_side(there, i);
+          mesh.triangle[other].mate[k] = make_side(target, i);
         } else {
           triangle.mate[i] = make_side(to[other], (k + 3 - turn[other]) % 3);
         }
@@ -482,12 +484,12 @@ struct RegionalDelaunay2<Coord>::Impl {
         journal.touch_vertex(slot(changes.removed_vertices[i]), true, changes.removed_points[i]);
       for (const VertexId v : changes.added_vertices) journal.touch_vertex(slot(v), false, {});
     }
-    fresh.resize(std::max<std::size_t>(fresh.size(), plain.vertex_slots()));
-    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = true;
+    is_new.resize(std::max<std::size_t>(is_new.size(), plain.vertex_slots()));
+    for (const VertexId v : changes.added_vertices) is_new[slot(v)] = true;
     touched.clear();
-    before.clear();
+    old_triangles.clear();
     unflipped.clear();
-    gone.clear();
+    removed_slots.clear();
     edges.clear();
     to_flip.clear();
     gather();
@@ -499,17 +501,17 @@ struct RegionalDelaunay2<Coord>::Impl {
     settle_slots();
     count += changes.added_triangles.size();
     count -= changes.removed_triangles.size();
-    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
+    for (const VertexId v : changes.added_vertices) is_new[slot(v)] = false;
   }
   void take_changes(Changes& out) {
     assert(journal.on());
     out.clear();
-    Point now{};
+    Point current{};
     journal.take(
         [&](std::uint32_t v) {
           if (!plain.alive(VertexId{v})) return static_cast<const Point*>(nullptr);
-          now = plain.point(VertexId{v});
-          return static_cast<const Point*>(&now);
+          current = plain.point(VertexId{v});
+          return static_cast<const Point*>(&current);
         },
         [&](std::uint32_t t) {
           const Triple& c = mesh.triangle[t].corner;

@@ -33,37 +33,37 @@ class VertexOwners {
 
   void reserve(std::size_t vertex_slots);
   /// Upper bound of all vertex slots seen so far.
-  [[nodiscard]] std::size_t slots() const { return standing_.size(); }
+  [[nodiscard]] std::size_t slots() const { return representatives_.size(); }
 
   Change add(VertexId vertex, Owner owner, double height, const ClusterTree& tree) {
     const std::size_t at = static_cast<std::uint32_t>(vertex);
-    if (at >= standing_.size()) grow(at + 1);
-    if (standing_[at].slot == ClusterTree::kNoSlot) {
-      standing_[at] = owner;
+    if (at >= representatives_.size()) grow(at + 1);
+    if (representatives_[at].slot == ClusterTree::kNoSlot) {
+      representatives_[at] = owner;
       heights_[at] = height;
       return Change::first;
     }
-    return add_further(vertex, owner, height, tree);
+    return add_other(vertex, owner, height, tree);
   }
 
   /// Must be called while the owner's cluster is still in the tree.
   Change remove(VertexId vertex, Owner owner, const ClusterTree& tree) {
-    Owner& standing = standing_[static_cast<std::uint32_t>(vertex)];
-    if (standing.slot == owner.slot && standing.index == owner.index) {
-      standing.slot = ClusterTree::kNoSlot;
+    Owner& current = representatives_[static_cast<std::uint32_t>(vertex)];
+    if (current.slot == owner.slot && current.index == owner.index) {
+      current.slot = ClusterTree::kNoSlot;
       return Change::last;
     }
     return remove_shared(vertex, owner, tree);
   }
 
   /// The point that represents an existing vertex.
-  [[nodiscard]] Owner standing(VertexId vertex) const {
-    const Owner owner = standing_[static_cast<std::uint32_t>(vertex)];
+  [[nodiscard]] Owner representative(VertexId vertex) const {
+    const Owner owner = representatives_[static_cast<std::uint32_t>(vertex)];
     return {owner.slot, owner.index & ~kShared};
   }
   /// True if a point is on the vertex in this slot, which must be below slots().
-  [[nodiscard]] bool owned(VertexId vertex) const {
-    return standing_[static_cast<std::uint32_t>(vertex)].slot != ClusterTree::kNoSlot;
+  [[nodiscard]] bool has_owner(VertexId vertex) const {
+    return representatives_[static_cast<std::uint32_t>(vertex)].slot != ClusterTree::kNoSlot;
   }
   [[nodiscard]] double height(VertexId vertex) const {
     return heights_[static_cast<std::uint32_t>(vertex)];
@@ -72,10 +72,10 @@ class VertexOwners {
   /// of succession.
   template <class Visit>
   void for_each(VertexId vertex, Visit&& visit) const {
-    visit(standing(vertex));
-    if (!(standing_[static_cast<std::uint32_t>(vertex)].index & kShared)) return;
-    for (auto it = further_.lower_bound(Further{vertex, kFirst, {}, 0.0});
-         it != further_.end() && it->vertex == vertex; ++it) {
+    visit(representative(vertex));
+    if (!(representatives_[static_cast<std::uint32_t>(vertex)].index & kShared)) return;
+    for (auto it = other_owners_.lower_bound(OtherOwner{vertex, kFirstId, {}, 0.0});
+         it != other_owners_.end() && it->vertex == vertex; ++it) {
       visit(it->owner);
     }
   }
@@ -87,28 +87,28 @@ class VertexOwners {
   static constexpr std::uint32_t kShared = 0x80000000u;
 
   /// Sorts before all points.
-  static constexpr PointId kFirst{cluster_id(255, 0), 0};
+  static constexpr PointId kFirstId{cluster_id(255, 0), 0};
 
-  // A waiting owner. Points at the same x, y (walls seen from above) can give one vertex many
-  // owners, so they are kept in order.
-  struct Further {
+  // An owner that does not represent its vertex. Points at the same x, y (walls seen from above)
+  // can give one vertex many owners, so they are kept in order.
+  struct OtherOwner {
     VertexId vertex{};
     PointId id;
     Owner owner;
     double height = 0.0;
-    bool operator<(const Further& other) const {
+    bool operator<(const OtherOwner& other) const {
       if (vertex != other.vertex) return vertex < other.vertex;
-      return stands_before(id, other.id);
+      return takes_precedence(id, other.id);
     }
   };
 
   void grow(std::size_t slots);
-  Change add_further(VertexId vertex, Owner owner, double height, const ClusterTree& tree);
+  Change add_other(VertexId vertex, Owner owner, double height, const ClusterTree& tree);
   Change remove_shared(VertexId vertex, Owner owner, const ClusterTree& tree);
 
-  std::vector<Owner> standing_;
+  std::vector<Owner> representatives_;
   std::vector<double> heights_;
-  std::set<Further> further_;
+  std::set<OtherOwner> other_owners_;
 };
 
 }  // namespace terrace::tri

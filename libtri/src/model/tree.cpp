@@ -39,7 +39,7 @@ PointId ClusterTree::head(Slot slot) const {
   return {clusters_[cluster.home].id, cluster.home_index};
 }
 
-ClusterId ClusterTree::headed_by(Slot slot, std::uint32_t member, unsigned level) const {
+ClusterId ClusterTree::headed_cluster(Slot slot, std::uint32_t member, unsigned level) const {
   const Cluster& cluster = clusters_[slot];
   const std::size_t per_member = level_of(cluster.id);
   assert(level < per_member && member < cluster.size);
@@ -59,16 +59,16 @@ std::uint32_t ClusterTree::child_count(Slot slot) const {
 ClusterId ClusterTree::child_id(ChildRef child) const {
   const Cluster& parent = clusters_[child.parent];
   const unsigned level = level_of(parent.id) - 1;
-  if (child.index < parent.size) return headed_by(child.parent, child.index, level);
-  return headed_by(parent.home, parent.home_index, level);
+  if (child.index < parent.size) return headed_cluster(child.parent, child.index, level);
+  return headed_cluster(parent.home, parent.home_index, level);
 }
 
 ClusterId ClusterTree::head_child(ChildRef child) const {
   const Cluster& parent = clusters_[child.parent];
   const unsigned level = level_of(parent.id) - 1;
   assert(level > 0);
-  if (child.index < parent.size) return headed_by(child.parent, child.index, level - 1);
-  return headed_by(parent.home, parent.home_index, level - 1);
+  if (child.index < parent.size) return headed_cluster(child.parent, child.index, level - 1);
+  return headed_cluster(parent.home, parent.home_index, level - 1);
 }
 
 ClusterTree::Slot ClusterTree::child_slot(ChildRef child) const {
@@ -83,8 +83,8 @@ const ClusterRecord& ClusterTree::record(ChildRef child) {
     unknown.members = kUnknown;
     inner.records.assign(inner.children.size(), unknown);
   }
-  ClusterRecord& known = inner.records[child.index];
-  if (known.members == kUnknown) {
+  ClusterRecord& cached = inner.records[child.index];
+  if (cached.members == kUnknown) {
     const ClusterId id = child_id(child);
     const ClusterRecord record = source_->record(id);
     if (record.members > kMaxMembers) {
@@ -92,14 +92,14 @@ const ClusterRecord& ClusterTree::record(ChildRef child) {
                                    " members, at most " + std::to_string(kMaxMembers) +
                                    " are possible; the source is damaged, verify it");
     }
-    known = record;
+    cached = record;
   }
-  return known;
+  return cached;
 }
 
 ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
   Plan result;
-  std::vector<Slot> above{kRoot}, here;
+  std::vector<Slot> upper_level{kRoot}, current_level;
   struct Wanted {
     ChildRef child;
     bool children_too;
@@ -107,11 +107,12 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
   std::vector<Wanted> wanted;
   std::vector<ClusterId> ids;
   try {
-    for (unsigned level = top(); level-- > 0 && !above.empty(); above.swap(here)) {
-      here.clear();
+    for (unsigned level = top(); level-- > 0 && !upper_level.empty();
+         upper_level.swap(current_level)) {
+      current_level.clear();
       wanted.clear();
       ids.clear();
-      for (const Slot parent : above) {
+      for (const Slot parent : upper_level) {
         const std::uint32_t count = child_count(parent);
         for (std::uint32_t i = 0; i < count; ++i) {
           const ChildRef child{parent, i};
@@ -122,7 +123,7 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
             case Verdict::keep:
               break;
             case Verdict::visit:
-              if (expanded) here.push_back(present);
+              if (expanded) current_level.push_back(present);
               break;
             case Verdict::expand:
             case Verdict::expand_alone:
@@ -130,7 +131,7 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
                 wanted.push_back({child, verdict == Verdict::expand});
                 ids.push_back(child_id(child));
               } else if (verdict == Verdict::expand || has_expanded_children(present)) {
-                here.push_back(present);
+                current_level.push_back(present);
               }
               break;
             case Verdict::collapse:
@@ -144,7 +145,7 @@ ClusterTree::Plan ClusterTree::plan(const Judge& judge, const Take& take) {
         // before anything that may throw, as every staged cluster must be listed
         result.staged.push_back(kNoSlot);
         result.staged.back() = stage(ids[i], wanted[i].child, take);
-        if (wanted[i].children_too) here.push_back(result.staged.back());
+        if (wanted[i].children_too) current_level.push_back(result.staged.back());
       }
     }
   } catch (...) {
@@ -219,9 +220,9 @@ ClusterTree::Slot ClusterTree::stage(ClusterId id, ChildRef place, const Take& t
   if (!is_root) {
     // The head is the parent's own head or a member of the parent.
     const Cluster& parent = clusters_[place.parent];
-    const bool own = place.index == parent.size;
-    cluster.home = own ? parent.home : place.parent;
-    cluster.home_index = own ? parent.home_index : place.index;
+    const bool shares_head = place.index == parent.size;
+    cluster.home = shares_head ? parent.home : place.parent;
+    cluster.home_index = shares_head ? parent.home_index : place.index;
   }
   if (level > 0) {
     check_ordinals(id, members.children);

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "map.hpp"
+#include "cluster_map.hpp"
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/multiresolution.hpp"
 
@@ -20,7 +20,7 @@ namespace terrace::tri {
 /// 1 headed by p and by each member. A child can be expanded while its parent is expanded.
 ///
 /// A step has two halves. In the first, plan() or stage() reads everything that the step needs from
-/// the source; an exception there leaves the tree unchanged. In the second, the clusters to
+/// the source. An exception there leaves the tree unchanged. In the second, the clusters to
 /// collapse are released, which cannot fail.
 ///
 /// Memory: 48 bytes per expanded cluster and 4 per member. Above level 0 also 20 + 8 * level per
@@ -44,12 +44,12 @@ class ClusterTree {
   [[nodiscard]] std::span<VertexId> vertices(Slot slot) {
     return {clusters_[slot].vertices.get(), clusters_[slot].size};
   }
-  /// The vertex of the head; kNoVertex for the root.
+  /// The vertex of the head, or kNoVertex for the root.
   [[nodiscard]] VertexId head_vertex(Slot slot) const;
   /// The id of the point that heads the cluster. Requires slot != kRoot.
   [[nodiscard]] PointId head(Slot slot) const;
   /// The cluster of `level` that a member heads. Requires level < level(slot).
-  [[nodiscard]] ClusterId headed_by(Slot slot, std::uint32_t member, unsigned level) const;
+  [[nodiscard]] ClusterId headed_cluster(Slot slot, std::uint32_t member, unsigned level) const;
 
   // Potential clusters: the children of expanded clusters.
   [[nodiscard]] std::optional<ChildRef> find(ClusterId id) const;
@@ -63,7 +63,7 @@ class ClusterTree {
     return slot < clusters_.size() && clusters_[slot].live;
   }
   [[nodiscard]] Slot slots() const { return static_cast<Slot>(clusters_.size()); }
-  /// The position of an expanded cluster; its parent is kNoSlot for the root.
+  /// The position of an expanded cluster. Its parent is kNoSlot for the root.
   [[nodiscard]] ChildRef place(Slot slot) const { return clusters_[slot].place; }
   /// kNoSlot while it is not expanded.
   [[nodiscard]] Slot child_slot(ChildRef child) const;
@@ -106,7 +106,7 @@ class ClusterTree {
     std::vector<Slot> staged, collapsed;
   };
   /// Walks down from the root, level by level, and reads the clusters that `judge` wants expanded.
-  /// Throws whatever the source, `judge` or `take` throw, and HierarchyError; the tree is then
+  /// Throws whatever the source, `judge` or `take` throw, and HierarchyError. The tree is then
   /// unchanged.
   [[nodiscard]] Plan plan(const Judge& judge, const Take& take);
   /// The plan that expands one cluster, which must not be expanded.
@@ -126,8 +126,8 @@ class ClusterTree {
   // Data of clusters above level 0 only.
   struct Inner {
     std::vector<std::uint64_t> ordinals;  // the clusters headed by its members: level per member
-    std::vector<Slot> children;           // children one level down; kNoSlot if not expanded
-    std::vector<ClusterRecord> records;   // of the children; empty until one is requested
+    std::vector<Slot> children;           // children one level down, or kNoSlot if not expanded
+    std::vector<ClusterRecord> records;   // of the children, or empty until one is requested
     std::uint32_t expanded = 0;           // number of expanded children
   };
   struct Cluster {

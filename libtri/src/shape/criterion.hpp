@@ -40,14 +40,14 @@ struct Gabriel {
 
 /// The distance, computed without overflow or underflow. Symmetric.
 inline double distance(const Vector3& a, const Vector3& b) {
-  // The difference of quarters of finite doubles is finite; below kBig, scaling is exact.
-  constexpr double kBig = 0x1p480, kSmall = 0x1p-480;
+  // The difference of quarters of finite doubles is finite. Below kLargeScale, scaling is exact.
+  constexpr double kLargeScale = 0x1p480, kSmallScale = 0x1p-480;
   Vector3 d = minus(a, b);
   const double m = largest(d);
-  if (m > kSmall && m < kBig) [[likely]]
+  if (m > kSmallScale && m < kLargeScale) [[likely]]
     return std::sqrt(dot(d, d));
   if (m == 0.0) return 0.0;
-  if (m <= kSmall) {
+  if (m <= kSmallScale) {
     for (double& c : d) c *= 0x1p540;
     return std::sqrt(dot(d, d)) * 0x1p-540;
   }
@@ -55,7 +55,7 @@ inline double distance(const Vector3& a, const Vector3& b) {
   return std::sqrt(dot(d, d)) * 0x1p560;  // may be infinite, as the sum of such lengths would be
 }
 
-/// The vector from a to b; in an elliptical metric, mapped to where the metric is Euclidean.
+/// The vector from a to b. In an elliptical metric it is mapped to where the metric is Euclidean.
 template <class Mesh>
 Vector3 edge(const Mesh&, const Vector3& a, const Vector3& b) {
   if constexpr (is_elliptical<Mesh>) {

@@ -24,20 +24,20 @@ namespace {
 using Corners3 = std::array<std::uint32_t, 3>;
 
 /// The face rotated so that the smallest number comes first.
-Corners3 turned(Corners3 c) {
+Corners3 rotate_to_smallest(Corners3 c) {
   std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
   return c;
 }
 
 /// The finalizer of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
-std::uint64_t stirred(std::uint64_t x) {
+std::uint64_t mix(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
   x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
   return x ^ (x >> 31);
 }
 
 template <class Coord>
-std::uint64_t number_of(Coord c) {
+std::uint64_t bit_pattern(Coord c) {
   if constexpr (std::is_integral_v<Coord>) {
     return static_cast<std::uint32_t>(c);
   } else {
@@ -54,12 +54,12 @@ template <class Coord>
 struct DynamicSurface<Coord>::Impl {
   Delaunay3<Coord> tetrahedra;
   shape::State state;
-  // The facets of the closed surface by slot. `behind` holds their slots by tetrahedron and
+  // The facets of the closed surface by slot. `facet_at` holds their slots by tetrahedron and
   // opposite corner, kNone elsewhere.
   Pool<Corners3> corners;  ///< in a free slot the first corner is kFreeCorner
   Pool<spatial::Side> side;
   Pool<shape::LidFace> lid_face;
-  Pool<std::array<std::uint32_t, 4>> behind;
+  Pool<std::array<std::uint32_t, 4>> facet_at;
   FreeSlots free;
   shape::LidShare share;
   bool open = false;                     ///< if true, lids are not triangles
@@ -72,21 +72,22 @@ struct DynamicSurface<Coord>::Impl {
   // Scratch memory.
   struct Facet {
     Corners3 corners;
-    std::uint32_t slot_or_side;  ///< slot of a vanishing, side of a new facet
+    std::uint32_t slot_or_side;  ///< slot of a removed facet, side of an added one
     bool operator<(const Facet& other) const { return corners < other.corners; }
   };
   typename Delaunay3<Coord>::Changes changes;
   std::vector<std::uint32_t> examined, exposed;
-  std::vector<Facet> vanished, appeared;
-  std::vector<std::uint32_t> unsure;  ///< facets that may have become lids or stopped being lids
-  std::vector<bool> fresh;  ///< by vertex slot: new since the last changes; false between calls
+  std::vector<Facet> removed_facets, added_facets;
+  std::vector<std::uint32_t>
+      lid_candidates;        ///< facets that may have become lids or stopped being lids
+  std::vector<bool> is_new;  ///< by vertex slot: new since the last changes. false between calls
 
   [[nodiscard]] std::uint32_t& at(spatial::Side s) {
-    return behind[spatial::tetrahedron_of(s)][spatial::index_of(s)];
+    return facet_at[spatial::tetrahedron_of(s)][spatial::index_of(s)];
   }
   [[nodiscard]] const auto& mesh() const { return Delaunay3Access::mesh(tetrahedra); }
 
-  /// Brings labels up to date. Lists the tetrahedra whose facets may have appeared or vanished.
+  /// Brings labels up to date. Lists the tetrahedra whose facets may have changed.
   void relabel(bool from_scratch, unsigned threads) {
     if (!from_scratch && shape::worth_updating(mesh(), state, changes)) {
       examined = shape::update_nearby(mesh(), state, changes, exposed);
@@ -97,19 +98,19 @@ struct DynamicSurface<Coord>::Impl {
     for (std::uint32_t t = 0; t < examined.size(); ++t) examined[t] = t;
   }
 
-  void compare() {
+  void find_changed_facets() {
     const auto& all = mesh();
-    vanished.clear();
-    appeared.clear();
-    const std::uint32_t known = behind.size();
-    behind.resize(std::max(known, all.tetrahedron.size()));
-    for (std::uint32_t t = known; t < behind.size(); ++t) behind[t].fill(spatial::kNone);
-    const auto vanish = [&](spatial::Side s) {
+    removed_facets.clear();
+    added_facets.clear();
+    const std::uint32_t known = facet_at.size();
+    facet_at.resize(std::max(known, all.tetrahedron.size()));
+    for (std::uint32_t t = known; t < facet_at.size(); ++t) facet_at[t].fill(spatial::kNone);
+    const auto remove_facet = [&](spatial::Side s) {
       const std::uint32_t triangle = std::exchange(at(s), spatial::kNone);
-      if (triangle != spatial::kNone) vanished.push_back({corners[triangle], triangle});
+      if (triangle != spatial::kNone) removed_facets.push_back({corners[triangle], triangle});
     };
     for (const TetrahedronId t : changes.removed_tetrahedra)
-      for (std::uint32_t i = 0; i < 4; ++i) vanish(spatial::make_side(slot(t), i));
+      for (std::uint32_t i = 0; i < 4; ++i) remove_facet(spatial::make_side(slot(t), i));
     for (const std::uint32_t t : examined) {
       const spatial::Tetrahedron& tetrahedron = all.tetrahedron[t];
       if (!spatial::is_finite(tetrahedron.corner)) continue;
@@ -118,42 +119,42 @@ struct DynamicSurface<Coord>::Impl {
         const bool facet = state.of[t] == shape::kKept &&
                            state.of[spatial::tetrahedron_of(tetrahedron.mate[i])] != shape::kKept;
         if (!facet) {
-          vanish(s);
+          remove_facet(s);
         } else if (at(s) == spatial::kNone) {
-          appeared.push_back({turned(spatial::facet_of(tetrahedron, i)), s});
+          added_facets.push_back({rotate_to_smallest(spatial::facet_of(tetrahedron, i)), s});
         }
       }
     }
-    std::sort(vanished.begin(), vanished.end());
-    std::sort(appeared.begin(), appeared.end());
+    std::sort(removed_facets.begin(), removed_facets.end());
+    std::sort(added_facets.begin(), added_facets.end());
   }
 
   /// Applies the differences. Facets that exist before and after keep their slots.
-  void exchange() {
-    const std::uint32_t counted = at_vertex.size();
-    at_vertex.resize(std::max(counted, tetrahedra.vertex_slots()));
-    for (std::uint32_t v = counted; v < at_vertex.size(); ++v) at_vertex[v] = 0;
-    fresh.resize(std::max<std::size_t>(fresh.size(), tetrahedra.vertex_slots()));
-    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = true;
-    const auto stays = [&](const Facet& before, const Facet& after) {
-      return before.corners == after.corners && !fresh[before.corners[0]] &&
-             !fresh[before.corners[1]] && !fresh[before.corners[2]];
+  void replace_facets() {
+    const std::uint32_t old_size = at_vertex.size();
+    at_vertex.resize(std::max(old_size, tetrahedra.vertex_slots()));
+    for (std::uint32_t v = old_size; v < at_vertex.size(); ++v) at_vertex[v] = 0;
+    is_new.resize(std::max<std::size_t>(is_new.size(), tetrahedra.vertex_slots()));
+    for (const VertexId v : changes.added_vertices) is_new[slot(v)] = true;
+    const auto is_same = [&](const Facet& old_facet, const Facet& new_facet) {
+      return old_facet.corners == new_facet.corners && !is_new[old_facet.corners[0]] &&
+             !is_new[old_facet.corners[1]] && !is_new[old_facet.corners[2]];
     };
-    auto old = vanished.begin();
-    std::size_t left = 0;
-    for (const Facet& facet : appeared) {
-      for (; old != vanished.end() && *old < facet; ++old) drop(old->slot_or_side);
-      if (old != vanished.end() && stays(*old, facet)) {
+    auto old = removed_facets.begin();
+    std::size_t added_count = 0;
+    for (const Facet& facet : added_facets) {
+      for (; old != removed_facets.end() && *old < facet; ++old) drop(old->slot_or_side);
+      if (old != removed_facets.end() && is_same(*old, facet)) {
         at(facet.slot_or_side) = old->slot_or_side;
         side[old->slot_or_side] = facet.slot_or_side;
         ++old;
       } else {
-        appeared[left++] = facet;
+        added_facets[added_count++] = facet;
       }
     }
-    for (; old != vanished.end(); ++old) drop(old->slot_or_side);
-    appeared.resize(left);
-    for (const Facet& facet : appeared) add(facet);
+    for (; old != removed_facets.end(); ++old) drop(old->slot_or_side);
+    added_facets.resize(added_count);
+    for (const Facet& facet : added_facets) add(facet);
   }
   void drop(std::uint32_t facet) {
     if (is_triangle(facet)) hide(facet);
@@ -161,7 +162,7 @@ struct DynamicSurface<Coord>::Impl {
     corners[facet].fill(spatial::kFreeCorner);
     free.put(facet);
   }
-  /// Adds a facet as a triangle; find_lids() decides later whether it is a lid.
+  /// Adds a facet as a triangle. find_lids() decides later whether it is a lid.
   void add(const Facet& facet) {
     const std::uint32_t slot = free.empty() ? side.size() : free.take();
     if (slot == side.size()) {
@@ -173,7 +174,7 @@ struct DynamicSurface<Coord>::Impl {
     corners[slot] = facet.corners;
     lid_face[slot] = {};
     at(facet.slot_or_side) = slot;
-    unsure.push_back(slot);
+    lid_candidates.push_back(slot);
     show(slot);
   }
   void show(std::uint32_t facet) {
@@ -190,7 +191,7 @@ struct DynamicSurface<Coord>::Impl {
   /// Examines new facets and those where spacings have changed.
   void find_lids() {
     shape::LidFinder<std::decay_t<decltype(mesh())>> finder(mesh(), spacings);
-    for (const std::uint32_t facet : unsure) {
+    for (const std::uint32_t facet : lid_candidates) {
       lid_face[facet] = finder.measure(corners[facet]);
       share.add(lid_face[facet]);
     }
@@ -199,20 +200,20 @@ struct DynamicSurface<Coord>::Impl {
     for (const auto& v : changes.removed_corners)
       finder.remove({slot(v[0]), slot(v[1]), slot(v[2]), slot(v[3])});
     for (const TetrahedronId t : changes.added_tetrahedra)
-      finder.add(mesh().tetrahedron[slot(t)].corner, fresh);
-    for (const VertexId v : changes.added_vertices) fresh[slot(v)] = false;
-    finder.renew([&](std::uint32_t v) {
+      finder.add(mesh().tetrahedron[slot(t)].corner, is_new);
+    for (const VertexId v : changes.added_vertices) is_new[slot(v)] = false;
+    finder.update_spacings([&](std::uint32_t v) {
       if (state.degree[v] == 0) return;  // it is not a corner of any facet
       finder.find_spacing(v, [&](std::uint32_t t) {
         for (std::uint32_t i = 0; i < 4; ++i) {
-          const std::uint32_t facet = behind[t][i];
+          const std::uint32_t facet = facet_at[t][i];
           if (facet != spatial::kNone && mesh().tetrahedron[t].corner[i] != v)
-            unsure.push_back(facet);
+            lid_candidates.push_back(facet);
         }
       });
     });
-    for (const std::uint32_t facet : unsure) {
-      const bool lid = finder.lid(corners[facet]);
+    for (const std::uint32_t facet : lid_candidates) {
+      const bool lid = finder.is_lid(corners[facet]);
       shape::LidFace& face = lid_face[facet];
       if (lid == (face.lid != 0)) continue;
       share.remove(face);
@@ -220,7 +221,7 @@ struct DynamicSurface<Coord>::Impl {
       share.add(face);
       if (open) lid ? hide(facet) : show(facet);
     }
-    unsure.clear();
+    lid_candidates.clear();
     if (std::exchange(open, share.open()) == open) return;
     for (std::uint32_t facet = 0; facet < corners.size(); ++facet) {
       if (!in_use(corners[facet]) || lid_face[facet].lid == 0) continue;
@@ -231,18 +232,18 @@ struct DynamicSurface<Coord>::Impl {
   void reserve(std::size_t vertices) {
     tetrahedra.reserve(vertices);
     // Typical numbers for a scan.
-    const std::size_t of_tetrahedra = 7 * vertices, of_triangles = 5 * vertices / 2;
-    state.of.reserve(of_tetrahedra);
-    state.forest.reserve(of_tetrahedra);
-    state.local_tetrahedron.reserve(of_tetrahedra);
-    behind.reserve(of_tetrahedra);
-    corners.reserve(of_triangles);
-    side.reserve(of_triangles);
-    lid_face.reserve(of_triangles);
+    const std::size_t tetrahedron_room = 7 * vertices, triangle_room = 5 * vertices / 2;
+    state.of.reserve(tetrahedron_room);
+    state.forest.reserve(tetrahedron_room);
+    state.local_tetrahedron.reserve(tetrahedron_room);
+    facet_at.reserve(tetrahedron_room);
+    corners.reserve(triangle_room);
+    side.reserve(triangle_room);
+    lid_face.reserve(triangle_room);
     spacings.reserve(vertices + 1);
     at_vertex.reserve(vertices + 1);
     state.degree.reserve(vertices + 1);
-    state.labels_gone.reserve(vertices + 1);
+    state.removed_labels.reserve(vertices + 1);
     state.local_vertex.reserve(vertices + 1);
   }
 
@@ -269,11 +270,11 @@ struct DynamicSurface<Coord>::Impl {
       for (const VertexId v : changes.added_vertices) journal.touch_vertex(slot(v), false, {});
     }
     relabel(from_scratch, threads);
-    compare();
-    exchange();
+    find_changed_facets();
+    replace_facets();
     find_lids();
   }
-  void take(Changes& out) {
+  void take_changes(Changes& out) {
     assert(journal.on());
     out.clear();
     const auto& all = mesh();
@@ -351,7 +352,7 @@ void DynamicSurface<Coord>::start_journal() {
 template <class Coord>
 void DynamicSurface<Coord>::take_changes(Changes& changes) {
   follow();
-  impl_->take(changes);
+  impl_->take_changes(changes);
 }
 
 template <class Coord>
@@ -406,14 +407,14 @@ const Delaunay3<Coord>& DynamicSurface<Coord>::tetrahedra() const {
 
 template <class Coord>
 std::uint64_t DynamicSurface<Coord>::hash() const {
-  std::uint64_t sum = stirred(impl_->count);
+  std::uint64_t sum = mix(impl_->count);
   for (const TriangleId triangle : all_triangles()) {
     std::array<Point, 3> p;
     for (std::size_t i = 0; i < 3; ++i) p[i] = point(vertices(triangle)[i]);
     std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
     std::uint64_t one = 0;
     for (const Point& corner : p)
-      for (const Coord c : corner) one = stirred(one ^ number_of(c)) + 1;
+      for (const Coord c : corner) one = mix(one ^ bit_pattern(c)) + 1;
     sum += one;
   }
   return sum;
@@ -423,12 +424,12 @@ template <class Coord>
 std::size_t DynamicSurface<Coord>::memory_bytes() const {
   const Impl& i = *impl_;
   return i.tetrahedra.memory_bytes() + i.state.bytes() + i.corners.bytes() + i.side.bytes() +
-         i.lid_face.bytes() + i.behind.bytes() + i.at_vertex.bytes() +
+         i.lid_face.bytes() + i.facet_at.bytes() + i.at_vertex.bytes() +
          i.spacings.capacity() * sizeof(shape::Spacing) +
-         (i.examined.capacity() + i.unsure.capacity()) * sizeof(std::uint32_t) + i.free.bytes() +
-         i.journal.bytes() +
-         (i.vanished.capacity() + i.appeared.capacity()) * sizeof(typename Impl::Facet) +
-         i.fresh.capacity() / 8;
+         (i.examined.capacity() + i.lid_candidates.capacity()) * sizeof(std::uint32_t) +
+         i.free.bytes() + i.journal.bytes() +
+         (i.removed_facets.capacity() + i.added_facets.capacity()) * sizeof(typename Impl::Facet) +
+         i.is_new.capacity() / 8;
 }
 
 #ifdef TERRACE_TRI_CORE

@@ -48,7 +48,7 @@ struct Poles {
 /// Finds the poles of vertices, by vertex slot.
 class PoleFinder {
  public:
-  /// In a part, only whole vertices have poles.
+  /// In a part, only complete vertices have poles.
   PoleFinder(const Spheres& spheres, const Part& part) : spheres_(spheres), part_(part) {
     const std::vector<Place>& places = spheres.places();
     vertices_.resize(static_cast<std::uint32_t>(places.size()));
@@ -62,7 +62,7 @@ class PoleFinder {
       Pool<std::uint64_t> largest;
       largest.resize(vertices_.size());
       for (std::uint32_t v = 0; v < vertices_.size(); ++v) largest[v] = least(v);
-      for_all([&](std::uint64_t sphere, std::uint32_t v) { take_larger(largest[v], sphere); });
+      for_all([&](std::uint64_t sphere, std::uint32_t v) { keep_larger(largest[v], sphere); });
       for (std::uint32_t v = 1; v < poles.size(); ++v) {
         if (!is_sphere(largest[v])) continue;
         poles[v].first = tetrahedron_of(largest[v]);
@@ -74,16 +74,16 @@ class PoleFinder {
       Vertex& vertex = vertices_[v];
       const Vector3 to_centre = spheres_.to_centre(tetrahedron_of(sphere), vertex.at);
       // Avoids a branch, which the processor could not predict.
-      const auto admitted = static_cast<std::uint64_t>(dot(to_centre, vertex.to_first) < 0.0);
-      take_larger(vertex.largest, sphere & (0 - admitted));
+      const auto is_opposite = static_cast<std::uint64_t>(dot(to_centre, vertex.to_first) < 0.0);
+      keep_larger(vertex.largest, sphere & (0 - is_opposite));
     });
     for (std::uint32_t v = 1; v < poles.size(); ++v) {
       const Vertex& vertex = vertices_[v];
       if (!is_sphere(vertex.largest)) continue;
       poles[v].second = tetrahedron_of(vertex.largest);
-      Vector3 back = spheres_.to_centre(poles[v].second, vertex.at);
-      for (double& c : back) c = -c;
-      poles[v].defect = kPoleWeight * defect_between(vertex.to_first, back);
+      Vector3 to_second = spheres_.to_centre(poles[v].second, vertex.at);
+      for (double& c : to_second) c = -c;
+      poles[v].defect = kPoleWeight * defect_between(vertex.to_first, to_second);
     }
     return poles;
   }
@@ -96,10 +96,10 @@ class PoleFinder {
   };
 
   // Spheres as numbers: the upper half of the squared radius, plus 2, followed by the tetrahedron's
-  // number. kNoSphere is below all of them: no sphere yet. kNeverAny is above all of them: no
+  // number. kNoSphere is below all of them: no sphere yet. kRejectAll is above all of them: no
   // sphere, and none will be accepted.
   static constexpr std::uint64_t kNoSphere = std::uint64_t{1} << 32;
-  static constexpr std::uint64_t kNeverAny = ~std::uint64_t{0};
+  static constexpr std::uint64_t kRejectAll = ~std::uint64_t{0};
 
   /// Returns the number of a sphere, or 0 if the tetrahedron is flat.
   [[nodiscard]] std::uint64_t sphere_of(std::uint32_t t) const {
@@ -107,23 +107,23 @@ class PoleFinder {
     if (std::isnan(r2)) return 0;
     return ((std::bit_cast<std::uint64_t>(r2) >> 32) + 2) << 32 | t;
   }
-  static bool is_sphere(std::uint64_t sphere) { return sphere > kNoSphere && sphere != kNeverAny; }
+  static bool is_sphere(std::uint64_t sphere) { return sphere > kNoSphere && sphere != kRejectAll; }
   static std::uint32_t tetrahedron_of(std::uint64_t sphere) {
     return static_cast<std::uint32_t>(sphere);
   }
   [[nodiscard]] std::uint64_t least(std::uint32_t v) const {
-    return part_.whole.empty() || part_.whole[v] != 0 ? kNoSphere : kNeverAny;
+    return part_.complete.empty() || part_.complete[v] != 0 ? kNoSphere : kRejectAll;
   }
   /// If two radii are equal, the sphere of the tetrahedron with the lexicographically first corners
   /// is the larger one.
-  void take_larger(std::uint64_t& held, std::uint64_t sphere) const {
-    if (held >> 32 == sphere >> 32) [[unlikely]] {
-      const std::uint32_t a = tetrahedron_of(held), b = tetrahedron_of(sphere);
+  void keep_larger(std::uint64_t& best_so_far, std::uint64_t sphere) const {
+    if (best_so_far >> 32 == sphere >> 32) [[unlikely]] {
+      const std::uint32_t a = tetrahedron_of(best_so_far), b = tetrahedron_of(sphere);
       const double radius_a = spheres_.radius2(a), radius_b = spheres_.radius2(b);
       if (radius_a != radius_b ? radius_b > radius_a : spheres_.ranks_of(b) < spheres_.ranks_of(a))
-        held = sphere;
+        best_so_far = sphere;
     } else {
-      held = std::max(held, sphere);
+      best_so_far = std::max(best_so_far, sphere);
     }
   }
   /// Calls take(sphere, corner) for all corners of all finite tetrahedra.
@@ -163,11 +163,11 @@ class PoleFinder {
     std::sort(normals.begin(), normals.end(), [](const Normal& a, const Normal& b) {
       return a.vertex != b.vertex ? a.vertex < b.vertex : a.facet < b.facet;
     });
-    std::uint32_t before = spatial::kNone;
+    std::uint32_t previous = spatial::kNone;
     for (const Normal& n : normals) {
       Vector3& sum = vertices_[n.vertex].to_first;
-      if (n.vertex != before) sum = {};
-      before = n.vertex;
+      if (n.vertex != previous) sum = {};
+      previous = n.vertex;
       poles[n.vertex].first = spatial::kNone;
       for (std::size_t k = 0; k < 3; ++k) sum[k] += n.normal[k];
     }
@@ -183,32 +183,34 @@ class PoleFinder {
 class SignedSets {
  public:
   explicit SignedSets(std::uint32_t count) {
-    up_.resize(count);
-    for (std::uint32_t x = 0; x < count; ++x) up_[x] = 2 * x;
+    parent_.resize(count);
+    for (std::uint32_t x = 0; x < count; ++x) parent_[x] = 2 * x;
   }
   /// Makes x, a root, a child of the node `below`.
-  void hook(std::uint32_t x, std::uint32_t below) { up_[x] = below; }
+  void attach(std::uint32_t x, std::uint32_t below) { parent_[x] = below; }
   /// Makes x a root again if it has been hooked to a root that has been hooked to x. Must be called
   /// in ascending order, so that the smaller number stays the root. Roots are then in spatial
   /// order, as their tetrahedra are.
   void cut_pair(std::uint32_t x) {
-    if (up_[up_[x] >> 1] >> 1 == x) up_[x] = 2 * x;
+    if (parent_[parent_[x] >> 1] >> 1 == x) parent_[x] = 2 * x;
   }
-  [[nodiscard]] bool is_root(std::uint32_t x) const { return up_[x] == 2 * x; }
+  [[nodiscard]] bool is_root(std::uint32_t x) const { return parent_[x] == 2 * x; }
   /// Makes x a child of the root of its set.
   void flatten(std::uint32_t x) {
-    for (std::uint32_t up = up_[x];;) {
-      const std::uint32_t next = up_[up >> 1] ^ (up & 1);
-      up_[x] = next;
+    for (std::uint32_t up = parent_[x];;) {
+      const std::uint32_t next = parent_[up >> 1] ^ (up & 1);
+      parent_[x] = next;
       if (next == up) return;
       up = next;
     }
   }
   /// The root of a node that has been flattened.
-  [[nodiscard]] std::uint32_t root(std::uint32_t node) const { return up_[node >> 1] ^ (node & 1); }
+  [[nodiscard]] std::uint32_t root(std::uint32_t node) const {
+    return parent_[node >> 1] ^ (node & 1);
+  }
 
  private:
-  Pool<std::uint32_t> up_;
+  Pool<std::uint32_t> parent_;
 };
 
 class Forest {
@@ -220,27 +222,27 @@ class Forest {
         ticks_(check_stop),
         threads_(threads),
         part_(part),
-        beyond_(static_cast<std::uint32_t>(spheres.tetrahedra().size())) {}
+        outside_node_(static_cast<std::uint32_t>(spheres.tetrahedra().size())) {}
 
   std::vector<std::uint8_t> labels() {
     poles_ = PoleFinder(spheres_, part_).find();
     ticks_.look();
     measure_facets();
-    SignedSets sets(beyond_ + 1);
+    SignedSets sets(outside_node_ + 1);
     join_tetrahedra(sets);
     ticks_.look();
     list_statements(sets);
     std::vector<std::uint32_t> first_roots;
-    for (std::uint32_t x = 0; x <= beyond_; ++x)
+    for (std::uint32_t x = 0; x <= outside_node_; ++x)
       if (sets.is_root(x)) first_roots.push_back(x);
     std::vector<std::uint32_t> roots = first_roots;
     while (list_.size() > 0) join_best(sets, roots);
     // The first roots come first because they are on the paths of all others.
     for (const std::uint32_t x : first_roots) sets.flatten(x);
-    for (std::uint32_t x = 0; x <= beyond_; ++x) sets.flatten(x);
-    const std::uint32_t outside = sets.root(2 * beyond_);
-    std::vector<std::uint8_t> inside(beyond_);
-    for (std::uint32_t t = 0; t < beyond_; ++t)
+    for (std::uint32_t x = 0; x <= outside_node_; ++x) sets.flatten(x);
+    const std::uint32_t outside = sets.root(2 * outside_node_);
+    std::vector<std::uint8_t> inside(outside_node_);
+    for (std::uint32_t t = 0; t < outside_node_; ++t)
       inside[t] = static_cast<std::uint8_t>((sets.root(2 * t) ^ outside) & 1);
     return inside;
   }
@@ -253,7 +255,7 @@ class Forest {
     return (t < other) | !spheres_.finite(other);
   }
   [[nodiscard]] std::uint32_t unlabelled() const {
-    return part_.label.empty() ? beyond_ : static_cast<std::uint32_t>(part_.unlabelled);
+    return part_.label.empty() ? outside_node_ : static_cast<std::uint32_t>(part_.unlabelled);
   }
 
   /// Writes the key of every facet of an unlabelled tetrahedron at both of its sides.
@@ -295,25 +297,25 @@ class Forest {
   /// best statement about it.
   void join_tetrahedra(SignedSets& sets) {
     const std::uint32_t count = unlabelled();
-    best_.resize(beyond_ + 1);
-    std::fill(best_.data(), best_.data() + count, kNoBest);
+    best_.resize(outside_node_ + 1);
+    std::fill(best_.data(), best_.data() + count, kNoStatement);
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
       if (poles_[v].second == spatial::kNone) continue;
       for (const std::uint32_t t : {poles_[v].first, poles_[v].second})
-        if (t < count) take_better(best_[t], key_of(poles_[v].defect, true), v);
+        if (t < count) keep_better(best_[t], key_of(poles_[v].defect, true), v);
     }
-    for (std::uint32_t t = 0; t < beyond_; ++t) {
+    for (std::uint32_t t = 0; t < outside_node_; ++t) {
       if (!spheres_.finite(t)) {
-        sets.hook(t, 2 * beyond_);
+        sets.attach(t, 2 * outside_node_);
       } else if (t >= count) {
-        sets.hook(t, 2 * beyond_ + (part_.label[t] == 2));
+        sets.attach(t, 2 * outside_node_ + (part_.label[t] == 2));
       } else {
         std::uint64_t best = best_[t];
         for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
           const spatial::Side side = spatial::make_side(t, i);
-          take_better(best, keys_[side], side);
+          keep_better(best, keys_[side], side);
         }
-        sets.hook(t, partner(t, best));
+        sets.attach(t, partner(t, best));
       }
     }
     for (std::uint32_t t = 0; t < count; ++t) sets.cut_pair(t);
@@ -327,27 +329,27 @@ class Forest {
       return 2 * spatial::tetrahedron_of(spheres_.tetrahedra()[t].mate[spatial::index_of(subject)]);
     const std::uint32_t other =
         poles_[subject].first == t ? poles_[subject].second : poles_[subject].first;
-    return 2 * (other == spatial::kNone ? beyond_ : other) + 1;
+    return 2 * (other == spatial::kNone ? outside_node_ : other) + 1;
   }
 
   /// Lists all statements between two sets.
   void list_statements(const SignedSets& sets) {
     const auto tetrahedra = spheres_.tetrahedra();
     const std::uint32_t count = unlabelled();
-    std::uint32_t left = 0;
-    const auto has_room_for_more = [&](std::uint32_t more) {
-      if (left + more > list_.size()) list_.resize(left + left / 8 + more);
+    std::uint32_t listed = 0;
+    const auto make_room_for = [&](std::uint32_t more) {
+      if (listed + more > list_.size()) list_.resize(listed + listed / 8 + more);
     };
     const auto list = [&](std::uint32_t key, std::uint32_t subject, std::uint32_t one,
                           std::uint32_t other, bool is_new) {
-      list_[left] = {key, subject, one >> 1, other ^ (one & 1)};
-      left += static_cast<std::uint32_t>(is_new) & (one >> 1 != other >> 1);
+      list_[listed] = {key, subject, one >> 1, other ^ (one & 1)};
+      listed += static_cast<std::uint32_t>(is_new) & (one >> 1 != other >> 1);
     };
-    has_room_for_more(count + count / 2);
+    make_room_for(count + count / 2);
     for (std::uint32_t t = 0; t < count; ++t) {
       ticks_(16);
       if (!spheres_.finite(t)) continue;
-      has_room_for_more(4);
+      make_room_for(4);
       const std::uint32_t one = sets.root(2 * t);
       for (const std::uint32_t i : {0u, 1u, 2u, 3u}) {
         const spatial::Side side = spatial::make_side(t, i), mate = tetrahedra[t].mate[i];
@@ -358,19 +360,19 @@ class Forest {
     for (std::uint32_t v = 1; v < poles_.size(); ++v) {
       const Poles& poles = poles_[v];
       if (poles.second == spatial::kNone) continue;
-      has_room_for_more(1);
-      const std::uint32_t first = poles.first == spatial::kNone ? beyond_ : poles.first;
+      make_room_for(1);
+      const std::uint32_t first = poles.first == spatial::kNone ? outside_node_ : poles.first;
       list(key_of(poles.defect, true), v, sets.root(2 * poles.second), sets.root(2 * first + 1),
            true);
     }
-    list_.resize(left);
+    list_.resize(listed);
     keys_.release();
   }
 
-  void take_better(std::uint64_t& best, std::uint32_t key, std::uint32_t subject) const {
+  void keep_better(std::uint64_t& best, std::uint32_t key, std::uint32_t subject) const {
     const std::uint64_t candidate = std::uint64_t{key} << 32 | subject;
     if (best >> 33 == candidate >> 33) [[unlikely]] {
-      if (before(candidate, best)) best = candidate;
+      if (precedes(candidate, best)) best = candidate;
     } else {
       best = std::min(best, candidate);
     }
@@ -379,23 +381,24 @@ class Forest {
   /// A further round of Boruvka's: joins every set with another by the best statement about it, and
   /// drops statements within one set.
   void join_best(SignedSets& sets, std::vector<std::uint32_t>& roots) {
-    for (const std::uint32_t root : roots) best_[root] = kNoBest;
+    for (const std::uint32_t root : roots) best_[root] = kNoStatement;
     for (std::uint32_t i = 0; i < list_.size(); ++i) {
       ticks_(4);
       const Statement& s = list_[i];
       const std::uint64_t best = std::uint64_t{s.key >> 1} << 32 | i;
-      for (std::uint64_t* held : {&best_[s.one], &best_[s.other >> 1]}) {
-        if (*held >> 32 == best >> 32) [[unlikely]] {
-          if (before(s.claim(), list_[static_cast<std::uint32_t>(*held)].claim())) *held = best;
+      for (std::uint64_t* best_so_far : {&best_[s.one], &best_[s.other >> 1]}) {
+        if (*best_so_far >> 32 == best >> 32) [[unlikely]] {
+          if (precedes(s.claim(), list_[static_cast<std::uint32_t>(*best_so_far)].claim()))
+            *best_so_far = best;
         } else {
-          *held = std::min(*held, best);
+          *best_so_far = std::min(*best_so_far, best);
         }
       }
     }
     for (const std::uint32_t root : roots) {
-      if (best_[root] == kNoBest) continue;
+      if (best_[root] == kNoStatement) continue;
       const Statement& s = list_[static_cast<std::uint32_t>(best_[root])];
-      sets.hook(root, s.one == root ? s.other : 2 * s.one | (s.other & 1));
+      sets.attach(root, s.one == root ? s.other : 2 * s.one | (s.other & 1));
     }
     for (const std::uint32_t root : roots) sets.cut_pair(root);
     for (const std::uint32_t root : roots) sets.flatten(root);
@@ -405,17 +408,18 @@ class Forest {
       count += sets.is_root(root);
     }
     roots.resize(count);
-    std::uint32_t left = 0;
+    std::uint32_t listed = 0;
     for (const Statement& s : span_of(list_)) {
       const std::uint32_t one = sets.root(2 * s.one), other = sets.root(s.other);
-      list_[left] = {s.key, s.subject, one >> 1, other ^ (one & 1)};
-      left += one >> 1 != other >> 1;
+      list_[listed] = {s.key, s.subject, one >> 1, other ^ (one & 1)};
+      listed += one >> 1 != other >> 1;
     }
-    list_.resize(left);
+    list_.resize(listed);
   }
 
-  /// Orders claims with the same rounded defect: by defect, then corners; facets before vertices.
-  [[nodiscard]] bool before(std::uint64_t a, std::uint64_t b) const {
+  /// Orders claims with the same rounded defect: by defect, then corners, with facets before
+  /// vertices.
+  [[nodiscard]] bool precedes(std::uint64_t a, std::uint64_t b) const {
     const double defect_a = defect_of(a), defect_b = defect_of(b);
     if (defect_a != defect_b) return defect_a < defect_b;
     return corners_of(a) < corners_of(b);
@@ -432,14 +436,14 @@ class Forest {
     return {spheres_.places()[subject].rank, kNoCorner, kNoCorner, kNoCorner};
   }
 
-  static constexpr std::uint64_t kNoBest = ~std::uint64_t{0};
+  static constexpr std::uint64_t kNoStatement = ~std::uint64_t{0};
 
   const Spheres& spheres_;
   const base::StopCheck& check_stop_;
   base::StopTicks ticks_;
   unsigned threads_;
   const Part& part_;
-  std::uint32_t beyond_;
+  std::uint32_t outside_node_;
   std::vector<Poles> poles_;
   Pool<std::uint32_t> keys_;  ///< of facets, by side
   Pool<Statement> list_;

@@ -9,20 +9,21 @@ namespace {
 using Epick = CGAL::Exact_predicates_inexact_constructions_kernel;
 
 /// A difference of integers. Ties are frequent on grids and must be cheap.
-struct Whole {
+struct IntVector {
   std::int64_t x, y, z;
 };
 
-bool small_difference(const Vector3& p, const Vector3& a, Whole& result) {
-  constexpr double kLimit = 0x1p18, kWhole = 0x1p52;
+bool small_difference(const Vector3& p, const Vector3& a, IntVector& result) {
+  constexpr double kLimit = 0x1p18, kMaxCoordinate = 0x1p52;
   std::array<std::int64_t, 3> v{};
   for (std::size_t k = 0; k < 3; ++k) {
     const double difference = p[k] - a[k];
-    if (!(std::abs(p[k]) < kWhole && std::abs(a[k]) < kWhole && std::abs(difference) < kLimit))
+    if (!(std::abs(p[k]) < kMaxCoordinate && std::abs(a[k]) < kMaxCoordinate &&
+          std::abs(difference) < kLimit))
       return false;
-    const auto whole_p = static_cast<std::int64_t>(p[k]), whole_a = static_cast<std::int64_t>(a[k]);
-    if (static_cast<double>(whole_p) != p[k] || static_cast<double>(whole_a) != a[k]) return false;
-    v[k] = whole_p - whole_a;
+    const auto int_p = static_cast<std::int64_t>(p[k]), int_a = static_cast<std::int64_t>(a[k]);
+    if (static_cast<double>(int_p) != p[k] || static_cast<double>(int_a) != a[k]) return false;
+    v[k] = int_p - int_a;
   }
   result = {v[0], v[1], v[2]};
   return true;
@@ -30,21 +31,23 @@ bool small_difference(const Vector3& p, const Vector3& a, Whole& result) {
 
 __extension__ using Wide = __int128;
 
-std::int64_t dot(const Whole& a, const Whole& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Wide dot_wide(const Whole& a, const Whole& b) {
+std::int64_t dot(const IntVector& a, const IntVector& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+Wide dot_wide(const IntVector& a, const IntVector& b) {
   return Wide{a.x} * b.x + Wide{a.y} * b.y + Wide{a.z} * b.z;
 }
-Whole cross(const Whole& a, const Whole& b) {
+IntVector cross(const IntVector& a, const IntVector& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 /// Differences are below 2^18, so n is below 2^37, n x b below 2^56, and the two sides below 2^115.
-bool in_smallest_sphere_whole(const Whole& b, const Whole& c, const Whole& d) {
+bool in_smallest_sphere_int(const IntVector& b, const IntVector& c, const IntVector& d) {
   const std::int64_t bb = dot(b, b), cc = dot(c, c), bc = dot(b, c), dd = dot(d, d);
   if (bc <= 0) return dd - dot(d, b) - dot(d, c) + bc < 0;
   if (bb <= bc) return dd - dot(d, c) < 0;
   if (cc <= bc) return dd - dot(d, b) < 0;
-  const Whole n = cross(b, c);
+  const IntVector n = cross(b, c);
   return Wide{dd} * dot_wide(n, n) <
          Wide{cc} * dot_wide(d, cross(n, b)) + Wide{bb} * dot_wide(d, cross(c, n));
 }
@@ -53,9 +56,9 @@ bool in_smallest_sphere_whole(const Whole& b, const Whole& c, const Whole& d) {
 
 bool in_smallest_sphere_exactly(const Vector3& pa, const Vector3& pb, const Vector3& pc,
                                 const Vector3& pd) {
-  Whole wb{}, wc{}, wd{};
+  IntVector wb{}, wc{}, wd{};
   if (small_difference(pb, pa, wb) && small_difference(pc, pa, wc) && small_difference(pd, pa, wd))
-    return in_smallest_sphere_whole(wb, wc, wd);
+    return in_smallest_sphere_int(wb, wc, wd);
   const auto cgal = [](const Vector3& p) { return Epick::Point_3(p[0], p[1], p[2]); };
   const Epick::Point_3 a = cgal(pa), b = cgal(pb), c = cgal(pc), d = cgal(pd);
   const Epick kernel;

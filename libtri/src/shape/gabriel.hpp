@@ -52,7 +52,7 @@ inline int filter_smallest_sphere(const Vector3& b, const Vector3& c, const Vect
   // for the rest. Every product and partial sum is rounded, and so are differences of doubles. The
   // total of the absolute products is below 12 m^2 in every case, each with at most 8 roundings.
   // Scalar products of vectors of at most 3^0.5 m, each with an error of e, have an error of 2 e
-  // 3^0.5 m; there are four.
+  // 3^0.5 m. There are four.
   const double bound2 = (12 * 8 + 240 * spread) * 0x1p-53 * (m * m);
   const double bb = dot(b, b), cc = dot(c, c), bc = dot(b, c);
   const double at_b = bb - bc, at_c = cc - bc;  // cosines at a, b and c up to a positive factor

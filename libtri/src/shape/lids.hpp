@@ -41,12 +41,12 @@ class LidShare {
   /// rest.
   [[nodiscard]] bool open() const {
     std::int64_t sum = 0;
-    bool rest = false;  // true if there is a fraction below the current exponent
+    bool has_fraction = false;  // true if there is a fraction below the current exponent
     for (const std::int64_t bin : bins_) {
-      rest = rest || (sum & 1) != 0;
+      has_fraction = has_fraction || (sum & 1) != 0;
       sum = bin + (sum >> 1);
     }
-    return sum > 0 || (sum == 0 && rest);
+    return sum > 0 || (sum == 0 && has_fraction);
   }
 
  private:
@@ -73,13 +73,13 @@ class LidFinder {
  public:
   using Face = std::array<std::uint32_t, 3>;
 
-  /// spacings: by vertex slot; computed when lid() needs them.
+  /// spacings: by vertex slot. Computed when lid() needs them.
   LidFinder(const Mesh& mesh, std::vector<Spacing>& spacings) : mesh_(mesh), spacings_(spacings) {
     spacings_.resize(std::max<std::size_t>(spacings_.size(), mesh.vertex.size()));
   }
 
   /// True if an edge of the face is longer than ten times the spacing at each of its corners.
-  bool lid(const Face& face) {
+  bool is_lid(const Face& face) {
     const double limit =
         std::max({length(face[0], face[1]), length(face[1], face[2]), length(face[2], face[0])}) /
         kLidSpacings;
@@ -100,16 +100,16 @@ class LidFinder {
               [&](Spacing& at, std::uint32_t, std::uint32_t end) { at.removed |= bit(at, end); });
   }
   /// fresh: by vertex slot, true for added vertices.
-  void add(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& fresh) {
+  void add(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& is_new) {
     for_edges(corners, [&](Spacing& at, std::uint32_t v, std::uint32_t end) {
-      const std::uint8_t known = fresh[end] ? 0 : bit(at, end);
+      const std::uint8_t known = is_new[end] ? 0 : bit(at, end);
       at.added |= known;
       if (known == 0 && length(v, end) < at.length) at.removed |= kShorter;
     });
   }
   /// Calls changed(v) for vertices whose spacing was known and no longer is.
   template <class Changed>
-  void renew(const Changed& changed) {
+  void update_spacings(const Changed& changed) {
     for (const std::uint32_t v : touched_) {
       Spacing& at = spacings_[v];
       const bool same = (at.removed & ~at.added) == 0;
@@ -146,7 +146,7 @@ class LidFinder {
     }
     at.length = least.back();
   }
-  /// Measures the area of a face; the result is not marked as a lid.
+  /// Measures the area of a face. The result is not marked as a lid.
   [[nodiscard]] LidFace measure(Face face) const {
     // In lexicographic order, so that the last bit does not depend on slots.
     const auto order = [&](std::size_t i, std::size_t j) {
@@ -168,13 +168,14 @@ class LidFinder {
     const Vector3 normal = cross(u, v);
     const double area = std::sqrt(dot(normal, normal));
     if (!(area > 0.0 && area < 0x1p10)) return {};  // flat, or out of range
-    int exponent = 0, of_scale = 0;
+    int exponent = 0, scale_exponent = 0;
     const double mantissa = std::frexp(area, &exponent);
-    std::frexp(scale, &of_scale);
+    std::frexp(scale, &scale_exponent);
     LidFace result{};
     result.mantissa = static_cast<std::uint32_t>(mantissa * 0x1p18) & 0x3FFFFU;
     result.bin =
-        static_cast<std::uint32_t>(exponent - 2 * (of_scale - 2) + LidFace::kOffset) & 0x1FFFU;
+        static_cast<std::uint32_t>(exponent - 2 * (scale_exponent - 2) + LidFace::kOffset) &
+        0x1FFFU;
     return result;
   }
 
@@ -211,9 +212,9 @@ class LidFinder {
   spatial::Star<typename Mesh::Kernel> star_;
 };
 
-/// Removes the lids of an open scan, and the vertices that only they have; sets `open` and `lids`.
+/// Removes the lids of an open scan, and the vertices that only they have. Sets `open` and `lids`.
 template <class Mesh>
-void leave_out_lids(const Mesh& mesh, ShapeSurface& result) {
+void remove_lids(const Mesh& mesh, ShapeSurface& result) {
   using Face = std::array<std::uint32_t, 3>;
   std::vector<Face>& faces = result.surface.faces;
   std::vector<Spacing> spacings;
@@ -224,7 +225,7 @@ void leave_out_lids(const Mesh& mesh, ShapeSurface& result) {
     Face face;
     for (std::size_t i = 0; i < 3; ++i) face[i] = slot(result.vertices[faces[f][i]]);
     LidFace measured = finder.measure(face);
-    measured.lid = is_lid[f] = finder.lid(face);
+    measured.lid = is_lid[f] = finder.is_lid(face);
     share.add(measured);
   }
   result.lids = static_cast<std::size_t>(std::count(is_lid.begin(), is_lid.end(), true));
@@ -235,12 +236,12 @@ void leave_out_lids(const Mesh& mesh, ShapeSurface& result) {
   std::size_t kept = 0;
   for (std::size_t f = 0; f < faces.size(); ++f) {
     if (is_lid[f]) continue;
-    result.behind[kept] = result.behind[f];
+    result.tetrahedra[kept] = result.tetrahedra[f];
     faces[kept++] = faces[f];
     for (const std::uint32_t v : faces[f]) used[v] = true;
   }
   faces.resize(kept);
-  result.behind.resize(kept);
+  result.tetrahedra.resize(kept);
   std::vector<std::uint32_t> number(used.size());
   std::uint32_t count = 0;
   for (std::size_t v = 0; v < used.size(); ++v) {

@@ -22,19 +22,19 @@ inline constexpr double kPoleWeight = 2.0;
 
 /// Known facts, by slot, if the tetrahedra are only a part of all.
 struct Part {
-  std::span<const std::uint8_t> label;  ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
-  std::size_t unlabelled = 0;           ///< the number of unknown ones, which come first
-  std::span<const std::uint8_t> whole;  ///< of vertices: all tetrahedra at them are here
+  std::span<const std::uint8_t> label;     ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
+  std::size_t unlabelled = 0;              ///< the number of unknown ones, which come first
+  std::span<const std::uint8_t> complete;  ///< of vertices: 1 if all tetrahedra at them are here
 };
 
 /// The first step: returns labels by tetrahedron slot, 1 inside, 0 outside or not finite. The nodes
 /// are the finite tetrahedra, and one for all space beyond the hull. A facet states that both of
 /// its sides are alike, the more credibly the smaller its defect. A vertex states that its two
 /// poles (the largest circumspheres on either side, N. Amenta, M. Bern, doi:10.1007/PL00009475) are
-/// on different sides. A spanning forest of these statements with the least defect is believed;
+/// on different sides. A spanning forest of these statements with the least defect is believed.
 /// Boruvka's algorithm finds it.
 ///
-/// In a part, the vertices of unknown tetrahedra are whole. If the known labels are those of the
+/// In a part, the vertices of unknown tetrahedra are complete. If the known labels are those of the
 /// whole forest, so are the others: joining tetrahedra by their right labels in advance does not
 /// close a cycle that contradicts them.
 ///
@@ -56,7 +56,7 @@ using LabelCounts = std::vector<std::array<std::uint32_t, 2>>;
 /// surface, the one with the least defect first. Otherwise this changes neither the topology of the
 /// surface nor the vertices on it.
 ///
-/// In a part, only tetrahedra between whole vertices are flipped.
+/// In a part, only tetrahedra between complete vertices are flipped.
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
                               const Part& part = {}, const base::StopCheck& check_stop = {});
 

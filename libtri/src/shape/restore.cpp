@@ -49,7 +49,7 @@ RestoredSurface compact(std::span<const Point3> points, RestoredSurface result) 
   return result;
 }
 
-/// Restores a surface without its points; faces refer to those of the input.
+/// Restores a surface without its points. Faces refer to those of the input.
 template <class Triangulation>
 RestoredSurface shape_faces(std::span<const typename Triangulation::Point> points,
                             const RestoreOptions& options,
@@ -71,13 +71,13 @@ RestoredSurface shape_faces(std::span<const typename Triangulation::Point> point
   result.surface.faces = std::move(surface.surface.faces);
   for (Face& face : result.surface.faces)
     for (std::uint32_t& v : face) v = point_of[slot(surface.vertices[v])];
-  result.points_off = triangulation.vertex_count() - surface.vertices.size();
+  result.unused_points = triangulation.vertex_count() - surface.vertices.size();
   result.open = surface.open;
   result.lids = surface.lids;
   return result;
 }
 
-std::vector<std::array<std::int32_t, 3>> quantised(std::span<const Point3> points, unsigned bits) {
+std::vector<std::array<std::int32_t, 3>> quantise(std::span<const Point3> points, unsigned bits) {
   std::vector<std::array<std::int32_t, 3>> result(points.size());
   if (points.empty()) return result;
   Point3 min = points[0], max = points[0];
@@ -107,7 +107,7 @@ RestoredSurface restore_surface(std::span<const Point3> points, const RestoreOpt
                                        Delaunay3<double, EllipticalMetric3>(*options.metric)));
   if (options.quantise_bits == 0)
     return compact(points, shape_faces<Delaunay3<double>>(points, options));
-  const auto integers = quantised(points, options.quantise_bits);
+  const auto integers = quantise(points, options.quantise_bits);
   return compact(points, shape_faces<Delaunay3<std::int32_t>>(integers, options));
 }
 

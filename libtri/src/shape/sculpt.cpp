@@ -14,8 +14,8 @@ namespace {
 class Labels {
  public:
   Labels(const Spheres& spheres, std::vector<std::uint8_t>& inside,
-         std::span<const std::uint8_t> whole)
-      : spheres_(spheres), inside_(inside), whole_(whole), count_(spheres.places().size()) {
+         std::span<const std::uint8_t> complete)
+      : spheres_(spheres), inside_(inside), complete_(complete), count_(spheres.places().size()) {
     const auto tetrahedra = spheres.tetrahedra();
     for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
       const auto& corner = tetrahedra[t].corner;
@@ -30,26 +30,26 @@ class Labels {
   [[nodiscard]] std::uint32_t count(std::uint32_t vertex, std::uint8_t label) const {
     return count_[vertex][label];
   }
-  [[nodiscard]] bool buried(std::uint32_t v) const {
+  [[nodiscard]] bool is_off_surface(std::uint32_t v) const {
     return count_[v][0] == 0 || count_[v][1] == 0;
   }
-  /// By vertex, true if it is buried and its tetrahedra may change. Empty if there is no such
-  /// vertex.
-  [[nodiscard]] std::vector<std::uint8_t> all_buried() const {
+  /// By vertex, true if it is off the surface and its tetrahedra may change. Empty if there is no
+  /// such vertex.
+  [[nodiscard]] std::vector<std::uint8_t> vertices_off_surface() const {
     std::vector<std::uint8_t> result(count_.size());
-    bool any = false;
+    bool found = false;
     for (std::uint32_t v = 1; v < count_.size(); ++v) {
-      if (count_[v][0] + count_[v][1] == 0 || !buried(v)) continue;
-      any |= (result[v] = whole_.empty() || whole_[v] != 0) != 0;
+      if (count_[v][0] + count_[v][1] == 0 || !is_off_surface(v)) continue;
+      found |= (result[v] = complete_.empty() || complete_[v] != 0) != 0;
     }
-    return any ? result : std::vector<std::uint8_t>{};
+    return found ? result : std::vector<std::uint8_t>{};
   }
   /// True if t is finite and all tetrahedra at its corners are in the part.
   [[nodiscard]] bool changeable(std::uint32_t t) const {
     if (!spheres_.finite(t)) return false;
     const auto& corner = spheres_.tetrahedra()[t].corner;
-    return whole_.empty() || std::all_of(corner.begin(), corner.end(),
-                                         [&](std::uint32_t v) { return whole_[v] != 0; });
+    return complete_.empty() || std::all_of(corner.begin(), corner.end(),
+                                            [&](std::uint32_t v) { return complete_[v] != 0; });
   }
   LabelCounts take_counts() { return std::move(count_); }
   void flip(std::uint32_t t) {
@@ -63,14 +63,14 @@ class Labels {
  private:
   const Spheres& spheres_;
   std::vector<std::uint8_t>& inside_;
-  std::span<const std::uint8_t> whole_;
+  std::span<const std::uint8_t> complete_;
   LabelCounts count_;
 };
 
 /// Smaller gains could be rounding errors that flip a tetrahedron back and forth.
-constexpr double kLeastGain = 0x1p-40;
+constexpr double kMinGain = 0x1p-40;
 
-/// How much t's facets contradict its label, if at least two neighbours differ from it; otherwise
+/// How much t's facets contradict its label, if at least two neighbours differ from it. Otherwise
 /// 0.
 double gain_of(const Spheres& spheres, const Labels& labels, std::uint32_t t) {
   const spatial::Tetrahedron& tetrahedron = spheres.tetrahedra()[t];
@@ -104,7 +104,7 @@ void smooth(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
   const auto consider = [&](std::uint32_t t) {
     if (!labels.changeable(t)) return;
     const double gain = gain_of(spheres, labels, t);
-    if (gain > kLeastGain) next.push({gain, spheres.ranks_of(t), t});
+    if (gain > kMinGain) next.push({gain, spheres.ranks_of(t), t});
   };
   for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
     ticks(32);
@@ -144,19 +144,20 @@ void sculpt(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
   std::priority_queue<Candidate> next;
   const auto consider = [&](spatial::Side side) {
     const std::uint32_t t = spatial::tetrahedron_of(side);
-    if (!spheres.finite(t) || !labels.buried(vertex_of(side)) || !labels.changeable(t)) return;
+    if (!spheres.finite(t) || !labels.is_off_surface(vertex_of(side)) || !labels.changeable(t))
+      return;
     const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
     if (labels.at(spatial::tetrahedron_of(mate)) == labels.at(t)) return;
     next.push({spheres.facet_defect(side), spheres.places()[vertex_of(side)].rank,
                spheres.facet_ranks(side), side});
   };
-  const std::vector<std::uint8_t> buried = labels.all_buried();
-  if (buried.empty()) return;
+  const std::vector<std::uint8_t> is_off_surface = labels.vertices_off_surface();
+  if (is_off_surface.empty()) return;
   for (std::uint32_t t = 0; t < tetrahedra.size(); ++t) {
     ticks(8);
     if (!spheres.finite(t)) continue;
     for (const std::uint32_t i : {0u, 1u, 2u, 3u})
-      if (buried[tetrahedra[t].corner[i]] != 0) consider(spatial::make_side(t, i));
+      if (is_off_surface[tetrahedra[t].corner[i]] != 0) consider(spatial::make_side(t, i));
   }
   while (!next.empty()) {
     ticks(256);
@@ -164,10 +165,11 @@ void sculpt(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
     next.pop();
     const std::uint32_t t = spatial::tetrahedron_of(side);
     const spatial::Side mate = tetrahedra[t].mate[spatial::index_of(side)];
-    if (!labels.buried(vertex_of(side)) || labels.at(spatial::tetrahedron_of(mate)) == labels.at(t))
+    if (!labels.is_off_surface(vertex_of(side)) ||
+        labels.at(spatial::tetrahedron_of(mate)) == labels.at(t))
       continue;
     labels.flip(t);
-    for (const spatial::Side beyond : tetrahedra[t].mate) consider(beyond);
+    for (const spatial::Side neighbour : tetrahedra[t].mate) consider(neighbour);
   }
 }
 
@@ -176,7 +178,7 @@ void sculpt(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
 LabelCounts smooth_and_sculpt(const Spheres& spheres, std::vector<std::uint8_t>& inside,
                               const Part& part, const base::StopCheck& check_stop) {
   base::StopTicks ticks(check_stop);
-  Labels labels(spheres, inside, part.whole);
+  Labels labels(spheres, inside, part.complete);
   smooth(spheres, labels, ticks);
   sculpt(spheres, labels, ticks);
   return labels.take_counts();

@@ -48,7 +48,8 @@ Renumbered in_order_of_vertices(std::span<const spatial::Tetrahedron> tetrahedra
   base::parallel_blocks(slots, kSphereBlock, threads, [&](std::size_t begin, std::size_t end) {
     for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t) {
       if (turn[t] == 0) continue;
-      result.tetrahedra[result.number[t]] = turned(tetrahedra[t], kTurns[turn[t]], new_side);
+      result.tetrahedra[result.number[t]] =
+          rotate_corners(tetrahedra[t], kTurns[turn[t]], new_side);
     }
   });
   return result;
@@ -77,7 +78,7 @@ Spheres::Sphere Spheres::sphere_of(const spatial::Tetrahedron& t) const {
                 d = to(t.corner[in_order ? 3 : 2]);
   const Vector3 cd = cross(c, d), db = cross(d, b), bc = cross(b, c);
   const double volume6 = dot(b, cd);
-  // The sum of the absolute values of the six products in it; each has at most 8 roundings.
+  // The sum of the absolute values of the six products in it. Each has at most 8 roundings.
   const double total = std::abs(b[0]) * (std::abs(c[1] * d[2]) + std::abs(c[2] * d[1])) +
                        std::abs(b[1]) * (std::abs(c[2] * d[0]) + std::abs(c[0] * d[2])) +
                        std::abs(b[2]) * (std::abs(c[0] * d[1]) + std::abs(c[1] * d[0]));
@@ -91,7 +92,7 @@ Spheres::Sphere Spheres::sphere_of(const spatial::Tetrahedron& t) const {
 }
 
 Vector3 Spheres::hull_normal(Side side) const {
-  // Counter-clockwise as seen from outside; sorting reverses it if the permutation is odd.
+  // Counter-clockwise as seen from outside. Sorting reverses it if the permutation is odd.
   std::array<std::uint32_t, 3> f =
       spatial::facet_of(tetrahedra_[spatial::tetrahedron_of(side)], spatial::index_of(side));
   bool odd = false;

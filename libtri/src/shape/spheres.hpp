@@ -30,7 +30,7 @@ namespace terrace::tri::shape {
 /// In an elliptical metric it is mapped to where the metric is Euclidean.
 struct Place {
   Vector3 at;
-  std::uint32_t rank;  ///< in lexicographic order; the ghost is last
+  std::uint32_t rank;  ///< in lexicographic order. The ghost is last
 };
 inline constexpr Place kGhostPlace{{}, 0xFFFFFFFFu};
 
@@ -153,8 +153,8 @@ std::uint8_t turn_of(const std::array<std::uint32_t, 4>& corner, const Rank& ran
 
 /// Applies a turn to a tetrahedron. new_side(mate): the new number of a neighbour's side.
 template <class NewSide>
-spatial::Tetrahedron turned(const spatial::Tetrahedron& t, const Turn& turn,
-                            const NewSide& new_side) {
+spatial::Tetrahedron rotate_corners(const spatial::Tetrahedron& t, const Turn& turn,
+                                    const NewSide& new_side) {
   spatial::Tetrahedron result;
   for (std::size_t i = 0; i < 4; ++i) {
     result.corner[i] = t.corner[turn.from[i]];
@@ -190,7 +190,7 @@ class Spheres {
   [[nodiscard]] bool finite(std::uint32_t t) const { return finite_[t] != 0; }
   /// True if the tetrahedron is so flat that rounding decides where its circumcentre is.
   [[nodiscard]] bool flat(std::uint32_t t) const { return std::isnan(sphere_[t].centre[0]); }
-  /// The squared circumradius; NaN if flat.
+  /// The squared circumradius, or NaN if flat.
   [[nodiscard]] double radius2(std::uint32_t t) const {
     return dot(sphere_[t].centre, sphere_[t].centre);
   }
@@ -230,7 +230,7 @@ class Spheres {
 
  private:
   struct Sphere {
-    Vector3 centre;       ///< relative to the first corner; NaN if flat
+    Vector3 centre;       ///< relative to the first corner, or NaN if flat
     std::uint32_t first;  ///< the first corner
   };
   [[nodiscard]] Sphere sphere_of(const spatial::Tetrahedron& t) const;
@@ -241,7 +241,7 @@ class Spheres {
   Pool<std::uint8_t> finite_;  ///< separate, as it is read everywhere
 };
 
-/// 1 - cos of the angle between two vectors, in 0 .. 2; 1 if rounding leaves no angle.
+/// 1 - cos of the angle between two vectors, in 0 .. 2, or 1 if rounding leaves no angle.
 inline double defect_between(const Vector3& u, const Vector3& v) {
   const double cosine = dot(u, v) / std::sqrt(dot(u, u) * dot(v, v));
   if (std::isnan(cosine)) return 1.0;

@@ -41,8 +41,8 @@ struct State {
   std::vector<std::uint32_t> touched;  ///< vertices whose degree may have changed
   /// By vertex slot: 1 if tetrahedra removed there were outside, 2 if inside, 3 if both. 0 between
   /// calls.
-  std::vector<std::uint8_t> labels_gone;
-  /// Local numbers by slot, see nearby.hpp; kNone between calls.
+  std::vector<std::uint8_t> removed_labels;
+  /// Local numbers by slot, see nearby.hpp. kNone between calls.
   Pool<std::uint32_t> local_tetrahedron, local_vertex;
 
   template <class Mesh>
@@ -60,7 +60,7 @@ struct State {
   [[nodiscard]] std::size_t bytes() const {
     const std::size_t words = degree.capacity() + lost.capacity() + rescued.capacity() +
                               queue.capacity() + pending.capacity() + touched.capacity();
-    return of.capacity() + forest.capacity() + labels_gone.capacity() +
+    return of.capacity() + forest.capacity() + removed_labels.capacity() +
            words * sizeof(std::uint32_t) + local_tetrahedron.bytes() + local_vertex.bytes();
   }
   void forget_rescued() {

@@ -19,7 +19,7 @@ namespace {
 struct SurfaceEdge {
   std::uint64_t ends;  ///< the smaller number in the upper half
   std::uint32_t face;
-  std::int32_t way;  ///< +1: from the smaller to the larger
+  std::int32_t direction;  ///< +1: from the smaller to the larger
 };
 
 /// Three edges per face, sorted by their ends and then by face.
@@ -110,15 +110,15 @@ SurfaceMeasures measure(const Surface& surface) {
   const std::vector<SurfaceEdge> edges = sorted_edges(surface.faces);
   base::UnionFind parts(surface.faces.size());
   for (std::size_t begin = 0, end = 0; begin < edges.size(); begin = end) {
-    std::int64_t ways = 0;
+    std::int64_t direction_sum = 0;
     for (; end < edges.size() && edges[end].ends == edges[begin].ends; ++end) {
-      ways += edges[end].way;
+      direction_sum += edges[end].direction;
       parts.unite(edges[begin].face, edges[end].face);
     }
     ++result.edges;
     result.border_edges += end - begin == 1;
     result.non_manifold_edges += end - begin > 2;
-    if (ways != 0) result.closed = false;
+    if (direction_sum != 0) result.closed = false;
   }
   result.components = parts.sets();
   result.euler_characteristic = static_cast<std::int64_t>(result.vertices) -

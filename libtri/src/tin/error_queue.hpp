@@ -124,20 +124,20 @@ class ErrorHeap {
   std::vector<std::pair<float, std::uint32_t>> heap_;
 };
 
-/// Processes samples in parts of `together` consecutive numbers, one part after another. If the
-/// samples of a part are close to each other in the plane, it and its triangles stay in the cache;
-/// the result is as good as if all parts were handled together.
+/// Processes samples in parts of `part_size` consecutive numbers, one part after another. If the
+/// samples of a part are close to each other in the plane, it and its triangles stay in the cache.
+/// The result is as good as if all parts were handled together.
 class ErrorParts {
  public:
-  ErrorParts(float least, std::size_t samples, std::size_t together)
+  ErrorParts(float least, std::size_t samples, std::size_t part_size)
       : queue_(least),
-        together_(std::max<std::size_t>(together, 1)),
-        later_(samples / together_ + 1) {}
+        part_size_(std::max<std::size_t>(part_size, 1)),
+        later_parts_(samples / part_size_ + 1) {}
 
   void push(const Triangle& triangle, std::uint32_t number) {
-    const std::size_t part = triangle.place / together_;
+    const std::size_t part = triangle.place / part_size_;
     if (part > part_) {
-      later_[part].push_back(number);
+      later_parts_[part].push_back(number);
     } else {
       queue_.push(triangle, number);
     }
@@ -147,20 +147,20 @@ class ErrorParts {
     for (;;) {
       const std::uint32_t t = queue_.pop(triangles);
       if (t != kNone) return t;
-      while (part_ < later_.size() && later_[part_].empty()) ++part_;
-      if (part_ == later_.size()) return kNone;
-      for (const std::uint32_t waiting : later_[part_])
-        if (triangles[waiting].error > 0) queue_.push(triangles[waiting], waiting);
-      later_[part_] = {};
+      while (part_ < later_parts_.size() && later_parts_[part_].empty()) ++part_;
+      if (part_ == later_parts_.size()) return kNone;
+      for (const std::uint32_t later : later_parts_[part_])
+        if (triangles[later].error > 0) queue_.push(triangles[later], later);
+      later_parts_[part_] = {};
     }
   }
 
  private:
   ErrorBuckets<> queue_;
-  std::size_t together_;
+  std::size_t part_size_;
   std::size_t part_ = 0;  ///< the current part
-  /// The triangles of later parts; some of them may have changed since.
-  std::vector<std::vector<std::uint32_t>> later_;
+  /// The triangles of later parts. Some of them may have changed since.
+  std::vector<std::vector<std::uint32_t>> later_parts_;
 };
 
 }  // namespace terrace::tri::tin

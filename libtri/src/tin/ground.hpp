@@ -32,9 +32,9 @@ bool visit_rows(const P& a, const P& b, const P& c, const Visit& visit) {
       const P &p = *corner[i], &q = *corner[i + 1];
       // A sample is left of pq if along_x (x - p.x) + along_y (y - p.y) >= 0.
       const std::int64_t along_x = p.y - q.y, along_y = q.x - p.x;
-      const std::int64_t rest = along_y * (y - p.y);
-      if (along_x > 0) first = std::max(first, p.x - floor_divide(rest, along_x));
-      if (along_x < 0) last = std::min(last, p.x + floor_divide(rest, -along_x));
+      const std::int64_t offset = along_y * (y - p.y);
+      if (along_x > 0) first = std::max(first, p.x - floor_divide(offset, along_x));
+      if (along_x < 0) last = std::min(last, p.x + floor_divide(offset, -along_x));
     }
     if (first <= last &&
         !visit(y, static_cast<std::int32_t>(first), static_cast<std::int32_t>(last)))
@@ -57,7 +57,7 @@ inline double tangent_of(double degrees) {
 class Ground {
  public:
   /// column_step, row_step: on the ground. extent: the greatest difference of coordinates. tangent:
-  /// tangent of the smallest angle for which wide() is true.
+  /// tangent of the smallest angle for which has_wide_angles() is true.
   Ground(double column_step, double row_step, std::int64_t extent, double tangent)
       : tangent_(tangent) {
     const double x = std::fabs(column_step), y = std::fabs(row_step);
@@ -80,11 +80,11 @@ class Ground {
   /// True if the counter-clockwise a, b, c, of twice the area `twice` on the lattice, have no angle
   /// below the smallest one.
   template <class P>
-  bool wide(const P& a, const P& b, const P& c, std::int64_t twice) const {
+  bool has_wide_angles(const P& a, const P& b, const P& c, std::int64_t twice) const {
     const std::int64_t ab = square(a, b), bc = square(b, c), ca = square(c, a);
     // Twice the scalar product at the smallest angle, which is opposite to the shortest side.
-    const std::int64_t most = ab + bc + ca - 2 * std::min({ab, bc, ca});
-    return 2 * area_ * static_cast<double>(twice) >= tangent_ * static_cast<double>(most);
+    const std::int64_t twice_product = ab + bc + ca - 2 * std::min({ab, bc, ca});
+    return 2 * area_ * static_cast<double>(twice) >= tangent_ * static_cast<double>(twice_product);
   }
 
   template <class P>

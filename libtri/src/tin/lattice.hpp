@@ -28,20 +28,20 @@ namespace terrace::tri::tin {
 class Tiles {
  public:
   Tiles(std::int32_t columns, std::int32_t rows)
-      : across_((columns >> kBits) + 1), down_((rows >> kBits) + 1) {}
+      : tile_columns_((columns >> kBits) + 1), tile_rows_((rows >> kBits) + 1) {}
 
   std::size_t count() const {
-    return static_cast<std::size_t>(across_) * static_cast<std::size_t>(down_);
+    return static_cast<std::size_t>(tile_columns_) * static_cast<std::size_t>(tile_rows_);
   }
   std::uint32_t of(std::uint32_t place) const {
     const std::int32_t row = row_of(place) >> kBits, column = column_of(place) >> kBits;
-    return static_cast<std::uint32_t>(row * across_ +
-                                      (row % 2 == 0 ? column : across_ - 1 - column));
+    return static_cast<std::uint32_t>(row * tile_columns_ +
+                                      (row % 2 == 0 ? column : tile_columns_ - 1 - column));
   }
 
  private:
   static constexpr int kBits = 5;
-  std::int32_t across_, down_;
+  std::int32_t tile_columns_, tile_rows_;
 };
 
 /// True if a triangle is within the bound at one sample, or does not contain it. Most triangles
@@ -94,7 +94,7 @@ class LatticeHole {
  private:
   bool fits_and_wide(std::size_t i, std::size_t m, std::size_t j) const {
     const std::int64_t twice = turn(ring_[i], ring_[m], ring_[j]);
-    return twice > 0 && samples_.ground().wide(ring_[i], ring_[m], ring_[j], twice) &&
+    return twice > 0 && samples_.ground().has_wide_angles(ring_[i], ring_[m], ring_[j], twice) &&
            samples_.fits(ring_[i], ring_[m], ring_[j], removed_);
   }
 
@@ -119,7 +119,7 @@ class LatticeSamples {
   using Vertices = std::vector<Vertex>;
   using Hole = LatticeHole<Own>;
   using FirstSide = LowestSide;
-  static constexpr std::size_t kMostFitted = std::numeric_limits<std::size_t>::max();
+  static constexpr std::size_t kMaxFittedTriangles = std::numeric_limits<std::size_t>::max();
 
   explicit LatticeSamples(const Ground& ground) : ground_(ground) {}
 
@@ -133,7 +133,7 @@ class LatticeSamples {
 
   void split(Mesh<Vertices>& mesh, std::span<const std::uint32_t> created, std::uint32_t,
              std::uint32_t, const Spot&) {
-    for (const std::uint32_t t : created) static_cast<Own&>(*this).judge(mesh, t);
+    for (const std::uint32_t t : created) static_cast<Own&>(*this).set_error(mesh, t);
   }
 
  private:
@@ -158,20 +158,20 @@ Refinement<S> start_in_rectangle(S samples, std::vector<typename S::Vertex> fram
   std::size_t corners = 0;
   for (std::uint32_t v = 0; v < frame.size(); ++v)
     if (is_corner(frame[v])) corner[corners++] = v;
-  Refinement<S> made(std::move(samples),
+  Refinement<S> refinement(std::move(samples),
                      {std::move(frame),
                       {{{corner[0], corner[1], corner[2]}, {kNone, 1, kNone}, 0, 0.0F},
                        {{corner[0], corner[2], corner[3]}, {kNone, kNone, 0}, 0, 0.0F}}},
                      std::move(check_stop));
   std::uint32_t near = 0;
-  for (std::uint32_t v = 0; v < made.mesh().vertices.size(); ++v) {
-    const Vertex p = made.mesh().vertices[v];
-    if (!is_corner(p)) near = made.insert(v, made.locate(p, near)).front();
+  for (std::uint32_t v = 0; v < refinement.mesh().vertices.size(); ++v) {
+    const Vertex p = refinement.mesh().vertices[v];
+    if (!is_corner(p)) near = refinement.insert(v, refinement.locate(p, near)).front();
   }
-  return made;
+  return refinement;
 }
 
-/// The positions of elements after sorting by key, a number below `count`; equal keys keep their
+/// The positions of elements after sorting by key, a number below `count`. Equal keys keep their
 /// order.
 inline std::vector<std::uint32_t> sorted_by(const std::vector<std::uint32_t>& keys,
                                             std::size_t count) {
@@ -200,17 +200,17 @@ void arrange(Refinement<S>& refinement, std::size_t first) {
   keys.clear();
   for (const Triangle& triangle : triangles) keys.push_back(tile_of(vertices[triangle.corner[0]]));
   const std::vector<std::uint32_t> triangle_at = sorted_by(keys, tiles.count());
-  std::vector<typename S::Vertex> moved_vertices(vertices.size());
-  for (std::size_t i = 0; i < vertices.size(); ++i) moved_vertices[vertex_at[i]] = vertices[i];
-  vertices.swap(moved_vertices);
-  Triangles moved(triangles.size());
-  for (std::size_t i = 0; i < moved.size(); ++i) {
-    Triangle& triangle = moved[triangle_at[i]] = triangles[i];
+  std::vector<typename S::Vertex> sorted_vertices(vertices.size());
+  for (std::size_t i = 0; i < vertices.size(); ++i) sorted_vertices[vertex_at[i]] = vertices[i];
+  vertices.swap(sorted_vertices);
+  Triangles sorted_triangles(triangles.size());
+  for (std::size_t i = 0; i < sorted_triangles.size(); ++i) {
+    Triangle& triangle = sorted_triangles[triangle_at[i]] = triangles[i];
     for (std::uint32_t& corner : triangle.corner) corner = vertex_at[corner];
     for (std::uint32_t& next : triangle.next)
       if (next != kNone) next = triangle_at[next];
   }
-  triangles.swap(moved);
+  triangles.swap(sorted_triangles);
 }
 
 /// Refines to the bound and applies the steps of the quality. The first `first` vertices stay

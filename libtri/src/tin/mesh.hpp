@@ -2,13 +2,15 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
-/// Triangles linked to their neighbours. Shared by all TINs.
+/// Triangles linked to their neighbours, and the insertion of a vertex. Shared by all TINs.
 
 namespace terrace::tri::tin {
 
@@ -39,7 +41,7 @@ struct Mesh {
 
 /// The place of a point in a mesh.
 struct Spot {
-  std::uint32_t triangle = kNone;  ///< contains the point; kNone: outside
+  std::uint32_t triangle = kNone;  ///< contains the point. kNone: outside
   unsigned zeros = 0;              ///< number of its sides whose lines contain the point
   unsigned side = 0;               ///< one of these
   bool border = false;             ///< the point is on the mesh's border, between two vertices
@@ -80,8 +82,8 @@ inline constexpr std::int32_t row_of(std::uint32_t place) {
   return static_cast<std::int32_t>(place >> 16);
 }
 
-inline constexpr unsigned after(unsigned side) { return side == 2 ? 0 : side + 1; }
-inline constexpr unsigned before(unsigned side) { return side == 0 ? 2 : side - 1; }
+inline constexpr unsigned next_side(unsigned side) { return side == 2 ? 0 : side + 1; }
+inline constexpr unsigned previous_side(unsigned side) { return side == 0 ? 2 : side - 1; }
 
 /// The side of `triangle` across which its neighbour `neighbour` is.
 inline unsigned side_to(const Triangle& triangle, std::uint32_t neighbour) {
@@ -102,5 +104,81 @@ inline std::vector<std::uint32_t> triangle_of_vertices(const Triangles& triangle
       for (const std::uint32_t vertex : triangles[t].corner) result[vertex] = t;
   return result;
 }
+
+/// Inserts a vertex into a Delaunay triangulation: replaces the triangles whose circles contain it
+/// by triangles of the vertex and the sides of the hole (A. Bowyer, D. F. Watson, 1981).
+class Cavity {
+ public:
+  /// Collects the triangles to remove: `first`, which contains the new vertex, and those reachable
+  /// from it for which `inside(triangle)` holds (its circle strictly contains the vertex).
+  template <class Inside>
+  void grow(const Triangles& triangles, std::uint32_t first, const Inside& inside) {
+    edges_.clear();
+    removed_.assign(1, first);
+    stack_.assign({{first, 2}, {first, 1}, {first, 0}});
+    while (!stack_.empty()) {
+      const auto [t, side] = stack_.back();
+      stack_.pop_back();
+      const std::uint32_t neighbour = triangles[t].next[side];
+      const unsigned outer_side = neighbour == kNone ? 0 : side_to(triangles[neighbour], t);
+      if (neighbour != kNone && inside(triangles[neighbour])) {
+        removed_.push_back(neighbour);
+        stack_.push_back({neighbour, previous_side(outer_side)});
+        stack_.push_back({neighbour, next_side(outer_side)});
+      } else {
+        edges_.push_back({triangles[t].corner[next_side(side)],
+                          triangles[t].corner[previous_side(side)], neighbour, outer_side});
+      }
+    }
+  }
+
+  /// Fills the hole with the triangles of `vertex` and its sides. `flat(a, b)`: true for a side on
+  /// the hull if the vertex is on it. Such a side is split in two. The new triangles have the
+  /// vertex as corner 0. Their `place` and `error` are 0.
+  template <class Flat>
+  void fill(Triangles& triangles, std::uint32_t vertex, const Flat& flat) {
+    bool on_border = false;
+    for (std::size_t i = 0; i < edges_.size() && !on_border; ++i) {
+      if (edges_[i].outer != kNone || !flat(edges_[i].a, edges_[i].b)) continue;
+      on_border = true;  // the other sides are a chain that starts after it
+      rotated_.assign(edges_.begin() + static_cast<std::ptrdiff_t>(i) + 1, edges_.end());
+      rotated_.insert(rotated_.end(), edges_.begin(),
+                      edges_.begin() + static_cast<std::ptrdiff_t>(i));
+      std::swap(edges_, rotated_);
+    }
+    const std::size_t count = edges_.size();
+    assert(count >= removed_.size());
+    created_ = removed_;
+    while (created_.size() < count) {
+      created_.push_back(static_cast<std::uint32_t>(triangles.size()));
+      triangles.emplace_back();
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      const Edge& edge = edges_[i];
+      const std::uint32_t following = i + 1 < count ? created_[i + 1]
+                                      : on_border   ? kNone
+                                                    : created_[0];
+      const std::uint32_t preceding = i > 0       ? created_[i - 1]
+                                      : on_border ? kNone
+                                                  : created_[count - 1];
+      triangles[created_[i]] = {
+          {vertex, edge.a, edge.b}, {edge.outer, following, preceding}, 0, 0.0F};
+      if (edge.outer != kNone) triangles[edge.outer].next[edge.outer_side] = created_[i];
+    }
+  }
+
+  /// The triangles made by fill(), which reuse all slots of the removed ones.
+  const std::vector<std::uint32_t>& created() const { return created_; }
+
+ private:
+  struct Edge {
+    std::uint32_t a, b;   ///< along the hole, counter-clockwise
+    std::uint32_t outer;  ///< the triangle beyond, or kNone
+    unsigned outer_side;  ///< the side of `outer` towards the hole
+  };
+  std::vector<Edge> edges_, rotated_;
+  std::vector<std::uint32_t> removed_, created_;
+  std::vector<std::pair<std::uint32_t, unsigned>> stack_;
+};
 
 }  // namespace terrace::tri::tin

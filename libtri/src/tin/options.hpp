@@ -36,12 +36,13 @@ inline bool valid(const TinLattice& lattice) {
 }
 
 /// The nearest integer to a coordinate, halves up.
-inline double to_whole(double place) { return std::floor(place + 0.5); }
+inline double round_half_up(double place) { return std::floor(place + 0.5); }
 
 /// The lattice height nearest to `height`.
 inline double on_lattice(const TinLattice& lattice, double height) {
   return lattice.height_origin +
-         to_whole((height - lattice.height_origin) / lattice.height_step) * lattice.height_step;
+         round_half_up((height - lattice.height_origin) / lattice.height_step) *
+             lattice.height_step;
 }
 
 }  // namespace terrace::tri::tin

@@ -12,7 +12,6 @@
 
 #include <terrace/base/stop_check.hpp>
 
-#include "cavity.hpp"
 #include "mesh.hpp"
 #include "scan.hpp"
 #include "star.hpp"
@@ -31,16 +30,16 @@ namespace terrace::tri::tin {
 /// - Vertex: members x, y and z. Vertices: an array of them.
 /// - Hole: the star of a vertex that may be removed, see VertexHole.
 /// - FirstSide: the side that a walk tries first, LowestSide or RandomSide.
-/// - kMoved: a vertex may differ in position from its sample, so that it may fall on another
-///   vertex, on the border or into another triangle. Otherwise it is at its sample, in the triangle
-///   that was judged, unless it separates data from missing data.
-/// - kMostFitted: vertices with more triangles keep their height.
+/// - kMovesVertices: true if a vertex may differ in position from its sample, so that it may fall
+///   on another vertex, on the border or into another triangle. Otherwise it is at its sample, in
+///   the triangle that was judged, unless it separates data from missing data.
+/// - kMaxFittedTriangles: vertices with more triangles keep their height.
 template <class S>
 concept Samples = requires(S samples, const S known, Mesh<typename S::Vertices> mesh,
                            typename S::Vertex vertex, const Spot spot, std::uint32_t number,
                            std::span<const std::uint32_t> created, Interval rises) {
-  requires std::same_as<decltype(S::kMoved), const bool>;
-  requires std::same_as<decltype(S::kMostFitted), const std::size_t>;
+  requires std::same_as<decltype(S::kMovesVertices), const bool>;
+  requires std::same_as<decltype(S::kMaxFittedTriangles), const std::size_t>;
   typename S::Hole;
   { typename S::FirstSide(number).next() } -> std::same_as<unsigned>;
 
@@ -51,11 +50,11 @@ concept Samples = requires(S samples, const S known, Mesh<typename S::Vertices> 
   // True if no vertex may be inserted on the border.
   { known.border_fixed() } -> std::same_as<bool>;
 
-  // judge(mesh, t): sets `place` and `error` of triangle t to its worst sample that is beyond
-  // the bound and may become a vertex; `error` is 0 if there is none. split(mesh, created,
+  // set_error(mesh, t): sets `place` and `error` of triangle t to its worst sample that is beyond
+  // the bound and may become a vertex. `error` is 0 if there is none. split(mesh, created,
   // place, t, spot): does so for the triangles `created` around the last vertex, which was made
   // from the sample that was the worst of t. The removed triangles' numbers come first.
-  samples.judge(mesh, number);
+  samples.set_error(mesh, number);
   samples.split(mesh, created, number, number, spot);
   // open(place): true if the sample may become a vertex. take(place): returns that vertex.
   // give_up(place): it cannot become one after all. restore(): undoes all give_up() that must
@@ -68,7 +67,7 @@ concept Samples = requires(S samples, const S known, Mesh<typename S::Vertices> 
 
   // narrow(t, v, b, c, rises): narrows the range by which vertex v of triangle t may rise to
   // the range that the samples in the triangle allow. raise(v, rises): moves v to the middle of
-  // it; false if it stays. within(mesh, t, v, b, c): true if the triangle is within the bound.
+  // it, or false if it stays. within(mesh, t, v, b, c): true if the triangle is within the bound.
   known.narrow(number, vertex, vertex, vertex, rises);
   { known.raise(vertex, rises) } -> std::same_as<bool>;
   { known.within(mesh, number, vertex, vertex, vertex) } -> std::same_as<bool>;
@@ -95,10 +94,10 @@ concept VertexHole = requires(H hole, Mesh<typename S::Vertices> mesh, const Sta
   hole.replaced(mesh, star, fill);
 };
 
-/// Ends refinement, apart from the bound.
+/// Limits that end refinement before the bound holds everywhere.
 struct RefinementLimits {
-  std::size_t vertices = std::numeric_limits<std::size_t>::max();   ///< at most, those that count
-  std::size_t triangles = std::numeric_limits<std::size_t>::max();  ///< stops with more
+  std::size_t vertices = std::numeric_limits<std::size_t>::max();  ///< at most this many that count
+  std::size_t triangles = std::numeric_limits<std::size_t>::max();  ///< stops when there are more
 };
 
 /// A mesh of a convex region under construction.
@@ -134,12 +133,12 @@ class Refinement {
       Spot spot{at};
       std::uint32_t next = kNone;
       unsigned side = first.next();
-      for (unsigned k = 0; k < 3; ++k, side = after(side)) {
+      for (unsigned k = 0; k < 3; ++k, side = next_side(side)) {
         if (from != kNone && t.next[side] == from) continue;
-        const auto turned =
-            samples_.turn(mesh_.vertex(t, after(side)), mesh_.vertex(t, before(side)), p);
-        if (turned > 0) continue;
-        if (turned == 0) {
+        const auto orientation = samples_.turn(mesh_.vertex(t, next_side(side)),
+                                               mesh_.vertex(t, previous_side(side)), p);
+        if (orientation > 0) continue;
+        if (orientation == 0) {
           ++spot.zeros;
           spot.side = side;
           continue;
@@ -156,7 +155,7 @@ class Refinement {
     }
   }
 
-  /// The spot of a new vertex; it has no triangle if the vertex cannot be inserted.
+  /// Returns the spot of a new vertex. It has no triangle if the vertex cannot be inserted.
   Spot free_spot(const Vertex& p, std::uint32_t near) const {
     const Spot spot = locate(p, near);
     return spot.zeros == 2 || (spot.border && samples_.border_fixed()) ? Spot{} : spot;
@@ -166,8 +165,8 @@ class Refinement {
   /// removed ones first.
   const std::vector<std::uint32_t>& insert(std::uint32_t number, const Spot& spot) {
     const Vertex p = mesh_.vertices[number];
-    const std::uint32_t border = mesh_.triangles[spot.triangle].corner[after(spot.side)];
-    cavity_.dig(mesh_.triangles, spot.triangle, [&](const Triangle& t) {
+    const std::uint32_t border = mesh_.triangles[spot.triangle].corner[next_side(spot.side)];
+    cavity_.grow(mesh_.triangles, spot.triangle, [&](const Triangle& t) {
       const Vertex &a = mesh_.vertex(t, 0), &b = mesh_.vertex(t, 1), &c = mesh_.vertex(t, 2);
       if (delaunay_) return samples_.in_circle(a, b, c, p);
       return samples_.turn(a, b, p) >= 0 && samples_.turn(b, c, p) >= 0 &&
@@ -187,7 +186,7 @@ class Refinement {
   void judge_all(Queue& queue) {
     for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
       check_stop();
-      judge(queue, t);
+      set_error(queue, t);
     }
   }
 
@@ -205,7 +204,7 @@ class Refinement {
       const std::uint32_t place = mesh_.triangles[t].place;
       // Several triangles may have waited for this sample.
       if (!samples_.open(place)) {
-        judge(queue, t);
+        set_error(queue, t);
         continue;
       }
       const Vertex p = samples_.take(place);
@@ -222,15 +221,15 @@ class Refinement {
       }
       // The triangle still exists, or its sample separated data from missing data and was outside
       // it.
-      if (S::kMoved ? reached : spot.triangle == t) continue;
+      if (S::kMovesVertices ? reached : spot.triangle == t) continue;
       samples_.give_up(place);
-      judge(queue, t);
+      set_error(queue, t);
     }
     samples_.restore();
   }
 
   /// Removes inner vertices without which the bound still holds, in the order of their numbers.
-  /// Returns their number; they remain as vertices without triangles.
+  /// Returns their number. They remain as vertices without triangles.
   std::size_t remove() {
     std::vector<std::uint32_t> triangle_of =
         triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
@@ -269,22 +268,23 @@ class Refinement {
     for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
       check_stop();
       if (triangle_of[v] == kNone) continue;
-      Vertex& own = mesh_.vertices[v];
+      Vertex& vertex = mesh_.vertices[v];
       Interval rises;
       std::size_t count = 0;
-      const bool inner =
-          around(v, triangle_of[v], [&](std::uint32_t t, const Vertex& b, const Vertex& c) {
-            samples_.narrow(t, own, b, c, rises);
-            return ++count <= S::kMostFitted && rises.low <= rises.high;
+      const bool inner = for_each_triangle_at(
+          v, triangle_of[v], [&](std::uint32_t t, const Vertex& b, const Vertex& c) {
+            samples_.narrow(t, vertex, b, c, rises);
+            return ++count <= S::kMaxFittedTriangles && rises.low <= rises.high;
           });
-      const Vertex before = own;
-      if (!inner || !samples_.raise(own, rises)) continue;
+      const Vertex original = vertex;
+      if (!inner || !samples_.raise(vertex, rises)) continue;
       // Steps between heights may be larger than the range.
-      if (S::kMoved &&
-          !around(v, triangle_of[v], [&](std::uint32_t t, const Vertex& b, const Vertex& c) {
-            return samples_.within(mesh_, t, own, b, c);
-          }))
-        own = before;
+      if (S::kMovesVertices &&
+          !for_each_triangle_at(v, triangle_of[v],
+                                [&](std::uint32_t t, const Vertex& b, const Vertex& c) {
+                                  return samples_.within(mesh_, t, vertex, b, c);
+                                }))
+        vertex = original;
     }
   }
 
@@ -318,22 +318,23 @@ class Refinement {
     if (mesh_.triangles[t].error > 0) queue.push(mesh_.triangles[t], t);
   }
   template <class Queue>
-  void judge(Queue& queue, std::uint32_t t) {
-    samples_.judge(mesh_, t);
+  void set_error(Queue& queue, std::uint32_t t) {
+    samples_.set_error(mesh_, t);
     enter(queue, t);
   }
 
   /// Calls visit(t, b, c) for the triangles t of vertex v, b, c until it returns false. Returns
   /// false if it did, or if v is on the border.
   template <class Visit>
-  bool around(std::uint32_t v, std::uint32_t first, const Visit& visit) const {
+  bool for_each_triangle_at(std::uint32_t v, std::uint32_t first, const Visit& visit) const {
     std::uint32_t t = first;
     do {
       const Triangle& triangle = mesh_.triangles[t];
       const unsigned at = corner_of(triangle, v);
-      if (!visit(t, mesh_.vertex(triangle, after(at)), mesh_.vertex(triangle, before(at))))
+      if (!visit(t, mesh_.vertex(triangle, next_side(at)),
+                 mesh_.vertex(triangle, previous_side(at))))
         return false;
-      t = triangle.next[after(at)];
+      t = triangle.next[next_side(at)];
     } while (t != first && t != kNone);
     return t == first;
   }

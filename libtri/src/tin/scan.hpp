@@ -53,7 +53,7 @@ inline constexpr int kUnsure = -1;
 template <class T>
 struct GridScan {
   /// Finds the sample in the triangle (including sides, excluding corners) with the greatest error
-  /// that may exceed `bound`; on ties the first in the first row. The error is 0 if there is none,
+  /// that may exceed `bound`, on ties the first in the first row. The error is 0 if there is none,
   /// and infinite, without a place, if a sample has no data.
   WorstSample<T> (*worst)(const GridSamples<T>& samples, const GridCorner<T>& a,
                           const GridCorner<T>& b, const GridCorner<T>& c, T bound);
@@ -74,7 +74,7 @@ struct RowCorner {
 /// Samples in rows and columns at given places, row by row, with at least kRowPad values after each
 /// row and one more row after the last. NaN marks a missing sample.
 struct RowSamples {
-  /// If `upright`, the places of columns and rows, ascending; x[-1] and y[-1] are -infinity, and at
+  /// If `upright`, the places of columns and rows, ascending. x[-1] and y[-1] are -infinity, and at
   /// least kRowPad places at infinity follow the last. Otherwise the places of all samples, laid
   /// out like z.
   const double* x;
@@ -84,10 +84,11 @@ struct RowSamples {
   std::int32_t columns, rows;
   bool upright;
   bool mirrored;  ///< true if columns and rows form a left-handed system
-  /// The approximate column of a place is column_0 + column_x * x + column_y * y; the row likewise.
+  /// The approximate column of a place is column_0 + column_x * x + column_y * y. The row is
+  /// computed likewise.
   double column_0, column_x, column_y;
   double row_0, row_x, row_y;
-  double off;  ///< the largest error of such a column or row
+  double deviation;  ///< the largest error of such a column or row
 };
 inline constexpr std::size_t kRowPad = 8;
 
@@ -95,7 +96,7 @@ inline constexpr std::size_t kRowPad = 8;
 /// plane and the samples in it, including its sides. Samples so close to a side that rounding
 /// decides belong to the triangles on both sides of it. Rounding errors are added, never ignored.
 struct RowScan {
-  /// Finds the sample with the greatest error that may be above `bound`; on ties the first in the
+  /// Finds the sample with the greatest error that may be above `bound`, on ties the first in the
   /// first row. The error is 0 if there is none.
   WorstSample<double> (*worst)(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                                const RowCorner& c, double bound);
@@ -125,7 +126,7 @@ struct CheckWindow {
 
 /// One sum per lane, so that the order of summation is the same for all instruction sets.
 struct CheckSums {
-  double most[kCheckLanes] = {};
+  double max_error[kCheckLanes] = {};
   double squares[kCheckLanes] = {};
   std::int64_t covered[kCheckLanes] = {};
 };

@@ -33,32 +33,32 @@ namespace {
   return _mm512_cmp_pd_mask((__m512d)a, (__m512d)b, _CMP_GT_OQ);
 }
 template <class Mask>
-[[gnu::always_inline]] inline Mask either(Mask a, Mask b) {
+[[gnu::always_inline]] inline Mask mask_or(Mask a, Mask b) {
   return static_cast<Mask>(a | b);
 }
 template <class Mask>
-[[gnu::always_inline]] inline Mask both(Mask a, Mask b) {
+[[gnu::always_inline]] inline Mask mask_and(Mask a, Mask b) {
   return static_cast<Mask>(a & b);
 }
-[[gnu::always_inline]] inline Ints16 chosen(__mmask16 mask, Ints16 a, Ints16 b) {
+[[gnu::always_inline]] inline Ints16 blend(__mmask16 mask, Ints16 a, Ints16 b) {
   return (Ints16)_mm512_mask_mov_epi32((__m512i)b, mask, (__m512i)a);
 }
-[[gnu::always_inline]] inline Ints8 chosen(__mmask8 mask, Ints8 a, Ints8 b) {
+[[gnu::always_inline]] inline Ints8 blend(__mmask8 mask, Ints8 a, Ints8 b) {
   return (Ints8)_mm512_mask_mov_epi64((__m512i)b, mask, (__m512i)a);
 }
-[[gnu::always_inline]] inline Reals8 chosen(__mmask8 mask, Reals8 a, Reals8 b) {
+[[gnu::always_inline]] inline Reals8 blend(__mmask8 mask, Reals8 a, Reals8 b) {
   return (Reals8)_mm512_mask_mov_pd((__m512d)b, mask, (__m512d)a);
 }
-[[gnu::always_inline]] inline Reals16 kept(Reals16 lanes, __mmask16 mask) {
+[[gnu::always_inline]] inline Reals16 zero_unless(Reals16 lanes, __mmask16 mask) {
   return (Reals16)_mm512_maskz_mov_ps(mask, (__m512)lanes);
 }
-[[gnu::always_inline]] inline Reals8 kept(Reals8 lanes, __mmask8 mask) {
+[[gnu::always_inline]] inline Reals8 zero_unless(Reals8 lanes, __mmask8 mask) {
   return (Reals8)_mm512_maskz_mov_pd(mask, (__m512d)lanes);
 }
-[[gnu::always_inline]] inline unsigned beyond(Reals16 lanes, Reals16 limit, __mmask16 mask) {
+[[gnu::always_inline]] inline unsigned exceeding(Reals16 lanes, Reals16 limit, __mmask16 mask) {
   return _mm512_mask_cmp_ps_mask(mask, (__m512)lanes, (__m512)limit, _CMP_NLE_UQ);
 }
-[[gnu::always_inline]] inline unsigned beyond(Reals8 lanes, Reals8 limit, __mmask8 mask) {
+[[gnu::always_inline]] inline unsigned exceeding(Reals8 lanes, Reals8 limit, __mmask8 mask) {
   return _mm512_mask_cmp_pd_mask(mask, (__m512d)lanes, (__m512d)limit, _CMP_NLE_UQ);
 }
 [[gnu::always_inline]] inline unsigned equal(Ints16 a, Ints16 b) {

@@ -67,7 +67,7 @@ struct GridFace {
   /// NaN, a sample without data, is beyond every limit.
   template <class Sides>
   [[gnu::always_inline]] static bool any_beyond(Reals error, Reals limit, const Sides& sides) {
-    return beyond(error, limit, sides.inside()) != 0;
+    return exceeding(error, limit, sides.inside()) != 0;
   }
 
   /// The mask of samples in the triangle, as a function.
@@ -122,9 +122,9 @@ struct GridFace {
       const auto inside = [&]() __attribute__((always_inline)) {
         const auto between = not_negative(edge[0] | edge[1] | edge[2]);
         if (!face.clipped) return between;
-        return both(between,
-                    both(at_most(lane_x(), Int{face.last_column - face.first_column} - Ints{}),
-                         at_most(lane_y(), Int{face.last_row - y} - Ints{})));
+        return mask_and(
+            between, mask_and(at_most(lane_x(), Int{face.last_column - face.first_column} - Ints{}),
+                              at_most(lane_y(), Int{face.last_row - y} - Ints{})));
       };
       if (!visitor(above_plane, Sides<decltype(inside)>{inside}, face.first_column, y, kWidth))
         return false;
@@ -182,9 +182,9 @@ struct GridFace {
 
     template <class Visit>
     [[gnu::always_inline]] bool visit(std::int32_t x, const Visit& visitor) const {
-      const Reals across =
+      const Reals dx =
           static_cast<T>(kStep * x - face.a.x) + __builtin_convertvector(kStep * K::kLane, Reals);
-      const Reals above_plane = (K::load(row + x) - face.a.z) - (face.gradient_x * across + rise_y);
+      const Reals above_plane = (K::load(row + x) - face.a.z) - (face.gradient_x * dx + rise_y);
       const auto inside = [&]() __attribute__((always_inline)) {
         return at_most(K::kLane, Int{last - x} - Ints{});
       };
@@ -208,29 +208,29 @@ WorstSample<T> worst_of_grid(const GridSamples<T>& samples, const GridCorner<T>&
   if (face.empty) return {0, 0};
   const T limit = greatest_allowed(bound, face.slack);
   if (limit == kUnsure) return {T{kUnsure}, 0};
-  Ints most = (Ints)(limit - Reals{});
+  Ints largest = (Ints)(limit - Reals{});
   Ints block = {};  // the block of each lane's worst sample
-  auto grown = more(most, most);
+  auto has_grown = more(largest, largest);
   int width = 1;
   scan_triangle(
       face, [&](Reals above_plane, const auto& sides, std::int32_t x, std::int32_t y,
                 int columns) __attribute__((always_inline)) {
-        const Ints own = (Ints)kept(K::absolute(above_plane), sides.inside());
-        const auto grew = more(own, most);
-        most = chosen(grew, own, most);
+        const Ints error = (Ints)zero_unless(K::absolute(above_plane), sides.inside());
+        const auto grows = more(error, largest);
+        largest = blend(grows, error, largest);
         const auto place = static_cast<std::uint32_t>(y) << 16 | static_cast<std::uint32_t>(x);
-        block = chosen(grew, static_cast<Int>(place) - Ints{}, block);
-        grown = either(grown, grew);
+        block = blend(grows, static_cast<Int>(place) - Ints{}, block);
+        has_grown = mask_or(has_grown, grows);
         width = columns;
         return true;
       });
-  if (bits_of(grown) == 0) return {0, 0};
-  const Int greatest_bits = K::greatest_lane(most);
+  if (bits_of(has_grown) == 0) return {0, 0};
+  const Int greatest_bits = K::greatest_lane(largest);
   T error;
   __builtin_memcpy(&error, &greatest_bits, sizeof error);
   if (!(error < static_cast<T>(__builtin_inf()))) return {static_cast<T>(__builtin_inf()), 0};
   std::uint32_t first = 0xFFFFFFFF;
-  for (unsigned lanes = equal(most, greatest_bits - Ints{}); lanes != 0; lanes &= lanes - 1) {
+  for (unsigned lanes = equal(largest, greatest_bits - Ints{}); lanes != 0; lanes &= lanes - 1) {
     const int lane = __builtin_ctz(lanes);
     const auto corner = static_cast<std::uint32_t>(block[lane]);
     const auto x = (corner & 0xFFFF) + static_cast<std::uint32_t>(lane & (width - 1));

@@ -2,8 +2,8 @@
 #pragma once
 
 // Includes all scans. The includer must first define the functions on masks of lanes:
-// not_negative(), at_most(), more(), at_least(), above(), either(), both(), chosen(), kept(),
-// beyond(), equal(), bits_of().
+// not_negative(), at_most(), more(), at_least(), above(), mask_or(), mask_and(), blend(),
+// zero_unless(), exceeding(), equal(), bits_of().
 #include "scan.hpp"
 #include "scan_check.hpp"
 #include "scan_grid.hpp"

@@ -94,9 +94,9 @@ struct Lanes<double> {
     return (Reals)((Ints)lanes & 0x7FFFFFFFFFFFFFFF);
   }
   [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
-    Int most = lanes[0];
-    for (int i = 1; i < kLanes; ++i) most = lanes[i] > most ? lanes[i] : most;
-    return most;
+    Int largest = lanes[0];
+    for (int i = 1; i < kLanes; ++i) largest = lanes[i] > largest ? lanes[i] : largest;
+    return largest;
   }
   [[gnu::always_inline]] static Reals load(const double* from) {
     Reals lanes;

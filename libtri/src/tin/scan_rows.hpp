@@ -38,13 +38,14 @@ constexpr double kFlat = 1e-6;
   return samples.row_0 + (samples.row_x * p.x + samples.row_y * p.y);
 }
 
-/// Rounds up and down to integers from -1 to `count`.
-[[gnu::always_inline]] inline std::int32_t whole_from(double low, std::int32_t count) {
-  const double kept = least(greatest(low, 0.0), static_cast<double>(count));
-  const auto down = static_cast<std::int32_t>(kept);
-  return down + (static_cast<double>(down) < kept ? 1 : 0);
+/// Rounds up to an integer from 0 to `count`.
+[[gnu::always_inline]] inline std::int32_t clamped_ceiling(double low, std::int32_t count) {
+  const double clamped = least(greatest(low, 0.0), static_cast<double>(count));
+  const auto down = static_cast<std::int32_t>(clamped);
+  return down + (static_cast<double>(down) < clamped ? 1 : 0);
 }
-[[gnu::always_inline]] inline std::int32_t whole_to(double high, std::int32_t count) {
+/// Rounds down to an integer from -1 to `count - 1`.
+[[gnu::always_inline]] inline std::int32_t clamped_floor(double high, std::int32_t count) {
   return static_cast<std::int32_t>(least(greatest(high, -1.0), static_cast<double>(count - 1)) +
                                    1.0) -
          1;
@@ -112,8 +113,8 @@ struct RowFace {
   /// A range of the lattice that contains all samples between these positions.
   [[gnu::always_inline]] void range_around(double p, double q, double r, std::int32_t count,
                                            std::int32_t& first, std::int32_t& last) const {
-    first = whole_from(least(p, least(q, r)) - samples.off, count);
-    last = whole_to(greatest(p, greatest(q, r)) + samples.off, count);
+    first = clamped_ceiling(least(p, least(q, r)) - samples.deviation, count);
+    last = clamped_floor(greatest(p, greatest(q, r)) + samples.deviation, count);
   }
 
   /// Edge functions, which are evaluated only where errors require it. edge(i) is that of side i.
@@ -123,8 +124,8 @@ struct RowFace {
     double margin;
     [[gnu::always_inline]] auto inside() const {
       const Reals8 least_inside = margin - Reals8{};
-      return both(at_least(edge(0), least_inside),
-                  both(at_least(edge(1), least_inside), at_least(edge(2), least_inside)));
+      return mask_and(at_least(edge(0), least_inside),
+                      mask_and(at_least(edge(1), least_inside), at_least(edge(2), least_inside)));
     }
   };
 
@@ -132,7 +133,7 @@ struct RowFace {
   template <class Sides>
   [[gnu::always_inline]] static bool any_beyond(Reals8 error, Reals8 limit, const Sides& sides) {
     const auto candidates = above(error, limit);
-    return bits_of(candidates) != 0 && bits_of(both(candidates, sides.inside())) != 0;
+    return bits_of(candidates) != 0 && bits_of(mask_and(candidates, sides.inside())) != 0;
   }
 
   template <int kWidth>
@@ -202,10 +203,10 @@ struct RowFace {
         base[i] = p[i] - slope[i] * q[i];
         // The samples' deviation from the lattice, plus rounding.
         const double steep = __builtin_fabs(slope[i]);
-        const double off =
-            kColumnMargin + samples.off * (1.0 + steep) +
+        const double deviation =
+            kColumnMargin + samples.deviation * (1.0 + steep) +
             0x1p-44 * (__builtin_fabs(p[i]) + steep * __builtin_fabs(q[i]) + steep * samples.rows);
-        base[i] += left[i] ? -off : off;
+        base[i] += left[i] ? -deviation : deviation;
       }
     }
 
@@ -268,7 +269,7 @@ WorstSample<double> worst_of_rows(const RowSamples& samples, const RowCorner& a,
         const Reals8 error = Lanes<double>::absolute(above_plane);
         const auto candidates = above(error, best - Reals8{});
         if (bits_of(candidates) == 0) return true;
-        unsigned found = bits_of(both(candidates, sides.inside()));
+        unsigned found = bits_of(mask_and(candidates, sides.inside()));
         for (; found != 0; found &= found - 1) {
           const int lane = __builtin_ctz(found);
           if (!(error[lane] > best)) continue;
@@ -293,7 +294,7 @@ void measure_in(const RowSamples& samples, const RowCorner& a, const RowCorner& 
         const Reals8 sure = Lanes<double>::absolute(above_plane) + face.slack;
         const Reals8 known = width == 4 ? Lanes<double>::load_halves(to, to + samples.stride)
                                         : Lanes<double>::load(to);
-        const Reals8 raised = chosen(both(above(sure, known), sides.inside()), sure, known);
+        const Reals8 raised = blend(mask_and(above(sure, known), sides.inside()), sure, known);
         __builtin_memcpy(to, &raised, width == 4 ? sizeof(Lanes<double>::Half) : sizeof(Reals8));
         if (width == 4)
           __builtin_memcpy(to + samples.stride, reinterpret_cast<const double*>(&raised) + 4,
@@ -306,7 +307,7 @@ template <bool kUpright>
 void narrow_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b,
                const RowCorner& c, double bound, Interval& rises) {
   // Samples where the corner has a smaller weight are ignored.
-  constexpr double kLeast = 1e-9;
+  constexpr double kMinWeight = 1e-9;
   const RowFace<kUpright> face(samples, a, b, c);
   if (face.empty) return;
   const double allowed = greatest(bound - face.slack, 0.0);
@@ -320,7 +321,7 @@ void narrow_in(const RowSamples& samples, const RowCorner& a, const RowCorner& b
                   for (; lanes != 0; lanes &= lanes - 1) {
                     const int lane = __builtin_ctz(lanes);
                     const double weight = weights[lane], rise = above_plane[lane];
-                    if (!(weight > kLeast) || rise != rise) continue;
+                    if (!(weight > kMinWeight) || rise != rise) continue;
                     found.low = greatest(found.low, (rise - allowed) / weight);
                     found.high = least(found.high, (rise + allowed) / weight);
                   }

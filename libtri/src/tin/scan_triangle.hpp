@@ -12,7 +12,7 @@
 // - first_column, last_column, first_row, last_row: a box around the samples in the triangle.
 // - kWidestBlock: boxes of at most this many columns are visited in blocks of 4 columns, 8, and so
 //   on, which may span several rows; wider ones row by row.
-// - Blocks<kWidth>(face).visit(row, visit): visits the block at the row; called for each in turn.
+// - Blocks<kWidth>(face).visit(row, visit): visits the block at the row. Called for each in turn.
 // - Rows(face).start(row): gives the row's columns as `first` and `last`. visit(column, visit).
 //
 // Vectors are visited by visit(above_plane, sides, column, row, width). `above_plane`: heights of

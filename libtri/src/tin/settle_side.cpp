@@ -15,60 +15,61 @@ namespace {
 /// next to it. All samples inside a longer segment with data are therefore surrounded by data, and
 /// triangles on the segment can have data too.
 template <class T>
-std::vector<std::uint8_t> needed_on(std::span<const T> line, std::span<const T> beside,
-                                    std::span<const T> other_beside) {
+std::vector<std::uint8_t> required_vertices(std::span<const T> line,
+                                            std::span<const T> neighbour_line,
+                                            std::span<const T> other_neighbour_line) {
   const std::size_t count = line.size();
-  std::vector<std::uint8_t> needed(count, 0);
-  needed.front() = needed.back() = 1;
-  const auto has = [&](std::size_t i) { return std::isfinite(line[i]); };
+  std::vector<std::uint8_t> required(count, 0);
+  required.front() = required.back() = 1;
+  const auto has_height = [&](std::size_t i) { return std::isfinite(line[i]); };
   const auto near_gap = [&](std::size_t i) {
     for (std::size_t k = i == 0 ? 0 : i - 1; k < count && k <= i + 1; ++k)
-      if (!has(k) || (!beside.empty() && !std::isfinite(beside[k])) ||
-          (!other_beside.empty() && !std::isfinite(other_beside[k])))
+      if (!has_height(k) || (!neighbour_line.empty() && !std::isfinite(neighbour_line[k])) ||
+          (!other_neighbour_line.empty() && !std::isfinite(other_neighbour_line[k])))
         return true;
     return false;
   };
   for (std::size_t i = 0; i < count; ++i) {
-    const bool next_has = i + 1 < count && has(i + 1);
-    if (i + 1 < count && has(i) != next_has) needed[i] = needed[i + 1] = 1;
-    if (has(i) && near_gap(i)) needed[i] = 1;
+    const bool next_has_height = i + 1 < count && has_height(i + 1);
+    if (i + 1 < count && has_height(i) != next_has_height) required[i] = required[i + 1] = 1;
+    if (has_height(i) && near_gap(i)) required[i] = 1;
   }
-  return needed;
+  return required;
 }
 
 /// Splits between a and b until the bound holds.
 template <class T>
 void simplify(std::span<const T> line, std::size_t a, std::size_t b, double limit,
-              std::vector<std::uint8_t>& kept) {
-  std::vector<std::pair<std::size_t, std::size_t>> waiting{{a, b}};
-  while (!waiting.empty()) {
-    const auto [from, to] = waiting.back();
-    waiting.pop_back();
+              std::vector<std::uint8_t>& is_vertex) {
+  std::vector<std::pair<std::size_t, std::size_t>> pending{{a, b}};
+  while (!pending.empty()) {
+    const auto [from, to] = pending.back();
+    pending.pop_back();
     const auto start = static_cast<double>(line[from]);
     const double rise = static_cast<double>(line[to]) - start;
     const auto length = static_cast<double>(to - from);
-    double most = std::max(limit, 0x1p-50 * std::fabs(rise));  // ignores rounding errors
+    double largest = std::max(limit, 0x1p-50 * std::fabs(rise));  // ignores rounding errors
     std::size_t worst = from;
     for (std::size_t i = from + 1; i < to; ++i) {
       const double error = std::fabs(static_cast<double>(line[i]) - start -
                                      rise * static_cast<double>(i - from) / length);
-      if (error <= most) continue;
-      most = error;
+      if (error <= largest) continue;
+      largest = error;
       worst = i;
     }
     if (worst == from) continue;
-    kept[worst] = 1;
-    waiting.push_back({from, worst});
-    waiting.push_back({worst, to});
+    is_vertex[worst] = 1;
+    pending.push_back({from, worst});
+    pending.push_back({worst, to});
   }
 }
 
 }  // namespace
 
 template <class T>
-std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> beside,
-                                       std::span<const T> other_beside, double max_error) {
-  for (const std::span<const T> other : {beside, other_beside})
+std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> neighbour_line,
+                                       std::span<const T> other_neighbour_line, double max_error) {
+  for (const std::span<const T> other : {neighbour_line, other_neighbour_line})
     if (!other.empty() && other.size() != line.size())
       throw std::invalid_argument("settle_side: the lines must have equal lengths");
   if (!(max_error >= 0)) throw std::invalid_argument("settle_side: max_error must not be negative");
@@ -77,16 +78,17 @@ std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const 
       throw std::invalid_argument("settle_side: a height is beyond 1e150");
   std::vector<std::uint32_t> vertices;
   if (line.empty()) return vertices;
-  std::vector<std::uint8_t> kept = needed_on(line, beside, other_beside);
+  std::vector<std::uint8_t> is_vertex =
+      required_vertices(line, neighbour_line, other_neighbour_line);
   // Slightly below the bound, so that later rounding cannot exceed it.
   const double limit = max_error * (1 - 1e-5);
   for (std::size_t a = 0, b = 1; b < line.size(); ++b) {
-    if (kept[b] == 0) continue;
-    if (std::isfinite(line[a]) && std::isfinite(line[b])) simplify(line, a, b, limit, kept);
+    if (is_vertex[b] == 0) continue;
+    if (std::isfinite(line[a]) && std::isfinite(line[b])) simplify(line, a, b, limit, is_vertex);
     a = b;
   }
   for (std::size_t i = 0; i < line.size(); ++i)
-    if (kept[i] != 0) vertices.push_back(static_cast<std::uint32_t>(i));
+    if (is_vertex[i] != 0) vertices.push_back(static_cast<std::uint32_t>(i));
   return vertices;
 }
 
@@ -103,8 +105,8 @@ GridSides settle_sides(const GridWindow<T>& window, double max_error) {
       for (std::size_t y = 0; y < rows; ++y) result.push_back(window.heights[y * columns + x]);
     return result;
   };
-  const auto settle = [&](std::span<const T> line, std::span<const T> beside) {
-    return settle_side<T>(line, beside, {}, max_error);
+  const auto settle = [&](std::span<const T> line, std::span<const T> neighbour_line) {
+    return settle_side<T>(line, neighbour_line, {}, max_error);
   };
   return {settle(row(0), row(1)), settle(row(rows - 1), row(rows - 2)),
           settle(column(0), column(1)), settle(column(columns - 1), column(columns - 2))};

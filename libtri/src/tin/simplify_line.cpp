@@ -11,7 +11,7 @@ namespace terrace::tri {
 namespace {
 
 using tin::on_lattice;
-using tin::to_whole;
+using tin::round_half_up;
 using tin::valid;
 
 void check(std::span<const double> t, std::span<const double> heights, double max_error,
@@ -34,7 +34,7 @@ LineVertex vertex_of(double t, double height, std::size_t sample,
                      const std::optional<TinLattice>& lattice) {
   const auto number = static_cast<std::uint32_t>(sample);
   if (!lattice) return {t, height, number};
-  return {to_whole(t), on_lattice(*lattice, height), number};
+  return {round_half_up(t), on_lattice(*lattice, height), number};
 }
 
 /// The height of the line at t. Beyond the ends, which rounding may reach, it is the height of the

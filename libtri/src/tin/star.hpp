@@ -44,9 +44,9 @@ bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonF
         const Cost parts = cost[i][m] > cost[m][j] ? cost[i][m] : cost[m][j];
         if (parts > limit || parts >= best) continue;
         const Cost allowed = best < limit ? best : limit;
-        const Cost own = worst(i, m, j, allowed);
-        if (own > allowed) continue;
-        const Cost all = own > parts ? own : parts;
+        const Cost triangle_cost = worst(i, m, j, allowed);
+        if (triangle_cost > allowed) continue;
+        const Cost all = triangle_cost > parts ? triangle_cost : parts;
         if (all >= best) continue;
         best = all;
         fill.apex[i][j] = static_cast<std::uint8_t>(m);
@@ -57,7 +57,7 @@ bool fill_least_worst(std::size_t size, Cost limit, const Worst& worst, PolygonF
   return cost[0][size - 1] <= limit;
 }
 
-/// Finds any way to cut such a polygon into triangles for which fits(i, m, j) holds; only
+/// Finds any way to cut such a polygon into triangles for which fits(i, m, j) holds. Only
 /// counter-clockwise triangles may fit. Slightly more triangles remain in the end than with
 /// fill_least_worst(), but there are far fewer calls, as only parts next to a fitting triangle are
 /// examined.
@@ -105,18 +105,18 @@ class AnyFill {
 template <class Left, class Inside>
 bool fill_delaunay(std::size_t size, const Left& left, const Inside& inside, PolygonFill& fill) {
   std::array<std::array<std::uint8_t, 2>, kMaxRing> stack;
-  std::size_t waiting = 0;
-  stack[waiting++] = {0, static_cast<std::uint8_t>(size - 1)};
-  while (waiting > 0) {
-    const auto [i, j] = stack[--waiting];
+  std::size_t depth = 0;
+  stack[depth++] = {0, static_cast<std::uint8_t>(size - 1)};
+  while (depth > 0) {
+    const auto [i, j] = stack[--depth];
     std::size_t best = kMaxRing;
     for (std::size_t m = i + 1U; m < j; ++m)
       if (left(i, m, j) && (best == kMaxRing || inside(i, best, j, m))) best = m;
     if (best == kMaxRing) return false;
     const auto apex = static_cast<std::uint8_t>(best);
     fill.apex[i][j] = apex;
-    if (apex - i > 1) stack[waiting++] = {i, apex};
-    if (j - apex > 1) stack[waiting++] = {apex, j};
+    if (apex - i > 1) stack[depth++] = {i, apex};
+    if (j - apex > 1) stack[depth++] = {apex, j};
   }
   return true;
 }
@@ -132,10 +132,10 @@ class Star {
       if (size_ == kMaxRing) return false;
       const Triangle& triangle = triangles[t];
       const unsigned at = corner_of(triangle, vertex);
-      ring_[size_] = triangle.corner[after(at)];
+      ring_[size_] = triangle.corner[next_side(at)];
       outer_[size_] = triangle.next[at];
       slot_[size_++] = t;
-      t = triangle.next[after(at)];
+      t = triangle.next[next_side(at)];
       if (t == kNone) return false;
     } while (t != first);
     return true;

@@ -9,53 +9,53 @@ namespace terrace::tri {
 namespace {
 
 // Bytes of a cluster's nodes in the list and the table.
-constexpr std::size_t kOverhead = sizeof(GivenCluster) + 64;
+constexpr std::size_t kOverhead = sizeof(LoadedCluster) + 64;
 
-std::size_t bytes_held(const GivenCluster& cluster) {
+std::size_t bytes_held(const LoadedCluster& cluster) {
   return kOverhead + cluster.positions.capacity() * sizeof(Point3) +
          cluster.children.capacity() * sizeof(std::uint64_t) + cluster.values.capacity() +
          cluster.child_records.capacity() * sizeof(ClusterRecord);
 }
 
-GivenCluster load(ClusterSource& source, ClusterId id, const ClusterId* head_child) {
+LoadedCluster load(ClusterSource& source, ClusterId id, const ClusterId* head_child) {
   const unsigned level = level_of(id);
   source.announce({&id, 1});
   const ClusterMembers members = source.read(id);
-  GivenCluster given;
-  given.cluster = id;
-  given.positions.assign(members.positions.begin(), members.positions.end());
-  given.children.assign(members.children.begin(), members.children.end());
-  given.values.assign(members.values.begin(), members.values.end());
-  if (level == 0) return given;
-  if (given.children.size() != given.positions.size() * level) {
-    throw HierarchyError(id, std::to_string(given.positions.size()) + " members of level " +
+  LoadedCluster cluster;
+  cluster.cluster = id;
+  cluster.positions.assign(members.positions.begin(), members.positions.end());
+  cluster.children.assign(members.children.begin(), members.children.end());
+  cluster.values.assign(members.values.begin(), members.values.end());
+  if (level == 0) return cluster;
+  if (cluster.children.size() != cluster.positions.size() * level) {
+    throw HierarchyError(id, std::to_string(cluster.positions.size()) + " members of level " +
                                  std::to_string(level) + " came with " +
-                                 std::to_string(given.children.size()) +
+                                 std::to_string(cluster.children.size()) +
                                  " child ordinals; the source is damaged, verify it");
   }
   const std::uint64_t count = source.cluster_count(level - 1);
-  given.child_records.reserve(given.positions.size() + 1);
-  for (std::size_t i = 0; i < given.positions.size(); ++i) {
-    const std::uint64_t ordinal = given.children[i * level + level - 1];
+  cluster.child_records.reserve(cluster.positions.size() + 1);
+  for (std::size_t i = 0; i < cluster.positions.size(); ++i) {
+    const std::uint64_t ordinal = cluster.children[i * level + level - 1];
     if (ordinal >= count) {
       throw HierarchyError(
           id, "member " + std::to_string(i) + " heads cluster " + std::to_string(ordinal) +
                   " of level " + std::to_string(level - 1) + ", which has " +
                   std::to_string(count) + " clusters; the source is damaged, verify it");
     }
-    given.child_records.push_back(source.record(cluster_id(level - 1, ordinal)));
+    cluster.child_records.push_back(source.record(cluster_id(level - 1, ordinal)));
   }
-  if (head_child) given.child_records.push_back(source.record(*head_child));
-  return given;
+  if (head_child) cluster.child_records.push_back(source.record(*head_child));
+  return cluster;
 }
 
 }  // namespace
 
-GivenCluster load(ClusterSource& source, const ViewRequest& request) {
+LoadedCluster load(ClusterSource& source, const ViewRequest& request) {
   return load(source, request.cluster, &request.head_child);
 }
 
-GivenCluster load_root(ClusterSource& source) {
+LoadedCluster load_root(ClusterSource& source) {
   return load(source, cluster_id(source.top(), 0), nullptr);
 }
 
@@ -66,7 +66,7 @@ double ViewCache::bytes_of(unsigned level, std::uint64_t members) const {
   return static_cast<double>(members) * per_member + sizeof(ClusterRecord) + kOverhead;
 }
 
-bool ViewCache::give(GivenCluster cluster) {
+bool ViewCache::give(LoadedCluster cluster) {
   drop(cluster.cluster);
   cluster.positions.shrink_to_fit();
   cluster.children.shrink_to_fit();
@@ -83,14 +83,14 @@ bool ViewCache::give(GivenCluster cluster) {
   return true;
 }
 
-const GivenCluster* ViewCache::find(ClusterId cluster, bool use) {
+const LoadedCluster* ViewCache::find(ClusterId cluster, bool use) {
   const auto at = places_.find(cluster);
   if (at == places_.end()) return nullptr;
   if (use) clusters_.splice(clusters_.end(), clusters_, at->second);
   return &*at->second;
 }
 
-const GivenCluster* ViewCache::find(ClusterId cluster) const {
+const LoadedCluster* ViewCache::find(ClusterId cluster) const {
   const auto at = places_.find(cluster);
   return at == places_.end() ? nullptr : &*at->second;
 }

@@ -19,15 +19,15 @@ class ViewCache final : public ClusterSource {
  public:
   /// counts: number of clusters of each level below the top.
   explicit ViewCache(std::vector<std::uint64_t> counts) : counts_(std::move(counts)) {}
-  /// Sets the budget. Must be called before clusters are given; without it there is no limit.
+  /// Sets the budget. Must be called before clusters are given. Without it there is no limit.
   void limit(std::size_t max_bytes) { max_bytes_ = max_bytes; }
 
   /// Stores a cluster in place of an earlier version. Returns false, without storing it, if it is
   /// larger than the budget.
-  bool give(GivenCluster cluster);
+  bool give(LoadedCluster cluster);
   /// Returns null if the cluster is not cached. `use`: marks it as most recently used.
-  const GivenCluster* find(ClusterId cluster, bool use);
-  [[nodiscard]] const GivenCluster* find(ClusterId cluster) const;
+  const LoadedCluster* find(ClusterId cluster, bool use);
+  [[nodiscard]] const LoadedCluster* find(ClusterId cluster) const;
   void drop(ClusterId cluster);
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
@@ -50,7 +50,7 @@ class ViewCache final : public ClusterSource {
   ClusterMembers read(ClusterId id) override;
 
  private:
-  using Places = std::list<GivenCluster>;
+  using Places = std::list<LoadedCluster>;
   void erase(std::unordered_map<ClusterId, Places::iterator>::iterator at);
 
   std::vector<std::uint64_t> counts_;

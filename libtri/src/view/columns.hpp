@@ -14,8 +14,8 @@ namespace terrace::tri {
 /// box, error, level and, for outlines, the cone. 57 bytes per cluster, 89 with cones.
 class ViewColumns {
  public:
-  /// Columns 0..2 hold the minima of the boxes in x, y, z, columns 3..5 the maxima, 6 the errors;
-  /// with cones 7..9 hold the axes, 10 the sines of the half angles.
+  /// Columns 0..2 hold the minima of the boxes in x, y, z, columns 3..5 the maxima, 6 the errors.
+  /// With cones 7..9 hold the axes, 10 the sines of the half angles.
   static constexpr std::size_t kError = 6, kAxis = 7, kSine = 10, kColumns = 11;
 
   explicit ViewColumns(bool cones = false) : cones_(cones) {}
@@ -53,7 +53,7 @@ struct ViewDemand {
 
   std::vector<double> want;      ///< by the view itself
   std::vector<double> keep;      ///< by the view widened by the guard; not less than want
-  std::vector<double> distance;  ///< of the box from the camera; 0 without a camera
+  std::vector<double> distance;  ///< of the box from the camera, or 0 without a camera
 
   void resize(std::size_t size) {
     want.resize(size);
@@ -63,7 +63,7 @@ struct ViewDemand {
 };
 
 /// Measures entries from `first` to `last`. If a cluster is inside the box of another and has no
-/// greater error, neither of its demands is greater, including rounding; outlines can violate that.
+/// greater error, neither of its demands is greater, including rounding. Outlines can violate that.
 /// O(entries * (7 + focuses + regions)).
 void measure(const View& view, const ViewOptions& options, const ViewColumns& columns,
              std::size_t first, std::size_t last, ViewDemand& demand);

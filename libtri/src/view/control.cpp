@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "columns.hpp"
+
 #ifndef TERRACE_TRI_CORE
 #include "terrace/tri/regional_delaunay2.hpp"
 #endif
@@ -12,7 +14,7 @@ namespace terrace::tri {
 #ifdef TERRACE_TRI_CORE
 namespace detail {
 
-void check(const GivenCluster& cluster, unsigned top) {
+void check(const LoadedCluster& cluster, unsigned top) {
   const unsigned level = level_of(cluster.cluster);
   const std::size_t size = cluster.positions.size();
   if (level > top) {

@@ -11,7 +11,8 @@
 
 #include "cache.hpp"
 #include "front.hpp"
-#include "model/model.hpp"
+#include "model/multiresolution.hpp"
+#include "model/owners.hpp"
 #include "terrace/tri/view.hpp"
 
 /// Implements the template ViewControl of view.hpp, for files that instantiate it.
@@ -21,14 +22,14 @@ namespace terrace::tri {
 namespace detail {
 
 /// Throws HierarchyError if a delivered cluster contradicts itself.
-void check(const GivenCluster& cluster, unsigned top);
+void check(const LoadedCluster& cluster, unsigned top);
 ViewOptions checked(ViewOptions options);
 
 }  // namespace detail
 
 template <class Triangulation>
 struct ViewControl<Triangulation>::Impl {
-  Impl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options,
+  Impl(std::vector<std::uint64_t> counts, LoadedCluster root, ViewOptions options,
        Triangulation&& empty);
 
   const Step& step(const View& view, const StepBudget& budget);
@@ -36,25 +37,25 @@ struct ViewControl<Triangulation>::Impl {
 
   using Slot = ClusterTree::Slot;
   using Candidate = ViewFront::Candidate;
-  struct Asked {
+  struct Requested {
     std::uint64_t step = 0;
     double bytes = 0.0;
   };
 
   void expand_wanted();
-  bool collapse_unwanted(std::size_t up_to);
+  bool collapse_unwanted(std::size_t max_remaining);
   enum class Room { enough, none, later };
-  [[nodiscard]] std::size_t lacking(std::size_t points) const {
+  [[nodiscard]] std::size_t points_over_limit(std::size_t points) const {
     const std::size_t needed = model_.point_count() + points;
     return needed > options_.max_points ? needed - options_.max_points : 0;
   }
   [[nodiscard]] bool could_fit(const Candidate& candidate, std::size_t points);
   [[nodiscard]] Room make_room(const Candidate& candidate);
-  void ask(const Candidate& candidate);
-  void ask_soon();
-  void ask_for_records();
+  void request_missing(const Candidate& candidate);
+  void request_upcoming();
+  void request_records();
   void request(const Candidate& candidate, double importance, double bytes);
-  void expand(const Candidate& candidate, const GivenCluster& given);
+  void expand(const Candidate& candidate, const LoadedCluster& loaded);
   /// The work of removing vertices, as a number of points in ordinary places.
   [[nodiscard]] std::size_t work_to_remove(std::span<const VertexId> vertices) const {
     if constexpr (kEstimatesWork) return model_.triangulation().removal_work(vertices);
@@ -64,16 +65,17 @@ struct ViewControl<Triangulation>::Impl {
     return work_to_remove(model_.impl_->present(slot));
   }
   [[nodiscard]] bool has_time_to_collapse(Slot slot) {
-    if constexpr (kEstimatesWork) return meter_.has(work_to_collapse(slot), StepMeter::kCollapse);
-    return meter_.has_usual(StepMeter::kCollapse);
+    if constexpr (kEstimatesWork)
+      return meter_.has_time(work_to_collapse(slot), StepMeter::kCollapse);
+    return meter_.has_time_for_usual(StepMeter::kCollapse);
   }
-  [[nodiscard]] std::uint32_t fitting(Slot slot);
+  [[nodiscard]] std::uint32_t points_after_budget(Slot slot);
   bool collapse(Slot slot);
   void withdraw();
 
-  /// Upper limit of missing clusters requested in a step; loading that many takes longer than the
+  /// Upper limit of missing clusters requested in a step. Loading that many takes longer than the
   /// step.
-  static constexpr std::size_t kMostAsked = 1024;
+  static constexpr std::size_t kMaxRequested = 1024;
   /// Number of clusters between two readings of the clock.
   static constexpr std::size_t kClockInterval = 16;
   static constexpr bool kEstimatesWork = requires(const Triangulation& t) { t.removal_work({}); };
@@ -82,20 +84,20 @@ struct ViewControl<Triangulation>::Impl {
   ViewCache cache_;
   Model model_;
   ViewFront front_;
-  std::unordered_map<ClusterId, Asked> asked_;
+  std::unordered_map<ClusterId, Requested> requested_;
   std::set<ClusterId> faulty_;
 
-  Slot partial_ = ClusterTree::kNoSlot;  // partly collapsed; must be finished first
+  Slot partial_ = ClusterTree::kNoSlot;  // partly collapsed. Must be finished first
   Step result_;
   StepMeter meter_;
-  std::uint64_t number_ = 0;  // of the step
-  bool evict_ = true;         // true while room can still be made in this step
-  std::size_t claimed_ = 0;   // points of wanted clusters that were given or requested
-  double claimed_bytes_ = 0.0;
+  std::uint64_t number_ = 0;         // of the step
+  bool evict_ = true;                // true while room can still be made in this step
+  std::size_t reserved_points_ = 0;  // points of wanted clusters that were given or requested
+  double reserved_bytes_ = 0.0;
 };
 
 template <class Triangulation>
-ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, GivenCluster root,
+ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, LoadedCluster root,
                                        ViewOptions options, Triangulation&& empty)
     : options_(detail::checked(std::move(options))),
       cache_([&] {
@@ -123,18 +125,18 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   result_ = {};
   ++number_;
   evict_ = true;
-  claimed_ = 0;
-  claimed_bytes_ = 0.0;
-  for (const auto& [id, asked] : asked_) claimed_bytes_ += asked.bytes;
+  reserved_points_ = 0;
+  reserved_bytes_ = 0.0;
+  for (const auto& [id, requested] : requested_) reserved_bytes_ += requested.bytes;
 
   front_.start(view);
-  meter_.ready();
+  meter_.start_operations();
   model_.open_step();
   if (partial_ != ClusterTree::kNoSlot) collapse(partial_);
   expand_wanted();
-  ask_soon();
-  ask_for_records();
-  meter_.fixed();
+  request_upcoming();
+  request_records();
+  meter_.end_fixed_work();
   const bool done = collapse_unwanted(0);
   withdraw();
   result_.delta = &model_.close_step();
@@ -146,9 +148,9 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
 // Collapses until at most this many points of unwanted clusters are left. Returns false if the
 // budget ended first.
 template <class Triangulation>
-bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
+bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t max_remaining) {
   if (partial_ != ClusterTree::kNoSlot) return false;
-  while (front_.points_below(options_.collapse_below) > up_to || up_to == 0) {
+  while (front_.points_below(options_.collapse_below) > max_remaining || max_remaining == 0) {
     const Slot slot = front_.next_to_collapse(options_.collapse_below);
     if (slot == ClusterTree::kNoSlot) break;
     if (!has_time_to_collapse(slot) || !collapse(slot)) return false;
@@ -162,28 +164,28 @@ bool ViewControl<Triangulation>::Impl::collapse_unwanted(std::size_t up_to) {
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::expand_wanted() {
   for (std::size_t examined = 0; const auto candidate = front_.next();) {
-    const bool prepares = result_.pending > 0 || result_.missing > kMostAsked;
-    if (prepares && ++examined % kClockInterval == 0 && meter_.dwelt()) {
+    const bool prepares = result_.pending > 0 || result_.missing > kMaxRequested;
+    if (prepares && ++examined % kClockInterval == 0 && meter_.is_late()) {
       result_.pending += 1 + front_.candidates();
       return;
     }
     if (!faulty_.empty() && faulty_.count(candidate->id)) continue;
-    const GivenCluster* given = cache_.find(candidate->id, false);
+    const LoadedCluster* loaded = cache_.find(candidate->id, false);
     Room room = Room::none;
-    if (!given) {
-      if (++result_.missing <= kMostAsked) ask(*candidate);
+    if (!loaded) {
+      if (++result_.missing <= kMaxRequested) request_missing(*candidate);
     } else {
       room = make_room(*candidate);
       if (room == Room::later) ++result_.pending;
       if (room == Room::none) ++result_.blocked;
       if (room == Room::later) {
-        claimed_ += given->positions.size();
-        claimed_bytes_ += cache_.bytes_of(level_of(candidate->id), candidate->members);
+        reserved_points_ += loaded->positions.size();
+        reserved_bytes_ += cache_.bytes_of(level_of(candidate->id), candidate->members);
       }
       if (room != Room::none) cache_.find(candidate->id, true);
     }
     if (room == Room::enough) {
-      expand(*candidate, *given);
+      expand(*candidate, *loaded);
     } else {
       result_.worst = std::max(result_.worst, candidate->want);
     }
@@ -195,12 +197,12 @@ void ViewControl<Triangulation>::Impl::expand_wanted() {
 // does not depend on where a step was interrupted.
 template <class Triangulation>
 bool ViewControl<Triangulation>::Impl::could_fit(const Candidate& candidate, std::size_t points) {
-  const std::size_t lack = lacking(points);
-  if (lack == 0) return true;
+  const std::size_t excess = points_over_limit(points);
+  if (excess == 0) return true;
   const double unwanted = options_.collapse_below;
-  if (evict_ && front_.points_below(unwanted * candidate.want) >= lack) return true;
+  if (evict_ && front_.points_below(unwanted * candidate.want) >= excess) return true;
   if (points == candidate.members) evict_ = false;
-  return front_.points_below(unwanted) >= lack;
+  return front_.points_below(unwanted) >= excess;
 }
 
 template <class Triangulation>
@@ -208,10 +210,10 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
   const std::size_t members = static_cast<std::size_t>(candidate.members);
   collapse_unwanted(model_.point_count() / 4 + 1);
   if (partial_ != ClusterTree::kNoSlot) return Room::later;
-  if (lacking(members) > 0) {
+  if (points_over_limit(members) > 0) {
     if (!could_fit(candidate, members)) return Room::none;
     const double below = options_.collapse_below * (evict_ ? candidate.want : 1.0);
-    while (lacking(members) > 0) {
+    while (points_over_limit(members) > 0) {
       const Slot slot = front_.next_to_collapse(below);
       if (slot == ClusterTree::kNoSlot) return Room::none;  // pins keep them expanded
       if (!has_time_to_collapse(slot) || !collapse(slot)) return Room::later;
@@ -220,57 +222,58 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
   // The collapsed cluster may have been above this one.
   const auto place = tree().find(candidate.id);
   if (!place || *place != candidate.place) return Room::none;
-  return meter_.has(members) ? Room::enough : Room::later;
+  return meter_.has_time(members) ? Room::enough : Room::later;
 }
 
 template <class Triangulation>
-void ViewControl<Triangulation>::Impl::ask(const Candidate& candidate) {
+void ViewControl<Triangulation>::Impl::request_missing(const Candidate& candidate) {
   const std::size_t members = static_cast<std::size_t>(
       std::min<std::uint64_t>(candidate.members, ClusterTree::kMaxMembers));
   const unsigned level = level_of(candidate.id);
   // Requests only clusters that could be expanded, and kept until then.
-  const std::size_t claims = claimed_ + members;
-  const auto known = asked_.find(candidate.id);
+  const std::size_t reserved = reserved_points_ + members;
+  const auto known = requested_.find(candidate.id);
   const double bytes = cache_.bytes_of(level, members);
-  const double more = known == asked_.end() ? bytes : 0.0;
-  if (!could_fit(candidate, members) || !could_fit(candidate, claims) ||
-      claimed_bytes_ + more > static_cast<double>(cache_.max_bytes())) {
+  const double additional = known == requested_.end() ? bytes : 0.0;
+  if (!could_fit(candidate, members) || !could_fit(candidate, reserved) ||
+      reserved_bytes_ + additional > static_cast<double>(cache_.max_bytes())) {
     --result_.missing;
     ++result_.blocked;
     return;
   }
-  claimed_ += members;
-  claimed_bytes_ += more;
+  reserved_points_ += members;
+  reserved_bytes_ += additional;
   request(candidate, candidate.want, bytes);
 }
 
 // Requests early the clusters that may be wanted soon, and keeps those that are in
 // the cache.
 template <class Triangulation>
-void ViewControl<Triangulation>::Impl::ask_soon() {
+void ViewControl<Triangulation>::Impl::request_upcoming() {
   std::size_t examined = 0;
-  for (const Candidate& candidate : front_.soon()) {
-    if (++examined % kClockInterval == 0 && meter_.dwelt()) break;
+  for (const Candidate& candidate : front_.upcoming()) {
+    if (++examined % kClockInterval == 0 && meter_.is_late()) break;
     if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
     const double bytes = cache_.bytes_of(level_of(candidate.id), candidate.members);
-    const bool known = asked_.count(candidate.id) != 0;
-    if (!known && claimed_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
-    if (!known) claimed_bytes_ += bytes;
+    const bool known = requested_.count(candidate.id) != 0;
+    if (!known && reserved_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
+    if (!known) reserved_bytes_ += bytes;
     if (!cache_.find(candidate.id, true)) request(candidate, std::min(candidate.keep, 1.0), bytes);
   }
 }
 
 // Both lists are ordered by importance.
 template <class Triangulation>
-void ViewControl<Triangulation>::Impl::ask_for_records() {
-  const auto unread = front_.unread();
-  if (unread.empty()) return;
+void ViewControl<Triangulation>::Impl::request_records() {
+  const auto unread_records = front_.unread_records();
+  if (unread_records.empty()) return;
   std::vector<ViewRequest> clusters;
   clusters.swap(result_.wanted);
   std::size_t next = 0;
   const auto records_above = [&](double importance) {
-    for (; next < unread.size() && unread[next].keep > importance; ++next) {
-      result_.wanted.push_back({unread[next].id, {}, ClusterRecord::kUnread, unread[next].keep});
+    for (; next < unread_records.size() && unread_records[next].keep > importance; ++next) {
+      result_.wanted.push_back(
+          {unread_records[next].id, {}, ClusterRecord::kUnread, unread_records[next].keep});
     }
   };
   for (const ViewRequest& cluster : clusters) {
@@ -286,14 +289,14 @@ void ViewControl<Triangulation>::Impl::request(const Candidate& candidate, doubl
   ViewRequest request{candidate.id, {}, candidate.members, importance};
   if (level_of(candidate.id) > 0) request.head_child = tree().head_child(candidate.place);
   result_.wanted.push_back(request);
-  const auto [known, fresh] = asked_.try_emplace(candidate.id, Asked{number_, bytes});
-  if (fresh) result_.requests.push_back(request);
+  const auto [known, is_new] = requested_.try_emplace(candidate.id, Requested{number_, bytes});
+  if (is_new) result_.requests.push_back(request);
   known->second.step = number_;
 }
 
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::expand(const Candidate& candidate,
-                                              const GivenCluster& given) {
+                                              const LoadedCluster& loaded) {
   cache_.expect(candidate.id, front_.record(candidate.place));
   try {
     model_.expand(candidate.id);
@@ -304,22 +307,22 @@ void ViewControl<Triangulation>::Impl::expand(const Candidate& candidate,
     return;
   }
   ++result_.expanded;
-  front_.add(tree().child_slot(candidate.place), given.child_records, &candidate);
-  meter_.spend(given.positions.size());
+  front_.add(tree().child_slot(candidate.place), loaded.child_records, &candidate);
+  meter_.spend(loaded.positions.size());
 }
 
-// Returns the number of points that remain after collapsing a cluster in the rest of the step;
-// always fewer than are present.
+// Returns the number of points that remain after collapsing a cluster in the rest of the step. They
+// are always fewer than are present.
 template <class Triangulation>
-std::uint32_t ViewControl<Triangulation>::Impl::fitting(Slot slot) {
+std::uint32_t ViewControl<Triangulation>::Impl::points_after_budget(Slot slot) {
   const std::span<const VertexId> present = model_.impl_->present(slot);
   if (meter_.fits(work_to_remove(present), StepMeter::kCollapse)) return 0;
-  std::size_t left = present.size();
-  for (std::size_t work = 0; left > 0; --left) {
-    work += work_to_remove(present.subspan(left - 1, 1));
-    if (left < present.size() && !meter_.fits(work, StepMeter::kCollapse)) break;
+  std::size_t remaining = present.size();
+  for (std::size_t work = 0; remaining > 0; --remaining) {
+    work += work_to_remove(present.subspan(remaining - 1, 1));
+    if (remaining < present.size() && !meter_.fits(work, StepMeter::kCollapse)) break;
   }
-  return static_cast<std::uint32_t>(left);
+  return static_cast<std::uint32_t>(remaining);
 }
 
 // Returns false if there was no time for all of its points, some of which may cost far more than
@@ -329,12 +332,12 @@ bool ViewControl<Triangulation>::Impl::collapse(Slot slot) {
   const ClusterId id = tree().id(slot);
   const ChildRef place = tree().place(slot);
   const auto present = model_.impl_->present(slot);
-  const std::uint32_t left = kEstimatesWork ? fitting(slot) : 0;
-  const std::size_t work = work_to_remove(present.subspan(left));
-  model_.impl_->collapse_to(slot, left);
+  const std::uint32_t remaining = kEstimatesWork ? points_after_budget(slot) : 0;
+  const std::size_t work = work_to_remove(present.subspan(remaining));
+  model_.impl_->collapse_to(slot, remaining);
   meter_.spend(work, StepMeter::kCollapse);
-  partial_ = left > 0 ? slot : ClusterTree::kNoSlot;
-  if (left > 0) {
+  partial_ = remaining > 0 ? slot : ClusterTree::kNoSlot;
+  if (remaining > 0) {
     ++result_.pending;
     return false;
   }
@@ -348,18 +351,18 @@ bool ViewControl<Triangulation>::Impl::collapse(Slot slot) {
 // hysteresis.
 template <class Triangulation>
 void ViewControl<Triangulation>::Impl::withdraw() {
-  for (const auto& [id, asked] : asked_) {
-    if (asked.step == number_) continue;
+  for (const auto& [id, requested] : requested_) {
+    if (requested.step == number_) continue;
     const auto place = tree().find(id);
     if (place && front_.keep(*place) >= options_.collapse_below) continue;
     result_.withdrawn.push_back(id);
   }
   std::sort(result_.withdrawn.begin(), result_.withdrawn.end());
-  for (const ClusterId id : result_.withdrawn) asked_.erase(id);
+  for (const ClusterId id : result_.withdrawn) requested_.erase(id);
 }
 
 template <class Triangulation>
-ViewControl<Triangulation>::ViewControl(std::vector<std::uint64_t> counts, GivenCluster root,
+ViewControl<Triangulation>::ViewControl(std::vector<std::uint64_t> counts, LoadedCluster root,
                                         ViewOptions options, Triangulation empty)
     : impl_(std::make_unique<Impl>(std::move(counts), std::move(root), std::move(options),
                                    std::move(empty))) {}
@@ -382,14 +385,14 @@ auto ViewControl<Triangulation>::restore(unsigned threads) -> const Delta& {
   return impl_->model_.restore(threads);
 }
 template <class Triangulation>
-bool ViewControl<Triangulation>::give(GivenCluster cluster) {
+bool ViewControl<Triangulation>::give(LoadedCluster cluster) {
   detail::check(cluster, impl_->model_.top());
-  impl_->asked_.erase(cluster.cluster);
+  impl_->requested_.erase(cluster.cluster);
   impl_->faulty_.erase(cluster.cluster);
   return impl_->cache_.give(std::move(cluster));
 }
 template <class Triangulation>
-const GivenCluster* ViewControl<Triangulation>::given(ClusterId cluster) const {
+const LoadedCluster* ViewControl<Triangulation>::cached_cluster(ClusterId cluster) const {
   return std::as_const(impl_->cache_).find(cluster);
 }
 template <class Triangulation>
@@ -397,12 +400,13 @@ void ViewControl<Triangulation>::give_record(ClusterId cluster, const ClusterRec
   if (const auto place = impl_->tree().find(cluster)) impl_->front_.set_record(*place, record);
 }
 template <class Triangulation>
-std::optional<ClusterRecord> ViewControl<Triangulation>::stands_for(VertexId vertex) const {
+std::optional<ClusterRecord> ViewControl<Triangulation>::represented_cluster(
+    VertexId vertex) const {
   const ClusterTree& tree = impl_->tree();
   std::optional<ClusterRecord> record;
   impl_->model_.impl_->owners_.for_each(vertex, [&](VertexOwners::Owner owner) {
     for (unsigned level = tree.level(owner.slot); level-- > 0 && !record;) {
-      const auto place = tree.find(tree.headed_by(owner.slot, owner.index, level));
+      const auto place = tree.find(tree.headed_cluster(owner.slot, owner.index, level));
       if (place && tree.child_slot(*place) == ClusterTree::kNoSlot) {
         record = impl_->front_.record(*place);
       }
@@ -416,7 +420,7 @@ bool ViewControl<Triangulation>::meets_collapsed(const Box3& box) const {
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::forget(ClusterId cluster) {
-  impl_->asked_.erase(cluster);
+  impl_->requested_.erase(cluster);
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::pin(ClusterId cluster, Pin state) {
@@ -432,7 +436,7 @@ std::size_t ViewControl<Triangulation>::cached_bytes() const {
 }
 template <class Triangulation>
 std::size_t ViewControl<Triangulation>::memory_bytes() const {
-  return impl_->model_.memory_bytes() + impl_->front_.memory() + impl_->asked_.size() * 64;
+  return impl_->model_.memory_bytes() + impl_->front_.memory() + impl_->requested_.size() * 64;
 }
 
 }  // namespace terrace::tri

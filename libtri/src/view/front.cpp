@@ -17,7 +17,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 ViewFront::ViewFront(const ClusterTree& tree, const ViewOptions& options)
     : tree_(&tree),
       options_(&options),
-      ask_above_(std::max(options.ask_above, options.collapse_below)),
+      request_above_(std::max(options.ask_above, options.collapse_below)),
       columns_(options.silhouette < 1.0),
       bounds_(options.silhouette < 1.0) {}
 
@@ -26,7 +26,7 @@ void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
   if (slot >= columns_.size()) {
     const std::size_t size = std::max<std::size_t>(slot + 1, columns_.size() * 5 / 4);
     columns_.resize(size);
-    own_.resize(size);
+    demand_.resize(size);
     group_of_.resize(size, kNone);
   }
   const ChildRef place = tree_->place(slot);
@@ -39,9 +39,9 @@ void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
     changed_groups_.push_back(parent);
   }
   if (candidate) {
-    own_.want[slot] = candidate->want;
-    own_.keep[slot] = candidate->keep;
-    own_.distance[slot] = candidate->distance;
+    demand_.want[slot] = candidate->want;
+    demand_.keep[slot] = candidate->keep;
+    demand_.distance[slot] = candidate->distance;
   }
   assert(children.size() == tree_->child_count(slot));
   if (children.empty()) return;
@@ -79,8 +79,8 @@ void ViewFront::drop(Slot slot, ChildRef place) {
   changed_groups_.push_back(group_of_[place.parent]);
   // A cluster that gave way to a more important one may find room again in the same step, just as
   // it would in the next.
-  if (own_.want[slot] > 1.0 && !pinned_down(slot)) {
-    candidates_.push_back({own_.want[slot], own_.keep[slot], own_.distance[slot], place,
+  if (demand_.want[slot] > 1.0 && !is_pinned_collapsed(slot)) {
+    candidates_.push_back({demand_.want[slot], demand_.keep[slot], demand_.distance[slot], place,
                            tree_->child_id(place), members(place)});
     std::push_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
   }
@@ -131,7 +131,7 @@ void ViewFront::set_columns(Group& group, std::uint32_t i, const ClusterRecord& 
 }
 
 // Computes a box around the collapsed children, and the greatest of their errors.
-void ViewFront::bound(std::uint32_t number) {
+void ViewFront::compute_bound(std::uint32_t number) {
   const Group& group = *groups_[number];
   ClusterRecord none;
   none.box = {{1.0, 1.0, 1.0}, {0.0, 0.0, 0.0}};
@@ -148,35 +148,35 @@ void ViewFront::bound(std::uint32_t number) {
 void ViewFront::start(const View& view) {
   view_ = &view;
   candidates_.clear();
-  heaped_ = false;
+  is_heap_ = false;
   soon_.clear();
   unread_.clear();
   order_.clear();
   sorted_below_ = -kInfinity;
   collapsed_ = 0;
-  last_ = ClusterId{~std::uint64_t{0}};
+  last_id_ = ClusterId{~std::uint64_t{0}};
   std::sort(changed_groups_.begin(), changed_groups_.end());
   changed_groups_.erase(std::unique(changed_groups_.begin(), changed_groups_.end()),
                         changed_groups_.end());
   for (const std::uint32_t group : changed_groups_) {
-    if (groups_[group]) bound(group);
+    if (groups_[group]) compute_bound(group);
   }
   changed_groups_.clear();
 
-  measure(view, *options_, columns_, 0, columns_.size(), own_);
-  own_.want[ClusterTree::kRoot] = own_.keep[ClusterTree::kRoot] = kInfinity;
-  own_.distance[ClusterTree::kRoot] = 0.0;
+  measure(view, *options_, columns_, 0, columns_.size(), demand_);
+  demand_.want[ClusterTree::kRoot] = demand_.keep[ClusterTree::kRoot] = kInfinity;
+  demand_.distance[ClusterTree::kRoot] = 0.0;
   clamp_to_parents();
   measure(view, *options_, bounds_, 0, bounds_.size(), bound_demand_);
   if (!pins_.empty()) apply_pins();
   for (std::uint32_t group = 0; group < groups_.size(); ++group) {
     if (!groups_[group]) continue;
-    if (bound_demand_.want[group] > 1.0 || bound_demand_.keep[group] > ask_above_) {
+    if (bound_demand_.want[group] > 1.0 || bound_demand_.keep[group] > request_above_) {
       measure_group(group);
     }
   }
   std::make_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
-  heaped_ = true;
+  is_heap_ = true;
 }
 
 void ViewFront::clamp_to_parents() {
@@ -189,9 +189,9 @@ void ViewFront::clamp_to_parents() {
     for (const Slot slot : by_level_) {
       if (tree_->level(slot) != level) continue;
       const Slot parent = tree_->place(slot).parent;
-      own_.want[slot] = std::min(own_.want[slot], own_.want[parent]);
-      own_.keep[slot] = std::min(own_.keep[slot], own_.keep[parent]);
-      own_.distance[slot] = std::max(own_.distance[slot], own_.distance[parent]);
+      demand_.want[slot] = std::min(demand_.want[slot], demand_.want[parent]);
+      demand_.keep[slot] = std::min(demand_.keep[slot], demand_.keep[parent]);
+      demand_.distance[slot] = std::max(demand_.distance[slot], demand_.distance[parent]);
     }
   }
 }
@@ -204,7 +204,7 @@ void ViewFront::apply_pins() {
     if (slot == ClusterTree::kNoSlot) bound_demand_.want[group_of_[place->parent]] = kInfinity;
     if (slot == ClusterTree::kNoSlot) slot = place->parent;
     for (; slot != ClusterTree::kRoot; slot = tree_->place(slot).parent) {
-      own_.keep[slot] = kInfinity;
+      demand_.keep[slot] = kInfinity;
     }
   }
   for (const auto& [id, state] : pins_) {
@@ -212,27 +212,29 @@ void ViewFront::apply_pins() {
     if (!place || state != Pin::collapsed) continue;
     const Slot slot = tree_->child_slot(*place);
     if (slot == ClusterTree::kNoSlot) continue;
-    for (const Slot below : tree_->plan_collapse(slot).collapsed) own_.keep[below] = kPinnedDown;
+    for (const Slot below : tree_->plan_collapse(slot).collapsed)
+      demand_.keep[below] = kPinnedCollapsed;
   }
 }
 
 void ViewFront::measure_group(std::uint32_t number) {
   const Group& group = *groups_[number];
-  if (pinned_down(group.parent)) return;
+  if (is_pinned_collapsed(group.parent)) return;
   const std::size_t count = group.columns.size();
   scratch_.resize(std::max(count, scratch_.want.size()));
   measure(*view_, *options_, group.columns, 0, count, scratch_);
-  const double most = own_.want[group.parent], least_distance = own_.distance[group.parent];
-  const double most_kept = own_.keep[group.parent];
+  const double max_want = demand_.want[group.parent],
+               least_distance = demand_.distance[group.parent];
+  const double max_keep = demand_.keep[group.parent];
   for (std::size_t i = 0; i < count; ++i) {
-    scratch_.want[i] = std::min(scratch_.want[i], most);
-    scratch_.keep[i] = std::min(scratch_.keep[i], most_kept);
+    scratch_.want[i] = std::min(scratch_.want[i], max_want);
+    scratch_.keep[i] = std::min(scratch_.keep[i], max_keep);
     scratch_.distance[i] = std::max(scratch_.distance[i], least_distance);
   }
   if (!pins_.empty()) override_by_pins(number);
   for (std::uint32_t i = 0; i < count; ++i) {
     const bool wanted = scratch_.want[i] > 1.0;
-    if (!wanted && !(scratch_.keep[i] > ask_above_)) continue;
+    if (!wanted && !(scratch_.keep[i] > request_above_)) continue;
     const ChildRef place{group.parent, i};
     if (tree_->child_slot(place) != ClusterTree::kNoSlot) continue;
     if (group.members[i] == ClusterRecord::kUnread) {
@@ -244,7 +246,7 @@ void ViewFront::measure_group(std::uint32_t number) {
     std::vector<Candidate>& list = wanted ? candidates_ : soon_;
     list.push_back({scratch_.want[i], scratch_.keep[i], scratch_.distance[i], place,
                     tree_->child_id(place), group.members[i]});
-    if (!wanted || !heaped_) continue;
+    if (!wanted || !is_heap_) continue;
     std::push_heap(candidates_.begin(), candidates_.end(), &ViewFront::less_wanted);
   }
 }
@@ -254,8 +256,8 @@ void ViewFront::override_by_pins(std::uint32_t number) {
   for (const auto& [id, state] : pins_) {
     const auto place = tree_->find(id);
     if (!place || place->parent != group.parent) continue;
-    const bool up = state == Pin::expanded;
-    scratch_.want[place->index] = scratch_.keep[place->index] = up ? kInfinity : 0.0;
+    const bool expand = state == Pin::expanded;
+    scratch_.want[place->index] = scratch_.keep[place->index] = expand ? kInfinity : 0.0;
   }
 }
 
@@ -263,7 +265,7 @@ double ViewFront::keep(ChildRef child) {
   const Group& group = *groups_[group_of_[child.parent]];
   scratch_.resize(std::max(group.columns.size(), scratch_.want.size()));
   measure(*view_, *options_, group.columns, child.index, child.index + 1, scratch_);
-  return std::min(scratch_.keep[child.index], own_.keep[child.parent]);
+  return std::min(scratch_.keep[child.index], demand_.keep[child.parent]);
 }
 
 std::size_t ViewFront::memory() const {
@@ -271,7 +273,7 @@ std::size_t ViewFront::memory() const {
       columns_.memory() + bounds_.memory() + group_of_.capacity() * sizeof(std::uint32_t) +
       (candidates_.capacity() + soon_.capacity() + unread_.capacity()) * sizeof(Candidate) +
       order_.capacity() * sizeof(Ordered) + by_level_.capacity() * sizeof(Slot);
-  for (const ViewDemand* demand : {&own_, &bound_demand_, &scratch_}) {
+  for (const ViewDemand* demand : {&demand_, &bound_demand_, &scratch_}) {
     bytes += 3 * demand->want.capacity() * sizeof(double);
   }
   for (const auto& group : groups_) {
@@ -297,8 +299,8 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
     candidates_.pop_back();
     // The cluster above may have been collapsed for lack of room, and even expanded again.
     const auto place = tree_->find(candidate.id);
-    if (candidate.id == last_ || !place || *place != candidate.place) continue;
-    last_ = candidate.id;
+    if (candidate.id == last_id_ || !place || *place != candidate.place) continue;
+    last_id_ = candidate.id;
     return candidate;
   }
   return std::nullopt;
@@ -307,28 +309,28 @@ std::optional<ViewFront::Candidate> ViewFront::next() {
 // Returns the first `most` candidates by keep, the coarsest first on ties, that still exist.
 std::span<const ViewFront::Candidate> ViewFront::first_of(std::vector<Candidate>& list,
                                                           std::size_t most) {
-  const auto sooner = [](const Candidate& a, const Candidate& b) {
+  const auto precedes = [](const Candidate& a, const Candidate& b) {
     if (a.keep != b.keep) return a.keep > b.keep;
     if (level_of(a.id) != level_of(b.id)) return level_of(a.id) > level_of(b.id);
     return a.id < b.id;
   };
   if (list.size() > most) {
     const auto end = list.begin() + static_cast<std::ptrdiff_t>(most);
-    std::nth_element(list.begin(), end, list.end(), sooner);
+    std::nth_element(list.begin(), end, list.end(), precedes);
     list.erase(end, list.end());
   }
   std::erase_if(list, [&](const Candidate& candidate) {
     const auto place = tree_->find(candidate.id);
     return !place || *place != candidate.place;
   });
-  std::sort(list.begin(), list.end(), sooner);
+  std::sort(list.begin(), list.end(), precedes);
   return list;
 }
 
 double ViewFront::key(Slot slot) const {
-  const double keep = own_.keep[slot];
+  const double keep = demand_.keep[slot];
   if (keep > 0.0) return keep;
-  return keep < 0.0 ? -kInfinity : -1.0 - own_.distance[slot];
+  return keep < 0.0 ? -kInfinity : -1.0 - demand_.distance[slot];
 }
 
 void ViewFront::sort(double below) {
@@ -344,8 +346,8 @@ void ViewFront::sort(double below) {
   std::sort(order_.begin(), order_.end(), [&](const Ordered& a, const Ordered& b) {
     if (a.key != b.key) return a.key < b.key;
     if (level_of(a.id) != level_of(b.id)) return level_of(a.id) < level_of(b.id);
-    if (own_.distance[a.slot] != own_.distance[b.slot]) {
-      return own_.distance[a.slot] > own_.distance[b.slot];
+    if (demand_.distance[a.slot] != demand_.distance[b.slot]) {
+      return demand_.distance[a.slot] > demand_.distance[b.slot];
     }
     return a.id < b.id;
   });

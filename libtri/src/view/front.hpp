@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "columns.hpp"
+#include "model/cluster_map.hpp"
 #include "model/tree.hpp"
 #include "terrace/tri/view.hpp"
 
@@ -63,21 +64,23 @@ class ViewFront {
 
   /// Measures everything. The view must exist until the end of the step.
   void start(const View& view);
-  /// The collapsed cluster with the greatest demand, on ties the coarsest, then the smallest id;
+  /// The collapsed cluster with the greatest demand, on ties the coarsest, then the smallest id, or
   /// nullopt if no demand above 1 is left. Includes children of added clusters.
   [[nodiscard]] std::optional<Candidate> next();
   /// Upper bound of the number that is left.
   [[nodiscard]] std::size_t candidates() const { return candidates_.size(); }
   /// At most a thousand clusters that may be wanted soon, the greatest demand first. Call it after
   /// next().
-  [[nodiscard]] std::span<const Candidate> soon() { return first_of(soon_, kMostSoon); }
+  [[nodiscard]] std::span<const Candidate> upcoming() { return first_of(soon_, kMostSoon); }
   /// At most a few thousand clusters whose record must be read to decide whether they are wanted,
-  /// now or soon. Their `keep` is an estimate; the greatest comes first. Call it after next().
-  [[nodiscard]] std::span<const Candidate> unread() { return first_of(unread_, kMostUnread); }
+  /// now or soon. Their `keep` is an estimate. The greatest comes first. Call it after next().
+  [[nodiscard]] std::span<const Candidate> unread_records() {
+    return first_of(unread_, kMostUnread);
+  }
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
   /// The expanded cluster to collapse first, if its demand is less than `below`. Clusters out of
-  /// view come before those in view, the farthest first; those in view in order of demand, the
+  /// view come before those in view, the farthest first. Those in view come in order of demand, the
   /// least first, then the farthest. Children come before parents. kNoSlot if there is none.
   /// Returns the same one until it is dropped.
   [[nodiscard]] Slot next_to_collapse(double below);
@@ -88,7 +91,7 @@ class ViewFront {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
-  /// Upper limits of requests ahead of time in a step; more would take too much of its time.
+  /// Upper limits of requests ahead of time in a step. More would take too much of its time.
   static constexpr std::size_t kMostSoon = 1024, kMostUnread = 4096;
   // The children of one expanded cluster.
   struct Group {
@@ -107,24 +110,26 @@ class ViewFront {
   [[nodiscard]] static bool less_wanted(const Candidate& a, const Candidate& b);
   std::span<const Candidate> first_of(std::vector<Candidate>& list, std::size_t most);
   void set_columns(Group& group, std::uint32_t i, const ClusterRecord& record);
-  void bound(std::uint32_t group);
+  void compute_bound(std::uint32_t group);
   void measure_group(std::uint32_t group);
   void clamp_to_parents();
   void apply_pins();
   void override_by_pins(std::uint32_t group);
   void sort(double below);
   [[nodiscard]] double key(Slot slot) const;
-  [[nodiscard]] bool pinned_down(Slot slot) const { return own_.keep[slot] == kPinnedDown; }
-  static constexpr double kPinnedDown = -1.0;
+  [[nodiscard]] bool is_pinned_collapsed(Slot slot) const {
+    return demand_.keep[slot] == kPinnedCollapsed;
+  }
+  static constexpr double kPinnedCollapsed = -1.0;
 
   const ClusterTree* tree_;
   const ViewOptions* options_;
-  double ask_above_;
+  double request_above_;
   std::map<ClusterId, Pin> pins_;
 
   // By slot: the expanded clusters.
   ViewColumns columns_;
-  ViewDemand own_;
+  ViewDemand demand_;
   std::vector<std::uint32_t> group_of_;
   // By group number: a box and the greatest error of its collapsed children.
   std::vector<std::unique_ptr<Group>> groups_;
@@ -135,14 +140,14 @@ class ViewFront {
   // State of the current step.
   const View* view_ = nullptr;
   std::vector<Candidate> candidates_;  // a heap once all groups are measured
-  bool heaped_ = false;
+  bool is_heap_ = false;
   std::vector<Candidate> soon_, unread_;
   ViewDemand scratch_;
   std::vector<Slot> by_level_;
   std::vector<Ordered> order_;
   double sorted_below_ = 0.0;  // order_ holds the clusters with a smaller key
   std::size_t collapsed_ = 0;  // entries of order_ that are done
-  ClusterId last_{~std::uint64_t{0}};
+  ClusterId last_id_{~std::uint64_t{0}};
 };
 
 }  // namespace terrace::tri

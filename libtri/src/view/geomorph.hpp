@@ -83,7 +83,7 @@ Point3 place_of(const std::array<Coord, 3>& point, double = 0.0) {
 
 }  // namespace detail
 
-/// A step as triangles before and after. Their vertices are numbered; removed vertices come first,
+/// A step as triangles before and after. Their vertices are numbered. Removed vertices come first,
 /// as other vertices may use their slots by now.
 template <class Triangulation>
 struct Geomorph<Triangulation>::Scratch {
@@ -94,24 +94,24 @@ struct Geomorph<Triangulation>::Scratch {
 
   struct Site {
     VertexId vertex;
-    Point3 before, after;
+    Point3 old_place, new_place;
     std::uint32_t lost = 0, gained = 0;  ///< number of triangles
   };
-  std::vector<std::uint32_t> number;  ///< of a site, by vertex slot; kNone between calls
+  std::vector<std::uint32_t> number;  ///< of a site, by vertex slot. kNone between calls
   std::vector<Site> sites;
-  std::size_t gone = 0;  ///< number of sites that were removed
-  std::vector<Triangle> before, after;
+  std::size_t removed_count = 0;  ///< number of sites that were removed
+  std::vector<Triangle> old_triangles, new_triangles;
   std::vector<std::uint32_t> part;  ///< of each site
   Patches<kAxes> patches;
   detail::PlaceMask mask;
   struct Mover {
     Point3 place;
-    std::uint32_t part, who;   ///< who: number of a site or an anchor
-    std::uint32_t on = kNone;  ///< the triangle on which it ends
+    std::uint32_t part, index;  ///< index: number of a site or an anchor
+    std::uint32_t on = kNone;   ///< the triangle on which it ends
   };
   std::vector<Mover> movers;
   std::vector<std::uint32_t> order;  ///< the triangles of `patches`
-  std::vector<std::uint32_t> index;  ///< in `before`, by slot; kNone between calls
+  std::vector<std::uint32_t> index;  ///< in `old_triangles`, by slot. kNone between calls
 
   std::uint32_t site(const Model& model, VertexId vertex) {
     std::uint32_t& n = number[slot(vertex)];
@@ -125,14 +125,14 @@ struct Geomorph<Triangulation>::Scratch {
     return n;
   }
   void read(const Model& model, const Delta& delta) {
-    const Triangulation& now = model.triangulation();
+    const Triangulation& triangulation = model.triangulation();
     const auto& changes = delta.changes;
-    number.resize(std::max<std::size_t>(number.size(), now.vertex_slots()), kNone);
+    number.resize(std::max<std::size_t>(number.size(), triangulation.vertex_slots()), kNone);
     sites.clear();
-    before.clear();
-    after.clear();
-    gone = changes.removed_vertices.size();
-    for (std::size_t i = 0; i < gone; ++i) {
+    old_triangles.clear();
+    new_triangles.clear();
+    removed_count = changes.removed_vertices.size();
+    for (std::size_t i = 0; i < removed_count; ++i) {
       const Point3 place =
           detail::place_of(changes.removed_points[i], kAxes == 2 ? delta.removed_heights[i] : 0.0);
       number[slot(changes.removed_vertices[i])] = static_cast<std::uint32_t>(i);
@@ -147,21 +147,21 @@ struct Geomorph<Triangulation>::Scratch {
       }
       to.push_back(triangle);
     };
-    for (const auto& corners : changes.removed_corners) add(before, corners, &Site::lost);
+    for (const auto& corners : changes.removed_corners) add(old_triangles, corners, &Site::lost);
     for (const VertexId vertex : changes.removed_vertices) number[slot(vertex)] = kNone;
     for (const TriangleId t : changes.added_triangles) {
-      add(after, now.vertices(t), &Site::gained);
+      add(new_triangles, triangulation.vertices(t), &Site::gained);
     }
     for (std::size_t i = 0; i < delta.reassigned.size(); ++i) {
-      Point3& place = sites[site(model, delta.reassigned[i])].before;
+      Point3& place = sites[site(model, delta.reassigned[i])].old_place;
       if constexpr (kAxes == 2) place[2] = delta.reassigned_heights[i];
     }
     for (const VertexId vertex : changes.added_vertices) site(model, vertex);
   }
   /// Determines the connected parts and returns their number.
-  std::size_t join() {
+  std::size_t find_parts() {
     base::UnionFind sets(sites.size());
-    for (const auto* triangles : {&before, &after}) {
+    for (const auto* triangles : {&old_triangles, &new_triangles}) {
       for (const auto& [a, b, c] : *triangles) {
         sets.unite(a, b);
         sets.unite(a, c);
@@ -176,8 +176,9 @@ struct Geomorph<Triangulation>::Scratch {
     }
     return count;
   }
-  void forget() {
-    for (std::size_t i = gone; i < sites.size(); ++i) number[slot(sites[i].vertex)] = kNone;
+  void reset_numbers() {
+    for (std::size_t i = removed_count; i < sites.size(); ++i)
+      number[slot(sites[i].vertex)] = kNone;
   }
 
   /// Turns the anchors on removed triangles into movers.
@@ -192,7 +193,7 @@ struct Geomorph<Triangulation>::Scratch {
       anchor.moved = anchor.on != kNoTriangle && slot(anchor.on) < index.size() &&
                      index[slot(anchor.on)] != kNone;
       if (!anchor.moved) continue;
-      movers.push_back({anchor.place, part[before[index[slot(anchor.on)]][0]], i});
+      movers.push_back({anchor.place, part[old_triangles[index[slot(anchor.on)]][0]], i});
     }
     for (const TriangleId t : removed) index[slot(t)] = kNone;
   }
@@ -249,16 +250,17 @@ void Geomorph<Triangulation>::make(const Model& model, const typename Model::Del
   if constexpr (plane) {
     for (const VertexId vertex : delta.reassigned) {
       const Site& site = s.sites[s.number[slot(vertex)]];
-      reassigned.add(vertex, site.before, site.after);
+      reassigned.add(vertex, site.old_place, site.new_place);
     }
   }
   parts = {};
   removed_on.clear();
-  const std::size_t count = !plane || with_removed || !anchors.empty() ? s.join() : 0;
+  const std::size_t count = !plane || with_removed || !anchors.empty() ? s.find_parts() : 0;
   if (with_removed) {
     parts.count = count;
-    for (const auto& corners : s.before) parts.removed_triangles.push_back(s.part[corners[0]]);
-    for (const auto& corners : s.after) parts.added_triangles.push_back(s.part[corners[0]]);
+    for (const auto& corners : s.old_triangles)
+      parts.removed_triangles.push_back(s.part[corners[0]]);
+    for (const auto& corners : s.new_triangles) parts.added_triangles.push_back(s.part[corners[0]]);
   }
 
   const auto mover = [&](std::uint32_t n, Point3 Site::*at) {
@@ -266,46 +268,47 @@ void Geomorph<Triangulation>::make(const Model& model, const typename Model::Del
   };
   s.movers.clear();
   if constexpr (plane) {
-    for (const VertexId v : changes.added_vertices) mover(s.number[slot(v)], &Site::after);
+    for (const VertexId v : changes.added_vertices) mover(s.number[slot(v)], &Site::new_place);
   } else {
-    for (auto n = static_cast<std::uint32_t>(s.gone); n < s.sites.size(); ++n) {
+    for (auto n = static_cast<std::uint32_t>(s.removed_count); n < s.sites.size(); ++n) {
       const Site& site = s.sites[n];
-      const bool came = site.gained > 0 && site.lost == 0 &&
-                        site.gained == model.triangulation().triangles_at(site.vertex);
-      if (came) mover(n, &Site::after);
+      const bool is_added = site.gained > 0 && site.lost == 0 &&
+                            site.gained == model.triangulation().triangles_at(site.vertex);
+      if (is_added) mover(n, &Site::new_place);
     }
   }
-  s.project(count, s.before, &Site::before);
+  s.project(count, s.old_triangles, &Site::old_place);
   for (const auto& m : s.movers) {
-    added.add(s.sites[m.who].vertex, m.place, s.sites[m.who].after);
+    added.add(s.sites[m.index].vertex, m.place, s.sites[m.index].new_place);
     if (with_removed) parts.added.push_back(m.part);
   }
 
   s.movers.clear();
   for (std::uint32_t n = 0; with_removed && n < s.sites.size(); ++n) {
     const Site& site = s.sites[n];
-    bool left = n < s.gone;
+    bool is_removed = n < s.removed_count;
     if constexpr (!plane) {
-      left = site.lost > 0 && (left || model.triangulation().triangles_at(site.vertex) == 0);
+      is_removed =
+          site.lost > 0 && (is_removed || model.triangulation().triangles_at(site.vertex) == 0);
     }
-    if (left) mover(n, &Site::before);
+    if (is_removed) mover(n, &Site::old_place);
   }
-  const std::size_t left = s.movers.size();
+  const std::size_t removed_movers = s.movers.size();
   s.find_anchors(changes.removed_triangles, anchors);
-  s.project(count, s.after, &Site::after);
+  s.project(count, s.new_triangles, &Site::new_place);
   for (std::size_t i = 0; i < s.movers.size(); ++i) {
     const auto& m = s.movers[i];
     const TriangleId on = m.on == Scratch::kNone ? kNoTriangle : changes.added_triangles[m.on];
-    if (i < left) {
-      removed.add(s.sites[m.who].vertex, s.sites[m.who].before, m.place);
+    if (i < removed_movers) {
+      removed.add(s.sites[m.index].vertex, s.sites[m.index].old_place, m.place);
       removed_on.push_back(on);
       parts.removed.push_back(m.part);
     } else {
-      anchors[m.who].end = m.place;
-      anchors[m.who].on = on;
+      anchors[m.index].end = m.place;
+      anchors[m.index].on = on;
     }
   }
-  s.forget();
+  s.reset_numbers();
 }
 
 }  // namespace terrace::tri

@@ -11,14 +11,14 @@ namespace {
 
 // The estimate rises fast and falls slowly, as a step must not last longer than its budget. A
 // measurement disturbed by other programs counts as at most twice the usual value.
-void learn(double& rate, double measured) {
+void update_estimate(double& rate, double measured) {
   if (rate > 0.0) measured = std::min(measured, 2.0 * rate);
   rate += (measured - rate) * (rate == 0.0 ? 1.0 : measured > rate ? 0.25 : 0.0625);
 }
 
 // Share of the budget to plan for. Actual times scatter around the estimate, and steps with more
 // than enough work should end within the budget too.
-constexpr double kAim = 0.95;
+constexpr double kPlannedShare = 0.95;
 
 // Adds the part of the cost of each operation, and of the end of a step, that does not depend on
 // the number of points.
@@ -41,33 +41,34 @@ void StepMeter::start(const StepBudget& budget) {
 bool StepMeter::fits(std::size_t points, std::size_t kind) const {
   if (operations_ >= budget_->operations) return false;
   if (!timed_) return true;
-  const double ahead = with_overhead(points) * operation_rate_[kind] +
-                       with_overhead(points_[0] + points_[1] + points) * end_rate_ +
-                       static_cast<double>(points_[0]) * budget_->after[0] +
-                       static_cast<double>(points_[1]) * budget_->after[1] +
-                       with_overhead(points) * budget_->after[kind] + (fixed_done_ ? 0.0 : fixed_);
-  return last_ - begin_ + ahead < kAim * budget_->seconds;
+  const double predicted = with_overhead(points) * operation_rate_[kind] +
+                           with_overhead(points_[0] + points_[1] + points) * end_rate_ +
+                           static_cast<double>(points_[0]) * budget_->after[0] +
+                           static_cast<double>(points_[1]) * budget_->after[1] +
+                           with_overhead(points) * budget_->after[kind] +
+                           (fixed_done_ ? 0.0 : fixed_);
+  return last_ - begin_ + predicted < kPlannedShare * budget_->seconds;
 }
 
 void StepMeter::spend(std::size_t points, std::size_t kind) {
   ++operations_;
   points_[kind] += points;
   if (!timed_) return;
-  const double before = std::exchange(last_, now());
-  learn(operation_rate_[kind], (last_ - before) / with_overhead(points));
-  learn(usual_points_[kind], static_cast<double>(points));
+  const double previous = std::exchange(last_, now());
+  update_estimate(operation_rate_[kind], (last_ - previous) / with_overhead(points));
+  update_estimate(usual_points_[kind], static_cast<double>(points));
 }
 
-void StepMeter::fixed() {
+void StepMeter::end_fixed_work() {
   fixed_done_ = true;
   if (!timed_) return;
-  const double before = std::exchange(last_, now());
-  learn(fixed_, last_ - before);
+  const double previous = std::exchange(last_, now());
+  update_estimate(fixed_, last_ - previous);
 }
 
 void StepMeter::end() {
   if (timed_ && operations_ > 0)
-    learn(end_rate_, (now() - last_) / with_overhead(points_[0] + points_[1]));
+    update_estimate(end_rate_, (now() - last_) / with_overhead(points_[0] + points_[1]));
 }
 
 }  // namespace terrace::tri

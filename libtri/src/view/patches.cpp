@@ -20,8 +20,8 @@ double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] 
 Point3 difference(const Point3& a, const Point3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
-Point3 along(const Point3& a, const Point3& way, double share) {
-  return {a[0] + share * way[0], a[1] + share * way[1], a[2] + share * way[2]};
+Point3 point_on_line(const Point3& a, const Point3& direction, double share) {
+  return {a[0] + share * direction[0], a[1] + share * direction[1], a[2] + share * direction[2]};
 }
 double squared_distance(const Point3& a, const Point3& b) {
   const Point3 d = difference(a, b);
@@ -32,7 +32,7 @@ Point3 nearest_on_edge(const Point3& a, const Point3& b, const Point3& p) {
   const Point3 ab = difference(b, a);
   const double length = dot(ab, ab), at = dot(ab, difference(p, a));
   if (!(at > 0.0)) return a;
-  return at < length ? along(a, ab, at / length) : b;
+  return at < length ? point_on_line(a, ab, at / length) : b;
 }
 
 /// Decides by the region of the triangle's plane that contains the projected place: C. Ericson,
@@ -42,10 +42,10 @@ Point3 nearest_on_triangle(const Point3& a, const Point3& b, const Point3& c, co
   const Point3 ab = difference(b, a), ac = difference(c, a), ap = difference(p, a);
   const double b1 = dot(ab, ap), c1 = dot(ac, ap);
   if (b1 <= 0.0 && c1 <= 0.0) return a;
-  const double aa = dot(ab, ab), cc = dot(ac, ac), mixed = dot(ab, ac);
-  const double b2 = b1 - aa, c2 = c1 - mixed;  // of p - b
+  const double aa = dot(ab, ab), cc = dot(ac, ac), ab_ac = dot(ab, ac);
+  const double b2 = b1 - aa, c2 = c1 - ab_ac;  // of p - b
   if (b2 >= 0.0 && c2 <= b2) return b;
-  const double b3 = b1 - mixed, c3 = c1 - cc;  // of p - c
+  const double b3 = b1 - ab_ac, c3 = c1 - cc;  // of p - c
   if (c3 >= 0.0 && b3 <= c3) return c;
   const double of_c = b1 * c2 - b2 * c1, of_b = b3 * c1 - b1 * c3, of_a = b2 * c3 - b3 * c2;
   if (of_a > 0.0 && of_b > 0.0 && of_c > 0.0) {
@@ -53,8 +53,8 @@ Point3 nearest_on_triangle(const Point3& a, const Point3& b, const Point3& c, co
     return {a[0] + v * ab[0] + w * ac[0], a[1] + v * ab[1] + w * ac[1],
             a[2] + v * ab[2] + w * ac[2]};
   }
-  if (of_a > 0.0 && of_b > 0.0 && b1 > 0.0 && b2 < 0.0) return along(a, ab, b1 / (b1 - b2));
-  if (of_a > 0.0 && of_c > 0.0 && c1 > 0.0 && c3 < 0.0) return along(a, ac, c1 / (c1 - c3));
+  if (of_a > 0.0 && of_b > 0.0 && b1 > 0.0 && b2 < 0.0) return point_on_line(a, ab, b1 / (b1 - b2));
+  if (of_a > 0.0 && of_c > 0.0 && c1 > 0.0 && c3 < 0.0) return point_on_line(a, ac, c1 / (c1 - c3));
   Point3 best = nearest_on_edge(b, c, p);
   double least = squared_distance(best, p);
   for (const Point3& other : {nearest_on_edge(a, b, p), nearest_on_edge(a, c, p)}) {
@@ -141,18 +141,18 @@ void Patches<kAxes>::add_tree(std::uint32_t first, std::uint32_t last) {
       Node& node = nodes_.emplace_back();
       node.first = first + static_cast<std::uint32_t>(i);
       node.leaf = leaf;
-      Box whole;
+      Box box;
       for (std::size_t k = 0; k < kAxes; ++k) {
         node.low[k].fill(kInfinity);
         node.high[k].fill(-kInfinity);
         for (std::size_t j = i; j < std::min(i + kWidth, boxes_.size()); ++j) {
           node.low[k][j - i] = boxes_[j].min[k];
           node.high[k][j - i] = boxes_[j].max[k];
-          whole.min[k] = std::min(whole.min[k], boxes_[j].min[k]);
-          whole.max[k] = std::max(whole.max[k], boxes_[j].max[k]);
+          box.min[k] = std::min(box.min[k], boxes_[j].min[k]);
+          box.max[k] = std::max(box.max[k], boxes_[j].max[k]);
         }
       }
-      boxes_[count++] = whole;
+      boxes_[count++] = box;
     }
     boxes_.resize(count);
     first = begin;
@@ -194,7 +194,7 @@ requires(kAxes == 2) {
                             : w == 1.0 ? c[2]
                                        : u * a[2] + v * b[2] + w * c[2];
       result = Found{{x, y, height}, triangle.number};
-      if (least > 0.0) return result;  // inside; no other triangle contains it
+      if (least > 0.0) return result;  // inside. No other triangle contains it
     }
   }
   return result;
@@ -204,18 +204,18 @@ template <std::size_t kAxes>
 auto Patches<kAxes>::nearest(Part& part, const Point3& place) const -> Found requires(kAxes == 3) {
   Found found{};
   double best = kInfinity;
-  const auto look = [&](std::uint32_t triangle) {
+  const auto examine = [&](std::uint32_t triangle) {
     const auto& [a, b, c] = triangles_[triangle].corners;
     const Point3 candidate = patches::nearest_on_triangle(a, b, c, place);
     const double distance = patches::squared_distance(candidate, place);
     if (distance > best || (distance == best && !(candidate < found.place))) return;
     best = distance;
     found = {candidate, triangles_[triangle].number};
-    part.near = triangle;
+    part.last_triangle = triangle;
   };
-  look(part.near);
+  examine(part.last_triangle);
   struct Visit {
-    double away;
+    double squared_distance;
     std::uint32_t child;
     bool leaf;
   };
@@ -224,26 +224,27 @@ auto Patches<kAxes>::nearest(Part& part, const Point3& place) const -> Found req
   stack[depth++] = {0.0, part.root, false};
   while (depth > 0) {
     const Visit visit = stack[--depth];
-    if (visit.away > best) continue;
+    if (visit.squared_distance > best) continue;
     if (visit.leaf) {
-      look(visit.child);
+      examine(visit.child);
       continue;
     }
     const Node& node = nodes_[visit.child];
-    std::array<double, kWidth> away{};
+    std::array<double, kWidth> squared_distances{};
     for (std::size_t k = 0; k < kAxes; ++k) {
       for (std::size_t i = 0; i < kWidth; ++i) {
         const double d = place[k] - std::min(std::max(place[k], node.low[k][i]), node.high[k][i]);
-        away[i] += d * d;
+        squared_distances[i] += d * d;
       }
     }
     // Examines the nearest one first.
     const std::size_t begin = depth;
     for (std::uint32_t i = 0; i < kWidth; ++i) {
-      if (away[i] > best) continue;
+      if (squared_distances[i] > best) continue;
       std::size_t at = depth++;
-      for (; at > begin && stack[at - 1].away < away[i]; --at) stack[at] = stack[at - 1];
-      stack[at] = {away[i], node.first + i, node.leaf};
+      for (; at > begin && stack[at - 1].squared_distance < squared_distances[i]; --at)
+        stack[at] = stack[at - 1];
+      stack[at] = {squared_distances[i], node.first + i, node.leaf};
     }
   }
   return found;

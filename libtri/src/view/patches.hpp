@@ -33,10 +33,10 @@ class Patches {
     triangles_.push_back({{a, b, c}, part, static_cast<std::uint32_t>(triangles_.size())});
   }
   void build(std::size_t parts);
-  /// Over the plane: the place at the same x and y, linear in the triangle that contains them;
+  /// Over the plane: the place at the same x and y, linear in the triangle that contains them, or
   /// nullopt if none does, up to rounding. In space: the nearest place, edges included, and of
-  /// equally near ones the least; nullopt if the part has no triangle. Fast if the previous place
-  /// was near.
+  /// equally near ones the least, or nullopt if the part has no triangle. Fast if the previous
+  /// place was near.
   [[nodiscard]] std::optional<Found> find(std::uint32_t part, const Point3& place) {
     if (part >= parts_.size() || parts_[part].root == kNone) return {};
     if constexpr (kAxes == 2) return above(parts_[part], place);
@@ -59,7 +59,8 @@ class Patches {
     bool leaf;                                                ///< the children are triangles
   };
   struct Part {
-    std::uint32_t root = kNone, near = 0;  ///< near: the triangle on which a place was last found
+    std::uint32_t root = kNone,
+                  last_triangle = 0;  ///< last_triangle: the one on which a place was last found
   };
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "model/multiresolution.hpp"
 #include "view/control.hpp"
 #include "view/geomorph.hpp"
 

@@ -90,8 +90,8 @@ Camera perspective_camera(const Pose& pose, double fov_y_degrees, double aspect,
   Camera camera;
   camera.position = pose.position;
   camera.direction = f.forward;
-  const auto side = [&](double tangent, double sign, const Point3& across) {
-    return plane(unit(combine(tangent, f.forward, sign, across), "the field of view is degenerate"),
+  const auto side = [&](double tangent, double sign, const Point3& axis) {
+    return plane(unit(combine(tangent, f.forward, sign, axis), "the field of view is degenerate"),
                  pose.position);
   };
   camera.planes = {side(tan_x, 1.0, f.right), side(tan_x, -1.0, f.right), side(tan_y, 1.0, f.up),
@@ -145,8 +145,8 @@ Camera matrix_camera(const std::array<double, 16>& view_projection, double viewp
     camera.position = meet(rows[0], rows[1], rows[3]);
     camera.direction = unit(w, "the matrix is degenerate");
     // An off-centre projection shears y along the axis.
-    const Point3 across = combine(1.0, y, -dot(y, w) / dot(w, w), w);
-    scale = std::sqrt(dot(across, across) / dot(w, w));
+    const Point3 perpendicular = combine(1.0, y, -dot(y, w) / dot(w, w), w);
+    scale = std::sqrt(dot(perpendicular, perpendicular) / dot(w, w));
   } else {
     check_positive(rows[3][3], "the matrix is degenerate");
     camera.position = meet(rows[0], rows[1], rows[2]);

@@ -63,7 +63,7 @@ struct MatchRequest {
 
 struct MatchOutcome {
   std::vector<std::uint32_t>
-      mate;  ///< partner of each point; matching::kNobody for a point left over
+      mate;  ///< partner of each point; matching::kNone for a point left over
   double cost = 0.0;
   std::uint64_t iterations = 0;       ///< iterations of halving, or rounds of windows
   std::optional<double> lower_bound;  ///< if the method provides one
@@ -403,7 +403,7 @@ class MatchCommand final : public Command {
   [[nodiscard]] Summary summary_of(const MatchOutcome& outcome, std::size_t pairs,
                                    const Stopwatch& watch) const {
     Summary summary;
-    const auto alone = std::find(outcome.mate.begin(), outcome.mate.end(), matching::kNobody);
+    const auto alone = std::find(outcome.mate.begin(), outcome.mate.end(), matching::kNone);
     const bool odd = alone != outcome.mate.end();
     summary.json = {{"pairs", pairs},
                     {"cost", outcome.cost},

@@ -19,12 +19,12 @@ inline constexpr std::uint32_t kUnassigned = 0xFFFFFFFFu;
 /// cheaper.
 template <class Number>
 struct BasicAssignment {
-  /// Each row's column, or kUnassigned. min(rows, columns) rows have one; all columns are
+  /// Each row's column, or kUnassigned. min(rows, columns) rows have one. All columns are
   /// different.
   std::vector<std::uint32_t> column;
   Number cost = 0;  ///< sum of the chosen entries, added in row order
   /// Feasible labels: row_dual[i] + column_dual[j] <= cost(i, j), with equality where j is the
-  /// column of i. With rows <= columns, column_dual[j] <= 0, and 0 for unassigned columns; with
+  /// column of i. With rows <= columns, column_dual[j] <= 0, and 0 for unassigned columns. With
   /// rows > columns, row_dual[i] <= 0, and 0 for unassigned rows.
   std::vector<Number> row_dual, column_dual;
 };
@@ -49,7 +49,7 @@ inline constexpr double kLargestCost = 1e300;
 /// Cost: O(rows * columns * min(rows, columns)) time, O(rows + columns) memory.
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 4.3.1 (feasible labels,
 /// equality subgraph, alternating trees). The thesis states equations 4.27 to 4.29 for the largest
-/// sum; here, for the least sum, labels stay below the costs. Trees grow as in Dijkstra's
+/// sum. Here, for the least sum, labels stay below the costs. Trees grow as in Dijkstra's
 /// algorithm, so the n label changes of a tree cost O(n^2) together. Before that, augmenting row
 /// reduction assigns most rows: R. Jonker and A. Volgenant, "A shortest augmenting path algorithm
 /// for dense and sparse linear assignment problems", 1987.
@@ -69,7 +69,7 @@ using CostRow = std::function<void(std::size_t row, std::span<double> costs)>;
 ///
 /// Throws: std::invalid_argument as above, std::bad_function_call if fill_row is empty, and
 /// whatever fill_row throws.
-/// Cost: O(rows + columns) memory; fill_row is called O(rows * min(rows, columns)) times at worst.
+/// Cost: O(rows + columns) memory. fill_row is called O(rows * min(rows, columns)) times at worst.
 Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fill_row);
 
 /// As assign_rows(), with costs from a function of row and column.

@@ -49,9 +49,9 @@ struct HierarchyOptions {
 template <std::size_t D>
 struct HierarchyNode {
   std::array<float, D> min, max;  ///< in the frame of the hierarchy, rounded outward
-  /// first slot of a leaf; otherwise the second child (the first is the next node)
+  /// first slot of a leaf, or the second child (the first child is the next node)
   std::uint32_t link;
-  std::uint32_t count;  ///< primitives of a leaf; 0 for an inner node
+  std::uint32_t count;  ///< primitives of a leaf, or 0 for an inner node
 };
 
 /// Frame in which boxes are stored as floats: coordinates * `scale` - `centre`. `centre` is the
@@ -79,7 +79,7 @@ class BoundingVolumeHierarchy {
   /// not exist yet or already has a parent (the message names the row), a box that is not finite or
   /// whose min exceeds its max (the message gives its index), a leaf size of 0, and costs that are
   /// negative or not finite.
-  /// Cost: O(n) time; 80 bytes per box while building.
+  /// Cost: O(n) time and 80 bytes per box while building.
   BoundingVolumeHierarchy(std::span<const TreeChildren> rows, std::span<const base::Box<D>> boxes,
                           const HierarchyOptions& options = {});
 
@@ -112,8 +112,8 @@ class BoundingVolumeHierarchy {
 ///
 /// Returns: the same number of rows, children before parents.
 /// Throws: std::invalid_argument for bad rows and boxes, as BoundingVolumeHierarchy does.
-/// Cost: O(n) time per pass, 0.5 us per box in all (measured, 100,000 points); 150 bytes per box.
-/// Source: A. Kensler, "Tree rotations for improving bounding volume hierarchies", 2008.
+/// Cost: O(n) time per pass, 0.5 us per box in all (measured, 100,000 points), and 150 bytes per
+/// box. Source: A. Kensler, "Tree rotations for improving bounding volume hierarchies", 2008.
 template <std::size_t D>
 [[nodiscard]] std::vector<TreeChildren> rotate_tree(std::span<const TreeChildren> rows,
                                                     std::span<const base::Box<D>> boxes,

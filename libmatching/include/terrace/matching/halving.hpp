@@ -17,13 +17,13 @@
 /// matched at the least total distance (an assignment). Source: J. Skála, Algorithms for
 /// manipulating large geometric data, 7.5.1.
 ///
-/// Neither method is exact; use point_matching.hpp for that. The first method is the published one,
+/// Neither method is exact. Use point_matching.hpp for that. The first method is the published one,
 /// the second goes one step further.
 
 namespace terrace::matching {
 
 enum class Halving : std::uint8_t {
-  /// The published method: random halves; the best matching of all iterations is kept. It does not
+  /// The published method: random halves. The best matching of all iterations is kept. It does not
   /// converge: for 100 uniform points the best of 1,000 iterations is about 30 to 40 % above the
   /// optimum.
   monte_carlo,
@@ -39,10 +39,10 @@ struct HalvingOptions {
   /// Starts no iteration after this many seconds. The result then depends on the machine's speed.
   double seconds = std::numeric_limits<double>::infinity();
   std::uint64_t seed = 1;
-  /// Number of iterations of monte_carlo that run concurrently; 0: one per core. Does not change
-  /// the result unless `seconds` is set.
+  /// Number of iterations of monte_carlo that run concurrently. 0 means one per core. Does not
+  /// change the result unless `seconds` is set.
   unsigned threads = 1;
-  std::uint64_t memory_limit = 0;  ///< limit for the matrices, in bytes; 0: none
+  std::uint64_t memory_limit = 0;  ///< limit for the matrices, in bytes. 0 means none
   /// Called on the caller's thread after each iteration (or a few) with the number of iterations
   /// done, their total, and the least cost so far. Returning false ends the search.
   std::function<bool(std::uint64_t done, std::uint64_t total, double cost)> progress = {};
@@ -50,9 +50,9 @@ struct HalvingOptions {
 };
 
 struct HalvingMatching {
-  std::vector<std::uint32_t> mate;    ///< partner of each point; kNobody for the one left over
-  double cost = 0.0;                  ///< sum of the distances of all pairs, added by lower index
-  std::uint32_t left_over = kNobody;  ///< the point without a partner where n is odd
+  std::vector<std::uint32_t> mate;  ///< partner of each point, or kNone for the one left over
+  double cost = 0.0;                ///< sum of the distances of all pairs, added by lower index
+  std::uint32_t left_over = kNone;  ///< the point without a partner where n is odd
   std::uint64_t iterations = 0;
   /// The cost after each iteration that lowered it, which makes a convergence curve.
   struct Step {
@@ -69,14 +69,14 @@ using PairDistance = std::function<double(std::uint32_t, std::uint32_t)>;
 /// Matches points in the plane (z = 0) or in space by Euclidean distance.
 /// Throws: std::invalid_argument for a coordinate that is not finite or exceeds 1e150 in magnitude
 /// (the message gives its index), and if the matrices do not fit into options.memory_limit (the
-/// message gives the memory needed); std::bad_alloc.
-/// Cost: an assignment of n/2 to n/2 per iteration, O(n^3) at worst; a matrix of n^2/4 doubles per
-/// thread.
+/// message gives the memory needed), and std::bad_alloc.
+/// Cost: an assignment of n/2 to n/2 per iteration, O(n^3) at worst, and a matrix of n^2/4 doubles
+/// per thread.
 [[nodiscard]] HalvingMatching match_by_halving(std::span<const Point3> points,
                                                const HalvingOptions& options = {});
 
 /// As above, for any distance function. Also throws std::invalid_argument for a distance that is
-/// not finite; the message names the pair.
+/// not finite. The message names the pair.
 [[nodiscard]] HalvingMatching match_by_halving(std::size_t count, const PairDistance& distance,
                                                const HalvingOptions& options = {});
 

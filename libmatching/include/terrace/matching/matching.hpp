@@ -12,7 +12,7 @@
 namespace terrace::matching {
 
 /// Means "no vertex" or "no blossom".
-inline constexpr std::uint32_t kNobody = 0xFFFFFFFFu;
+inline constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
 /// An edge of a graph: two different vertices and the cost of matching them.
 struct WeightedEdge {
@@ -39,7 +39,7 @@ struct Matching {
   std::vector<std::int64_t> vertex_dual;
   std::vector<std::int64_t> blossom_dual;
   /// Nesting of the blossoms: the innermost blossom around each vertex and the next one around each
-  /// blossom, or kNobody. A blossom contains the vertices whose chains of parents include it.
+  /// blossom, or kNone. A blossom contains the vertices whose chains of parents include it.
   std::vector<std::uint32_t> vertex_blossom, blossom_parent;
 
   /// Half the sum of all duals, times 2^-exponent. It is a lower bound for every perfect matching
@@ -64,7 +64,7 @@ struct Matching {
 ///
 /// Deterministic: the result depends on the input alone.
 ///
-/// Cost: O(vertices * edges * log) in the worst case; on sparse geometric graphs most trees are
+/// Cost: O(vertices * edges * log) in the worst case. On sparse geometric graphs most trees are
 /// small. About 100 bytes per vertex and 48 per edge.
 ///
 /// Source: J. Edmonds, "Paths, trees, and flowers", 1965. The initial duals and the order of dual

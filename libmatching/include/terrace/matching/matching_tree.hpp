@@ -36,12 +36,12 @@ struct MatchingTree {
   std::vector<MatchingTreeRow> rows;
   /// The weighted mean of all points below each row's node.
   std::vector<Point> positions;
-  /// The last row's node, or 0 for a single point. kNobody if there are no points or the work was
+  /// The last row's node, or 0 for a single point. kNone if there are no points or the work was
   /// stopped.
-  std::uint32_t root = kNobody;
+  std::uint32_t root = kNone;
 };
 
-/// Matches the nodes of one level. Returns the partner of each node; exactly one is kNobody if the
+/// Matches the nodes of one level. Returns the partner of each node. Exactly one is kNone if the
 /// number of nodes is odd.
 template <class Point>
 using LevelMatcher = std::function<std::vector<std::uint32_t>(std::span<const Point>)>;
@@ -49,11 +49,11 @@ using LevelMatcher = std::function<std::vector<std::uint32_t>(std::span<const Po
 template <class Point>
 struct MatchingTreeOptions {
   std::span<const double> weights{};  ///< positive and finite, one per point; all 1 where empty
-  /// The cluster of each point, as arbitrary numbers. Each cluster becomes a tree; then the roots
+  /// The cluster of each point, as arbitrary numbers. Each cluster becomes a tree. Then the roots
   /// are matched in the same way. If empty, all points are one cluster.
   std::span<const std::uint32_t> labels{};
-  unsigned threads = 1;  ///< concurrent clusters, 0: one per core; does not change the result
-  std::uint64_t memory_limit = 0;  ///< limit for the tree, in bytes; 0: none
+  unsigned threads = 1;  ///< concurrent clusters, 0 for one per core. Does not change the result
+  std::uint64_t memory_limit = 0;  ///< limit for the tree, in bytes. 0 means none
   /// Called on the caller's thread at intervals with the number of rows made so far and their
   /// total. Returning false ends the work and makes the tree empty.
   std::function<bool(std::size_t done, std::size_t total)> progress{};
@@ -66,7 +66,7 @@ struct MatchingTreeOptions {
 /// the next level. The depth is at most the number of levels: the base-2 logarithm of the size of
 /// the largest cluster, rounded up, plus that of the number of clusters.
 ///
-/// points: finite; duplicates allowed.
+/// points: finite. Duplicates are allowed.
 /// Returns: the same tree for any number of threads.
 /// Throws: std::invalid_argument for a coordinate that is not finite, a weight that is not positive
 /// and finite (the message gives the index), weights whose sum overflows a double, numbers of

@@ -27,8 +27,8 @@ namespace terrace::matching {
 /// the index).
 /// Cost: depends on how far apart the sets are. Memory grows with the number of candidates. The
 /// worst case is that of the complete graph: O(n^3) time and 16 bytes per pair.
-/// Source: J. Skála, 4.3.1; pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code on
-/// dense problems).
+/// Source: J. Skála, 4.3.1, and pricing as in R. Jonker and A. Volgenant, 1987 (their sparse code
+/// on dense problems).
 Assignment assign_points(std::span<const Point2> rows, std::span<const Point2> columns,
                          const base::StopCheck& check_stop = {});
 Assignment assign_points(std::span<const Point3> rows, std::span<const Point3> columns,

@@ -16,7 +16,7 @@ namespace terrace::matching {
 
 /// A primitive and its distance.
 struct Neighbour {
-  std::uint32_t index = kNobody;
+  std::uint32_t index = kNone;
   double distance = std::numeric_limits<double>::infinity();
   friend bool operator==(const Neighbour&, const Neighbour&) = default;
 };
@@ -31,7 +31,7 @@ struct Ray {
 
 /// The first primitive along a ray.
 struct RayHit {
-  std::uint32_t index = kNobody;
+  std::uint32_t index = kNone;
   double t = 0.0;
   friend bool operator==(const RayHit&, const RayHit&) = default;
 };
@@ -56,7 +56,7 @@ class PointHierarchy {
   /// Returns the nearest point, or nullopt if there are no points.
   /// Throws: std::invalid_argument for a query that is not finite or farther away than 2^400 times
   /// the largest coordinate.
-  /// Cost: O(log n) for non-adversarial points and queries; O(k) among k duplicates.
+  /// Cost: O(log n) for non-adversarial points and queries, O(k) among k duplicates.
   [[nodiscard]] std::optional<Neighbour> nearest(const Point& query) const;
 
   /// Finds the k nearest points, nearest first, or all points if there are fewer than k. Throws and

@@ -26,7 +26,7 @@ struct PointMetric {
 };
 
 struct PointMatchingOptions {
-  /// Each point gets candidate edges to this many nearest points; at least 1.
+  /// Each point gets candidate edges to this many nearest points, at least 1.
   std::uint32_t neighbours = 8;
   /// Additional candidate edges, for instance from a Delaunay triangulation.
   std::span<const std::pair<std::uint32_t, std::uint32_t>> candidates{};
@@ -36,19 +36,19 @@ struct PointMatchingOptions {
 
 /// The optimal matching of points and its proof.
 struct PointMatching {
-  std::vector<std::uint32_t> mate;    ///< partner of each point, kNobody for the one left over
-  double cost = 0.0;                  ///< sum of the distances of all pairs
-  double dual_bound = 0.0;            ///< lower bound of every matching's cost, see below
-  std::uint32_t left_over = kNobody;  ///< the point without a partner where n is odd
-  std::size_t rounds = 0;             ///< rounds of solving and pricing
-  std::size_t edges = 0;              ///< candidate edges in the last round
-  Matching proof;  ///< for the sparse graph; if n is odd, vertex n means "nobody"
+  std::vector<std::uint32_t> mate;  ///< partner of each point, kNone for the one left over
+  double cost = 0.0;                ///< sum of the distances of all pairs
+  double dual_bound = 0.0;          ///< lower bound of every matching's cost, see below
+  std::uint32_t left_over = kNone;  ///< the point without a partner where n is odd
+  std::size_t rounds = 0;           ///< rounds of solving and pricing
+  std::size_t edges = 0;            ///< candidate edges in the last round
+  Matching proof;  ///< for the sparse graph. If n is odd, vertex n is a dummy partner.
 };
 
 /// Minimum-weight perfect matching of points on the complete graph.
 ///
-/// points: any number, finite; duplicates allowed. If their number is odd, the one left over is the
-/// point whose removal makes the rest cheapest.
+/// points: any number, finite. Duplicates are allowed. If their number is odd, the one left over is
+/// the point whose removal makes the rest cheapest.
 ///
 /// Method: the blossom algorithm on candidate edges, then pricing. Pricing finds absent pairs that
 /// are closer than their duals allow, blossom by blossom, with a tree of boxes that holds the
@@ -62,7 +62,7 @@ struct PointMatching {
 /// its index), a candidate edge with an end out of range, and n above 2^29.
 ///
 /// Cost: about n^1.2 on uniform points in the plane, n^1.3 in space (measured, 10,000 to 1,000,000
-/// points); more where many odd clusters are far apart. About 0.8 kB per point.
+/// points), and more where many odd clusters are far apart. About 0.8 kB per point.
 ///
 /// Source: pricing as in W. Cook and A. Rohe, "Computing minimum-weight perfect matchings", 1999.
 PointMatching match_points(std::span<const Point2> points,

@@ -37,7 +37,7 @@ struct CostEdge {
 /// rows (Hall's theorem), or, with rows > columns, a column from such a set of columns.
 /// Cost: O(n m log m) time at worst for n on the shorter side and m pairs, O(m) memory. Pairs of
 /// near neighbours take far less, as the trees stay small.
-/// Source: J. Skála, 4.3.1, with Dijkstra's algorithm and a heap on the pairs; optimality is proven
+/// Source: J. Skála, 4.3.1, with Dijkstra's algorithm and a heap on the pairs. Optimality is proven
 /// by complementary slackness.
 Assignment assign_sparse(const SparseCosts& costs, const base::StopCheck& check_stop = {});
 Assignment assign_sparse(std::span<const CostEdge> edges, std::size_t rows, std::size_t columns,

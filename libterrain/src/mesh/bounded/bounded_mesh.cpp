@@ -35,7 +35,7 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
     run(options.max_error / metres, ~std::uint64_t{0});
   } else {
     tri::LeastErrorSearch search;
-    search.most = options.max_points;
+    search.max_vertices = options.max_points;
     search.range = mesher.bounds().max[2] - mesher.bounds().min[2];
     if (mesher.can_estimate()) {
       search.estimate = [&](double bound) { return mesher.estimate(bound); };

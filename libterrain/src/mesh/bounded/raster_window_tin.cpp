@@ -334,7 +334,7 @@ void WindowMesher::require_sound(const WindowTin& tin) const {
 
 void WindowMesher::require_no_holes(const WindowTin& tin) const {
   const bool exact = rounding_.largest() == stream::Point3{} || options_.places.has_effect();
-  if (tin.check.nodata_covered > 0 || tin.check.uncovered_inner > 0 || tin.check.turned > 0) {
+  if (tin.check.nodata_covered > 0 || tin.check.uncovered_inner > 0 || tin.check.inverted > 0) {
     fail(tin, "the mesh covers cells without data, leaves out cells with data, or folds",
          exact ? "this is a fault of terrace, please report it"
                : "write PLY, which is exact, or a smaller `region`");

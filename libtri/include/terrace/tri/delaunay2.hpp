@@ -23,7 +23,7 @@
 /// triangulations", doi:10.1016/j.comgeo.2010.09.010). A collapse after an expansion therefore
 /// restores exactly the same triangles, in whatever order the operations come.
 ///
-/// x grows to the right and y upwards; "left" and "counter-clockwise" refer to this frame.
+/// x grows to the right and y upwards. "Left" and "counter-clockwise" refer to this frame.
 
 namespace terrace::tri {
 
@@ -47,7 +47,7 @@ using base::Box3;
 /// x, y and z or a height.
 using base::Point3;
 
-/// The box of a region in the plane; it has no limits in height.
+/// The box of a region in the plane. It has no limits in height.
 constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return {{min_x, min_y, -kInfinity}, {max_x, max_y, kInfinity}};
@@ -58,7 +58,7 @@ enum class Place : std::uint8_t {
   kVertex,   ///< equal to a vertex
   kEdge,     ///< inside an edge, including hull edges
   kInside,   ///< inside a triangle
-  kOutside,  ///< outside the convex hull; without triangles, every point that is not a vertex
+  kOutside,  ///< outside the convex hull. Without triangles, every point that is not a vertex
 };
 
 struct Location {
@@ -69,7 +69,7 @@ struct Location {
   TriangleId triangle = kNoTriangle;
   /// kEdge, kOutside: the edge opposite to vertices(triangle)[edge].
   std::uint8_t edge = 0;
-  /// kVertex: the vertex at the point. Otherwise a vertex of the triangle, useful as a hint;
+  /// kVertex: the vertex at the point. Otherwise a vertex of the triangle, useful as a hint, or
   /// kNoVertex in an empty triangulation.
   VertexId vertex = kNoVertex;
 };
@@ -130,7 +130,7 @@ struct Euclidean {};
 ///
 /// - Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30). Uses integer
 ///   arithmetic only, so results are the same on every machine. About 60 bytes per vertex.
-/// - Coord = double: any finite coordinates, with exact predicates. Points are never moved; -0.0
+/// - Coord = double: any finite coordinates, with exact predicates. Points are never moved. -0.0
 ///   and 0.0 are equal. About 68 bytes per vertex.
 /// - Metric = EllipticalMetric2 (with doubles): see metric.hpp.
 ///
@@ -150,7 +150,7 @@ class Delaunay2 {
 
   // ---- Changing -------------------------------------------------------------------------------
   // All throw std::invalid_argument, naming the index, if a coordinate is not finite or out of
-  // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged. After
+  // range, and std::length_error beyond 2^29 - 2 vertices. The object is then unchanged. After
   // std::bad_alloc the object can only be cleared or destroyed.
 
   struct Insertion {
@@ -158,14 +158,14 @@ class Delaunay2 {
     bool created = false;  ///< false: `vertex` already existed, with the same coordinates
   };
 
-  /// Adds points to an empty triangulation; much faster than insert(). Returns the vertex of each
-  /// point; equal points share a vertex. O(n log n). Needs 20 bytes per point for sorting besides
+  /// Adds points to an empty triangulation, much faster than insert(). Returns the vertex of each
+  /// point. Equal points share a vertex. O(n log n). Needs 20 bytes per point for sorting besides
   /// the result, freed before the triangles are made.
   std::vector<VertexId> build(std::span<const Point> points);
   /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation. Writes
-  /// the canonical triangles directly, in O(n) and without predicates. Returns the first vertex;
-  /// the vertex of column i, row j is that plus j * columns + i. Requires step > 0 and the
-  /// Euclidean metric. With doubles, product and sum in x0 + i * step are each rounded once; throws
+  /// the canonical triangles directly, in O(n) and without predicates. Returns the first vertex.
+  /// The vertex of column i, row j is that plus j * columns + i. Requires step > 0 and the
+  /// Euclidean metric. With doubles, product and sum in x0 + i * step are each rounded once. Throws
   /// std::invalid_argument if a result is not exact (use build() then).
   VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
                       std::uint32_t rows) requires std::is_same_v<Metric, Euclidean>;
@@ -205,7 +205,7 @@ class Delaunay2 {
   /// A triangle at the vertex, kNoTriangle while there are no triangles. O(1).
   [[nodiscard]] TriangleId triangle_at(VertexId vertex) const;
   /// Replaces `result` with the vertices that share an edge with this one, counter-clockwise. For a
-  /// hull vertex they run from its successor on the hull to its predecessor; while all points are
+  /// hull vertex they run from its successor on the hull to its predecessor. While all points are
   /// collinear they are its neighbours on the line.
   void adjacent(VertexId vertex, std::vector<VertexId>& result) const;
 
@@ -214,8 +214,8 @@ class Delaunay2 {
   /// itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t triangle_slots() const;
-  [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle; false for kNoVertex
-  /// accepts any handle; false for kNoTriangle
+  [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle. False for kNoVertex
+  /// accepts any handle. False for kNoTriangle
   [[nodiscard]] bool alive(TriangleId triangle) const;
   [[nodiscard]] AliveRange<Delaunay2, VertexId> all_vertices() const {
     return {*this, vertex_slots()};
@@ -228,8 +228,8 @@ class Delaunay2 {
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
   /// for insert(). Takes about sqrt(n) steps from a distant hint, a few from a near one.
   [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point; of equally near vertices the lexicographically smallest;
-  /// kNoVertex if empty. Exact. Costs a walk.
+  /// The vertex nearest to the point, or kNoVertex if the triangulation is empty. Of equally near
+  /// vertices it is the lexicographically smallest. Exact. Costs a walk.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
   /// A hash of the set of triangles by coordinates, or of the points while there are no triangles.
@@ -254,7 +254,7 @@ class Delaunay2 {
   };
 
   /// Starts recording and drops earlier records. While recording, a change costs a few nanoseconds
-  /// more per triangle; the journal needs 2 bits per vertex besides the records.
+  /// more per triangle. The journal needs 2 bits per vertex besides the records.
   void start_journal();
   void stop_journal();
   /// Replaces `changes` with the changes since start_journal() or the last call, reusing its

@@ -42,7 +42,7 @@ enum class Place3 : std::uint8_t {
   kEdge,     ///< inside an edge, including hull edges
   kFacet,    ///< inside a facet, including hull facets
   kInside,   ///< inside a tetrahedron
-  kOutside,  ///< outside the convex hull; without tetrahedra, every point that is not a vertex
+  kOutside,  ///< outside the convex hull. Without tetrahedra, every point that is not a vertex
 };
 
 struct Location3 {
@@ -53,7 +53,7 @@ struct Location3 {
   /// kFacet, kOutside: the facet opposite to vertices(tetrahedron)[corner[0]]. kEdge: the edge
   /// joins the two corners other than corner[0] and corner[1].
   std::array<std::uint8_t, 2> corner = {0, 0};
-  /// kVertex: the vertex at the point. Otherwise a vertex of the tetrahedron, useful as a hint;
+  /// kVertex: the vertex at the point. Otherwise a vertex of the tetrahedron, useful as a hint, or
   /// kNoVertex in an empty triangulation.
   VertexId vertex = kNoVertex;
 };
@@ -61,12 +61,12 @@ struct Location3 {
 /// A Delaunay triangulation in space.
 ///
 /// - Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30).
-/// - Coord = double: any finite coordinates, with exact predicates. Points are never moved; -0.0
+/// - Coord = double: any finite coordinates, with exact predicates. Points are never moved. -0.0
 ///   and 0.0 are equal.
 /// - Metric = EllipticalMetric3 (with doubles): see metric.hpp.
 ///
 /// Empty sets, one or two points, and collinear or coplanar points are valid states without
-/// tetrahedra; in these, inserting or removing one vertex moves O(n) entries of 4 bytes. The limits
+/// tetrahedra. In these, inserting or removing one vertex moves O(n) entries of 4 bytes. The limits
 /// are 2^29 - 2 vertices and 2^30 - 2 tetrahedra, including those that belong to the structure
 /// itself. Several threads may call const functions at once.
 template <class Coord, class Metric = Euclidean>
@@ -83,7 +83,7 @@ class Delaunay3 {
 
   // ---- Changing -------------------------------------------------------------------------------
   // All throw std::invalid_argument, naming the index, if a coordinate is not finite or out of
-  // range, and std::length_error beyond 2^29 - 2 vertices; the object is then unchanged. After
+  // range, and std::length_error beyond 2^29 - 2 vertices. The object is then unchanged. After
   // std::bad_alloc, or std::length_error beyond 2^30 - 2 tetrahedra (which many vertices on two
   // curves can make), the object can only be cleared or destroyed.
 
@@ -92,10 +92,10 @@ class Delaunay3 {
     bool created = false;  ///< false: `vertex` already existed, with the same coordinates
   };
 
-  /// Adds points to an empty triangulation; much faster than insert(). Returns the vertex of each
-  /// point; equal points share a vertex. O(n log n) for points that fill a volume or a surface.
+  /// Adds points to an empty triangulation, much faster than insert(). Returns the vertex of each
+  /// point. Equal points share a vertex. O(n log n) for points that fill a volume or a surface.
   /// Needs 20 bytes per point for sorting besides the result, freed before the tetrahedra are made.
-  /// More than two threads do not help; the result, handles included, does not depend on their
+  /// More than two threads do not help. The result, handles included, does not depend on their
   /// number.
   std::vector<VertexId> build(std::span<const Point> points, unsigned threads = 1);
   /// hint: a vertex near the point, where the walk starts, or kNoVertex for the last vertex used.
@@ -107,7 +107,7 @@ class Delaunay3 {
               VertexId hint = kNoVertex);
   /// Usually changes only the tetrahedra at the vertex. If the hole that the vertex (or a very
   /// large set) leaves has so many vertices that filling it would cost more than a rebuild, all
-  /// tetrahedra are rebuilt; vertices then keep their handles and tetrahedra do not.
+  /// tetrahedra are rebuilt. Vertices then keep their handles and tetrahedra do not.
   void remove(VertexId vertex);
   /// Removes a set of different vertices. Fills the space of their tetrahedra as a whole, around
   /// any other vertices inside it. Two to five times as fast as removing them one by one if the set
@@ -147,8 +147,8 @@ class Delaunay3 {
   /// itself.
   [[nodiscard]] std::uint32_t vertex_slots() const;
   [[nodiscard]] std::uint32_t tetrahedron_slots() const;
-  [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle; false for kNoVertex
-  /// accepts any handle; false for kNoTetrahedron
+  [[nodiscard]] bool alive(VertexId vertex) const;  ///< accepts any handle. False for kNoVertex
+  /// accepts any handle. False for kNoTetrahedron
   [[nodiscard]] bool alive(TetrahedronId tetrahedron) const;
   [[nodiscard]] AliveRange<Delaunay3, VertexId> all_vertices() const {
     return {*this, vertex_slots()};
@@ -161,8 +161,9 @@ class Delaunay3 {
   /// in a triangulation", doi:10.1142/S0129054102001047) from the hint. The point must be valid as
   /// for insert(). Takes about the cube root of n steps from a distant hint, a few from a near one.
   [[nodiscard]] Location3 locate(const Point& point, VertexId hint = kNoVertex) const;
-  /// The vertex nearest to the point; of equally near vertices the lexicographically smallest;
-  /// kNoVertex if empty. Exact. Costs a walk, or O(n) while all points are coplanar.
+  /// The vertex nearest to the point, or kNoVertex if the triangulation is empty. Of equally near
+  /// vertices it is the lexicographically smallest. Exact. Costs a walk, or O(n) while all points
+  /// are coplanar.
   [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
 
   /// A hash of the set of tetrahedra by coordinates, or of the points while there are no
@@ -187,7 +188,7 @@ class Delaunay3 {
   };
 
   /// Starts recording and drops earlier records. While recording, a change costs a few nanoseconds
-  /// more per tetrahedron; the journal needs one bit per slot besides the records.
+  /// more per tetrahedron. The journal needs one bit per slot besides the records.
   void start_journal();
   void stop_journal();
   /// Replaces `changes` with the changes since start_journal() or the last call, reusing its

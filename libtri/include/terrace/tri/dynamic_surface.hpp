@@ -19,7 +19,7 @@ namespace terrace::tri {
 /// its "triangles" are the facets of the surface. It takes the place of a triangulation in a
 /// multiresolution model and in a view control.
 ///
-/// Points are inserted and removed immediately; follow() then updates the surface by the rules of
+/// Points are inserted and removed immediately. follow() then updates the surface by the rules of
 /// BasicShape3::update_nearby(): it judges new tetrahedra and those around them, and leaves all
 /// others as they were. The tetrahedra are a function of the points alone, but in a few pockets the
 /// surface may depend on the order in which the points came. restore() computes it from scratch.
@@ -57,7 +57,7 @@ class DynamicSurface {
   DynamicSurface(DynamicSurface&&) noexcept;
   DynamicSurface& operator=(DynamicSurface&&) noexcept;
 
-  /// As in Delaunay3; the surface is up to date on return.
+  /// As in Delaunay3. The surface is up to date on return.
   std::vector<VertexId> build(std::span<const Point> points);
   /// As in Delaunay3. Until follow() is called the surface stays as it was, and its triangles may
   /// have corners that no longer exist.
@@ -78,7 +78,7 @@ class DynamicSurface {
   /// scratch if most tetrahedra are new.
   void follow();
   /// Computes the surface from scratch, in 3 us per vertex. The result equals a new object with the
-  /// same points. threads: 0 for one per core; the result does not depend on it.
+  /// same points. threads: 0 for one per core. The result does not depend on it.
   void restore(unsigned threads = 1);
 
   /// Starts recording and drops earlier records.

@@ -30,7 +30,7 @@ struct Slides {
   }
 };
 
-/// A position that has left the surface and slides onto it. `end` is on the triangle `on`;
+/// A position that has left the surface and slides onto it. `end` is on the triangle `on`.
 /// kNoTriangle means that it is not on any triangle, permanently.
 struct Anchor {
   Point3 place{}, end{};
@@ -53,9 +53,9 @@ struct Anchor {
 /// In space (DynamicSurface) a vertex moves to the nearest point on the triangles that the step
 /// exchanged within the vertex's own connected part, so it does not cross to the other side of a
 /// thin body. Without such triangles it keeps its position. `added` and `removed` are the vertices
-/// that joined and left the surface; a few of these have tetrahedra before and after. `reassigned`
+/// that joined and left the surface. A few of these have tetrahedra before and after. `reassigned`
 /// is empty because positions do not change. The slides of an inverse step mirror those of the step
-/// wherever the surface itself returns; in a few pockets it depends on the order in which its
+/// wherever the surface itself returns. In a few pockets it depends on the order in which its
 /// points came.
 template <class Triangulation>
 class Geomorph {
@@ -82,7 +82,7 @@ class Geomorph {
 
   /// Replaces slides and parts by those of the model's last step, `delta`, which over the plane
   /// needs ModelOptions::old_heights. with_removed: false leaves `removed` empty, for renderers
-  /// that do not draw removed triangles. anchors: the anchors of earlier steps; those whose
+  /// that do not draw removed triangles. anchors: the anchors of earlier steps. Those whose
   /// triangle was removed move to the triangles that replace it and are projected onto them in the
   /// same way. O(n log n) in the size of the delta, 0.7 us per vertex in space. Throws
   /// std::invalid_argument for a delta over the plane without heights.

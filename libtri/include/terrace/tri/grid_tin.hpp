@@ -12,7 +12,7 @@
 /// Builds TINs of raster windows, within an error bound at every sample.
 ///
 /// Vertices are inserted greedily (M. Garland, P. S. Heckbert, "Fast polygonal approximation of
-/// terrains and height fields", CMU-CS-95-181); vertices that later ones made superfluous are then
+/// terrains and height fields", CMU-CS-95-181). Vertices that later ones made superfluous are then
 /// removed.
 ///
 /// Cut a large raster into windows that share their sides: the last column of one window is the
@@ -46,14 +46,14 @@ struct GridTinCheck {
   /// Uncovered samples whose 8 neighbours (those within the window) have data.
   std::size_t uncovered_inner = 0;
   std::size_t nodata_covered = 0;  ///< samples without data in a triangle
-  std::size_t turned = 0;  ///< triangles without area, or oriented opposite to the first one
+  std::size_t inverted = 0;  ///< triangles without area, or oriented opposite to the first one
 };
 
 /// Measures every sample in every triangle, including its sides and corners, in double. Points are
-/// column, row and height; they need not be on the lattice, as values read back from a file may
+/// column, row and height. They need not be on the lattice, as values read back from a file may
 /// have been rounded. `tolerance` is how far they may have moved, in cells: a sample within this
 /// distance outside a triangle counts as covered by it and is measured against its plane. Samples
-/// without data count only inside triangles. Time O(samples + triangles + points); memory: one byte
+/// without data count only inside triangles. Time O(samples + triangles + points). Memory: one byte
 /// per sample and four per uncovered sample.
 ///
 /// Throws std::invalid_argument if `heights` has the wrong length, if a corner is not the number of
@@ -80,7 +80,7 @@ enum class TinQuality : std::uint8_t {
 
 struct GridTinOptions {
   /// The error bound, >= 0, in the unit of heights. Bounds below about 2^-45 of the height range
-  /// cannot be distinguished from 0; see `max_error` of the result.
+  /// cannot be distinguished from 0. See `max_error` of the result.
   double max_error = 0;
   TinQuality quality = TinQuality::kRemoval;
   /// Signed distance on the ground from one column and one row to the next, in the same unit, not
@@ -106,7 +106,7 @@ struct GridSides {
 struct GridVertex {
   std::uint32_t column = 0;
   std::uint32_t row = 0;
-  double height = 0;  ///< the sample's height, exact for T = float; with kFitted, a value of type T
+  double height = 0;  ///< the sample's height, exact for T = float. With kFitted, a value of type T
 
   bool operator==(const GridVertex&) const = default;
 };
@@ -120,17 +120,17 @@ struct GridTin {
 };
 
 /// Chooses the vertices on a side of a window, or on any line of samples. Simplifies the line to
-/// within slightly less than `max_error`, greatest error first; both ends are vertices. `beside`
-/// and `other_beside` are the adjacent lines on either side. They have the same length, or are
-/// empty where the raster ends (or has data everywhere). A sample with data is a vertex if a
-/// neighbour on any of the three lines has no data. Both windows that share a side must pass the
-/// same three lines; the order of the last two does not matter. Usually O(n log n).
+/// within slightly less than `max_error`, greatest error first. Both ends are vertices.
+/// `neighbour_line` and `other_neighbour_line` are the adjacent lines on either side. They have the
+/// same length, or are empty where the raster ends (or has data everywhere). A sample with data is
+/// a vertex if a neighbour on any of the three lines has no data. Both windows that share a side
+/// must pass the same three lines. The order of the last two does not matter. Usually O(n log n).
 ///
 /// Throws std::invalid_argument for lines of different lengths, heights beyond 1e150, and a bound
 /// that is negative or NaN.
 template <class T>
-std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> beside,
-                                       std::span<const T> other_beside, double max_error);
+std::vector<std::uint32_t> settle_side(std::span<const T> line, std::span<const T> neighbour_line,
+                                       std::span<const T> other_neighbour_line, double max_error);
 
 /// Chooses the vertices on all four sides of a window without neighbours.
 template <class T>
@@ -139,7 +139,7 @@ GridSides settle_sides(const GridWindow<T>& window, double max_error);
 /// Builds a TIN with the vertices `sides` on its sides, within the bound at every sample that it
 /// covers. T is float (which also holds integers of 24 bits) or double. A window of one row or
 /// column has no triangles. Takes about a microsecond per vertex inserted (a third less with
-/// kGreedy, half as much again with kFitted); about twice as many vertices are inserted as remain.
+/// kGreedy, half as much again with kFitted). About twice as many vertices are inserted as remain.
 /// Memory: about 190 bytes per vertex inserted, and 4 or 8 per sample (7 or 11 if data is missing).
 ///
 /// Deterministic: gives the same bytes on every processor.
@@ -154,7 +154,7 @@ GridTin grid_tin(const GridWindow<T>& window, const GridSides& sides,
 
 /// Builds a TIN of at most `max_points` vertices, including the 4 corners, by inserting each vertex
 /// where the error is greatest. The resulting error is `check.max_error` (with options.measure).
-/// Insertion stops early once options.max_error is reached; options.quality is ignored. If there
+/// Insertion stops early once options.max_error is reached. options.quality is ignored. If there
 /// are too few points to separate data from missing data, some samples with data remain uncovered
 /// (check.uncovered_inner). Throws as grid_tin() does, and for max_points < 4.
 template <class T>

@@ -54,7 +54,7 @@ class Heights {
   double operator()(VertexId vertex) const {
     return call_ == nullptr ? values_[slot(vertex)] : call_(object_, vertex);
   }
-  /// The length of the array; unlimited for functions.
+  /// The length of the array, unlimited for functions.
   [[nodiscard]] std::size_t slots() const { return slots_; }
 
  private:
@@ -65,8 +65,8 @@ class Heights {
 };
 
 enum class Interpolation : std::uint8_t {
-  /// The nearest vertex, also outside the hull; of equally near vertices the lexicographically
-  /// smallest.
+  /// The nearest vertex, also outside the hull. Of equally near vertices it is the
+  /// lexicographically smallest.
   kNearest,
   /// Barycentric coordinates in the triangle.
   kLinear,
@@ -85,8 +85,8 @@ struct VertexWeight {
 /// Computes the weights of the vertices that interpolate at a query. They are >= 0, their sum is 1,
 /// and (except with kNearest) the weighted mean of the vertices is the query. There are none
 /// outside the hull (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as
-/// inside, decided exactly; if all points are collinear, the hull is the segment between the
-/// outermost ones. On a vertex only that vertex has a weight; on a hull edge only its two ends have
+/// inside, decided exactly. If all points are collinear, the hull is the segment between the
+/// outermost ones. On a vertex only that vertex has a weight. On a hull edge only its two ends have
 /// one.
 ///
 /// The triangles that a query affects are found exactly. Weights are computed in double. If the
@@ -104,7 +104,7 @@ void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Inte
 /// Returns the heights at many queries, in their order. A height is NaN if there are no weights or
 /// if a vertex with a weight has the height NaN. Queries are sorted along a Hilbert curve
 /// internally, so pass many at once: they take about 0.4 us each on one core. threads: 0 for one
-/// per core; the result does not depend on it. Memory: 16 bytes per query, for at most 2^24 queries
+/// per core. The result does not depend on it. Memory: 16 bytes per query, for at most 2^24 queries
 /// at a time.
 ///
 /// Throws std::invalid_argument, naming the index, for a query that is not finite, and if an array
@@ -130,7 +130,7 @@ enum class GradientFrom : std::uint8_t {
   kNaturalNeighbours,
 };
 
-/// Returns the gradients at many queries; otherwise like heights_at(). Gradients are undefined
+/// Returns the gradients at many queries. Otherwise like heights_at(). Gradients are undefined
 /// outside the hull, and everywhere if all points are collinear.
 template <class Coord>
 std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const Heights& heights,
@@ -142,7 +142,7 @@ std::vector<Gradient> gradients_at(const Delaunay2<Coord>& triangulation, const 
 [[nodiscard]] double slope_degrees(const Gradient& gradient);
 
 /// The direction of steepest descent in degrees clockwise from north (+y), so east (+x) is 90. 0 <=
-/// aspect < 360; NaN if the surface is level.
+/// aspect < 360, or NaN if the surface is level.
 [[nodiscard]] double aspect_degrees(const Gradient& gradient);
 
 #define TERRACE_TRI_DECLARE(Coord)                                                                \

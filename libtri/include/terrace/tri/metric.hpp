@@ -23,7 +23,7 @@
 namespace terrace::tri {
 
 /// A linear map, row-major. A map that is a metric is finite and invertible. Maps that differ by a
-/// rotation, a reflection or a factor give the same triangulation; the usual choice is a symmetric
+/// rotation, a reflection or a factor give the same triangulation. The usual choice is a symmetric
 /// positive definite map.
 template <std::size_t Dimension>
 using LinearMap = std::array<double, Dimension * Dimension>;
@@ -39,7 +39,7 @@ inline constexpr LinearMap<Dimension> kIdentityMap = [] {
 
 /// Returns the symmetric map of the ellipse with semi-axis `a` along the direction `angle_degrees`,
 /// counter-clockwise from +x, and `b` across it, both in the unit of the points. The off-diagonal
-/// entry is therefore (1/a - 1/b) sin cos; equation 4.5 of the thesis, as printed, has the angle
+/// entry is therefore (1/a - 1/b) sin cos. Equation 4.5 of the thesis, as printed, has the angle
 /// clockwise. Throws std::invalid_argument for a semi-axis that is not positive and finite or whose
 /// reciprocal is infinite, and for an angle that is not finite.
 [[nodiscard]] LinearMap2 ellipse_map(double a, double b, double angle_degrees);
@@ -47,7 +47,7 @@ inline constexpr LinearMap<Dimension> kIdentityMap = [] {
 /// machine's sine. Throws as above, and if their squares do not add up to 1 within 1e-9.
 [[nodiscard]] LinearMap2 ellipse_map(double a, double b, const std::array<double, 2>& direction);
 /// Returns the map of the plane that measures vectors with z = 0 as the given map of space does. It
-/// is the upper left part of that map, bit for bit, if the map leaves z alone; otherwise it is a
+/// is the upper left part of that map, bit for bit, if the map leaves z alone. Otherwise it is a
 /// triangular map, rounded. Throws std::invalid_argument if the result is not finite or not
 /// invertible.
 [[nodiscard]] LinearMap2 plane_map(const LinearMap3& map);
@@ -59,7 +59,7 @@ inline constexpr LinearMap<Dimension> kIdentityMap = [] {
 [[nodiscard]] LinearMap3 ellipsoid_map(const std::array<double, 3>& semi_axes,
                                        const LinearMap3& axes = kIdentityMap<3>);
 
-/// Throws std::invalid_argument if the map is not a metric; the message calls it `what`. Exact.
+/// Throws std::invalid_argument if the map is not a metric. The message calls it `what`. Exact.
 void check_metric(const LinearMap2& map, const std::string& what);
 void check_metric(const LinearMap3& map, const std::string& what);
 
@@ -67,7 +67,7 @@ void check_metric(const LinearMap3& map, const std::string& what);
 [[nodiscard]] double metric_length(const LinearMap3& map, const std::array<double, 3>& vector);
 
 /// The elliptical metric of a triangulation. Pass it as the second template argument and to the
-/// constructor; metric().map() returns the map:
+/// constructor. metric().map() returns the map:
 ///
 ///   Delaunay2<double, EllipticalMetric2> slanted(ellipse_map(4, 1, 30));
 ///
@@ -89,7 +89,7 @@ void check_metric(const LinearMap3& map, const std::string& what);
 ///   equal;
 /// - build_grid() does not exist because the triangles of a grid depend on the metric.
 /// In space, filters decide nearly always as long as the semi-axes differ by a factor of at most
-/// some thousands; beyond about 2^28 exact tests decide everything, slowly.
+/// some thousands. Beyond about 2^28 exact tests decide everything, slowly.
 template <std::size_t Dimension>
 class EllipticalMetric {
  public:
@@ -119,7 +119,7 @@ class MetricField {
   using Point = std::array<double, Dimension>;
   using Map = LinearMap<Dimension>;
   struct Region {
-    /// Closed; infinite sides are allowed. In the plane only x and y count, see box2().
+    /// Closed. Infinite sides are allowed. In the plane only x and y count, see box2().
     Box3 box;
     Map map = kIdentityMap<Dimension>;
   };
@@ -145,7 +145,7 @@ using MetricField3 = MetricField<3>;
 extern template class MetricField<2>;
 extern template class MetricField<3>;
 
-/// Selects triangles of a triangulation; an empty filter selects all of them.
+/// Selects triangles of a triangulation. An empty filter selects all of them.
 using TriangleFilter = std::function<bool(TriangleId)>;
 
 /// Returns the triangles of a triangulation after flipping edges to suit a field of metrics (7.4,
@@ -168,21 +168,21 @@ using TriangleFilter = std::function<bool(TriangleId)>;
 /// metric has decreased. No particular order and no guard against cycles is needed. In-circle tests
 /// are exact on the given coordinates.
 ///
-/// takes_part: triangles for which it returns false are left out beforehand, such as those over
+/// filter: triangles for which it returns false are left out beforehand, such as those over
 /// areas without data, and the edges next to them stay. The result covers the other triangles, has
 /// as many triangles, and the guarantees apply to these. Called once for each triangle. window:
-/// leaves out the triangles whose bounding box does not meet it; only x and y count.
+/// leaves out the triangles whose bounding box does not meet it. Only x and y count.
 ///
 /// Throws std::invalid_argument if the field returns a map at a vertex that is not a metric, and
 /// whatever the field throws. The map is evaluated once per vertex of these triangles. O(n) plus
-/// the flips; O(n^2) flips are possible, but there are few unless ellipses are extreme. Needs about
+/// the flips. O(n^2) flips are possible, but there are few unless ellipses are extreme. Needs about
 /// 120 bytes per vertex while it runs, including the result.
 ///
 /// Triangulation: any Delaunay2, also one of a MultiresolutionModel.
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field,
-    const TriangleFilter& takes_part = {}, const base::StopCheck& check_stop = {});
+    const TriangleFilter& filter = {}, const base::StopCheck& check_stop = {});
 template <class Triangulation>
 [[nodiscard]] std::vector<std::array<VertexId, 3>> metric_triangles(
     const Triangulation& triangulation, const MetricField2& field, const Box3& window);

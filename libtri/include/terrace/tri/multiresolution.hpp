@@ -22,8 +22,8 @@
 /// A triangulation whose detail is raised and lowered by expanding and collapsing the clusters of a
 /// hierarchy, and the interface through which it reads that hierarchy from any storage.
 ///
-/// Level 0 is full resolution; levels grow coarser upward to the top. A cluster of level L is
-/// headed by one point whose highest level is above L; its members are points whose highest level
+/// Level 0 is full resolution. Levels grow coarser upward to the top. A cluster of level L is
+/// headed by one point whose highest level is above L. Its members are points whose highest level
 /// is exactly L. A point of highest level h heads one cluster on every level below h. The points of
 /// the top level are the members of the root, which has no head.
 
@@ -45,7 +45,7 @@ struct PointId {
 
 /// Returns true if `a` rather than `b` represents a vertex that both points share: the point of the
 /// higher level does, then the one with the smaller id.
-constexpr bool stands_before(const PointId& a, const PointId& b) {
+constexpr bool takes_precedence(const PointId& a, const PointId& b) {
   const unsigned la = level_of(a.cluster), lb = level_of(b.cluster);
   return la != lb ? la > lb : a < b;
 }
@@ -53,7 +53,7 @@ constexpr bool stands_before(const PointId& a, const PointId& b) {
 /// Facts about a cluster that are known before its members are read.
 struct ClusterRecord {
   Box3 box;  ///< of all descendants down to level 0, including the head
-  /// ground metres; upper bound of the distance of any descendant from the head
+  /// upper bound of the distance of any descendant from the head, in ground metres
   double error = 0.0;
   std::uint64_t members = 0;  ///< number of members that read() will deliver
 
@@ -65,12 +65,12 @@ struct ClusterRecord {
 /// The members of a cluster, in the order that defines their ids. They are inserted in this order.
 /// An order in which neighbours follow each other (row by row for rasters, a k-d tree's for clouds)
 /// is 1.2 to 1.6 times as fast as a random one, and about as fast as a Hilbert curve. A member of
-/// level L has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1;
-/// those of member i start at children[i * L]. The spans are valid until the next call of read().
+/// level L has L `children`: the ordinals of the clusters that it heads on levels 0, 1, ... L - 1.
+/// Those of member i start at children[i * L]. The spans are valid until the next call of read().
 struct ClusterMembers {
   std::span<const Point3> positions;
   std::span<const std::uint64_t> children;
-  /// Other data of the members, the same number of bytes for each. The model ignores it; a view
+  /// Other data of the members, the same number of bytes for each. The model ignores it. A view
   /// keeps it with the cluster.
   std::span<const std::byte> values{};
 };
@@ -81,9 +81,9 @@ class ClusterSource {
  public:
   virtual ~ClusterSource() = default;
 
-  /// The level of the root, cluster_id(top(), 0); 0 if all points are on one level.
+  /// The level of the root, cluster_id(top(), 0), or 0 if all points are on one level.
   [[nodiscard]] virtual unsigned top() const = 0;
-  /// Number of clusters of a level below the top; their ordinals are 0 .. cluster_count - 1.
+  /// Number of clusters of a level below the top. Their ordinals are 0 .. cluster_count - 1.
   [[nodiscard]] virtual std::uint64_t cluster_count(unsigned level) const = 0;
   /// Never called for the root.
   virtual ClusterRecord record(ClusterId id) = 0;
@@ -133,7 +133,7 @@ struct ModelOptions {
 };
 
 /// A triangulation of a hierarchy of clusters that is coarse in some places and fine in others. The
-/// points of the top level are always present; expanding a cluster adds its members, collapsing it
+/// points of the top level are always present. Expanding a cluster adds its members, collapsing it
 /// removes them again. Source: J. Skala, Algorithms for manipulating large geometric data, chapter
 /// 8.
 ///
@@ -151,11 +151,11 @@ struct ModelOptions {
 /// unchanged. After std::bad_alloc during a step the model can only be destroyed.
 ///
 /// Memory, besides the triangulation: 16 bytes per vertex, 4 per member and 48 per expanded
-/// cluster; more for points above level 0. With clusters of 140 members this is about 21 bytes per
-/// vertex.
+/// cluster, and more for points above level 0. With clusters of 140 members this is about 21 bytes
+/// per vertex.
 ///
-/// Triangulation: Delaunay2 or Delaunay3, in any metric; RegionalDelaunay2, with a metric per
-/// region; DynamicSurface or PointCloud.
+/// Triangulation: Delaunay2 or Delaunay3 in any metric, RegionalDelaunay2 with a metric per region,
+/// DynamicSurface, or PointCloud.
 template <class Triangulation>
 class MultiresolutionModel {
  public:
@@ -207,7 +207,7 @@ class MultiresolutionModel {
   const Delta& set_level(unsigned level) { return set_detail({level, {}}); }
 
   /// Combines several steps into one. Until close_step() the functions above change the
-  /// triangulation at once, but their return values have no meaning; close_step() returns the
+  /// triangulation at once, but their return values have no meaning. close_step() returns the
   /// combined delta. `reassigned` may include an unchanged vertex whose point was removed and added
   /// again in between.
   void open_step();
@@ -243,7 +243,7 @@ class MultiresolutionModel {
   void children(ClusterId cluster, std::vector<ClusterId>& clusters) const;
   /// The vertex of the point that heads a cluster that is expanded or can be.
   [[nodiscard]] VertexId head_vertex(ClusterId cluster) const;
-  /// The record of such a cluster; asks the source once.
+  /// The record of such a cluster. Asks the source once.
   [[nodiscard]] const ClusterRecord& record(ClusterId cluster);
 
   /// Memory in bytes besides the triangulation.
@@ -260,7 +260,7 @@ class MultiresolutionModel {
 /// The model of points in the plane: std::int32_t for rasters in column and row, otherwise double.
 template <class Coord, class Metric = Euclidean>
 using Multiresolution2 = MultiresolutionModel<Delaunay2<Coord, Metric>>;
-/// The model of points in space, with tetrahedra instead of triangles; the height of a vertex is
+/// The model of points in space, with tetrahedra instead of triangles. The height of a vertex is
 /// its z. For points scanned from a surface, MultiresolutionModel<DynamicSurface<Coord>> also
 /// maintains the surface.
 template <class Coord, class Metric = Euclidean>

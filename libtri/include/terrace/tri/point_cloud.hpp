@@ -15,7 +15,7 @@ namespace terrace::tri {
 /// needs only the points, such as a laser cloud on a screen. Equal points are separate vertices.
 /// About 30 bytes per point.
 ///
-/// Handles are as in Delaunay2; members of the same name do the same.
+/// Handles are as in Delaunay2. Members of the same name do the same.
 class PointCloud {
  public:
   using Point = Point3;
@@ -36,7 +36,7 @@ class PointCloud {
   PointCloud& operator=(PointCloud&&) noexcept;
 
   /// build() and insert() throw std::invalid_argument, naming the index, if a coordinate is not
-  /// finite, and std::length_error beyond 2^29 - 2 points; the object is then unchanged.
+  /// finite, and std::length_error beyond 2^29 - 2 points. The object is then unchanged.
   std::vector<VertexId> build(std::span<const Point> points);
   void insert(std::span<const Point> points, std::span<Insertion> results,
               VertexId hint = kNoVertex);
@@ -55,7 +55,7 @@ class PointCloud {
   [[nodiscard]] std::size_t memory_bytes() const;
 
   void start_journal();
-  /// A point that was added and removed between two calls is in neither list; a reused slot is in
+  /// A point that was added and removed between two calls is in neither list. A reused slot is in
   /// both.
   void take_changes(Changes& changes);
 

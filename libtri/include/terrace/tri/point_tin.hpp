@@ -47,8 +47,8 @@ struct PointTinOptions {
   TinQuality quality = TinQuality::kRemoval;
   PointDuplicates duplicates = PointDuplicates::kFirst;
   /// Maximum number of vertices, including those of the frame (or the hull's corners), which are
-  /// never dropped; 0: no limit. If it is reached first, max_error is exceeded and PointTin::errors
-  /// reports by how much.
+  /// never dropped. 0 means no limit. If it is reached first, max_error is exceeded and
+  /// PointTin::errors reports by how much.
   std::size_t max_points = 0;
   /// Removal does not create triangles with a smaller angle in the plane unless they are Delaunay.
   /// 0 to 30.
@@ -70,7 +70,7 @@ struct TinErrors {
   std::size_t uncovered = 0;  ///< all other samples, which are not measured
   double largest = 0;
   double rms = 0;
-  /// A sample with the largest error; measure_surface() reports the one with the least x, y, z.
+  /// A sample with the largest error. measure_surface() reports the one with the least x, y, z.
   std::uint32_t largest_at = kNoSample;
 };
 
@@ -79,7 +79,7 @@ struct PointTin {
   /// The sample from which each vertex was made, parallel to `vertices`.
   std::vector<std::uint32_t> sample;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertices, counter-clockwise
-  /// Errors of all samples after duplicates were merged; with kAll those of the lowest and the
+  /// Errors of all samples after duplicates were merged. With kAll those of the lowest and the
   /// highest sample of each position. errors.largest <= max_error, unless max_points was reached or
   /// samples are `stuck`.
   TinErrors errors;
@@ -100,13 +100,13 @@ struct PointTin {
 /// vertices, several of which may be on one straight side. Its vertices and sides are kept exactly
 /// as given. Samples inside and on the sides are covered. Samples outside, however close, are
 /// counted as uncovered and have no influence. Without a frame the region is the convex hull of the
-/// samples: its corners are vertices, so every sample is covered; other samples on the hull's
+/// samples: its corners are vertices, so every sample is covered. Other samples on the hull's
 /// boundary become vertices only where the error requires it. Fewer than 3 samples, or collinear
 /// samples, have no surface: the result has no vertices and all samples are uncovered.
 ///
 /// The result depends only on the arguments and has the same bytes on every machine. The order of
 /// samples at different positions does not matter. Runs in one thread. Takes about n log n time for
-/// n samples: on a processor of 2024, 0.3 us per sample and 1.3 us per vertex inserted; with
+/// n samples: on a processor of 2024, 0.3 us per sample and 1.3 us per vertex inserted. With
 /// removal 0.7 us per vertex inserted and 1 us more to try to remove it. Memory: 36 bytes per
 /// sample and about 100 per vertex inserted, including the result.
 ///
@@ -115,8 +115,8 @@ struct PointTin {
 ///
 /// Throws std::invalid_argument, naming the index, for a coordinate or height that is not finite or
 /// above 1e100 in absolute value, for a frame vertex where the polygon is not convex, and for a
-/// duplicate with kError; also for options out of range and arrays of different lengths. Throws
-/// std::length_error for more than 2^29 samples.
+/// duplicate with kError. Throws it also for options out of range and arrays of different lengths.
+/// Throws std::length_error for more than 2^29 samples.
 [[nodiscard]] PointTin point_tin(std::span<const double> x, std::span<const double> y,
                                  std::span<const double> z, std::span<const Point3> frame,
                                  const PointTinOptions& options);
@@ -125,7 +125,7 @@ struct PointTin {
 struct SampleRows {
   std::span<const double> x;  ///< one per column
   std::span<const double> y;  ///< one per row
-  std::span<const double> z;  ///< row by row; NaN: missing
+  std::span<const double> z;  ///< row by row. NaN means missing
 };
 
 /// Samples on an approximately regular grid, such as a raster in another projection. The sample
@@ -155,7 +155,7 @@ struct SampleGrid {
 
 /// Measures samples against any surface whose triangles do not overlap, however it was made.
 /// Measures every one of several samples at the same position. Finds the triangle of each sample
-/// through a raster of cells and exact predicates; computes heights in extended precision. O(n +
+/// through a raster of cells and exact predicates. Computes heights in extended precision. O(n +
 /// triangles) for well-shaped surfaces. Throws std::invalid_argument for arrays of different
 /// lengths and for a triangle with a vertex that does not exist.
 [[nodiscard]] TinErrors measure_surface(std::span<const double> x, std::span<const double> y,
@@ -170,7 +170,7 @@ struct LineVertex {
 };
 
 struct SimplifiedLine {
-  std::vector<LineVertex> vertices;  ///< ascending in t; the first and the last are the ends
+  std::vector<LineVertex> vertices;  ///< ascending in t. The first and the last are the ends
   double largest_error = 0;          ///< of all samples; exceeds max_error only on a lattice
 };
 
@@ -178,13 +178,13 @@ struct SimplifiedLine {
 /// two ends and repeatedly adds the sample of greatest error (the first on ties). It depends only
 /// on these samples, so both sides of a border get the same chain.
 ///
-/// t: positions along the line, ascending; the first of several samples at one position counts. On
+/// t: positions along the line, ascending. The first of several samples at one position counts. On
 /// a lattice, t and heights of vertices are rounded as in point_tin(). Errors are measured at the
-/// true positions; if a position on the lattice is taken, the error may stay above max_error.
+/// true positions. If a position on the lattice is taken, the error may stay above max_error.
 ///
 /// Throws std::invalid_argument, naming the index, for a t that descends and for a value that is
-/// not finite; also for max_error < 0 and arrays of different lengths. Without samples there are no
-/// vertices. Usually O(n log n), at worst O(n^2).
+/// not finite. Throws it also for max_error < 0 and arrays of different lengths. Without samples
+/// there are no vertices. Usually O(n log n), at worst O(n^2).
 [[nodiscard]] SimplifiedLine simplify_line(std::span<const double> t,
                                            std::span<const double> heights, double max_error,
                                            const std::optional<TinLattice>& lattice = {},

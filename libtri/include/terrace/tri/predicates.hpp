@@ -6,7 +6,7 @@
 #include "terrace/tri/interpolation.hpp"
 
 /// The exact tests on which Delaunay2<double> is built, for programs that find single triangles of
-/// a set of points without triangulating it. They take some nanoseconds each; ties and near ties,
+/// a set of points without triangulating it. They take some nanoseconds each. Ties and near ties,
 /// which exact numbers decide, take up to a microsecond.
 
 namespace terrace::tri {

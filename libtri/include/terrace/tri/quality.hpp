@@ -10,7 +10,7 @@
 #include "terrace/tri/interpolation.hpp"
 
 /// Quality measures of a triangulation and of the surface on it. Angles, aspects and edges are
-/// measured in the plane, where the triangulation is Delaunay. Computed in double; lengths whose
+/// measured in the plane, where the triangulation is Delaunay. Computed in double. Lengths whose
 /// squares overflow give infinities.
 
 namespace terrace::tri {
@@ -20,9 +20,9 @@ struct TriangleQuality {
   /// The longest edge over 2 sqrt(3) times the radius of the inscribed circle: 1 for an equilateral
   /// triangle, larger for all others.
   double aspect = 1;
-  std::array<double, 3> edges{};  ///< lengths; edge i is opposite to corner i
+  std::array<double, 3> edges{};  ///< lengths. Edge i is opposite to corner i
   double area = 0;                ///< in the plane
-  double surface_area = 0;        ///< of the sloping triangle; NaN if a height is NaN
+  double surface_area = 0;        ///< of the sloping triangle, or NaN if a height is NaN
   double volume_above = 0;        ///< below the surface and above the datum; NaN if a height is NaN
   double volume_below = 0;        ///< above the surface and below the datum, >= 0; NaN if a height
                                   ///< is NaN
@@ -74,7 +74,7 @@ struct VerticalDistances {
 };
 
 /// Measures how far points that are not in the triangulation are above or below its surface.
-/// `threads` and errors are as in heights_at(); the result does not depend on the number of
+/// `threads` and errors are as in heights_at(). The result does not depend on the number of
 /// threads.
 template <class Coord>
 VerticalDistances vertical_distances(const Delaunay2<Coord>& triangulation, const Heights& heights,

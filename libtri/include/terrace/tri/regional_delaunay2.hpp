@@ -19,16 +19,16 @@ namespace terrace::tri {
 ///
 ///   MultiresolutionModel<RegionalDelaunay2<double>> model(source, {}, {}, field);
 ///
-/// Points are inserted into and removed from the Euclidean triangulation, plain(), immediately;
+/// Points are inserted into and removed from the Euclidean triangulation, plain(), immediately.
 /// follow() then updates the triangles. They are a function of the points and the field alone,
 /// whatever the history.
 ///
 /// follow() works as follows. Where plain() loses triangles, the triangles over them are flipped
 /// back to those of plain(), exchanged, and flipped as the metric of their region requires. It
-/// examines only the surroundings of a change; flips are few unless ellipses are extreme.
+/// examines only the surroundings of a change. Flips are few unless ellipses are extreme.
 ///
 /// Vertex handles are those of plain(). A triangle that exists before and after a call of follow()
-/// keeps its handle; triangle handles differ from those of plain(). Memory: 90 bytes per vertex
+/// keeps its handle. Triangle handles differ from those of plain(). Memory: 90 bytes per vertex
 /// besides plain().
 ///
 /// Coord: as in Delaunay2.
@@ -46,9 +46,9 @@ class RegionalDelaunay2 {
   RegionalDelaunay2(RegionalDelaunay2&&) noexcept;
   RegionalDelaunay2& operator=(RegionalDelaunay2&&) noexcept;
 
-  /// As in Delaunay2; the triangles are up to date on return. build() and insert() also throw
+  /// As in Delaunay2. The triangles are up to date on return. build() and insert() also throw
   /// std::invalid_argument if the field returns a map at a point that is not a metric, and whatever
-  /// the field throws; the object is then unchanged. The field is evaluated once per point.
+  /// the field throws. The object is then unchanged. The field is evaluated once per point.
   std::vector<VertexId> build(std::span<const Point> points);
   /// As in Delaunay2. Until follow() is called the triangles stay as they were, and may have
   /// corners that no longer exist.

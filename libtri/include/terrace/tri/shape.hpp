@@ -15,7 +15,7 @@
 #include "terrace/tri/metric.hpp"
 
 /// Reconstructs the non-convex shape of points scanned from a surface. Delaunay tetrahedra fill the
-/// convex hull; those inside the shape are kept, and their outer facets are the surface. Either the
+/// convex hull. Those inside the shape are kept, and their outer facets are the surface. Either the
 /// angles between circumspheres decide about every tetrahedron (ShapeRule::kPoles), or the
 /// tetrahedra outside are peeled off, starting from the hull (J. Skala's thesis, section 8.3).
 ///
@@ -80,7 +80,7 @@ enum class ShapeRule : std::uint8_t {
   /// deeply their circumspheres overlap. The defect of the statement "on the same side" is 1 - cos
   /// of the angle between the directions from a corner to their circumcentres. At a vertex the two
   /// poles, the largest circumspheres on opposite sides (N. Amenta, M. Bern,
-  /// doi:10.1007/PL00009475), are on different sides; the defect of that statement is 2 (1 + cos)
+  /// doi:10.1007/PL00009475), are on different sides. The defect of that statement is 2 (1 + cos)
   /// of the angle between the directions to them. The space beyond the hull takes part with
   /// half-spaces as spheres. A spanning forest of least defect connects all tetrahedra with that
   /// space and determines the side of each.
@@ -122,17 +122,17 @@ struct ShapeOptions {
   /// a removal that would take a vertex's last tetrahedron. After the flood rule, tetrahedra are
   /// put back until every vertex has one. Each time the candidate with the shortest longest edge is
   /// put back (on ties the lexicographically first, corners sorted). Candidates have a vertex
-  /// without tetrahedra and share a facet with a kept tetrahedron; if there are none, sharing a
+  /// without tetrahedra and share a facet with a kept tetrahedron. If there are none, sharing a
   /// facet is not required.
   bool keep_vertices = true;
 };
 
 struct ShapeSurface {
   Surface surface;
-  std::vector<VertexId> vertices;     ///< the vertex of each point of the surface, sorted by slot
-  std::vector<TetrahedronId> behind;  ///< the kept tetrahedron behind each face
-  bool open = false;                  ///< lids were left out
-  std::size_t lids = 0;               ///< number found by surface_without_lids()
+  std::vector<VertexId> vertices;  ///< the vertex of each point of the surface, sorted by slot
+  std::vector<TetrahedronId> tetrahedra;  ///< the kept tetrahedron behind each face
+  bool open = false;                      ///< lids were left out
+  std::size_t lids = 0;                   ///< number found by surface_without_lids()
 };
 
 /// The parts of a surface after separating it where solids touch in an edge or a vertex.
@@ -145,7 +145,7 @@ struct ShapeParts {
 /// changes. They are a function of the point set and the options, whatever the history of the
 /// triangulation and of this object.
 ///
-/// Needs one byte per tetrahedron slot and four per vertex slot. Triangulation: any Delaunay3; see
+/// Needs one byte per tetrahedron slot and four per vertex slot. Triangulation: any Delaunay3. See
 /// Shape3 below.
 ///
 /// In an elliptical metric the tetrahedra are those of the metric, and smallest spheres are its
@@ -164,7 +164,7 @@ class BasicShape3 {
   BasicShape3& operator=(BasicShape3&&) noexcept;
 
   /// Computes the shape from scratch. The result does not depend on the number of threads (0: one
-  /// per core); only the poles rule uses more than one. Poles: O(n log n). Flood: O(n) facet tests,
+  /// per core). Only the poles rule uses more than one. Poles: O(n log n). Flood: O(n) facet tests,
   /// about twice as many as removed tetrahedra, and O(m log m) for m tetrahedra at vertices that
   /// the flood has lost.
   /// After check_stop has thrown, the shape can only be restored or destroyed.
@@ -184,21 +184,21 @@ class BasicShape3 {
 
   /// Like update(), but applies the poles rule at a cost that depends on the changes, for
   /// interactive use. It repeats the first step only for the new tetrahedra and their neighbours,
-  /// and the other two for those between their corners; all others keep their labels. That is exact
+  /// and the other two for those between their corners. All others keep their labels. That is exact
   /// unless the change affects tetrahedra farther away, which happens in pockets with weak
   /// evidence. To correct these, call restore() from time to time or before saving. Other rules:
   /// calls update().
   void update_nearby(const Triangulation& triangulation,
                      const typename Triangulation::Changes& changes);
 
-  /// Accepts any handle; false for handles not in use.
+  /// Accepts any handle. Returns false for handles not in use.
   [[nodiscard]] bool kept(TetrahedronId tetrahedron) const;
   /// Number of kept tetrahedra. O(1).
   [[nodiscard]] std::size_t kept_count() const;
   /// Number of tetrahedra put back after the flood to give a vertex one.
   [[nodiscard]] std::size_t rescued_count() const;
   /// The vertices, sorted by slot, that the rule loses. Poles: vertices that are not on the
-  /// surface. Other rules: vertices that the rule by itself leaves without a tetrahedron; with
+  /// surface. Other rules: vertices that the rule by itself leaves without a tetrahedron. With
   /// keep_vertices and the flood rule, those that were given one back. Empty while there are no
   /// tetrahedra.
   [[nodiscard]] std::vector<VertexId> lost_vertices() const;
@@ -207,7 +207,7 @@ class BasicShape3 {
 
   /// The facets between kept tetrahedra and the outside, counter-clockwise seen from outside. Every
   /// edge is in as many of them in one direction as in the other, so the surface is closed. Where
-  /// kept tetrahedra meet only in an edge, that edge is in four or more faces; where they meet only
+  /// kept tetrahedra meet only in an edge, that edge is in four or more faces. Where they meet only
   /// in a vertex, the surface touches itself there. Faces are sorted by the slot of their
   /// tetrahedron. O(slots).
   [[nodiscard]] ShapeSurface surface(const Triangulation& triangulation) const;
@@ -215,7 +215,7 @@ class BasicShape3 {
   /// closes the areas that were not scanned. A face is a lid if one of its edges is more than 10
   /// times as long as the spacing at each of its corners, which is the third shortest edge of the
   /// triangulation there. If lids are more than a tenth of the area, the scan is open and they are
-  /// left out; otherwise the surface is complete. Lengths and areas are those of the metric.
+  /// left out. Otherwise the surface is complete. Lengths and areas are those of the metric.
   /// O(slots).
   [[nodiscard]] ShapeSurface surface_without_lids(const Triangulation& triangulation) const;
   /// The parts of this shape's surface, with or without lids. Where four or more faces meet in an
@@ -244,7 +244,7 @@ extern template class BasicShape3<Delaunay3<double, EllipticalMetric3>>;
 struct RestoreOptions {
   ShapeOptions shape;
   /// 0 triangulates the points unchanged. 1 to 30 rounds the points to integers of this many bits
-  /// over the longest side of their bounding box, which is faster; 24 is finer than a float. The
+  /// over the longest side of their bounding box, which is faster. 24 is finer than a float. The
   /// first of several points that coincide after rounding represents them. The surface always has
   /// the given coordinates.
   unsigned quantise_bits = 0;
@@ -261,7 +261,7 @@ struct RestoredSurface {
   /// The input index of each point of the surface.
   std::vector<std::size_t> input{};
   /// Points that are not a corner of any face. A point that coincides with another counts with it.
-  std::size_t points_off = 0;
+  std::size_t unused_points = 0;
   /// True if the scan is open, so that the lids over areas that were not scanned were left out
   /// (poles rule only), see BasicShape3::surface_without_lids().
   bool open = false;
@@ -270,7 +270,7 @@ struct RestoredSurface {
 };
 
 /// Returns the surface from which the points were scanned. It has no faces if all points (after any
-/// rounding) are in one plane; duplicates do not matter. A function of the points, their order and
+/// rounding) are in one plane. Duplicates do not matter. A function of the points, their order and
 /// the options.
 ///
 /// Throws std::invalid_argument, naming the index, for a point that is not finite, and for options

@@ -52,11 +52,11 @@ struct HeightChange {
 ///
 /// A neighbour's weight is the length of the common side of the two Voronoi cells divided by the
 /// distance in the plane. kLaplacian and kTaubin therefore preserve planes, however irregular the
-/// points; kBilateral does so where neighbours are placed symmetrically, as on grids. kLaplacian
+/// points. kBilateral does so where neighbours are placed symmetrically, as on grids. kLaplacian
 /// and kBilateral never leave the range of heights in the region.
 ///
 /// Each iteration reads only the heights of the previous one, so the order of vertices does not
-/// matter. Time O(vertices of the region * iterations); memory: 16 bytes per edge of the region.
+/// matter. Time O(vertices of the region * iterations). Memory: 16 bytes per edge of the region.
 ///
 /// Throws std::invalid_argument for options that are out of range or would make heights grow
 /// without bound, for a height in the region that is not finite, and if an array of heights is

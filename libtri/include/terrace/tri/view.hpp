@@ -18,7 +18,7 @@
 
 namespace terrace::tri {
 
-/// The half space normal . p + offset >= 0; the normal has length 1.
+/// The half space normal . p + offset >= 0. The normal has length 1.
 struct Plane {
   Point3 normal{};
   double offset = 1.0;
@@ -28,17 +28,17 @@ struct Plane {
 /// the four sides of the picture and the plane through the eye. There is no far plane.
 struct Camera {
   bool perspective = true;
-  /// Perspective: the eye. Orthographic: a point on the axis of view; clusters out of view are
+  /// Perspective: the eye. Orthographic: a point on the axis of view. Clusters out of view are
   /// collapsed in order of their distance from it, the farthest first.
   Point3 position{};
   Point3 direction{};  ///< axis of view, length 1
   std::array<Plane, 5> planes{};
   /// Pixels per ground unit: at distance 1 (perspective), or anywhere (orthographic).
   double pixels = 1.0;
-  double height = 1.0;  ///< of the picture in ground units; orthographic only
+  double height = 1.0;  ///< of the picture, in ground units (orthographic only)
 };
 
-/// Position and viewing direction of a camera. `up` must not be parallel to `direction`; neither
+/// Position and viewing direction of a camera. `up` must not be parallel to `direction`. Neither
 /// needs to have length 1.
 struct Pose {
   Point3 position{};
@@ -64,7 +64,7 @@ struct ErrorRegion {
   double error = 0.0;  ///< ground units
 };
 
-/// The wanted detail. Each part asks for some clusters; a cluster is wanted if any of them asks for
+/// The wanted detail. Each part asks for some clusters. A cluster is wanted if any of them asks for
 /// it.
 struct View {
   /// A cluster in view is wanted if its error may appear as more than `pixel_error` pixels. The
@@ -111,7 +111,7 @@ struct ViewOptions {
   /// perpendicular to a line of sight, as a fraction of View::pixel_error. 1: all are treated
   /// alike.
   double silhouette = 1.0;
-  /// Returns the normals of a cluster; called once, when its parent is expanded. Empty:
+  /// Returns the normals of a cluster. Called once, when its parent is expanded. Empty:
   /// terrain_cone().
   std::function<NormalCone(ClusterId, const ClusterRecord&)> cone;
   ModelOptions model;
@@ -125,10 +125,10 @@ struct StepBudget {
   /// Checked by `clock` between clusters. A cluster is left for the next step if, judging by
   /// previous ones, it would not be finished in time.
   double seconds = std::numeric_limits<double>::infinity();
-  /// Seconds since any fixed moment; required if `seconds` is finite.
+  /// Seconds since any fixed moment. Required if `seconds` is finite.
   std::function<double()> clock;
-  /// Seconds that the caller needs after the step for each point added and for each point removed;
-  /// the step leaves this time unused.
+  /// Seconds that the caller needs after the step for each point added and for each point removed.
+  /// The step leaves this time unused.
   std::array<double, 2> after{};
 };
 
@@ -141,24 +141,24 @@ class StepMeter {
 
   void start(const StepBudget& budget);
   /// True if one more operation on this many points may begin, because it fits or is the first one.
-  [[nodiscard]] bool has(std::size_t points, std::size_t kind = kExpand) const {
+  [[nodiscard]] bool has_time(std::size_t points, std::size_t kind = kExpand) const {
     return operations_ == 0 || fits(points, kind);
   }
   /// True if one more operation on this many points fits.
   [[nodiscard]] bool fits(std::size_t points, std::size_t kind = kExpand) const;
   /// The same for an operation whose number of points is not known yet.
-  [[nodiscard]] bool has_usual(std::size_t kind) const {
-    return has(static_cast<std::size_t>(usual_points_[kind]), kind);
+  [[nodiscard]] bool has_time_for_usual(std::size_t kind) const {
+    return has_time(static_cast<std::size_t>(usual_points_[kind]), kind);
   }
-  /// True if so much time has passed since the last operation that work which only prepares later
-  /// steps should wait. Asks the clock.
-  [[nodiscard]] bool dwelt() const { return timed_ && now() - last_ > kDwell * budget_->seconds; }
+  /// True if so much time has passed since the last operation that work for later steps should
+  /// wait. Reads the clock.
+  [[nodiscard]] bool is_late() const { return timed_ && now() - last_ > kDwell * budget_->seconds; }
   /// Call after each operation.
   void spend(std::size_t points, std::size_t kind = kExpand);
   /// Call before the first operation.
-  void ready() { last_ = now(); }
+  void start_operations() { last_ = now(); }
   /// Call after the work that takes about as long in each step, whatever the step changes.
-  void fixed();
+  void end_fixed_work();
   /// Call at the end of the step.
   void end();
 
@@ -181,14 +181,14 @@ class StepMeter {
 };
 
 /// A cluster as delivered by its loader.
-struct GivenCluster {
+struct LoadedCluster {
   ClusterId cluster{};
   /// As in ClusterMembers.
   std::vector<Point3> positions;
   std::vector<std::uint64_t> children;
   std::vector<std::byte> values{};
   /// Above level 0: the records of the clusters one level down headed by each member, in order,
-  /// then by the cluster's own head (ViewRequest::head_child); the root has no head. Records that
+  /// then by the cluster's own head (ViewRequest::head_child). The root has no head. Records that
   /// are slow to read may be bounds (ClusterRecord::kUnread), unless outlines are wanted
   /// (ViewOptions::silhouette).
   std::vector<ClusterRecord> child_records;
@@ -199,21 +199,21 @@ struct ViewRequest {
   ClusterId cluster{};
   ClusterId head_child{};  ///< above level 0: the cluster that its head heads one level down
   /// The number of members from its record. ClusterRecord::kUnread: the record itself is missing,
-  /// which is needed to decide whether the cluster is wanted; see ViewControl::give_record().
+  /// which is needed to decide whether the cluster is wanted. See ViewControl::give_record().
   std::uint64_t members = 0;
   double importance = 0.0;  ///< the cluster's error divided by the tolerance
 };
 
-/// Reads a cluster from a source, with everything that give() needs; blocks while the source does.
+/// Reads a cluster from a source, with everything that give() needs. Blocks while the source does.
 /// Throws whatever the source throws, and HierarchyError if the cluster is too damaged to continue.
-GivenCluster load(ClusterSource& source, const ViewRequest& request);
+LoadedCluster load(ClusterSource& source, const ViewRequest& request);
 /// Reads the root.
-GivenCluster load_root(ClusterSource& source);
+LoadedCluster load_root(ClusterSource& source);
 
 enum class ViewPin : std::uint8_t { expanded, collapsed };
 
 /// Level of detail by view: a multiresolution model that follows a camera under budgets of memory
-/// and time, and never waits for data. Each step reports which clusters are missing; the caller
+/// and time, and never waits for data. Each step reports which clusters are missing. The caller
 /// loads them in any way and delivers them when they arrive.
 ///
 /// Let S be the set of expanded clusters. With a view that does not change, sufficient budgets and
@@ -227,7 +227,7 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Order of a step: the clusters with the greatest demand are expanded first. If there would be too
 /// many points, clusters of less than collapse_below times that demand are collapsed to make room:
 /// first those out of view, the farthest first, then those of the least demand. The remaining time
-/// goes to collapsing clusters that are no longer wanted, in the same order; once they hold a
+/// goes to collapsing clusters that are no longer wanted, in the same order. Once they hold a
 /// quarter of the points, this comes before expanding. Under max_points the outcome depends on
 /// sizes, but it is also stable once reached.
 ///
@@ -235,9 +235,11 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Memory besides the model: 85 bytes per expanded cluster and 65 per cluster that could be
 /// expanded (with outlines 32 more each), and the delivered clusters that are kept.
 ///
-/// Triangulation: Delaunay2, for points in the plane with heights; RegionalDelaunay2, for the same
-/// with elliptical metrics in regions; DynamicSurface, for scans of surfaces in space, whose shape
-/// is then part of the step's cost; PointCloud, for points in space alone.
+/// Triangulation: one of
+/// - Delaunay2, for points in the plane with heights
+/// - RegionalDelaunay2, for the same with elliptical metrics in regions
+/// - DynamicSurface, for scans of surfaces in space. Its shape is part of the cost of a step.
+/// - PointCloud, for points in space alone
 template <class Triangulation>
 class ViewControl {
  public:
@@ -279,7 +281,7 @@ class ViewControl {
   /// counts: number of clusters of each level below the top, as from ClusterSource::cluster_count.
   /// root: cluster_id(counts.size(), 0) with all its data. empty: as in MultiresolutionModel.
   /// Throws HierarchyError, std::length_error, and std::invalid_argument for options out of range.
-  ViewControl(std::vector<std::uint64_t> counts, GivenCluster root, ViewOptions options = {},
+  ViewControl(std::vector<std::uint64_t> counts, LoadedCluster root, ViewOptions options = {},
               Triangulation empty = Triangulation());
   ~ViewControl();
   ViewControl(const ViewControl&) = delete;
@@ -301,16 +303,16 @@ class ViewControl {
   /// after it was expanded, in case it is needed again. Returns false if it is larger than the
   /// budget. Throws HierarchyError if the counts of members, children, values and records do not
   /// agree.
-  bool give(GivenCluster cluster);
+  bool give(LoadedCluster cluster);
   /// The delivered cluster if it is kept, otherwise null. Clusters that a step has expanded are
   /// kept until the next give(). O(1).
-  [[nodiscard]] const GivenCluster* given(ClusterId cluster) const;
+  [[nodiscard]] const LoadedCluster* cached_cluster(ClusterId cluster) const;
   /// Delivers the record of a cluster of which only bounds were known. Does nothing if it is no
   /// longer needed. O(log n).
   void give_record(ClusterId cluster, const ClusterRecord& record);
   /// The record, or its bounds, of the cluster that an existing vertex represents: the coarsest
   /// collapsed cluster that it heads. nullopt if it represents only itself. O(its level).
-  [[nodiscard]] std::optional<ClusterRecord> stands_for(VertexId vertex) const;
+  [[nodiscard]] std::optional<ClusterRecord> represented_cluster(VertexId vertex) const;
   /// True if the box of a collapsed cluster, or its bounds, meets the given box. O(children of the
   /// expanded clusters that meet it).
   [[nodiscard]] bool meets_collapsed(const Box3& box) const;

@@ -36,7 +36,7 @@ struct ScanVertices {
 inline constexpr std::size_t kScanPadding = 8;
 
 /// Lists the vertices that may have positive volume and, among these, the least power / volume.
-/// Fills in power and volume of all vertices. Returns the length of the list; `near` has room for
+/// Fills in power and volume of all vertices. Returns the length of the list. `near` has room for
 /// all vertices.
 using ScanFunction = std::size_t (*)(const ScanVertices& vertices, const ScanFacet& facet,
                                      std::uint32_t* near);

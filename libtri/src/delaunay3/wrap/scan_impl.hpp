@@ -19,14 +19,14 @@ namespace {
   __builtin_memcpy(to, &lanes, sizeof lanes);
 }
 
-constexpr double kNothing = __builtin_inf();
+constexpr double kNoQuotient = __builtin_inf();
 
 /// Writes powers and volumes. Returns an upper bound of the least quotient: the quotient of the
 /// vertex that has the least up to rounding, among those of certainly positive volume, or infinity
 /// if there is none.
 [[gnu::always_inline]] inline double measure_all(const ScanVertices& v, const ScanFacet& f) {
   const Lanes volume_error = f.volume_error - Lanes{};
-  Lanes best_power = kNothing - Lanes{};
+  Lanes best_power = kNoQuotient - Lanes{};
   Lanes best_volume = 1.0 - Lanes{};
   for (std::size_t i = 0; i < v.count; i += kLanes) {
     const Lanes x = load(v.x + i) - f.corner[0];
@@ -42,9 +42,9 @@ constexpr double kNothing = __builtin_inf();
   }
   const Lanes power = best_power + f.power_error;
   const Lanes ratio = power / (best_volume + (power > 0.0 ? -volume_error : volume_error));
-  const Lanes known = best_power < kNothing ? ratio : kNothing - Lanes{};
+  const Lanes quotient = best_power < kNoQuotient ? ratio : kNoQuotient - Lanes{};
   double least[kLanes];
-  for (std::size_t i = 0; i < kLanes; ++i) least[i] = known[i];
+  for (std::size_t i = 0; i < kLanes; ++i) least[i] = quotient[i];
   for (std::size_t half = kLanes / 2; half > 0; half /= 2)
     for (std::size_t i = 0; i < half; ++i)
       least[i] = least[i + half] < least[i] ? least[i + half] : least[i];
@@ -54,10 +54,10 @@ constexpr double kNothing = __builtin_inf();
 [[gnu::always_inline]] inline std::size_t scan_with_lanes(const ScanVertices& v, const ScanFacet& f,
                                                           std::uint32_t* near) {
   const double least = measure_all(v, f);
-  const bool any = least < kNothing;
+  const bool any = least < kNoQuotient;
   const double factor = any ? least : 0;
   const double margin =
-      any ? f.power_error + (least < 0 ? -least : least) * f.volume_error : kNothing;
+      any ? f.power_error + (least < 0 ? -least : least) * f.volume_error : kNoQuotient;
   std::size_t listed = 0;
   for (std::size_t i = 0; i < v.count; i += kScanPadding) {
     unsigned hits = 0;

@@ -55,7 +55,7 @@ class Wrapping {
       double low = kInfinity;
       double high = -kInfinity;
       for (std::size_t i = 1; i < count_; ++i) {
-        c[i] = static_cast<double>(scanned(hole_.point[i])[k]);
+        c[i] = static_cast<double>(scan_point(hole_.point[i])[k]);
         low = std::min(low, c[i]);
         high = std::max(high, c[i]);
       }
@@ -79,9 +79,9 @@ class Wrapping {
                  padded,         hole_.power.data(), hole_.volume.data()};
   }
 
-  /// The point as scan() uses it; in an elliptical metric it is mapped to where the metric is
+  /// The point as scan() uses it. In an elliptical metric it is mapped to where the metric is
   /// Euclidean.
-  Point scanned(const Point& p) const {
+  Point scan_point(const Point& p) const {
     if constexpr (kMapped) {
       return EllipticalKernel::mapped(p, hole_.point[1]);
     } else {

@@ -27,10 +27,10 @@ class HoleFilling {
       table_.find_or_add(hole_.facets[i].corner, i);
       if (is_finite_facet(i)) hole_.pending.push_back(i);
     }
-    std::uint32_t gone = 0;
+    std::uint32_t finite_removed = 0;
     for (const std::uint32_t t : hole_.slots)
-      if (!has_ghost(mesh_.tetrahedron[t].corner)) ++gone;
-    mesh_.finite_count -= gone;
+      if (!has_ghost(mesh_.tetrahedron[t].corner)) ++finite_removed;
+    mesh_.finite_count -= finite_removed;
   }
 
   /// The most recently opened finite facet that is still open, or kNone.

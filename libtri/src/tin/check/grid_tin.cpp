@@ -11,7 +11,7 @@
 #include <terrace/base/portable_math.hpp>
 #include <terrace/base/simd.hpp>
 
-#include "tin/by_path.hpp"
+#include "tin/instruction_set.hpp"
 #include "tin/options.hpp"
 #include "tin/scan.hpp"
 
@@ -48,7 +48,7 @@ class Checker {
   GridTinCheck finish() {
     double squares = 0;
     for (int i = 0; i < tin::kCheckLanes; ++i) {
-      check_.max_error = std::max(check_.max_error, sums_.most[i]);
+      check_.max_error = std::max(check_.max_error, sums_.max_error[i]);
       squares += sums_.squares[i];
       check_.covered += static_cast<std::size_t>(sums_.covered[i]);
     }
@@ -70,7 +70,7 @@ class Checker {
     return std::move(check_);
   }
 
-  void count_turned() { ++check_.turned; }
+  void count_inverted() { ++check_.inverted; }
 
  private:
   static double turn(const Point3& a, const Point3& b, const Point3& c) {
@@ -85,8 +85,8 @@ class Checker {
   /// Counts samples without data in a triangle, without tolerance.
   void count_missing(const Point3& a, const Point3& b, const Point3& c) {
     const auto begin = [](double least) { return std::max(0.0, std::ceil(least)); };
-    const auto end = [](double most, std::size_t count) {
-      return std::min(static_cast<double>(count - 1), most);
+    const auto end = [](double limit, std::size_t count) {
+      return std::min(static_cast<double>(count - 1), limit);
     };
     const double bottom = end(std::max({a[1], b[1], c[1]}), rows_);
     const double right = end(std::max({a[0], b[0], c[0]}), columns_);
@@ -138,7 +138,7 @@ void check_input(std::span<const Point3> points,
 namespace tin {
 
 template <class T>
-GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Point3> points,
+GridTinCheck check_grid_tin_with(const GridWindow<T>& window, std::span<const Point3> points,
                                std::span<const std::array<std::uint32_t, 3>> triangles,
                                double tolerance, base::SimdPath set,
                                const base::StopCheck& check_stop) {
@@ -153,15 +153,15 @@ GridTinCheck check_grid_tin_by(const GridWindow<T>& window, std::span<const Poin
     const auto& [a, b, c] = triangles[i];
     const double area = checker.visit(points[a], points[b], points[c]);
     if (i == 0) first_left = area > 0;
-    if (area == 0 || (area > 0) != first_left) checker.count_turned();
+    if (area == 0 || (area > 0) != first_left) checker.count_inverted();
   }
   return checker.finish();
 }
 
-template GridTinCheck check_grid_tin_by(const GridWindow<float>&, std::span<const Point3>,
+template GridTinCheck check_grid_tin_with(const GridWindow<float>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
                                         base::SimdPath, const base::StopCheck&);
-template GridTinCheck check_grid_tin_by(const GridWindow<double>&, std::span<const Point3>,
+template GridTinCheck check_grid_tin_with(const GridWindow<double>&, std::span<const Point3>,
                                         std::span<const std::array<std::uint32_t, 3>>, double,
                                         base::SimdPath, const base::StopCheck&);
 
@@ -171,7 +171,7 @@ template <class T>
 GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3> points,
                             std::span<const std::array<std::uint32_t, 3>> triangles,
                             double tolerance, const base::StopCheck& check_stop) {
-  return tin::check_grid_tin_by(window, points, triangles, tolerance, base::best_simd_path(),
+  return tin::check_grid_tin_with(window, points, triangles, tolerance, base::best_simd_path(),
                                 check_stop);
 }
 

@@ -18,7 +18,7 @@ namespace {
 using planar::DoubleKernel;
 using Corners = std::array<std::uint32_t, 3>;
 
-/// A raster over the surface; every cell lists the triangles that overlap it.
+/// A raster over the surface. Every cell lists the triangles that overlap it.
 class Raster {
  public:
   Raster(std::span<const Point3> vertices, std::span<const Corners> triangles)

@@ -11,18 +11,18 @@
 #include <terrace/base/simd.hpp>
 
 #include "samples.hpp"
-#include "tin/by_path.hpp"
+#include "tin/instruction_set.hpp"
 #include "tin/lattice.hpp"
 #include "tin/options.hpp"
 
 namespace terrace::tri::tin {
 namespace {
 
-constexpr double kGreatest = 1e150;
-constexpr std::uint32_t kMostSamples = 65'535;
+constexpr double kMaxHeight = 1e150;
+constexpr std::uint32_t kMaxSamples = 65'535;
 
 void check_options(const GridTinOptions& options) {
-  if (!(options.max_error >= 0 && options.max_error <= kGreatest))
+  if (!(options.max_error >= 0 && options.max_error <= kMaxHeight))
     throw std::invalid_argument("grid_tin: max_error must be in [0, 1e150]");
   for (const double step : {options.column_step, options.row_step})
     if (!(std::isfinite(step) && step != 0))
@@ -60,7 +60,7 @@ Range range_of(const GridWindow<T>& window) {
   }
   range.least = static_cast<double>(least);
   range.greatest = static_cast<double>(greatest);
-  if (range.data > 0 && std::max(-range.least, range.greatest) > kGreatest)
+  if (range.data > 0 && std::max(-range.least, range.greatest) > kMaxHeight)
     throw std::invalid_argument("grid_tin: a height is beyond 1e150");
   return range;
 }
@@ -68,12 +68,12 @@ Range range_of(const GridWindow<T>& window) {
 template <class T>
 Range check_window(const GridWindow<T>& window) {
   check_shape(window, "grid_tin");
-  if (window.columns > kMostSamples || window.rows > kMostSamples)
+  if (window.columns > kMaxSamples || window.rows > kMaxSamples)
     throw std::invalid_argument("grid_tin: a window of more than 65,535 columns or rows");
   return range_of(window);
 }
 
-/// True if floats are precise enough for most triangles; errors of the others are recomputed.
+/// True if floats are precise enough for most triangles. Errors of the others are recomputed.
 bool floats_suffice(const Range& range, double bound) {
   return range.floats && std::max(-range.least, range.greatest) <= 1e30 && bound >= 1e-30 &&
          bound <= 1e30 && bound >= (range.greatest - range.least) * 0x1p-17;
@@ -101,14 +101,14 @@ std::vector<GridCorner<T>> frame_of(RasterSamples<T>& samples, const GridSides& 
   std::vector<GridCorner<T>> frame{samples.take(place_at(0, 0)), samples.take(place_at(right, 0)),
                                    samples.take(place_at(right, last)),
                                    samples.take(place_at(0, last))};
-  const auto along = [&](const std::vector<std::uint32_t>& side, const auto& place_of) {
+  const auto add_side = [&](const std::vector<std::uint32_t>& side, const auto& place_of) {
     for (std::size_t i = 1; i + 1 < side.size(); ++i)
       frame.push_back(samples.take(place_of(static_cast<std::int32_t>(side[i]))));
   };
-  along(sides.first_row, [&](std::int32_t x) { return place_at(x, 0); });
-  along(sides.last_column, [&](std::int32_t y) { return place_at(right, y); });
-  along(sides.last_row, [&](std::int32_t x) { return place_at(x, last); });
-  along(sides.first_column, [&](std::int32_t y) { return place_at(0, y); });
+  add_side(sides.first_row, [&](std::int32_t x) { return place_at(x, 0); });
+  add_side(sides.last_column, [&](std::int32_t y) { return place_at(right, y); });
+  add_side(sides.last_row, [&](std::int32_t x) { return place_at(x, last); });
+  add_side(sides.first_column, [&](std::int32_t y) { return place_at(0, y); });
   return frame;
 }
 

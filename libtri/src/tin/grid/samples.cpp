@@ -31,7 +31,7 @@ bool have_data(const GridCorner<T>& a, const GridCorner<T>& b, const GridCorner<
   return !std::isnan(a.z) && !std::isnan(b.z) && !std::isnan(c.z);
 }
 
-struct CarefulWorst {
+struct PreciseWorst {
   double error = 0;
   double slack = 0;  ///< bound of the rounding error of `error`
   std::uint32_t place = 0;
@@ -41,9 +41,9 @@ struct CarefulWorst {
 /// Computes in double what the scans compute in floats, for triangles whose planes are too steep
 /// for floats. Corners do not count.
 template <class T>
-CarefulWorst careful_worst(const GridSamples<T>& samples, const GridCorner<T>& a,
+PreciseWorst precise_worst(const GridSamples<T>& samples, const GridCorner<T>& a,
                            const GridCorner<T>& b, const GridCorner<T>& c) {
-  CarefulWorst worst;
+  PreciseWorst worst;
   const auto base = static_cast<double>(a.z);
   const double bz = static_cast<double>(b.z) - base, cz = static_cast<double>(c.z) - base;
   const double bx = b.x - a.x, by = b.y - a.y, cx = c.x - a.x, cy = c.y - a.y;
@@ -53,7 +53,7 @@ CarefulWorst careful_worst(const GridSamples<T>& samples, const GridCorner<T>& a
   const double height = std::max({std::fabs(by), std::fabs(cy), std::fabs(by - cy)});
   worst.slack = 0x1p-50 * (std::fabs(slope_x) * width + std::fabs(slope_y) * height +
                            (std::fabs(bz) + std::fabs(cz)) * (1 + 2 * width * height / area));
-  const auto is = [](const GridCorner<T>& corner, std::int32_t x, std::int32_t y) {
+  const auto is_at = [](const GridCorner<T>& corner, std::int32_t x, std::int32_t y) {
     return corner.x == x && corner.y == y;
   };
   visit_rows(a, b, c, [&](std::int32_t y, std::int32_t first, std::int32_t last) {
@@ -64,7 +64,7 @@ CarefulWorst careful_worst(const GridSamples<T>& samples, const GridCorner<T>& a
       const double rise = slope_x * (x - a.x) + slope_y * (y - a.y);
       const double error = std::fabs(static_cast<double>(row[x]) - base - rise);
       worst.missing |= !(error >= 0);
-      if (!(error > worst.error) || is(a, x, y) || is(b, x, y) || is(c, x, y)) continue;
+      if (!(error > worst.error) || is_at(a, x, y) || is_at(b, x, y) || is_at(c, x, y)) continue;
       worst.error = error;
       worst.place = place_at(x, y);
     }
@@ -129,10 +129,10 @@ template <class T>
 WorstSample<T> RasterSamples<T>::worst(const Vertex& a, const Vertex& b, const Vertex& c) const {
   const WorstSample<T> found = scan_.worst(samples_, a, b, c, scan_bound_);
   if (found.error != T{kUnsure}) return found;
-  const CarefulWorst sure = careful_worst(samples_, a, b, c);
-  if (sure.missing) return {std::numeric_limits<T>::infinity(), 0};
-  if (sure.error <= std::max(bound_ - sure.slack, sure.slack)) return {0, 0};
-  return {std::max(static_cast<T>(sure.error), std::numeric_limits<T>::min()), sure.place};
+  const PreciseWorst precise = precise_worst(samples_, a, b, c);
+  if (precise.missing) return {std::numeric_limits<T>::infinity(), 0};
+  if (precise.error <= std::max(bound_ - precise.slack, precise.slack)) return {0, 0};
+  return {std::max(static_cast<T>(precise.error), std::numeric_limits<T>::min()), precise.place};
 }
 
 template <class T>
@@ -146,7 +146,7 @@ WorstSample<T> RasterSamples<T>::worst_to_insert(const Vertex& a, const Vertex& 
 }
 
 template <class T>
-void RasterSamples<T>::judge(RasterMesh& mesh, std::uint32_t t) const {
+void RasterSamples<T>::set_error(RasterMesh& mesh, std::uint32_t t) const {
   Triangle& triangle = mesh.triangles[t];
   const Vertex &a = mesh.vertex(triangle, 0), &b = mesh.vertex(triangle, 1),
                &c = mesh.vertex(triangle, 2);
@@ -166,13 +166,13 @@ void RasterSamples<T>::judge(RasterMesh& mesh, std::uint32_t t) const {
     triangle.error = 0;
     return;
   }
-  triangle.place = gaps_->cure(samples_, this->ground(), a, b, c);
+  triangle.place = gaps_->sample_to_insert(samples_, this->ground(), a, b, c);
   triangle.error = triangle.place == kNone ? 0 : std::numeric_limits<float>::infinity();
 }
 
 template <class T>
 bool RasterSamples<T>::open(std::uint32_t place) const {
-  return !gaps_ || !gaps_->taken(place);
+  return !gaps_ || !gaps_->is_vertex(place);
 }
 
 template <class T>
@@ -196,8 +196,8 @@ template <class T>
 bool RasterSamples<T>::within(const Vertex& a, const Vertex& b, const Vertex& c) const {
   const int found = scan_.within(samples_, a, b, c, scan_bound_);
   if (found != kUnsure) return found != 0;
-  const CarefulWorst sure = careful_worst(samples_, a, b, c);
-  return !sure.missing && sure.error <= std::max(bound_ - sure.slack, sure.slack);
+  const PreciseWorst precise = precise_worst(samples_, a, b, c);
+  return !precise.missing && precise.error <= std::max(bound_ - precise.slack, precise.slack);
 }
 
 template <class T>
@@ -239,16 +239,16 @@ template <class T>
 bool RasterSamples<T>::raise(Vertex& v, const Interval& rises) const {
   if (!(rises.low <= rises.high) || !std::isfinite(rises.low) || !std::isfinite(rises.high))
     return false;
-  const auto moved = static_cast<T>(static_cast<double>(v.z) + (rises.low + rises.high) / 2);
-  const double by = static_cast<double>(moved) - static_cast<double>(v.z);
-  if (!(rises.low <= by && by <= rises.high)) return false;
-  v.z = moved;
+  const auto height = static_cast<T>(static_cast<double>(v.z) + (rises.low + rises.high) / 2);
+  const double rise = static_cast<double>(height) - static_cast<double>(v.z);
+  if (!(rises.low <= rise && rise <= rises.high)) return false;
+  v.z = height;
   return true;
 }
 
 template <class T>
 bool RasterSamples<T>::covers(const Vertex& a, const Vertex& b, const Vertex& c) const {
-  return !gaps_ || (have_data(a, b, c) && !careful_worst(samples_, a, b, c).missing);
+  return !gaps_ || (have_data(a, b, c) && !precise_worst(samples_, a, b, c).missing);
 }
 
 template <class T>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fan.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
+
+#include "samples.hpp"
 
 #ifdef __SSE2__
 #include <emmintrin.h>
@@ -103,12 +103,12 @@ double Fan::height_without_plane(std::size_t sector, const Sample& sample) const
                    sample.x, sample.y);
 }
 
-void Fan::deal(Sample* samples, std::uint32_t head, std::uint32_t apart) {
+void Fan::assign_samples(Sample* samples, std::uint32_t head, std::uint32_t excluded) {
   const bool many = rays_.size() > kMaskBits;
   for (std::uint32_t i = head; i != kNone;) {
     Sample& sample = samples[i];
     const std::uint32_t next = sample.next;
-    if (i != apart) {
+    if (i != excluded) {
       const double dx = sample.x - apex_.x;
       const double dy = sample.y - apex_.y;
       const std::size_t s = many ? sector_of_many(dx, dy) : sector_of(dx, dy);
@@ -128,7 +128,7 @@ void Fan::deal(Sample* samples, std::uint32_t head, std::uint32_t apart) {
   }
 }
 
-void Fan::close() {
+void Fan::end_lists() {
   for (Sector& sector : sectors_) *sector.end = kNone;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hole.hpp"
-
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+
+#include "refinement.hpp"
 
 #ifdef __SSE2__
 #include <emmintrin.h>
@@ -13,7 +13,7 @@
 namespace terrace::tri::tin::points {
 namespace {
 
-constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kImpossible = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
@@ -27,9 +27,9 @@ bool PointHole::gather(const PointMesh& mesh, const Star& star, std::uint32_t v)
   y_.clear();
   z_.clear();
   index_.clear();
-  own_ = kNone;
+  own_sample_ = kNone;
   const auto add = [&](std::uint32_t i) {
-    if (i == centre.sample) own_ = index_.size();
+    if (i == centre.sample) own_sample_ = index_.size();
     index_.push_back(i);
     x_.push_back(samples[i].x - centre.x);
     y_.push_back(samples[i].y - centre.y);
@@ -42,21 +42,22 @@ bool PointHole::gather(const PointMesh& mesh, const Star& star, std::uint32_t v)
   }
   // A sample that has become a vertex is in no list.
   if (centre.sample != kNone && samples[centre.sample].next == kIsVertex) add(centre.sample);
-  beyond_ = index_.size();
-  own_ = std::min(own_, beyond_);
-  known_.fill(0);
+  failed_sample_ = index_.size();
+  own_sample_ = std::min(own_sample_, failed_sample_);
+  known_sides_.fill(0);
   words_ = (index_.size() + 63) / 64;
   if (sides_.size() < 2 * words_ * kMaxRing * kMaxRing)
     sides_.resize(2 * words_ * kMaxRing * kMaxRing);
-  return !out_of_reach(own_);
+  return !out_of_reach(own_sample_);
 }
 
 bool PointHole::fill_otherwise(PolygonFill& fill) {
-  return !out_of_reach(beyond_) &&
+  return !out_of_reach(failed_sample_) &&
          fill_least_worst(
              ring_.size(), all_.bound(),
              [&](std::size_t i, std::size_t m, std::size_t j, double limit) {
-               return left(i, m, j) && wide(i, m, j) ? worst(i, m, j, limit) : kNever;
+               return left(i, m, j) && has_wide_angles(i, m, j) ? worst(i, m, j, limit)
+                                                                : kImpossible;
              },
              fill);
 }
@@ -107,8 +108,8 @@ bool PointHole::out_of_reach(std::size_t sample) const {
 PointHole::Sides PointHole::sides(std::size_t i, std::size_t j) {
   std::uint64_t* const left = sides_.data() + 2 * words_ * (i * kMaxRing + j);
   std::uint64_t* const right = left + words_;
-  if ((known_[i] >> j & 1U) != 0) return {left, right};
-  known_[i] = static_cast<std::uint16_t>(known_[i] | 1U << j);
+  if ((known_sides_[i] >> j & 1U) != 0) return {left, right};
+  known_sides_[i] = static_cast<std::uint16_t>(known_sides_[i] | 1U << j);
   const std::size_t count = index_.size();
   const double ax = ring_[i].x;
   const double ay = ring_[i].y;
@@ -150,7 +151,7 @@ double PointHole::error_at(const Plane& plane, const Vertex& a, std::size_t samp
 double PointHole::worst(std::size_t i, std::size_t m, std::size_t j, double limit) {
   const Vertex& a = ring_[i];
   const Plane plane = plane_of(a, ring_[m], ring_[j]);
-  if (!plane.sound) return kNever;
+  if (!plane.sound) return kImpossible;
   const std::uint64_t* const first = sides(i, m).left;
   const std::uint64_t* const second = sides(m, j).left;
   const std::uint64_t* const chord = sides(i, j).right;
@@ -161,8 +162,8 @@ double PointHole::worst(std::size_t i, std::size_t m, std::size_t j, double limi
       const double error = error_at(plane, a, s);
       if (error > largest) {
         if (error > limit) {
-          beyond_ = s;
-          return kNever;
+          failed_sample_ = s;
+          return kImpossible;
         }
         largest = error;
       }
@@ -171,7 +172,7 @@ double PointHole::worst(std::size_t i, std::size_t m, std::size_t j, double limi
   return largest;
 }
 
-bool PointHole::wide(std::size_t i, std::size_t m, std::size_t j) const {
+bool PointHole::has_wide_angles(std::size_t i, std::size_t m, std::size_t j) const {
   const std::array<std::size_t, 3> corner{i, m, j};
   for (std::size_t k = 0; k < 3; ++k) {
     const Vertex& p = ring_[corner[k]];
@@ -186,8 +187,8 @@ bool PointHole::wide(std::size_t i, std::size_t m, std::size_t j) const {
 
 void PointHole::replaced(const PointMesh&, const Star& star, const PolygonFill& fill) {
   const std::size_t count = index_.size();
-  rest_.assign(words_, ~std::uint64_t{0});
-  if (count % 64 != 0) rest_.back() >>= 64 - count % 64;
+  unlisted_.assign(words_, ~std::uint64_t{0});
+  if (count % 64 != 0) unlisted_.back() >>= 64 - count % 64;
   Pool<Sample>& samples = all_.all();
   for (std::size_t k = 0; k < star.size(); ++k) all_.heads()[star.triangle(k)] = kNone;
   // Slots are reused in the order in which triangles are visited.
@@ -197,9 +198,9 @@ void PointHole::replaced(const PointMesh&, const Star& star, const PolygonFill& 
     const std::uint64_t* const second = sides(m, j).left;
     const std::uint64_t* const chord = sides(i, j).right;
     std::uint32_t& head = all_.heads()[star.triangle(k++)];
-    for (std::size_t w = 0; w < rest_.size(); ++w) {
-      const std::uint64_t inside = rest_[w] & first[w] & second[w] & chord[w];
-      rest_[w] &= ~inside;
+    for (std::size_t w = 0; w < unlisted_.size(); ++w) {
+      const std::uint64_t inside = unlisted_[w] & first[w] & second[w] & chord[w];
+      unlisted_[w] &= ~inside;
       for (std::uint64_t bits = inside; bits != 0; bits &= bits - 1) {
         const std::uint32_t s = index_[w * 64 + static_cast<std::size_t>(std::countr_zero(bits))];
         samples[s].next = head;
@@ -208,14 +209,14 @@ void PointHole::replaced(const PointMesh&, const Star& star, const PolygonFill& 
     }
     return true;
   });
-  for (std::size_t w = 0; w < rest_.size(); ++w)
-    for (std::uint64_t bits = rest_[w]; bits != 0; bits &= bits - 1)
-      list_rest(star, fill, w * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
+  for (std::size_t w = 0; w < unlisted_.size(); ++w)
+    for (std::uint64_t bits = unlisted_[w]; bits != 0; bits &= bits - 1)
+      list_unlisted(star, fill, w * 64 + static_cast<std::size_t>(std::countr_zero(bits)));
 }
 
 // Samples that rounding places in no triangle go to the triangle that they are least outside of.
-void PointHole::list_rest(const Star& star, const PolygonFill& fill, std::size_t sample) {
-  double best = -kNever;
+void PointHole::list_unlisted(const Star& star, const PolygonFill& fill, std::size_t sample) {
+  double best = -kImpossible;
   std::uint32_t slot = star.triangle(0);
   std::size_t k = 0;
   star.all_of(fill, [&](std::size_t i, std::size_t m, std::size_t j) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lists.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "refinement.hpp"
+
 namespace terrace::tri::tin::points {
 namespace {
 
-/// Adds up the errors of samples, and notes the worst one of each triangle.
+/// Adds up the errors of samples and stores the worst sample of each triangle.
 class ErrorSum {
  public:
   explicit ErrorSum(double bound) : bound_(bound) {}
@@ -24,14 +24,14 @@ class ErrorSum {
     if (!(error > bound_)) return;
     ++result.above;
     if (stuck(sample)) return;
-    ++result.to_mend;
-    if (!(triangle.error > 0)) result.waiting.push_back(at);
+    ++result.insertable;
+    if (!(triangle.error > 0)) result.triangles_to_refine.push_back(at);
     if (rounded_up(error) > triangle.error) {
       triangle.error = rounded_up(error);
       triangle.place = index;
     }
   }
-  Measured done() {
+  Measured finish() {
     if (result.errors.covered > 0)
       result.errors.rms = std::sqrt(squares_ / static_cast<double>(result.errors.covered));
     return std::move(result);
@@ -81,7 +81,7 @@ Measured list_samples(PointRefinement& refinement, std::uint32_t step) {
     ++sum.result.errors.covered;
     sum.add(mesh, at, sample, index);
   }
-  return sum.done();
+  return sum.finish();
 }
 
 Measured measure_lists(PointRefinement& refinement) {
@@ -110,7 +110,7 @@ Measured measure_lists(PointRefinement& refinement) {
       sum.add(mesh, t, sample, i);
     }
   }
-  return sum.done();
+  return sum.finish();
 }
 
 void sweep(PointRefinement& refinement, std::uint32_t step) {

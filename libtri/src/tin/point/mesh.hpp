@@ -14,7 +14,7 @@ using Kernel = planar::DoubleKernel;
 using Place2 = std::array<double, 2>;
 
 /// The predicates of Kernel for integers of at most about 2^15 in absolute value.
-struct WholeKernel {
+struct SmallIntegerKernel {
   /// Exact, because products are exact.
   static int orientation(const Place2& a, const Place2& b, const Place2& c) {
     const double left = (b[0] - a[0]) * (c[1] - a[1]);
@@ -28,9 +28,9 @@ struct WholeKernel {
     const double sine = at_a.cross * at_p.dot + at_p.cross * at_a.dot;
     constexpr double kDoubt = 0x1p12;
     if (sine > kDoubt || sine < -kDoubt) return sine < 0 ? 1 : -1;
-    const auto whole = [](double x) { return static_cast<std::int64_t>(x); };
-    const std::int64_t exact =
-        whole(at_a.cross) * whole(at_p.dot) + whole(at_p.cross) * whole(at_a.dot);
+    const auto to_integer = [](double x) { return static_cast<std::int64_t>(x); };
+    const std::int64_t exact = to_integer(at_a.cross) * to_integer(at_p.dot) +
+                               to_integer(at_p.cross) * to_integer(at_a.dot);
     return (exact < 0 ? 1 : 0) - (exact > 0 ? 1 : 0);
   }
 };
@@ -39,7 +39,7 @@ struct Vertex {
   double x;
   double y;
   double z;
-  std::uint32_t sample;  ///< its index; kNone: of the frame
+  std::uint32_t sample;  ///< its index, or kNone for a vertex of the frame
 };
 
 inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
@@ -52,7 +52,7 @@ struct Sample {
   double x;
   double y;
   double z;
-  std::uint32_t next;  ///< next in the list, kNone at its end; or why it is not listed
+  std::uint32_t next;  ///< next in the list, kNone at its end, or why it is not listed
   /// The caller's number, with kStuck set if it cannot become a vertex.
   std::uint32_t id;
 };

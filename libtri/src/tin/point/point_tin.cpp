@@ -7,9 +7,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "lists.hpp"
+#include "refinement.hpp"
 #include "samples.hpp"
-#include "start.hpp"
 #include "terrace/tri/least_error.hpp"
 #include "tin/error_queue.hpp"
 #include "tin/options.hpp"
@@ -37,7 +36,7 @@ namespace {
 using namespace tin::points;
 using tin::kNone;
 
-constexpr double kMostWhole = 0x1p15;
+constexpr double kMaxInteger = 0x1p15;
 constexpr std::size_t kUnlimited = std::numeric_limits<std::size_t>::max();
 
 /// Makes the mesh, for one bound after another.
@@ -61,17 +60,17 @@ class Maker {
     // capacity costs only address space.
     mesh.vertices.reserve(fixed + samples_.size());
     mesh.triangles.reserve(mesh.triangles.size() + 2 * std::size_t{samples_.size()});
-    const bool whole =
+    const bool integers =
         options_.lattice && std::all_of(frame_.begin(), frame_.end(), [](const Point3& p) {
-          return p[0] <= kMostWhole && p[1] <= kMostWhole;
+          return p[0] <= kMaxInteger && p[1] <= kMaxInteger;
         });
-    PointSamples samples(samples_, bound, options_, !frame_.empty(), whole, mesh.triangles);
+    PointSamples samples(samples_, bound, options_, !frame_.empty(), integers, mesh.triangles);
     PointRefinement& refinement =
         refinement_.emplace(std::move(samples), std::move(mesh), options_.check_stop);
     insert(refinement, max_vertices, quality != TinQuality::kGreedy);
     removed_ = 0;
     if (quality == TinQuality::kGreedy) {
-      mend(refinement, max_vertices);
+      insert_missed(refinement, max_vertices);
       inserted_ = refinement.mesh().vertices.size() - fixed;
       return true;
     }
@@ -86,7 +85,7 @@ class Maker {
       refinement.fit();
       removed_ += refinement.remove();
     }
-    mend(refinement, max_vertices);
+    insert_missed(refinement, max_vertices);
     return true;
   }
 
@@ -96,16 +95,16 @@ class Maker {
   /// The difference between the lowest and the highest of the samples and the frame.
   [[nodiscard]] double height_range() const {
     double low = std::numeric_limits<double>::infinity(), high = -low;
-    const auto take = [&](double z) { low = std::min(low, z), high = std::max(high, z); };
-    for (const Sample& sample : span_of(samples_)) take(sample.z);
-    for (const Point3& vertex : frame_) take(vertex[2]);
+    const auto include = [&](double z) { low = std::min(low, z), high = std::max(high, z); };
+    for (const Sample& sample : span_of(samples_)) include(sample.z);
+    for (const Point3& vertex : frame_) include(vertex[2]);
     return high - low;
   }
 
   /// Moves the mesh into the result and leaves it empty.
   void publish(PointTin& result) {
     result.errors = measured_.errors;
-    result.stuck = measured_.above - measured_.to_mend;
+    result.stuck = measured_.above - measured_.insertable;
     result.inserted = inserted_;
     result.removed = removed_;
     // Frees the memory of the samples before allocating the result.
@@ -126,33 +125,35 @@ class Maker {
     constexpr std::uint32_t kSteps[] = {64, 8, 1};
     constexpr std::size_t kSamplesPerTriangle = 3;
     // Few enough samples for them and their triangles to stay in the cache.
-    constexpr std::size_t kTogether = 8192;
+    constexpr std::size_t kPartSize = 8192;
     for (const std::uint32_t step : kSteps) {
-      const std::size_t listed = samples_.size() / step;
-      if (step > 1 && listed < 1024) continue;
+      const std::size_t list_size = samples_.size() / step;
+      if (step > 1 && list_size < 1024) continue;
       if (sweeps) sweep(refinement, step);
       if (sweeps && step > 1) continue;
       const bool last = step == 1 && max_vertices == kUnlimited;
-      refine(refinement, list_samples(refinement, step).waiting, last ? kTogether : samples_.size(),
-             {max_vertices, step > 1 ? listed / kSamplesPerTriangle : kUnlimited});
+      refine(refinement, list_samples(refinement, step).triangles_to_refine,
+             last ? kPartSize : samples_.size(),
+             {max_vertices, step > 1 ? list_size / kSamplesPerTriangle : kUnlimited});
     }
   }
 
   /// Measures, and inserts the very rare samples that rounding hid from the lists.
-  void mend(PointRefinement& refinement, std::size_t max_vertices) {
+  void insert_missed(PointRefinement& refinement, std::size_t max_vertices) {
     measured_ = measure_lists(refinement);
-    while (measured_.to_mend > 0 && refinement.mesh().vertices.size() < max_vertices) {
-      refine(refinement, measured_.waiting, samples_.size(), {.vertices = max_vertices});
+    while (measured_.insertable > 0 && refinement.mesh().vertices.size() < max_vertices) {
+      refine(refinement, measured_.triangles_to_refine, samples_.size(),
+             {.vertices = max_vertices});
       measured_ = measure_lists(refinement);
     }
   }
 
-  /// Starts with the triangles that have an error. `together`: see ErrorParts.
-  void refine(PointRefinement& refinement, const std::vector<std::uint32_t>& waiting,
-              std::size_t together, const tin::RefinementLimits& limits) {
+  /// Starts with the triangles that have an error. `part_size`: see ErrorParts.
+  void refine(PointRefinement& refinement, const std::vector<std::uint32_t>& triangles_to_refine,
+              std::size_t part_size, const tin::RefinementLimits& limits) {
     constexpr float kLeastError = 1e-30F;
-    tin::ErrorParts queue(kLeastError, samples_.size(), together);
-    for (const std::uint32_t t : waiting) queue.push(refinement.mesh().triangles[t], t);
+    tin::ErrorParts queue(kLeastError, samples_.size(), part_size);
+    for (const std::uint32_t t : triangles_to_refine) queue.push(refinement.mesh().triangles[t], t);
     refinement.refine(queue, limits);
   }
 
@@ -173,20 +174,21 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
   if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
   // The fixed vertices alone may exceed the limit.
   if (options.quality == TinQuality::kGreedy || maker.vertices() > limit) return true;
-  const double left = 0.6 * static_cast<double>(limit) * maker.measured().errors.largest;
-  const bool found =
-      least_error({.most = limit,
-                   .least = options.max_error,
-                   .range = std::max(options.max_error, maker.height_range()),
-                   .estimate =
-                       [left](double bound) {
-                         return left / std::max(bound, std::numeric_limits<double>::min());
-                       },
-                   .run =
-                       [&](double bound) {
-                         maker.make(bound, kUnlimited, options.quality);
-                         return static_cast<double>(maker.vertices());
-                       }});
+  const double vertices_times_bound =
+      0.6 * static_cast<double>(limit) * maker.measured().errors.largest;
+  const bool found = least_error({.max_vertices = limit,
+                                  .least = options.max_error,
+                                  .range = std::max(options.max_error, maker.height_range()),
+                                  .estimate =
+                                      [vertices_times_bound](double bound) {
+                                        return vertices_times_bound /
+                                               std::max(bound, std::numeric_limits<double>::min());
+                                      },
+                                  .run =
+                                      [&](double bound) {
+                                        maker.make(bound, kUnlimited, options.quality);
+                                        return static_cast<double>(maker.vertices());
+                                      }});
   // Sweeps insert more vertices than greedy insertion, and removal may leave more.
   return found || maker.make(options.max_error, limit, TinQuality::kGreedy);
 }
@@ -196,7 +198,7 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
 PointTin point_tin(std::span<const double> x, std::span<const double> y, std::span<const double> z,
                    std::span<const Point3> frame, const PointTinOptions& options) {
   tin::check_point_options(options, frame);
-  SampleList samples = take_samples(x, y, z, options.duplicates);
+  SampleList samples = prepare_samples(x, y, z, options.duplicates);
   PointTin result;
   result.duplicates = samples.duplicates;
   result.duplicate_range = samples.duplicate_range;

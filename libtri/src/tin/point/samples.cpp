@@ -10,13 +10,13 @@
 namespace terrace::tri::tin::points {
 
 PointSamples::PointSamples(Pool<Sample>& all, double bound, const PointTinOptions& options,
-                           bool border_fixed, bool whole, const Triangles& triangles)
+                           bool border_fixed, bool integers, const Triangles& triangles)
     : all_(all),
       bound_(bound),
       tangent_(tangent_of(options.min_angle_degrees)),
       lattice_(options.lattice),
       border_fixed_(border_fixed),
-      whole_(whole) {
+      integers_(integers) {
   heads_.reserve(triangles.size() + 2 * std::size_t{all.size()});
   add_lists(triangles);
 }
@@ -30,7 +30,7 @@ void PointSamples::set_error(Triangle& triangle, std::uint32_t worst, double err
   triangle.error = error > bound_ ? rounded_up(error) : 0;
 }
 
-void PointSamples::judge(PointMesh& mesh, std::uint32_t t) const {
+void PointSamples::set_error(PointMesh& mesh, std::uint32_t t) const {
   Triangle& triangle = mesh.triangles[t];
   double largest = 0;
   std::uint32_t worst = kNone;
@@ -59,8 +59,8 @@ void PointSamples::split(PointMesh& mesh, std::span<const std::uint32_t> created
   fan_.finish();
   const std::size_t removed = created.size() - (spot.border ? 1 : 2);
   for (const std::uint32_t number : created.first(removed))
-    fan_.deal(all_.data(), heads_[number], lattice_ ? kNone : place);
-  fan_.close();
+    fan_.assign_samples(all_.data(), heads_[number], lattice_ ? kNone : place);
+  fan_.end_lists();
   add_lists(mesh.triangles);
   for (std::size_t i = 0; i < created.size(); ++i) {
     const Fan::Sector& sector = fan_.sectors()[i];
@@ -81,13 +81,14 @@ void PointSamples::move(std::uint32_t index, std::uint32_t from, std::uint32_t t
 Vertex PointSamples::take(std::uint32_t place) const {
   const Sample& sample = all_[place];
   if (!lattice_) return {sample.x, sample.y, sample.z, place};
-  return {to_whole(sample.x), to_whole(sample.y), tin::on_lattice(*lattice_, sample.z), place};
+  return {round_half_up(sample.x), round_half_up(sample.y), tin::on_lattice(*lattice_, sample.z),
+          place};
 }
 
 void PointSamples::narrow(std::uint32_t t, const Vertex& v, const Vertex& b, const Vertex& c,
                           Interval& rises) const {
   // Samples where the vertex has a smaller weight are ignored.
-  constexpr double kLeast = 1e-9;
+  constexpr double kMinWeight = 1e-9;
   for (std::uint32_t i = heads_[t]; i != kNone; i = all_[i].next) {
     const Sample& sample = all_[i];
     const auto part = [&](const Vertex& p, const Vertex& q) {
@@ -98,12 +99,12 @@ void PointSamples::narrow(std::uint32_t t, const Vertex& v, const Vertex& b, con
     const double at_b = part(c, v);
     const double at_c = part(v, b);
     const double sum = at_v + at_b + at_c;
-    if (!(at_v > kLeast * sum)) continue;
+    if (!(at_v > kMinWeight * sum)) continue;
     // Heights are relative to the vertex's current one.
-    const double others = (at_b * (b.z - v.z) + at_c * (c.z - v.z)) / sum;
-    const double wanted = sample.z - v.z - others;
-    rises.low = std::max(rises.low, (wanted - bound_) * sum / at_v);
-    rises.high = std::min(rises.high, (wanted + bound_) * sum / at_v);
+    const double interpolated = (at_b * (b.z - v.z) + at_c * (c.z - v.z)) / sum;
+    const double target = sample.z - v.z - interpolated;
+    rises.low = std::max(rises.low, (target - bound_) * sum / at_v);
+    rises.high = std::min(rises.high, (target + bound_) * sum / at_v);
   }
 }
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "start.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "curve_sort.hpp"
+#include "refinement.hpp"
 #include "terrace/tri/delaunay2.hpp"
 #include "tin/options.hpp"
 
@@ -88,14 +87,14 @@ void triangulate(PointMesh& mesh) {
   std::uint32_t count = 0;
   for (const TriangleId t : delaunay.all_triangles()) triangle_of[slot(t)] = count++;
   for (const TriangleId t : delaunay.all_triangles()) {
-    Triangle made{{}, {}, kNone, 0.0F};
+    Triangle triangle{{}, {}, kNone, 0.0F};
     const auto corners = delaunay.vertices(t);
     const auto neighbours = delaunay.neighbours(t);
     for (std::size_t i = 0; i < 3; ++i) {
-      made.corner[i] = vertex_of[slot(corners[i])];
-      made.next[i] = neighbours[i] == kNoTriangle ? kNone : triangle_of[slot(neighbours[i])];
+      triangle.corner[i] = vertex_of[slot(corners[i])];
+      triangle.next[i] = neighbours[i] == kNoTriangle ? kNone : triangle_of[slot(neighbours[i])];
     }
-    mesh.triangles.push_back(made);
+    mesh.triangles.push_back(triangle);
   }
 }
 
@@ -103,8 +102,8 @@ bool lexicographically_less(const Place2& a, const Place2& b) {
   return a[0] != b[0] ? a[0] < b[0] : a[1] < b[1];
 }
 
-[[noreturn]] void refuse_frame(std::size_t i, const char* why) {
-  throw std::invalid_argument("point_tin: vertex " + std::to_string(i) + " of the frame " + why);
+[[noreturn]] void refuse_frame(std::size_t i, const char* reason) {
+  throw std::invalid_argument("point_tin: vertex " + std::to_string(i) + " of the frame " + reason);
 }
 
 /// Corners of the hull, counter-clockwise, of points sorted by x, then y.
@@ -126,8 +125,8 @@ std::vector<std::uint32_t> hull_of(const std::vector<std::uint32_t>& sorted, Pla
 
 }  // namespace
 
-SampleList take_samples(std::span<const double> x, std::span<const double> y,
-                        std::span<const double> z, PointDuplicates duplicates) {
+SampleList prepare_samples(std::span<const double> x, std::span<const double> y,
+                           std::span<const double> z, PointDuplicates duplicates) {
   if (x.size() != y.size() || x.size() != z.size())
     throw std::invalid_argument("point_tin: x, y and z must have equal lengths");
   if (x.size() > std::size_t{1} << 29) throw std::length_error("point_tin: more than 2^29 samples");
@@ -159,7 +158,7 @@ SampleList take_samples(std::span<const double> x, std::span<const double> y,
     all[k] = {x[i], y[i], z[i], kUnlisted, i};
   }
   numbers.release();
-  std::uint32_t kept = 0;
+  std::uint32_t unique_count = 0;
   for (std::uint32_t begin = 0; begin < count;) {
     Sample first = all[begin];
     std::uint32_t end = begin + 1;
@@ -168,7 +167,7 @@ SampleList take_samples(std::span<const double> x, std::span<const double> y,
       throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
                                   " is at the position of sample " + std::to_string(first.id));
     if (end - begin == 1) {
-      all[kept++] = first;
+      all[unique_count++] = first;
       begin = end;
       continue;
     }
@@ -180,15 +179,15 @@ SampleList take_samples(std::span<const double> x, std::span<const double> y,
     samples.duplicate_range = std::max(samples.duplicate_range, highest.z - lowest.z);
     if (duplicates == PointDuplicates::kAll) {
       // Once one of them is a vertex, the other cannot become one, because its position is taken.
-      all[kept++] = lowest;
-      if (highest.z > lowest.z) all[kept++] = highest;
+      all[unique_count++] = lowest;
+      if (highest.z > lowest.z) all[unique_count++] = highest;
     } else {
       first.z = merged_height(group, duplicates);
-      all[kept++] = first;
+      all[unique_count++] = first;
     }
     begin = end;
   }
-  all.resize(kept);
+  all.resize(unique_count);
   return samples;
 }
 
@@ -206,13 +205,13 @@ PointMesh start_with_frame(std::span<const Point3> frame) {
   std::size_t turns = 0;
   bool bends = false;
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Place2 before = place(mesh.vertices[i == 0 ? count - 1 : i - 1]);
-    const Place2 here = place(mesh.vertices[i]);
-    const Place2 after = place(mesh.vertices[i + 1 == count ? 0 : i + 1]);
-    if (here == after) refuse_frame(i, "coincides with the next");
-    const int side = Kernel::orientation(before, here, after);
+    const Place2 previous = place(mesh.vertices[i == 0 ? count - 1 : i - 1]);
+    const Place2 current = place(mesh.vertices[i]);
+    const Place2 next = place(mesh.vertices[i + 1 == count ? 0 : i + 1]);
+    if (current == next) refuse_frame(i, "coincides with the next");
+    const int side = Kernel::orientation(previous, current, next);
     const bool turns_back =
-        lexicographically_less(before, here) != lexicographically_less(here, after);
+        lexicographically_less(previous, current) != lexicographically_less(current, next);
     if (side < 0 || (side == 0 && turns_back))
       refuse_frame(i, "makes the frame non-convex or clockwise");
     bends = bends || side > 0;
@@ -232,7 +231,7 @@ PointMesh start_with_hull(Pool<Sample>& samples) {
   const auto less = [&](std::uint32_t a, std::uint32_t b) {
     return lexicographically_less(at(a), at(b));
   };
-  // The extremes in 16 directions form a polygon; points strictly inside it are not corners.
+  // The extremes in 16 directions form a polygon. Points strictly inside it are not corners.
   constexpr std::array<Place2, 8> kDirections{
       {{8, 0}, {7, 3}, {6, 6}, {3, 7}, {0, 8}, {-3, 7}, {-6, 6}, {-7, 3}}};
   std::array<double, 16> best;

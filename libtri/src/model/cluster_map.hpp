@@ -21,84 +21,84 @@ struct ChildRef {
 
 /// A hash table from cluster id to ChildRef: open addressing, linear probing, deletion by shifting
 /// back. There are no tombstones, so lookups stay short however often clusters come and go. 16
-/// bytes per place; once it has grown, between 3/8 and 3/4 of the places are occupied.
+/// bytes per entry. Once it has grown, between 3/8 and 3/4 of the entries are occupied.
 class ClusterMap {
  public:
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] std::size_t memory() const { return places_.capacity() * sizeof(Place); }
+  [[nodiscard]] std::size_t memory() const { return entries_.capacity() * sizeof(Entry); }
 
   /// Makes room so that the next `count` insertions cannot fail.
   void reserve(std::size_t count) {
-    std::size_t wanted = places_.empty() ? 16 : places_.size();
-    while (count > wanted / 4 * 3) wanted *= 2;
-    if (wanted > places_.size()) grow(wanted);
+    std::size_t capacity = entries_.empty() ? 16 : entries_.size();
+    while (count > capacity / 4 * 3) capacity *= 2;
+    if (capacity > entries_.size()) grow(capacity);
   }
 
   [[nodiscard]] const ChildRef* find(ClusterId id) const {
-    if (places_.empty()) return nullptr;
-    for (std::size_t i = home(id);; i = next(i)) {
-      if (places_[i].id == id) return &places_[i].where;
-      if (places_[i].id == kFree) return nullptr;
+    if (entries_.empty()) return nullptr;
+    for (std::size_t i = first_slot(id);; i = next(i)) {
+      if (entries_[i].id == id) return &entries_[i].child;
+      if (entries_[i].id == kFree) return nullptr;
     }
   }
 
-  /// Returns false, and changes nothing, if the id already exists. Requires a reserved place.
-  bool insert(ClusterId id, ChildRef where) {
-    assert(size_ < places_.size() / 4 * 3);
-    std::size_t i = home(id);
-    for (; places_[i].id != kFree; i = next(i)) {
-      if (places_[i].id == id) return false;
+  /// Returns false, and changes nothing, if the id already exists. Requires reserved space.
+  bool insert(ClusterId id, ChildRef child) {
+    assert(size_ < entries_.size() / 4 * 3);
+    std::size_t i = first_slot(id);
+    for (; entries_[i].id != kFree; i = next(i)) {
+      if (entries_[i].id == id) return false;
     }
-    places_[i] = {id, where};
+    entries_[i] = {id, child};
     ++size_;
     return true;
   }
 
   void erase(ClusterId id) {
-    std::size_t hole = home(id);
-    while (places_[hole].id != id) {
-      assert(places_[hole].id != kFree);
+    std::size_t hole = first_slot(id);
+    while (entries_[hole].id != id) {
+      assert(entries_[hole].id != kFree);
       hole = next(hole);
     }
     // An entry whose probe sequence crosses the hole moves into it and leaves the next hole.
-    for (std::size_t i = next(hole); places_[i].id != kFree; i = next(i)) {
-      const std::size_t from_home = (i - home(places_[i].id)) & (places_.size() - 1);
-      const std::size_t from_hole = (i - hole) & (places_.size() - 1);
-      if (from_home < from_hole) continue;
-      places_[hole] = places_[i];
+    for (std::size_t i = next(hole); entries_[i].id != kFree; i = next(i)) {
+      const std::size_t distance = (i - first_slot(entries_[i].id)) & (entries_.size() - 1);
+      const std::size_t from_hole = (i - hole) & (entries_.size() - 1);
+      if (distance < from_hole) continue;
+      entries_[hole] = entries_[i];
       hole = i;
     }
-    places_[hole].id = kFree;
+    entries_[hole].id = kFree;
     --size_;
   }
 
  private:
   // on level 255, with the only ordinal that is never used
   static constexpr ClusterId kFree{~std::uint64_t{0}};
-  struct Place {
+  struct Entry {
     ClusterId id = kFree;
-    ChildRef where;
+    ChildRef child;
   };
 
   // Fibonacci hashing spreads consecutive ordinals far apart.
-  [[nodiscard]] std::size_t home(ClusterId id) const {
+  [[nodiscard]] std::size_t first_slot(ClusterId id) const {
     return static_cast<std::size_t>((static_cast<std::uint64_t>(id) * 0x9E3779B97F4A7C15u) >>
                                     shift_);
   }
-  [[nodiscard]] std::size_t next(std::size_t i) const { return (i + 1) & (places_.size() - 1); }
+  [[nodiscard]] std::size_t next(std::size_t i) const { return (i + 1) & (entries_.size() - 1); }
 
   void grow(std::size_t count) {
-    std::vector<Place> old(count);
-    old.swap(places_);
+    std::vector<Entry> old(count);
+    old.swap(entries_);
     shift_ = 64;
     for (std::size_t n = count; n > 1; n /= 2) --shift_;
     size_ = 0;
-    for (const Place& place : old) {
-      if (place.id != kFree) insert(place.id, place.where);
+    for (const Entry& entry : old) {
+      if (entry.id != kFree) insert(entry.id, entry.child);
     }
   }
 
-  std::vector<Place> places_;
+  std::vector<Entry> entries_;
   std::size_t size_ = 0;
   unsigned shift_ = 64;
 };

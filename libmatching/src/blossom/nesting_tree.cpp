@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "blossom/nest.hpp"
+#include "blossom/nesting_tree.hpp"
 
 namespace terrace::matching::blossom {
 
-Nest::Nest(const Solver& solver) {
+NestingTree::NestingTree(const Solver& solver) {
   const std::uint32_t count = solver.node_count(), n = solver.vertex_count();
   begin_.assign(count + std::size_t{2}, 0);
   const auto slot = [&](std::uint32_t node) {
@@ -27,16 +27,16 @@ Nest::Nest(const Solver& solver) {
     open.push_back(top);
     while (!open.empty()) {
       const std::uint32_t x = open.back();
-      const auto here = static_cast<std::uint32_t>(order_.size());
+      const auto position = static_cast<std::uint32_t>(order_.size());
       if (x < n) {
-        ranges_[x] = {here, here + 1};
+        ranges_[x] = {position, position + 1};
         order_.push_back(x);
         open.pop_back();
       } else if (ranges_[x].end == kNone) {
-        ranges_[x].end = here;
+        ranges_[x].end = position;
         open.pop_back();
       } else {
-        ranges_[x] = {here, kNone};
+        ranges_[x] = {position, kNone};
         for (const std::uint32_t child : children_of(x)) open.push_back(child);
       }
     }

@@ -22,6 +22,7 @@ namespace terrace::matching::tree {
   throw std::invalid_argument("a tree over boxes: " + what);
 }
 
+/// Throws std::invalid_argument for a box that is not finite or whose min exceeds its max.
 template <std::size_t D>
 void check_boxes(std::span<const base::Box<D>> boxes) {
   for (std::size_t k = 0; k < boxes.size(); ++k) {
@@ -37,6 +38,7 @@ void check_boxes(std::span<const base::Box<D>> boxes) {
   }
 }
 
+/// Throws std::invalid_argument if the rows are not a binary tree over n primitives.
 inline void check_rows(std::span<const TreeChildren> rows, std::size_t n) {
   if (n > std::numeric_limits<std::uint32_t>::max() / 2) {
     refuse_tree(std::to_string(n) + " primitives would need about " + std::to_string(n / 13000000) +
@@ -46,15 +48,15 @@ inline void check_rows(std::span<const TreeChildren> rows, std::size_t n) {
     refuse_tree(std::to_string(rows.size()) + " rows for " + std::to_string(n) +
                 " primitives; a binary tree has one row fewer than leaves");
   }
-  std::vector<bool> taken(n + rows.size(), false);
+  std::vector<bool> has_parent(n + rows.size(), false);
   for (std::size_t r = 0; r < rows.size(); ++r) {
     for (const std::uint32_t child : {rows[r].a, rows[r].b}) {
-      if (child >= n + r || taken[child]) {
+      if (child >= n + r || has_parent[child]) {
         refuse_tree("row " + std::to_string(r) + " names node " + std::to_string(child) +
                     ", which " +
                     (child >= n + r ? "is not made by an earlier row" : "already has a parent"));
       }
-      taken[child] = true;
+      has_parent[child] = true;
     }
   }
 }

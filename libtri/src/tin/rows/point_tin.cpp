@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "terrace/tri/point_tin.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,9 +15,8 @@
 
 #include <terrace/base/simd.hpp>
 
-#include "places.hpp"
-#include "terrace/tri/point_tin.hpp"
-#include "tin/by_path.hpp"
+#include "padded_samples.hpp"
+#include "tin/instruction_set.hpp"
 #include "tin/lattice.hpp"
 #include "tin/options.hpp"
 #include "tin/scan.hpp"
@@ -24,7 +25,7 @@ namespace terrace::tri {
 namespace {
 
 /// True if samples in rows and columns can be meshed with these options.
-bool supported(std::span<const Point3> frame, const PointTinOptions& options) {
+bool is_supported(std::span<const Point3> frame, const PointTinOptions& options) {
   return options.lattice && options.max_points == 0 && tin::rows::is_rectangle(frame);
 }
 
@@ -74,7 +75,7 @@ namespace {
 struct PlacedVertex {
   std::int32_t x, y;
   double z;
-  std::uint32_t sample;  ///< place_at() of the sample; kNone for a vertex of the frame
+  std::uint32_t sample;  ///< place_at() of the sample, or kNone for a vertex of the frame
 };
 
 RowCorner corner(const PlacedVertex& vertex) {
@@ -86,7 +87,7 @@ class PlacedSamples : public LatticeSamples<PlacedSamples, PlacedVertex> {
  public:
   using Sample = RowCorner;
   using PlacedMesh = Mesh<std::vector<Vertex>>;
-  static constexpr bool kMoved = true;
+  static constexpr bool kMovesVertices = true;
   static constexpr bool kThinDelaunay = true;
 
   PlacedSamples(PaddedSamples padded, const PointTinOptions& options, base::SimdPath set);
@@ -97,7 +98,7 @@ class PlacedSamples : public LatticeSamples<PlacedSamples, PlacedVertex> {
 
   static bool border_fixed() { return true; }
 
-  void judge(PlacedMesh& mesh, std::uint32_t t) const;
+  void set_error(PlacedMesh& mesh, std::uint32_t t) const;
   bool open(std::uint32_t place) const;
   Vertex take(std::uint32_t place) const;
   void give_up(std::uint32_t place);
@@ -133,12 +134,12 @@ class PlacedSamples : public LatticeSamples<PlacedSamples, PlacedVertex> {
   PaddedSamples padded_;
   RowSamples samples_;
   const RowScan& scan_;
-  std::vector<std::pair<std::size_t, double>> given_up_;  ///< with their heights
+  std::vector<std::pair<std::size_t, double>> rejected_;  ///< with their heights
 };
 
 PlacedSamples::PlacedSamples(PaddedSamples padded, const PointTinOptions& options,
                              base::SimdPath set)
-    : LatticeSamples(Ground(1, 1, static_cast<std::int64_t>(kFarthest),
+    : LatticeSamples(Ground(1, 1, static_cast<std::int64_t>(kMaxCoordinate),
                             tangent_of(options.min_angle_degrees))),
       bound_(options.max_error),
       lattice_(*options.lattice),
@@ -150,7 +151,7 @@ float PlacedSamples::least_error() const {
   return static_cast<float>(std::clamp(bound_, 1e-30, 1e30));
 }
 
-void PlacedSamples::judge(PlacedMesh& mesh, std::uint32_t t) const {
+void PlacedSamples::set_error(PlacedMesh& mesh, std::uint32_t t) const {
   Triangle& triangle = mesh.triangles[t];
   const WorstSample<double> worst =
       scan_.worst(samples_, corner(mesh.vertex(triangle, 0)), corner(mesh.vertex(triangle, 1)),
@@ -162,19 +163,19 @@ void PlacedSamples::judge(PlacedMesh& mesh, std::uint32_t t) const {
 bool PlacedSamples::open(std::uint32_t place) const { return !std::isnan(padded_.z[at(place)]); }
 
 PlacedVertex PlacedSamples::take(std::uint32_t place) const {
-  const Sample own = sample(place);
-  return {static_cast<std::int32_t>(to_whole(own.x)), static_cast<std::int32_t>(to_whole(own.y)),
-          on_lattice(lattice_, own.z), place};
+  const Sample input = sample(place);
+  return {static_cast<std::int32_t>(round_half_up(input.x)),
+          static_cast<std::int32_t>(round_half_up(input.y)), on_lattice(lattice_, input.z), place};
 }
 
 void PlacedSamples::give_up(std::uint32_t place) {
-  given_up_.emplace_back(at(place), padded_.z[at(place)]);
+  rejected_.emplace_back(at(place), padded_.z[at(place)]);
   padded_.z[at(place)] = std::numeric_limits<double>::quiet_NaN();
 }
 
 void PlacedSamples::restore() {
-  for (const auto& [index, height] : given_up_) padded_.z[index] = height;
-  given_up_.clear();
+  for (const auto& [index, height] : rejected_) padded_.z[index] = height;
+  rejected_.clear();
 }
 
 bool PlacedSamples::within(const Vertex& a, const Vertex& b, const Vertex& c) const {
@@ -248,7 +249,7 @@ PointTin make_tin(const Samples& samples, std::span<const Point3> frame,
   check_sizes(samples);
   if (samples.z.size() > std::size_t{1} << 29)
     throw std::length_error("point_tin: more than 2^29 samples");
-  if (!supported(frame, options)) return tin_of_points(samples, frame, options);
+  if (!is_supported(frame, options)) return tin_of_points(samples, frame, options);
   std::optional<PaddedSamples> padded = padded_samples(samples, frame);
   if (!padded) return tin_of_points(samples, frame, options);
   std::vector<PlacedVertex> vertices;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hilbert.hpp"
+#include "curve_sort.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,8 +8,6 @@
 #include <type_traits>
 
 #include <terrace/base/hilbert.hpp>
-
-#include "curve_sort.hpp"
 
 namespace terrace::tri {
 namespace {

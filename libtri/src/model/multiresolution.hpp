@@ -79,13 +79,13 @@ struct MultiresolutionModel<Triangulation>::Impl {
   const Delta& expand(ClusterId cluster);
   const Delta& collapse(ClusterId cluster);
   /// Removes, within a step, points of an expanded cluster that has no expanded clusters below it,
-  /// until `left` of them remain. The cluster is collapsed once 0 remain. Until then no other
+  /// until `remaining` of them remain. The cluster is collapsed once 0 remain. Until then no other
   /// cluster may be expanded or collapsed.
-  void collapse_to(ClusterTree::Slot cluster, std::uint32_t left);
+  void collapse_to(ClusterTree::Slot cluster, std::uint32_t remaining);
   /// The points of an expanded cluster that are present.
   [[nodiscard]] std::span<const VertexId> present(ClusterTree::Slot cluster) {
     const std::span<const VertexId> vertices = tree_.vertices(cluster);
-    return cluster == partial_ ? vertices.first(left_) : vertices;
+    return cluster == partial_ ? vertices.first(remaining_) : vertices;
   }
   const Delta& refine(const Box3& region, unsigned level) {
     return change_region(region, level, true, false);
@@ -103,7 +103,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
 
   [[nodiscard]] PointId point_id(VertexId vertex) const;
   [[nodiscard]] unsigned level(VertexId vertex) const {
-    return tree_.level(owners_.standing(vertex).slot);
+    return tree_.level(owners_.representative(vertex).slot);
   }
   void heads(VertexId vertex, std::vector<ClusterId>& clusters) const;
   [[nodiscard]] std::vector<ClusterId> expanded() const;
@@ -116,7 +116,7 @@ struct MultiresolutionModel<Triangulation>::Impl {
   /// can compute it from scratch.
   static constexpr bool kFollows = requires(Triangulation t) { t.follow(); };
   static constexpr bool kRestores = requires(Triangulation t) { t.restore(1u); };
-  static constexpr std::size_t kKeptPoints = 1 << 16;
+  static constexpr std::size_t kMaxScratchPoints = 1 << 16;
 
   struct Staged {
     Slot slot;
@@ -134,11 +134,11 @@ struct MultiresolutionModel<Triangulation>::Impl {
   const Delta& change_region(const Box3& region, unsigned level, bool refine, bool coarsen);
   const Delta& apply(const ClusterTree::Plan& plan);
   void check_room() const;
-  void remove_points(Slot cluster, std::uint32_t left);
+  void remove_points(Slot cluster, std::uint32_t remaining);
   void reserve(std::size_t vertices);
   void insert_clusters(bool list_created);
   void build_clusters();
-  void note(VertexOwners::Change change, VertexId vertex, double height_before);
+  void record_change(VertexOwners::Change change, VertexId vertex, double former_height);
   void start_delta();
   void finish_delta();
   void finish_reassigned();
@@ -151,16 +151,16 @@ struct MultiresolutionModel<Triangulation>::Impl {
   std::size_t points_ = 0;
   bool deltas_, old_heights_;
   bool open_ = false;                    // between open_step() and close_step()
-  Slot partial_ = ClusterTree::kNoSlot;  // has `left_` points after collapse_to()
-  std::uint32_t left_ = 0;
+  Slot partial_ = ClusterTree::kNoSlot;  // has `remaining_` points after collapse_to()
+  std::uint32_t remaining_ = 0;
   Delta delta_;
   Stage stage_;
-  std::vector<VertexId> created_;         // vertices created in a step that also collapses
-  std::vector<bool> marks_;               // scratch of finish_delta(), all false
-  std::vector<double> heights_before_;    // with old_heights, by slot
-  std::vector<bool> noted_;               // marks the valid entries of heights_before_
-  std::vector<VertexId> noted_vertices_;  // the same as a list
-  std::vector<VertexId> gone_;            // scratch of remove_points()
+  std::vector<VertexId> created_;                 // vertices created in a step that also collapses
+  std::vector<bool> marks_;                       // scratch of finish_delta(), all false
+  std::vector<double> former_heights_;            // with old_heights, by slot
+  std::vector<bool> has_former_height_;           // marks the valid entries of former_heights_
+  std::vector<VertexId> former_height_vertices_;  // the same as a list
+  std::vector<VertexId> removed_vertices_;        // scratch of remove_points()
   std::vector<typename Triangulation::Insertion> inserted_;  // scratch of insert_clusters()
 };
 
@@ -190,8 +190,9 @@ auto MultiresolutionModel<Triangulation>::Impl::expand(ClusterId cluster) -> con
 
 template <class Triangulation>
 auto MultiresolutionModel<Triangulation>::Impl::collapse(ClusterId cluster) -> const Delta& {
-  const Slot there = tree_.child_slot(find(cluster));
-  return apply(there == ClusterTree::kNoSlot ? ClusterTree::Plan{} : tree_.plan_collapse(there));
+  const Slot expanded_slot = tree_.child_slot(find(cluster));
+  return apply(expanded_slot == ClusterTree::kNoSlot ? ClusterTree::Plan{}
+                                                     : tree_.plan_collapse(expanded_slot));
 }
 
 template <class Triangulation>
@@ -251,10 +252,10 @@ ClusterTree::Take MultiresolutionModel<Triangulation>::Impl::take() {
 
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::check_room() const {
-  const std::size_t there = triangulation_.vertex_count();
-  if (stage_.points.size() <= kMaxVertices - there) return;
+  const std::size_t present_count = triangulation_.vertex_count();
+  if (stage_.points.size() <= kMaxVertices - present_count) return;
   throw std::length_error("the step would add " + std::to_string(stage_.points.size()) +
-                          " points to " + std::to_string(there) +
+                          " points to " + std::to_string(present_count) +
                           " vertices, more than 2^29 - 2; ask for less detail");
 }
 
@@ -303,29 +304,31 @@ auto MultiresolutionModel<Triangulation>::Impl::restore([[maybe_unused]] unsigne
 }
 
 template <class Triangulation>
-void MultiresolutionModel<Triangulation>::Impl::collapse_to(Slot cluster, std::uint32_t left) {
+void MultiresolutionModel<Triangulation>::Impl::collapse_to(Slot cluster, std::uint32_t remaining) {
   assert(open_);
-  remove_points(cluster, left);
+  remove_points(cluster, remaining);
   if constexpr (kFollows) triangulation_.follow();
 }
 
-// Removes points of a cluster until `left` of them remain, and the cluster with its last point.
+// Removes points of a cluster until `remaining` of them remain, and the cluster with its last
+// point.
 template <class Triangulation>
-void MultiresolutionModel<Triangulation>::Impl::remove_points(Slot cluster, std::uint32_t left) {
+void MultiresolutionModel<Triangulation>::Impl::remove_points(Slot cluster,
+                                                              std::uint32_t remaining) {
   assert(partial_ == ClusterTree::kNoSlot || partial_ == cluster);
-  gone_.clear();
+  removed_vertices_.clear();
   const std::span<const VertexId> vertices = present(cluster);
-  for (std::uint32_t i = left; i < vertices.size(); ++i) {
+  for (std::uint32_t i = remaining; i < vertices.size(); ++i) {
     const double height = old_heights_ ? owners_.height(vertices[i]) : 0.0;
     const VertexOwners::Change change = owners_.remove(vertices[i], {cluster, i}, tree_);
-    if (change == VertexOwners::Change::last) gone_.push_back(vertices[i]);
-    note(change, vertices[i], height);
+    if (change == VertexOwners::Change::last) removed_vertices_.push_back(vertices[i]);
+    record_change(change, vertices[i], height);
   }
-  triangulation_.remove(gone_);
-  points_ -= vertices.size() - left;
-  partial_ = left > 0 ? cluster : ClusterTree::kNoSlot;
-  left_ = left;
-  if (left == 0) tree_.release(cluster);
+  triangulation_.remove(removed_vertices_);
+  points_ -= vertices.size() - remaining;
+  partial_ = remaining > 0 ? cluster : ClusterTree::kNoSlot;
+  remaining_ = remaining;
+  if (remaining == 0) tree_.release(cluster);
 }
 
 template <class Triangulation>
@@ -333,14 +336,14 @@ void MultiresolutionModel<Triangulation>::Impl::reserve(std::size_t vertices) {
   owners_.reserve(vertices + 1);
   if constexpr (requires { triangulation_.reserve(vertices); }) triangulation_.reserve(vertices);
   if (old_heights_) {
-    heights_before_.reserve(vertices + 1);
-    noted_.reserve(vertices + 1);
+    former_heights_.reserve(vertices + 1);
+    has_former_height_.reserve(vertices + 1);
   }
 }
 
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::insert_clusters(bool list_created) {
-  if (stage_.points.size() > kKeptPoints) {
+  if (stage_.points.size() > kMaxScratchPoints) {
     reserve(triangulation_.vertex_count() + stage_.points.size());
   }
   for (const Staged& staged : stage_.clusters) {
@@ -356,46 +359,47 @@ void MultiresolutionModel<Triangulation>::Impl::insert_clusters(bool list_create
       const double height = had_height ? owners_.height(vertex) : 0.0;
       const VertexOwners::Change change =
           owners_.add(vertex, {staged.slot, i}, stage_.heights[staged.first + i], tree_);
-      note(change, vertex, height);
+      record_change(change, vertex, height);
       if (list_created && change == VertexOwners::Change::first) created_.push_back(vertex);
     }
     points_ += size;
   }
   // The scratch memory of one cluster is worth keeping, but the memory of a whole level is not.
-  if (stage_.points.capacity() > kKeptPoints) stage_ = {};
+  if (stage_.points.capacity() > kMaxScratchPoints) stage_ = {};
 }
 
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::build_clusters() {
-  const std::vector<VertexId> built = triangulation_.build(stage_.points);
+  const std::vector<VertexId> vertices_of_points = triangulation_.build(stage_.points);
   stage_.points = {};
   owners_.reserve(triangulation_.vertex_count() + 1);
   for (const Staged& staged : stage_.clusters) {
     const std::span<VertexId> vertices = tree_.vertices(staged.slot);
     for (std::uint32_t i = 0; i < vertices.size(); ++i) {
-      vertices[i] = built[staged.first + i];
+      vertices[i] = vertices_of_points[staged.first + i];
       owners_.add(vertices[i], {staged.slot, i}, stage_.heights[staged.first + i], tree_);
     }
   }
-  points_ = built.size();
+  points_ = vertices_of_points.size();
   stage_ = {};
 }
 
 template <class Triangulation>
-void MultiresolutionModel<Triangulation>::Impl::note(VertexOwners::Change change, VertexId vertex,
-                                                     double height_before) {
+void MultiresolutionModel<Triangulation>::Impl::record_change(VertexOwners::Change change,
+                                                              VertexId vertex,
+                                                              double former_height) {
   if (change == VertexOwners::Change::other && deltas_) delta_.reassigned.push_back(vertex);
   if (!old_heights_) return;
   if (change != VertexOwners::Change::other && change != VertexOwners::Change::last) return;
   // The former height is known at the first change within a step.
-  if (noted_.size() < owners_.slots()) {
-    noted_.resize(owners_.slots());
-    heights_before_.resize(owners_.slots());
+  if (has_former_height_.size() < owners_.slots()) {
+    has_former_height_.resize(owners_.slots());
+    former_heights_.resize(owners_.slots());
   }
-  if (noted_[slot(vertex)]) return;
-  noted_[slot(vertex)] = true;
-  noted_vertices_.push_back(vertex);
-  heights_before_[slot(vertex)] = height_before;
+  if (has_former_height_[slot(vertex)]) return;
+  has_former_height_[slot(vertex)] = true;
+  former_height_vertices_.push_back(vertex);
+  former_heights_[slot(vertex)] = former_height;
 }
 
 template <class Triangulation>
@@ -431,7 +435,7 @@ void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
   mark(added, true);
   mark(removed, true);
   std::erase_if(delta_.reassigned, [&](VertexId vertex) {
-    if (!owners_.owned(vertex)) return true;  // added and removed again
+    if (!owners_.has_owner(vertex)) return true;  // added and removed again
     const bool other = marks_[static_cast<std::uint32_t>(vertex)];
     marks_[static_cast<std::uint32_t>(vertex)] = true;
     return other;
@@ -444,18 +448,18 @@ void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::finish_heights() {
   for (const VertexId vertex : delta_.changes.removed_vertices) {
-    delta_.removed_heights.push_back(heights_before_[slot(vertex)]);
+    delta_.removed_heights.push_back(former_heights_[slot(vertex)]);
   }
   for (const VertexId vertex : delta_.reassigned) {
-    delta_.reassigned_heights.push_back(heights_before_[slot(vertex)]);
+    delta_.reassigned_heights.push_back(former_heights_[slot(vertex)]);
   }
-  for (const VertexId vertex : noted_vertices_) noted_[slot(vertex)] = false;
-  noted_vertices_.clear();
+  for (const VertexId vertex : former_height_vertices_) has_former_height_[slot(vertex)] = false;
+  former_height_vertices_.clear();
 }
 
 template <class Triangulation>
 PointId MultiresolutionModel<Triangulation>::Impl::point_id(VertexId vertex) const {
-  const VertexOwners::Owner owner = owners_.standing(vertex);
+  const VertexOwners::Owner owner = owners_.representative(vertex);
   return {tree_.id(owner.slot), owner.index};
 }
 
@@ -464,8 +468,8 @@ void MultiresolutionModel<Triangulation>::Impl::heads(VertexId vertex,
                                                       std::vector<ClusterId>& clusters) const {
   clusters.clear();
   owners_.for_each(vertex, [&](VertexOwners::Owner owner) {
-    for (unsigned below = tree_.level(owner.slot); below-- > 0;) {
-      clusters.push_back(tree_.headed_by(owner.slot, owner.index, below));
+    for (unsigned lower_level = tree_.level(owner.slot); lower_level-- > 0;) {
+      clusters.push_back(tree_.headed_cluster(owner.slot, owner.index, lower_level));
     }
   });
 }
@@ -489,22 +493,22 @@ std::vector<ClusterId> MultiresolutionModel<Triangulation>::Impl::expanded() con
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::children(ClusterId cluster,
                                                          std::vector<ClusterId>& clusters) const {
-  Slot there = ClusterTree::kRoot;
-  if (cluster != tree_.id(ClusterTree::kRoot)) there = tree_.child_slot(find(cluster));
-  if (there == ClusterTree::kNoSlot) {
+  Slot expanded_slot = ClusterTree::kRoot;
+  if (cluster != tree_.id(ClusterTree::kRoot)) expanded_slot = tree_.child_slot(find(cluster));
+  if (expanded_slot == ClusterTree::kNoSlot) {
     throw std::invalid_argument(to_string(cluster) + " is not expanded");
   }
   clusters.clear();
-  const std::uint32_t count = tree_.child_count(there);
-  for (std::uint32_t i = 0; i < count; ++i) clusters.push_back(tree_.child_id({there, i}));
+  const std::uint32_t count = tree_.child_count(expanded_slot);
+  for (std::uint32_t i = 0; i < count; ++i) clusters.push_back(tree_.child_id({expanded_slot, i}));
 }
 
 template <class Triangulation>
 std::size_t MultiresolutionModel<Triangulation>::Impl::memory_bytes() const {
-  return tree_.memory() + owners_.memory() + gone_.capacity() * sizeof(VertexId) +
+  return tree_.memory() + owners_.memory() + removed_vertices_.capacity() * sizeof(VertexId) +
          created_.capacity() * sizeof(VertexId) + marks_.capacity() / 8 +
-         heights_before_.capacity() * sizeof(double) + noted_.capacity() / 8 +
-         noted_vertices_.capacity() * sizeof(VertexId) +
+         former_heights_.capacity() * sizeof(double) + has_former_height_.capacity() / 8 +
+         former_height_vertices_.capacity() * sizeof(VertexId) +
          inserted_.capacity() * sizeof(inserted_[0]) + stage_.points.capacity() * sizeof(Point) +
          stage_.heights.capacity() * sizeof(double);
 }

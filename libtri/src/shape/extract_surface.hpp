@@ -30,7 +30,7 @@ ShapeSurface surface_of(const Mesh& mesh, const State& state) {
       if (is_kept(of[spatial::tetrahedron_of(tetrahedron.mate[i])])) continue;
       // In order with the corner first, so counter-clockwise seen from the other side.
       faces.push_back(spatial::facet_of(tetrahedron, i));
-      result.behind.push_back(TetrahedronId{t});
+      result.tetrahedra.push_back(TetrahedronId{t});
       for (const std::uint32_t v : faces.back()) number[v] = 0;
     }
   }
@@ -57,7 +57,7 @@ ShapeParts parts_apart(const Mesh& mesh, const State& state, const ShapeSurface&
   constexpr std::uint32_t kNoFace = spatial::kNone;
   std::vector<std::uint32_t> number(state.of.size(), kNoFace);  // of a tetrahedron's first face
   for (std::uint32_t f = 0; f < faces; ++f) {
-    const std::uint32_t t = slot(surface.behind[f]);
+    const std::uint32_t t = slot(surface.tetrahedra[f]);
     std::uint32_t i = 0;
     const auto on_face = [&](std::uint32_t v) {
       const auto& face = surface.surface.faces[f];

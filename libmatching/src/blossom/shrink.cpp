@@ -6,6 +6,54 @@
 
 namespace terrace::matching::blossom {
 
+std::uint32_t Solver::new_blossom() {
+  if (spare_.empty()) {
+    spare_.push_back(node_count());
+    nodes_.emplace_back();
+    parts_.emplace_back();
+  }
+  const std::uint32_t blossom = spare_.back();
+  spare_.pop_back();
+  parts(blossom).clear();
+  return blossom;
+}
+
+// The part that contains the base, `exit`, gets the blossom's matched edge. The other parts are
+// paired around the cycle.
+void Solver::match_parts(std::uint32_t blossom, std::uint32_t exit) {
+  const std::vector<Part>& cycle = parts(blossom);
+  const std::uint32_t count = static_cast<std::uint32_t>(cycle.size());
+  nodes_[cycle[exit].node].base = nodes_[blossom].base;
+  nodes_[cycle[exit].node].mate = nodes_[blossom].mate;
+  for (std::uint32_t step = 1; step < count; step += 2) {
+    const Part& part = cycle[(exit + step) % count];
+    Node& x = nodes_[part.node];
+    Node& y = nodes_[cycle[(exit + step + 1) % count].node];
+    x.base = y.mate = part.from;
+    x.mate = y.base = part.to;
+  }
+}
+
+// Afterwards top() returns the part that contains a vertex. (Walking up from the vertex would take
+// time proportional to the nesting depth.) Base and mate of the blossom stay readable.
+void Solver::release_parts(std::uint32_t blossom) {
+  Node& b = nodes_[blossom];
+  for (const Part& part : parts(blossom)) {
+    Node& x = nodes_[part.node];
+    x.parent = kNone;
+    sets_[x.set] = part.node;
+    if (x.set == b.set) continue;
+    for (std::uint32_t v = x.first;; v = vertices_[v].next) {
+      vertices_[v].set = x.set;
+      if (v == x.last) break;
+    }
+  }
+  b.label = Label::free;
+  b.first = b.last = kNone;
+  b.dual = 0;
+  spare_.push_back(blossom);
+}
+
 std::uint32_t Solver::tree_parent(std::uint32_t plus) const {
   const std::uint32_t mate = nodes_[plus].mate;
   return mate == kNone ? kNone : top(nodes_[top(mate)].enter_from);
@@ -154,7 +202,7 @@ void Solver::expand(std::uint32_t blossom) {
     leave_minus(cycle[p].node);
     const Node& x = nodes_[cycle[p].node];
     for (std::uint32_t v = x.first;; v = vertices_[v].next) {
-      if (vertices_[v].key != std::numeric_limits<std::int64_t>::max()) offer(v);
+      if (vertices_[v].key != std::numeric_limits<std::int64_t>::max()) schedule_grow(v);
       if (v == x.last) break;
     }
   }

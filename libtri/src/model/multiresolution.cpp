@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "model.hpp"
+#include "multiresolution.hpp"
 
 #ifndef TERRACE_TRI_CORE
 #include "terrace/tri/regional_delaunay2.hpp"

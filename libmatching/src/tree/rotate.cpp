@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "terrace/matching/bounding_volume_hierarchy.hpp"
-#include "tree/check_tree.hpp"
+#include "tree/check.hpp"
 
 namespace terrace::matching {
 namespace {
@@ -34,18 +34,18 @@ class Rotation {
       }
     }
     boxes_.reserve(boxes_.size() + rows.size());
-    for (const auto& [a, b] : rows) boxes_.push_back(together(a, b));
+    for (const auto& [a, b] : rows) boxes_.push_back(enclosing_box(a, b));
     for (std::size_t v = count_; v < boxes_.size(); ++v) cost_ += tree::area_of(boxes_[v]);
     set_order();
   }
 
   /// Makes one pass. Returns whether it gained enough for another one.
   bool pass() {
-    double gained = 0.0;
-    for (const std::uint32_t v : order_) gained += rotate(v);
+    double gain = 0.0;
+    for (const std::uint32_t v : order_) gain += rotate(v);
     set_order();
-    cost_ -= gained;
-    return gained > 1e-3 * cost_;
+    cost_ -= gain;
+    return gain > 1e-3 * cost_;
   }
 
   /// Returns the rows in postorder.
@@ -63,7 +63,7 @@ class Rotation {
   }
 
  private:
-  [[nodiscard]] base::Box<D> together(std::uint32_t a, std::uint32_t b) const {
+  [[nodiscard]] base::Box<D> enclosing_box(std::uint32_t a, std::uint32_t b) const {
     base::Box<D> box = boxes_[a];
     for (std::size_t d = 0; d < D; ++d) {
       box.min[d] = std::min(box.min[d], boxes_[b].min[d]);
@@ -93,23 +93,24 @@ class Rotation {
   double rotate(std::uint32_t v) {
     const auto [a, b] = children_[v - count_];
     Swap best;
-    const auto lower = [&](std::uint32_t sibling, std::uint32_t parent) {
+    const auto try_swaps = [&](std::uint32_t sibling, std::uint32_t parent) {
       if (!may_change(parent)) return;
       const TreeChildren below = children_[parent - count_];
       for (const std::uint32_t child : {below.a, below.b}) {
-        const double gain =
-            tree::area_of(boxes_[parent]) - tree::area_of(together(sibling, other(below, child)));
+        const double gain = tree::area_of(boxes_[parent]) -
+                            tree::area_of(enclosing_box(sibling, other(below, child)));
         if (gain > best.gain) best = {v, sibling, parent, child, gain};
       }
     };
-    lower(a, b);
-    lower(b, a);
+    try_swaps(a, b);
+    try_swaps(b, a);
     if (may_change(a) && may_change(b)) {
       const TreeChildren left = children_[a - count_], right = children_[b - count_];
-      const double now = tree::area_of(boxes_[a]) + tree::area_of(boxes_[b]);
+      const double current_area = tree::area_of(boxes_[a]) + tree::area_of(boxes_[b]);
       for (const std::uint32_t child : {right.a, right.b}) {
-        const double gain = now - tree::area_of(together(left.a, other(right, child))) -
-                            tree::area_of(together(child, left.b));
+        const double gain = current_area -
+                            tree::area_of(enclosing_box(left.a, other(right, child))) -
+                            tree::area_of(enclosing_box(child, left.b));
         if (gain > best.gain) best = {a, left.a, b, child, gain};
       }
     }
@@ -120,14 +121,14 @@ class Rotation {
     for (const std::uint32_t parent : {best.first_parent, best.second_parent}) {
       if (parent == v) continue;
       const auto [first, second] = children_[parent - count_];
-      boxes_[parent] = together(first, second);
+      boxes_[parent] = enclosing_box(first, second);
     }
     return best.gain;
   }
 
-  void replace(std::uint32_t parent, std::uint32_t child, std::uint32_t by) {
+  void replace(std::uint32_t parent, std::uint32_t child, std::uint32_t replacement) {
     TreeChildren& children = children_[parent - count_];
-    (children.a == child ? children.a : children.b) = by;
+    (children.a == child ? children.a : children.b) = replacement;
   }
 
   // Lists parents before children from the root, then reverses the list.

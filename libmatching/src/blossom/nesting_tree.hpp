@@ -12,10 +12,10 @@ namespace terrace::matching::blossom {
 
 /// The nesting of a solution's nodes from the outside in: the children of each node, and its
 /// vertices as a range of one sequence.
-class Nest {
+class NestingTree {
  public:
-  Nest() = default;
-  explicit Nest(const Solver& solver);
+  NestingTree() = default;
+  explicit NestingTree(const Solver& solver);
 
   /// Returns the parts of a blossom or, for kNone, the top nodes.
   std::span<const std::uint32_t> children_of(std::uint32_t node) const {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "places.hpp"
+#include "padded_samples.hpp"
 
 #include <algorithm>
 #include <array>
@@ -18,9 +18,9 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 /// Maximum deviation of columns and rows from equal spacing, in spacings.
-constexpr double kRegular = 1e-3;
-/// Maximum distance of samples from a lattice, in spacings; larger ones would make scans slow.
-constexpr double kFarthestOff = 4.0;
+constexpr double kMaxUnevenness = 1e-3;
+/// Maximum distance of samples from a lattice, in spacings. Larger ones would make scans slow.
+constexpr double kMaxDeviation = 4.0;
 
 base::Box2 region_of(std::span<const Point3> frame) {
   base::Box2 region;
@@ -30,19 +30,19 @@ base::Box2 region_of(std::span<const Point3> frame) {
 
 /// True if the places ascend at approximately equal spacing.
 bool regular(std::span<const double> places) {
-  if (places.empty() || places.size() > kMostRows || !std::isfinite(places.front())) return false;
+  if (places.empty() || places.size() > kMaxRows || !std::isfinite(places.front())) return false;
   if (places.size() == 1) return true;
   const double first = places.front();
   const double step = (places.back() - first) / static_cast<double>(places.size() - 1);
   if (!(step > 0.0 && std::isfinite(step))) return false;
   for (std::size_t i = 0; i < places.size(); ++i)
-    if (!(std::abs(places[i] - (first + static_cast<double>(i) * step)) <= kRegular * step))
+    if (!(std::abs(places[i] - (first + static_cast<double>(i) * step)) <= kMaxUnevenness * step))
       return false;
   return true;
 }
 
 /// Adds the padding that scans require before and after the places.
-std::vector<double> padded(std::span<const double> places) {
+std::vector<double> pad(std::span<const double> places) {
   std::vector<double> all{-kInfinity};
   all.reserve(places.size() + 1 + kRowPad);
   all.insert(all.end(), places.begin(), places.end());
@@ -56,8 +56,8 @@ double per_unit(std::span<const double> places) {
 }
 
 /// Copies rows of `columns` numbers into longer rows.
-std::vector<double> padded_rows(std::span<const double> from, std::size_t columns,
-                                std::size_t stride) {
+std::vector<double> pad_rows(std::span<const double> from, std::size_t columns,
+                             std::size_t stride) {
   const std::size_t rows = from.size() / columns;
   std::vector<double> to((rows + 1) * stride);
   for (std::size_t row = 0; row < rows; ++row) {
@@ -74,7 +74,7 @@ template <class PlaceOf>
 void copy_heights(std::span<const double> from, std::size_t columns, const base::Box2& region,
                   const PlaceOf& place_of, PaddedSamples& out) {
   const std::size_t stride = out.layout.stride;
-  out.z = padded_rows(from, columns, stride);
+  out.z = pad_rows(from, columns, stride);
   for (std::size_t row = 0; row * columns < from.size(); ++row) {
     double* const to = out.z.data() + row * stride;
     for (std::size_t column = 0; column < columns; ++column) {
@@ -92,7 +92,9 @@ void copy_heights(std::span<const double> from, std::size_t columns, const base:
 /// Finds the affine map between places and columns and rows by least squares over some samples.
 bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layout) {
   constexpr std::size_t kEach = 8;
-  const auto along = [](std::size_t i, std::size_t count) { return i * (count - 1) / (kEach - 1); };
+  const auto spread = [](std::size_t i, std::size_t count) {
+    return i * (count - 1) / (kEach - 1);
+  };
   const double middle_column = static_cast<double>(samples.columns - 1) / 2;
   const double middle_row = static_cast<double>(rows - 1) / 2;
   std::array<double, 2> mean{}, by_column{}, by_row{};
@@ -101,10 +103,10 @@ bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layou
     for (std::size_t i = 0; i < kEach; ++i) {
       // Mirrored, so that rounding keeps the chosen samples symmetric about the middle.
       const std::size_t column = i < kEach / 2
-                                     ? along(i, samples.columns)
-                                     : samples.columns - 1 - along(kEach - 1 - i, samples.columns);
+                                     ? spread(i, samples.columns)
+                                     : samples.columns - 1 - spread(kEach - 1 - i, samples.columns);
       const std::size_t row =
-          j < kEach / 2 ? along(j, rows) : rows - 1 - along(kEach - 1 - j, rows);
+          j < kEach / 2 ? spread(j, rows) : rows - 1 - spread(kEach - 1 - j, rows);
       const std::size_t at = row * samples.columns + column;
       const double c = static_cast<double>(column) - middle_column;
       const double r = static_cast<double>(row) - middle_row;
@@ -134,22 +136,23 @@ bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layou
   return true;
 }
 
-/// The greatest deviation of samples from the lattice, in columns or rows; infinite if one has a
+/// The greatest deviation of samples from the lattice, in columns or rows, or infinite if one has a
 /// height but no place.
-double off_lattice(const SampleGrid& samples, const RowSamples& layout) {
-  double off = 0.0;
+double deviation_from_lattice(const SampleGrid& samples, const RowSamples& layout) {
+  double largest = 0.0;
   for (std::size_t i = 0; i < samples.z.size(); ++i) {
     if (std::isnan(samples.z[i])) continue;
     const double column = static_cast<double>(i % samples.columns);
     const double row = static_cast<double>(i / samples.columns);
     const double x = samples.x[i], y = samples.y[i];
-    const double across = layout.column_0 + (layout.column_x * x + layout.column_y * y) - column;
-    const double down = layout.row_0 + (layout.row_x * x + layout.row_y * y) - row;
-    const double own = std::max(std::abs(across), std::abs(down));
-    if (!(std::abs(across) + std::abs(down) < kInfinity)) return kInfinity;
-    off = std::max(off, own);
+    const double column_error =
+        layout.column_0 + (layout.column_x * x + layout.column_y * y) - column;
+    const double row_error = layout.row_0 + (layout.row_x * x + layout.row_y * y) - row;
+    const double deviation = std::max(std::abs(column_error), std::abs(row_error));
+    if (!(std::abs(column_error) + std::abs(row_error) < kInfinity)) return kInfinity;
+    largest = std::max(largest, deviation);
   }
-  return off;
+  return largest;
 }
 
 }  // namespace
@@ -159,15 +162,15 @@ bool is_rectangle(std::span<const Point3> frame) {
   for (const Point3& p : frame) {
     if (!(std::abs(p[2]) < kLargest)) return false;
     for (std::size_t k = 0; k < 2; ++k)
-      if (!(p[k] >= 0.0 && p[k] < kFarthest && p[k] == std::floor(p[k]))) return false;
+      if (!(p[k] >= 0.0 && p[k] < kMaxCoordinate && p[k] == std::floor(p[k]))) return false;
   }
   const auto region = region_of(frame);
   const auto &low = region.min, &high = region.max;
   const double width = high[0] - low[0], height = high[1] - low[1];
   if (!(width > 0.0 && height > 0.0)) return false;
   // Distances along the sides, from the south-west corner.
-  const double whole = 2.0 * (width + height);
-  const auto along = [&](const Point3& p) {
+  const double perimeter = 2.0 * (width + height);
+  const auto boundary_distance = [&](const Point3& p) {
     if (p[1] == low[1]) return p[0] - low[0];
     if (p[0] == high[0]) return width + (p[1] - low[1]);
     if (p[1] == high[1]) return width + height + (high[0] - p[0]);
@@ -175,8 +178,9 @@ bool is_rectangle(std::span<const Point3> frame) {
   };
   unsigned corners = 0, turns = 0;
   for (std::size_t i = 0; i < frame.size(); ++i) {
-    const double here = along(frame[i]), next = along(frame[i + 1 == frame.size() ? 0 : i + 1]);
-    if (here < 0.0 || here >= whole || here == next) return false;
+    const double here = boundary_distance(frame[i]),
+                 next = boundary_distance(frame[i + 1 == frame.size() ? 0 : i + 1]);
+    if (here < 0.0 || here >= perimeter || here == next) return false;
     turns += next < here ? 1 : 0;
     corners +=
         here == 0.0 || here == width || here == width + height || here == 2.0 * width + height ? 1
@@ -207,15 +211,15 @@ std::optional<PaddedSamples> padded_samples(const SampleRows& samples,
   layout.row_y = per_unit(samples.y);
   layout.column_0 = -samples.x[0] * layout.column_x;
   layout.row_0 = -samples.y[0] * layout.row_y;
-  layout.off = kRegular;
+  layout.deviation = kMaxUnevenness;
   copy_heights(
       samples.z, columns, region_of(frame),
       [&](std::size_t row, std::size_t column) {
         return std::array<double, 2>{samples.x[column], samples.y[row]};
       },
       out);
-  out.x = padded(samples.x);
-  out.y = padded(samples.y);
+  out.x = pad(samples.x);
+  out.y = pad(samples.y);
   return out;
 }
 
@@ -223,7 +227,7 @@ std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
                                             std::span<const Point3> frame) {
   const std::size_t columns = samples.columns;
   const std::size_t rows = columns == 0 ? 0 : samples.z.size() / columns;
-  if (columns < 2 || rows < 2 || columns > kMostRows || rows > kMostRows) return std::nullopt;
+  if (columns < 2 || rows < 2 || columns > kMaxRows || rows > kMaxRows) return std::nullopt;
   PaddedSamples out;
   RowSamples& layout = out.layout;
   layout.stride = columns + kRowPad;
@@ -231,8 +235,8 @@ std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
   layout.rows = static_cast<std::int32_t>(rows);
   if (!find_lattice(samples, rows, layout)) return std::nullopt;
   // Adds a margin for rounding.
-  layout.off = off_lattice(samples, layout) + 1e-6;
-  if (!(layout.off <= kFarthestOff)) return std::nullopt;
+  layout.deviation = deviation_from_lattice(samples, layout) + 1e-6;
+  if (!(layout.deviation <= kMaxDeviation)) return std::nullopt;
   copy_heights(
       samples.z, columns, region_of(frame),
       [&](std::size_t row, std::size_t column) {
@@ -240,8 +244,8 @@ std::optional<PaddedSamples> padded_samples(const SampleGrid& samples,
         return std::array<double, 2>{samples.x[i], samples.y[i]};
       },
       out);
-  out.x = padded_rows(samples.x, columns, layout.stride);
-  out.y = padded_rows(samples.y, columns, layout.stride);
+  out.x = pad_rows(samples.x, columns, layout.stride);
+  out.y = pad_rows(samples.y, columns, layout.stride);
   return out;
 }
 

@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Insertion of many vertices by two threads. Vertices are numbered along a Hilbert curve, so the
 // first half of the numbers is on one side of space and the second half on the other. Each thread
-// inserts the vertices of one half as long as it meets only tetrahedra of that half; the others are
+// inserts the vertices of one half as long as it meets only tetrahedra of that half. The others are
 // deferred. A second round cuts the circle of numbers elsewhere, so that most deferred vertices are
-// far from its border; the rest are inserted one by one.
-#include "parts_insert.hpp"
-
+// far from its border. The rest are inserted one by one.
 #include <algorithm>
 #include <array>
 #include <exception>
@@ -35,7 +33,7 @@ constexpr std::uint32_t kParts = 2;
 /// New tetrahedra go to blocks of slots that alternate between the parts.
 class Part {
  public:
-  static constexpr bool kWhole = false;
+  static constexpr bool kIsEntireMesh = false;
   static constexpr std::uint32_t kBlock = 128;  ///< marks of two cache lines
 
   /// `size` vertices first, first + 1, ... on a circle of `all` vertices that begins at `begin`.
@@ -49,7 +47,7 @@ class Part {
     }
   };
 
-  /// Uses slots from `base` on: `blocks` blocks for each of `parts` parts; this is part `number`.
+  /// Uses slots from `base` on: `blocks` blocks for each of `parts` parts. This is part `number`.
   /// free_list: slots that this part may use first.
   Part(const Range& range, std::uint32_t base, std::uint32_t parts, std::uint32_t number,
        std::uint32_t blocks, std::uint32_t free_list)
@@ -118,7 +116,7 @@ class Part {
 /// Starts a thread with this thread's metric. The result is not joinable if the system refuses to
 /// start one.
 template <class Kernel, class Work>
-std::thread in_thread(const Work& work) {
+std::thread start_thread(const Work& work) {
   try {
     if constexpr (std::is_same_v<Kernel, EllipticalKernel>) {
       return std::thread([work, &form = EllipticalKernel::form()] {
@@ -136,16 +134,16 @@ std::thread in_thread(const Work& work) {
 /// The nearest vertex before v on the curve (or else after it) that has tetrahedra and is in the
 /// range, or kNone. Takes few steps, as one vertex in four comes from coarser passes.
 template <class Kernel>
-std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Part::Range& range,
-                          std::uint32_t v) {
-  const auto is_there = [&](std::uint32_t u) { return mesh.vertex[u].incident < kLocalBit; };
+std::uint32_t find_hint(const Mesh<Kernel>& mesh, const Curve& curve, const Part::Range& range,
+                        std::uint32_t v) {
+  const auto has_tetrahedron = [&](std::uint32_t u) { return mesh.vertex[u].incident < kLocalBit; };
   for (std::uint32_t u = v; u - curve.begin >= curve.step && range.has(u - curve.step);) {
     u -= curve.step;
-    if (is_there(u)) return u;
+    if (has_tetrahedron(u)) return u;
   }
   for (std::uint32_t u = v; curve.end - u > curve.step && range.has(u + curve.step);) {
     u += curve.step;
-    if (is_there(u)) return u;
+    if (has_tetrahedron(u)) return u;
   }
   return kNone;
 }
@@ -154,8 +152,8 @@ std::uint32_t near_vertex(const Mesh<Kernel>& mesh, const Curve& curve, const Pa
 template <class Kernel>
 class alignas(128) Worker {
  public:
-  Worker(Mesh<Kernel>& mesh, const Curve& curve, const Part& its_part)
-      : part(its_part),
+  Worker(Mesh<Kernel>& mesh, const Curve& curve, const Part& thread_part)
+      : part(thread_part),
         mesh_(mesh),
         curve_(curve),
         insertion_(mesh, cavity_, part),
@@ -163,13 +161,13 @@ class alignas(128) Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  void run(std::span<const std::uint32_t> going) {
+  void run(std::span<const std::uint32_t> vertices) {
     try {
-      for (; tried < going.size(); ++tried) {
+      for (; attempts < vertices.size(); ++attempts) {
         ticks_(kTicksOfInsertion);
-        if (insert(going[tried])) continue;
+        if (insert(vertices[attempts])) continue;
         if (out_of_room_) return;
-        deferred.push_back(going[tried]);
+        deferred.push_back(vertices[attempts]);
       }
     } catch (...) {
       failure = std::current_exception();
@@ -178,13 +176,13 @@ class alignas(128) Worker {
 
   Part part;
   std::vector<std::uint32_t> deferred;
-  std::size_t tried = 0;  ///< all vertices, unless slots ran out
+  std::size_t attempts = 0;  ///< number of vertices, all unless slots ran out
   std::exception_ptr failure;
 
  private:
   bool insert(std::uint32_t v) {
     const auto& p = mesh_.vertex[v].point;
-    const std::uint32_t hint = near_vertex(mesh_, curve_, part.range(), v);
+    const std::uint32_t hint = find_hint(mesh_, curve_, part.range(), v);
     if (hint == kNone) return false;
     const WalkEnd end = walk(mesh_, p, mesh_.vertex[hint].incident, part);
     if (end.tetrahedron == kNone) return false;
@@ -213,7 +211,7 @@ class alignas(128) Worker {
 template <class Kernel>
 class Round {
  public:
-  /// Divides the curve's vertices, as a circle, into parts; the first begins at number `cut`.
+  /// Divides the curve's vertices, as a circle, into parts. The first begins at number `cut`.
   Round(Mesh<Kernel>& mesh, const Curve& curve, std::uint32_t cut) : mesh_(mesh), curve_(curve) {
     const std::uint32_t all = curve.end - curve.begin;
     const std::uint32_t half = all / 2;
@@ -221,15 +219,16 @@ class Round {
                Part::Range{curve.begin, all, curve.begin + (cut + half) % all, all - half}};
   }
 
-  /// Inserts the vertices `going` (sorted), which it rotates so that the first part comes first.
+  /// Inserts sorted vertices, which it rotates so that the first part comes first.
   /// Returns the vertices that could not be inserted, sorted.
-  std::vector<std::uint32_t> run(std::span<std::uint32_t> going, unsigned threads) {
-    std::rotate(going.begin(), std::lower_bound(going.begin(), going.end(), ranges_[0].first),
-                going.end());
-    const auto split = std::partition_point(going.begin(), going.end(),
+  std::vector<std::uint32_t> run(std::span<std::uint32_t> vertices, unsigned threads) {
+    std::rotate(vertices.begin(),
+                std::lower_bound(vertices.begin(), vertices.end(), ranges_[0].first),
+                vertices.end());
+    const auto split = std::partition_point(vertices.begin(), vertices.end(),
                                             [&](std::uint32_t v) { return ranges_[0].has(v); });
-    std::array<std::span<std::uint32_t>, kParts> lists = {std::span(going.begin(), split),
-                                                          std::span(split, going.end())};
+    std::array<std::span<std::uint32_t>, kParts> lists = {std::span(vertices.begin(), split),
+                                                          std::span(split, vertices.end())};
     std::vector<std::uint32_t> deferred;
     while (!lists[0].empty() || !lists[1].empty()) {
       fill_block();
@@ -240,7 +239,7 @@ class Round {
                            Part(ranges_[0], base, kParts, 0, blocks, mesh_.free_tetrahedron));
       Worker<Kernel> second(mesh_, curve_, Part(ranges_[1], base, kParts, 1, blocks, kNone));
       std::thread other;
-      if (threads > 1) other = in_thread<Kernel>([&] { second.run(lists[1]); });
+      if (threads > 1) other = start_thread<Kernel>([&] { second.run(lists[1]); });
       first.run(lists[0]);
       if (other.joinable()) {
         other.join();
@@ -253,8 +252,8 @@ class Round {
         deferred.insert(deferred.end(), worker->deferred.begin(), worker->deferred.end());
       }
       close_gaps(base, first.part, second.part);
-      lists = {lists[0].subspan(first.tried), lists[1].subspan(second.tried)};
-      if (first.tried + second.tried > 0) continue;
+      lists = {lists[0].subspan(first.attempts), lists[1].subspan(second.attempts)};
+      if (first.attempts + second.attempts > 0) continue;
       // A cavity needs more than all the room.
       for (const auto& list : lists) deferred.insert(deferred.end(), list.begin(), list.end());
       break;
@@ -278,19 +277,19 @@ class Round {
 
   /// Makes room for the tetrahedra of this many new vertices, in whole blocks. Uses capacity that
   /// is already reserved if it nearly suffices.
-  void make_room(std::size_t vertices) {
+  void make_room(std::size_t vertex_count) {
     constexpr std::size_t kUnit = kParts * std::size_t{Part::kBlock};
     const std::size_t size = mesh_.tetrahedron.size();
     const std::size_t reserved = mesh_.tetrahedron.bytes() / sizeof(Tetrahedron) - size;
-    const std::size_t wanted = 7 * vertices + 16 * kUnit;
-    const std::size_t taken =
-        reserved >= 6 * vertices + 8 * kUnit ? std::min(reserved, wanted) : wanted;
-    const std::size_t after = size + taken / kUnit * kUnit;
-    if (after > kMaxTetrahedra)
+    const std::size_t desired = 7 * vertex_count + 16 * kUnit;
+    const std::size_t added =
+        reserved >= 6 * vertex_count + 8 * kUnit ? std::min(reserved, desired) : desired;
+    const std::size_t new_size = size + added / kUnit * kUnit;
+    if (new_size > kMaxTetrahedra)
       throw std::length_error("a triangulation holds at most 2^30 - 2 tetrahedra");
-    mesh_.tetrahedron.resize(static_cast<std::uint32_t>(after));
-    mesh_.mark.resize(static_cast<std::uint32_t>(after));
-    std::fill(mesh_.mark.data() + size, mesh_.mark.data() + after, kUnknown);
+    mesh_.tetrahedron.resize(static_cast<std::uint32_t>(new_size));
+    mesh_.mark.resize(static_cast<std::uint32_t>(new_size));
+    std::fill(mesh_.mark.data() + size, mesh_.mark.data() + new_size, kUnknown);
   }
 
   /// Returns the slots that the parts have not used to the free list.
@@ -336,30 +335,31 @@ void insert_slot(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t hint) {
 }
 
 template <class Kernel>
-void insert_in_parts(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> going,
-                     unsigned threads) {
+void insert_in_parallel(Mesh<Kernel>& mesh, const Curve& curve, std::span<std::uint32_t> vertices,
+                        unsigned threads) {
   // A Hilbert curve passes through the halves of space one after the other. Its two middle quarters
   // together and its two outer ones are also halves, with a perpendicular cut.
   const std::uint32_t all = curve.end - curve.begin;
-  std::vector<std::uint32_t> left = Round<Kernel>(mesh, curve, 0).run(going, threads);
-  left = Round<Kernel>(mesh, curve, all / 4).run(left, threads);
+  std::vector<std::uint32_t> remaining = Round<Kernel>(mesh, curve, 0).run(vertices, threads);
+  remaining = Round<Kernel>(mesh, curve, all / 4).run(remaining, threads);
   const Part::Range everywhere = {curve.begin, all, curve.begin, all};
-  for (const std::uint32_t v : left) {
-    const std::uint32_t hint = near_vertex(mesh, curve, everywhere, v);
+  for (const std::uint32_t v : remaining) {
+    const std::uint32_t hint = find_hint(mesh, curve, everywhere, v);
     insert_slot(mesh, v, hint == kNone ? mesh.last_vertex : hint);
   }
 }
 
 #ifdef TERRACE_TRI_CORE
 template void insert_slot(Mesh<IntKernel>&, std::uint32_t, std::uint32_t);
-template void insert_in_parts(Mesh<IntKernel>&, const Curve&, std::span<std::uint32_t>, unsigned);
+template void insert_in_parallel(Mesh<IntKernel>&, const Curve&, std::span<std::uint32_t>,
+                                 unsigned);
 #else
 template void insert_slot(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t);
 template void insert_slot(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t);
-template void insert_in_parts(Mesh<DoubleKernel>&, const Curve&, std::span<std::uint32_t>,
-                              unsigned);
-template void insert_in_parts(Mesh<EllipticalKernel>&, const Curve&, std::span<std::uint32_t>,
-                              unsigned);
+template void insert_in_parallel(Mesh<DoubleKernel>&, const Curve&, std::span<std::uint32_t>,
+                                 unsigned);
+template void insert_in_parallel(Mesh<EllipticalKernel>&, const Curve&, std::span<std::uint32_t>,
+                                 unsigned);
 #endif
 
 }  // namespace terrace::tri::spatial
