@@ -92,7 +92,7 @@ TEST(Box, RoundingDoesNotRaiseDistances) {
   }
 }
 
-TEST(Box, NanIsNowhere) {
+TEST(Box, DoesNotContainNan) {
   Box2 box{{0, 0}, {2, 1}};
   const Box2 before = box;
   box.include(Point2{kNan, kNan});

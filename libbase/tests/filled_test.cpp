@@ -10,7 +10,7 @@ namespace {
 
 struct Stop {};
 
-TEST(Filled, IsAsLongAsAskedAndEndsAtACheck) {
+TEST(Filled, HasTheRequestedLengthAndStopsAtACheck) {
   constexpr std::size_t kCount = 3'000'000;
   std::size_t calls = 0;
   const auto values = filled(kCount, std::array<float, 3>{1, 2, 3}, [&] { ++calls; });

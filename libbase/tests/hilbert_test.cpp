@@ -38,7 +38,7 @@ void check_curve() {
   }
 }
 
-TEST(Hilbert, GoesFromNeighbourToNeighbour) {
+TEST(Hilbert, StepsToNeighbours) {
   check_curve<2, 4>();
   check_curve<2, 8>();
   check_curve<3, 1>();

@@ -15,13 +15,13 @@ TEST(OrderedWork, CommitsEachResultOnceInOrder) {
   for (const unsigned threads : {1U, 2U, 7U}) {
     for (const std::size_t count : {0U, 1U, 2U, 500U}) {
       SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
-      std::atomic<unsigned> made = 0;
+      std::atomic<unsigned> calls = 0;
       std::vector<std::size_t> committed;
       in_order(
           count, threads,
           [&](unsigned worker, std::size_t i) {
             EXPECT_LT(worker, threads);
-            ++made;
+            ++calls;
             if (i % 3 == 0) std::this_thread::yield();
             return std::make_unique<std::size_t>(i * i);  // need not be copyable
           },
@@ -29,7 +29,7 @@ TEST(OrderedWork, CommitsEachResultOnceInOrder) {
             EXPECT_EQ(*result, i * i);
             committed.push_back(i);
           });
-      EXPECT_EQ(made, count);
+      EXPECT_EQ(calls, count);
       ASSERT_EQ(committed.size(), count);
       for (std::size_t i = 0; i < count; ++i) EXPECT_EQ(committed[i], i);
     }
@@ -40,17 +40,17 @@ TEST(OrderedWork, TakesItemsOneByOneAndCommitsInOrder) {
   for (const unsigned threads : {1U, 2U, 7U}) {
     for (const std::size_t count : {0U, 1U, 2U, 500U}) {
       SCOPED_TRACE(testing::Message() << threads << " threads, " << count);
-      std::atomic<int> giving = 0;
-      std::size_t given = 0;
+      std::atomic<int> entered = 0;
+      std::size_t issued = 0;
       std::vector<std::size_t> committed;
       each_in_order(
           threads,
           [&](unsigned) -> std::optional<std::unique_ptr<std::size_t>> {  // need not be copyable
-            EXPECT_EQ(++giving, 1);
-            if (given % 5 == 0) std::this_thread::yield();
-            --giving;
-            if (given == count) return {};
-            return std::make_unique<std::size_t>(given++);
+            EXPECT_EQ(++entered, 1);
+            if (issued % 5 == 0) std::this_thread::yield();
+            --entered;
+            if (issued == count) return {};
+            return std::make_unique<std::size_t>(issued++);
           },
           [&](unsigned worker, std::unique_ptr<std::size_t> item) {
             EXPECT_LT(worker, std::max(1U, threads));
@@ -66,12 +66,12 @@ TEST(OrderedWork, TakesItemsOneByOneAndCommitsInOrder) {
 
 TEST(OrderedWork, CommitsItemsBeforeFailingNext) {
   for (const unsigned threads : {1U, 4U}) {
-    std::size_t given = 0, committed = 0;
+    std::size_t issued = 0, committed = 0;
     EXPECT_THROW(each_in_order(
                      threads,
                      [&](unsigned) -> std::optional<std::size_t> {
-                       if (given == 40) throw std::runtime_error("damaged");
-                       return given++;
+                       if (issued == 40) throw std::runtime_error("damaged");
+                       return issued++;
                      },
                      [](unsigned, std::size_t i) { return i; },
                      [&](std::size_t i) { EXPECT_EQ(i, committed++); }),
@@ -82,19 +82,19 @@ TEST(OrderedWork, CommitsItemsBeforeFailingNext) {
 
 TEST(OrderedWork, CommitsOneAtATimeOnRequestedThreads) {
   std::atomic<int> committing = 0, working = 0, most = 0;
-  std::vector<std::atomic<unsigned>> made(3);
-  std::latch all_at_work(3);
+  std::vector<std::atomic<unsigned>> calls(3);
+  std::latch all_workers(3);
   const auto enter = [&] {
     const int now = ++working;
-    for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+    for (int previous = most; now > previous && !most.compare_exchange_weak(previous, now);) {
     }
   };
   in_order(
       300, 3,
       [&](unsigned worker, std::size_t i) {
         enter();
-        ++made[worker];
-        if (i < 3) all_at_work.arrive_and_wait();
+        ++calls[worker];
+        if (i < 3) all_workers.arrive_and_wait();
         if (i % 7 == 0) std::this_thread::yield();
         --working;
         return i;
@@ -107,7 +107,7 @@ TEST(OrderedWork, CommitsOneAtATimeOnRequestedThreads) {
         --working;
       });
   EXPECT_LE(most, 3);
-  for (const std::atomic<unsigned>& own : made) EXPECT_GT(own, 0U);
+  for (const std::atomic<unsigned>& own : calls) EXPECT_GT(own, 0U);
 }
 
 TEST(OrderedWork, RethrowsFirstError) {
@@ -133,18 +133,18 @@ TEST(OrderedWork, RethrowsFirstError) {
 }
 
 TEST(OrderedWork, StopsAfterCommitError) {
-  std::atomic<unsigned> made = 0;
+  std::atomic<unsigned> calls = 0;
   EXPECT_THROW(in_order(
                    1000, 4,
                    [&](unsigned, std::size_t i) {
-                     ++made;
+                     ++calls;
                      return i;
                    },
                    [](std::size_t i, std::size_t) {
                      if (i == 10) throw std::runtime_error("full");
                    }),
                std::runtime_error);
-  EXPECT_LT(made, 1000U);
+  EXPECT_LT(calls, 1000U);
 }
 
 }  // namespace

@@ -36,12 +36,12 @@ TEST(ThreadTeam, WakesThreadsThatSleep) {
   ThreadTeam team(4);
   for (int round = 0; round < 3; ++round) {
     // Two tasks that wait for each other need two threads.
-    std::atomic<int> met = 0;
+    std::atomic<int> arrivals = 0;
     team.run(2, [&](std::size_t) {
-      ++met;
-      while (met < 2) std::this_thread::yield();
+      ++arrivals;
+      while (arrivals < 2) std::this_thread::yield();
     });
-    EXPECT_EQ(met, 2);
+    EXPECT_EQ(arrivals, 2);
     // Long enough for threads to fall asleep; the test holds if they have not.
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

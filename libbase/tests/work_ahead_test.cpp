@@ -20,29 +20,29 @@ struct Square {
 };
 
 WorkAhead<Square>::Work squares() {
-  return [](Square& job) {
-    if (job.number % 3 == 0) std::this_thread::yield();
-    job.square = job.number * job.number;
+  return [](Square& task) {
+    if (task.number % 3 == 0) std::this_thread::yield();
+    task.square = task.number * task.number;
   };
 }
 
-TEST(WorkAhead, GivesJobsBackDoneAndInOrder) {
+TEST(WorkAhead, ReturnsTasksDoneAndInOrder) {
   for (const unsigned threads : {0U, 1U, 2U, 7U}) {
-    for (const std::size_t most : {1U, 2U, 20U}) {
-      SCOPED_TRACE(testing::Message() << threads << " threads, " << most << " ahead");
+    for (const std::size_t limit : {1U, 2U, 20U}) {
+      SCOPED_TRACE(testing::Message() << threads << " threads, " << limit << " ahead");
       WorkAhead<Square> ahead(threads, squares);
       std::size_t taken = 0;
       const auto take = [&] {
-        const Square job = ahead.take();
-        EXPECT_EQ(job.number, taken);
-        EXPECT_EQ(job.square, taken * taken);
+        const Square task = ahead.take();
+        EXPECT_EQ(task.number, taken);
+        EXPECT_EQ(task.square, taken * taken);
         ++taken;
       };
       for (std::size_t i = 0; i < 500; ++i) {
-        if (ahead.size() == most) take();
+        if (ahead.size() == limit) take();
         ahead.give({.number = i});
       }
-      EXPECT_EQ(ahead.size(), most);
+      EXPECT_EQ(ahead.size(), limit);
       EXPECT_LE(ahead.threads(), threads);
       while (ahead.size() > 0) take();
       EXPECT_EQ(taken, 500u);
@@ -50,32 +50,32 @@ TEST(WorkAhead, GivesJobsBackDoneAndInOrder) {
   }
 }
 
-TEST(WorkAhead, MakesTheWorkOncePerThreadAndOnlyForJobs) {
+TEST(WorkAhead, CreatesTheWorkOncePerThreadAndOnlyForTasks) {
   for (const unsigned threads : {0U, 3U}) {
-    std::atomic<unsigned> made = 0;
+    std::atomic<unsigned> created = 0;
     {
       WorkAhead<int> idle(threads, [&] {
-        ++made;
+        ++created;
         return [](int&) {};
       });
     }
-    EXPECT_EQ(made, 0u);
+    EXPECT_EQ(created, 0u);
     WorkAhead<int> ahead(threads, [&] {
-      ++made;
-      return [](int& job) { ++job; };
+      ++created;
+      return [](int& task) { ++task; };
     });
     for (int i = 0; i < 50; ++i) ahead.give(i);
     for (int i = 0; i < 50; ++i) EXPECT_EQ(ahead.take(), i + 1);
-    EXPECT_GE(made, 1u);
-    EXPECT_LE(made, std::max(1u, threads));
+    EXPECT_GE(created, 1u);
+    EXPECT_LE(created, std::max(1u, threads));
   }
 }
 
-TEST(WorkAhead, RethrowsInTheTurnOfTheJobThatFailedAndGoesOn) {
+TEST(WorkAhead, RethrowsForTheTaskThatFailedAndContinues) {
   for (const unsigned threads : {0U, 1U, 4U}) {
     WorkAhead<int> ahead(threads, [] {
-      return [](int& job) {
-        if (job % 5 == 0) throw std::runtime_error(std::to_string(job));
+      return [](int& task) {
+        if (task % 5 == 0) throw std::runtime_error(std::to_string(task));
       };
     });
     for (int i = 0; i < 50; ++i) ahead.give(i);
@@ -92,7 +92,7 @@ TEST(WorkAhead, RethrowsInTheTurnOfTheJobThatFailedAndGoesOn) {
   }
 }
 
-TEST(WorkAhead, RethrowsWhatMakingTheWorkThrew) {
+TEST(WorkAhead, RethrowsWhenTheWorkCannotBeCreated) {
   for (const unsigned threads : {0U, 2U}) {
     WorkAhead<int> ahead(threads, []() -> WorkAhead<int>::Work { throw std::runtime_error("no"); });
     ahead.give(1);
@@ -100,20 +100,20 @@ TEST(WorkAhead, RethrowsWhatMakingTheWorkThrew) {
   }
 }
 
-TEST(WorkAhead, DropsWhatIsNotBegunAtTheEnd) {
-  std::atomic<int> done = 0;
+TEST(WorkAhead, DestructorDropsTasksThatHaveNotBegun) {
+  std::atomic<int> completed = 0;
   {
     WorkAhead<int> ahead(2, [&] {
       return [&](int&) {
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        ++done;
+        ++completed;
       };
     });
     for (int i = 0; i < 1000; ++i) ahead.give(i);
     ahead.take();
   }
-  EXPECT_GE(done, 1);
-  EXPECT_LT(done, 1000);
+  EXPECT_GE(completed, 1);
+  EXPECT_LT(completed, 1000);
 }
 
 }  // namespace

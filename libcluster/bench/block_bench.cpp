@@ -44,16 +44,16 @@ struct Input {
   std::array<std::vector<double>, kLengths.size()> costs;  // of the reference search, per block
 };
 
-Input make_input(std::size_t which) {
+Input make_input(std::size_t number) {
   std::mt19937_64 random(kSeed);
   std::vector<Point3> points;
-  if (which == 0) {
+  if (number == 0) {
     points = inputs::dem_tiles(4 * kSide, kSide, 30.0, 2.65, random);
-  } else if (which == 3) {
+  } else if (number == 3) {
     points = inputs::cube(kBlocks * kBlockSize, random);
   } else {
     points = kSmall ? inputs::scan(2, 40, random) : inputs::scan(4, 500, random);
-    if (which == 2) inputs::shuffle(points, random);
+    if (number == 2) inputs::shuffle(points, random);
   }
   Input input;
   const std::size_t all = points.size() / kBlockSize;
@@ -70,10 +70,10 @@ Input make_input(std::size_t which) {
 }
 
 /// Makes the input on first use, so that a filtered run makes only what it needs.
-const Input& input_of(std::size_t which) {
+const Input& input_of(std::size_t number) {
   static std::array<std::optional<Input>, kInputs.size()> inputs;
-  if (!inputs[which]) inputs[which] = make_input(which);
-  return *inputs[which];
+  if (!inputs[number]) inputs[number] = make_input(number);
+  return *inputs[number];
 }
 
 void report_quality(benchmark::State& state, const Input& input, BlockClusterer& clusterer,
@@ -100,7 +100,7 @@ void report_quality(benchmark::State& state, const Input& input, BlockClusterer&
   state.counters["median_size"] = static_cast<double>(*middle);
 }
 
-void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, SimdPath path) {
+void cluster_blocks(benchmark::State& state, std::size_t number, Effort effort, SimdPath path) {
   std::optional<BlockClusterer> clusterer;
   try {
     clusterer.emplace(path);
@@ -108,7 +108,7 @@ void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, S
     state.SkipWithError("this processor lacks the instructions");
     return;
   }
-  const Input& input = input_of(which);
+  const Input& input = input_of(number);
   BlockClustering clustering;
   std::size_t b = 0;
   std::size_t points = 0;
@@ -123,8 +123,8 @@ void cluster_blocks(benchmark::State& state, std::size_t which, Effort effort, S
 }
 
 /// Runs the textbook search by full scans with 0.1 m candidates, for comparison.
-void reference(benchmark::State& state, std::size_t which) {
-  const FacilityPoints problem{.points = input_of(which).blocks[0]};
+void reference(benchmark::State& state, std::size_t number) {
+  const FacilityPoints problem{.points = input_of(number).blocks[0]};
   for ([[maybe_unused]] const auto iteration : state) {
     benchmark::DoNotOptimize(solve(problem, {.strategy = FacilityStrategy::full_scan}).cost());
   }
@@ -134,17 +134,17 @@ void reference(benchmark::State& state, std::size_t which) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  for (std::size_t which = 0; which < kInputs.size(); ++which) {
-    const std::string input = kInputs[which];
+  for (std::size_t number = 0; number < kInputs.size(); ++number) {
+    const std::string input = kInputs[number];
     for (std::size_t path = kPaths.size(); path-- > 0;) {
       for (std::size_t effort = 0; effort < kEfforts.size(); ++effort) {
         if (kPaths[path] == SimdPath::portable && effort != 1) continue;
         const std::string name = input + "/" + kEfforts[effort] + "/" + kPathNames[path];
-        benchmark::RegisterBenchmark(name.c_str(), cluster_blocks, which,
+        benchmark::RegisterBenchmark(name.c_str(), cluster_blocks, number,
                                      static_cast<Effort>(effort), kPaths[path]);
       }
     }
-    benchmark::RegisterBenchmark((input + "/reference search 0.1 m").c_str(), reference, which);
+    benchmark::RegisterBenchmark((input + "/reference search 0.1 m").c_str(), reference, number);
   }
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;

@@ -36,32 +36,32 @@ double seconds_of(const std::function<void()>& work) {
 }
 
 struct Row {
-  double found = 0.0, growth = 0.0, stars = 0.0;  // costs
+  double solution = 0.0, growth = 0.0, stars = 0.0;  // costs
   double bound = 0.0, growth_bound = 0.0, stars_bound = 0.0;
-  double found_seconds = 0.0, growth_seconds = 0.0, stars_seconds = 0.0, bound_seconds = 0.0;
+  double solution_seconds = 0.0, growth_seconds = 0.0, stars_seconds = 0.0, bound_seconds = 0.0;
 };
 
 Row measure(const instances::Instance& instance) {
   const FacilityMatrix matrix = instance.matrix();
   Row row;
-  FacilitySolution found;
+  FacilitySolution solution;
   if (instance.medians > 0) {
-    row.found_seconds = seconds_of([&] { found = k_median(matrix, instance.medians); });
-    row.found = found.cost();
-    row.bound = found.lower_bound;
+    row.solution_seconds = seconds_of([&] { solution = k_median(matrix, instance.medians); });
+    row.solution = solution.cost();
+    row.bound = solution.lower_bound;
     return row;
   }
-  row.found_seconds = seconds_of([&] { found = solve(matrix); });
-  row.found = found.cost();
-  row.bound_seconds = seconds_of([&] { row.bound = lower_bound(matrix, found).lower_bound; });
+  row.solution_seconds = seconds_of([&] { solution = solve(matrix); });
+  row.solution = solution.cost();
+  row.bound_seconds = seconds_of([&] { row.bound = lower_bound(matrix, solution).lower_bound; });
   row.growth_seconds =
-      seconds_of([&] { found = solve(matrix, {.strategy = FacilityStrategy::jain_vazirani}); });
-  row.growth = found.cost();
-  row.growth_bound = found.lower_bound;
+      seconds_of([&] { solution = solve(matrix, {.strategy = FacilityStrategy::jain_vazirani}); });
+  row.growth = solution.cost();
+  row.growth_bound = solution.lower_bound;
   row.stars_seconds =
-      seconds_of([&] { found = solve(matrix, {.strategy = FacilityStrategy::greedy_stars}); });
-  row.stars = found.cost();
-  row.stars_bound = found.lower_bound;
+      seconds_of([&] { solution = solve(matrix, {.strategy = FacilityStrategy::greedy_stars}); });
+  row.stars = solution.cost();
+  row.stars_bound = solution.lower_bound;
   return row;
 }
 
@@ -83,14 +83,14 @@ void print_table(std::vector<instances::Instance> all,
     const double optimum = known ? instance.optimum : row.bound;
     const auto percent = [optimum](double cost) { return 100.0 * (cost / optimum - 1.0); };
     std::printf("%-34s %5zu %5zu %16.3f %9.4f ", instance.file.c_str(), instance.facilities,
-                instance.clients, optimum, percent(row.found));
+                instance.clients, optimum, percent(row.solution));
     if (instance.medians > 0) {
       std::printf("%8s %8s %8.3f %8s %8s %8.3f %7s %7s %7s k = %zu\n", "", "", percent(row.bound),
-                  "", "", row.found_seconds, "", "", "", instance.medians);
+                  "", "", row.solution_seconds, "", "", "", instance.medians);
     } else {
       std::printf("%8.2f %8.2f %8.3f %8.2f %8.2f %8.3f %7.3f %7.3f %7.3f %s\n", percent(row.growth),
                   percent(row.stars), percent(row.bound), percent(row.growth_bound),
-                  percent(row.stars_bound), row.found_seconds, row.bound_seconds,
+                  percent(row.stars_bound), row.solution_seconds, row.bound_seconds,
                   row.growth_seconds, row.stars_seconds,
                   !known            ? "of the bound"
                   : instance.proved ? ""
@@ -98,9 +98,9 @@ void print_table(std::vector<instances::Instance> all,
     }
     Summary& group = groups[instance.group()];
     ++group.count;
-    group.sum += percent(row.found);
-    group.worst = std::max(group.worst, percent(row.found));
-    group.seconds = std::max(group.seconds, row.found_seconds);
+    group.sum += percent(row.solution);
+    group.worst = std::max(group.worst, percent(row.solution));
+    group.seconds = std::max(group.seconds, row.solution_seconds);
     group.bound += percent(row.bound);
     instance.connection = {};
   }
@@ -113,8 +113,8 @@ void print_table(std::vector<instances::Instance> all,
 }
 
 // Makes an instance of facilities and clients in a square.
-instances::Instance made(std::size_t facilities, std::size_t clients, std::size_t medians,
-                         std::uint64_t seed) {
+instances::Instance random_instance(std::size_t facilities, std::size_t clients,
+                                    std::size_t medians, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   instances::Instance instance;
   instance.facilities = facilities;
@@ -199,8 +199,8 @@ int main() {
     const std::size_t scale = kSmall ? 1 : 5;
     std::vector<instances::Instance> all;
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
-      all.push_back(made(40 * scale, 60 * scale, 0, seed));
-      all.push_back(made(40 * scale, 60 * scale, 5 * scale, seed));
+      all.push_back(random_instance(40 * scale, 60 * scale, 0, seed));
+      all.push_back(random_instance(40 * scale, 60 * scale, 5 * scale, seed));
     }
     print_table(std::move(all), [](instances::Instance&) {});
   }

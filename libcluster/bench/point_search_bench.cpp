@@ -18,7 +18,7 @@
 #include <benchmark/benchmark.h>
 
 #include "../tests/inputs.hpp"
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "terrace/cluster/facility_location.hpp"
 
 namespace {

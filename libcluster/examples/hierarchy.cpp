@@ -110,6 +110,6 @@ int main() {
                 cluster->summary.error);
   }
 
-  const bool whole = result.points == 40000 && sink.top.summary.descendants == 40000;
-  return whole ? 0 : 1;
+  const bool complete = result.points == 40000 && sink.top.summary.descendants == 40000;
+  return complete ? 0 : 1;
 }

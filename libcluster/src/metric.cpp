@@ -27,7 +27,7 @@ void check_semi_axis(double length, std::size_t axis) {
                               ": it must be positive and finite, in the unit of the points");
 }
 
-LinearMap upright(double angle_degrees) {
+LinearMap rotation_about_z(double angle_degrees) {
   if (!std::isfinite(angle_degrees)) {
     throw std::invalid_argument(
         "the angle of an ellipse is not finite: give it in degrees, "
@@ -72,7 +72,7 @@ bool separate(const Box3& a, const Box3& b) {
 }  // namespace
 
 Elliptical::Elliptical(double a, double b, double angle_degrees, double c)
-    : Elliptical({a, b, c}, upright(angle_degrees)) {}
+    : Elliptical({a, b, c}, rotation_about_z(angle_degrees)) {}
 
 Elliptical::Elliptical(const Point3& semi_axes, const LinearMap& axes) : map_{}, least_scale_(0.0) {
   for (std::size_t k = 0; k < 3; ++k) check_semi_axis(semi_axes[k], k);
@@ -110,21 +110,21 @@ EllipticalField::EllipticalField(std::vector<Region> regions, const std::optiona
   }
 }
 
-Point3 EllipticalField::framed(const Point3& position) const {
+Point3 EllipticalField::to_frame(const Point3& position) const {
   if (!frame_) return position;
   const LinearMap& m = frame_->map;
-  Point3 out;
+  Point3 result;
   for (std::size_t i = 0; i < 3; ++i) {
-    out[i] = m[3 * i] * position[0] + m[3 * i + 1] * position[1] + m[3 * i + 2] * position[2] +
-             frame_->offset[i];
+    result[i] = m[3 * i] * position[0] + m[3 * i + 1] * position[1] + m[3 * i + 2] * position[2] +
+                frame_->offset[i];
   }
-  return out;
+  return result;
 }
 
 const EllipticalField::Region* EllipticalField::find(const Point3& position) const {
-  const Point3 place = framed(position);
+  const Point3 point = to_frame(position);
   for (const Region& region : regions_) {
-    if (region.box.contains(place)) return &region;
+    if (region.box.contains(point)) return &region;
   }
   return nullptr;
 }
@@ -140,23 +140,23 @@ double EllipticalField::least_scale(const Point3& position) const {
 }
 
 std::optional<LinearMap> EllipticalField::uniform_in(const Box3& box) const {
-  // The bounding box of `box` after its transformation to the frame.
-  Box3 around = box;
+  // The bounding box of `box` in the frame.
+  Box3 framed_box = box;
   if (frame_ && box.min[0] <= box.max[0]) {
-    around = Box3{};
+    framed_box = Box3{};
     for (unsigned corner = 0; corner < 8; ++corner) {
-      const Point3 place =
-          framed({corner & 1u ? box.max[0] : box.min[0], corner & 2u ? box.max[1] : box.min[1],
-                  corner & 4u ? box.max[2] : box.min[2]});
+      const Point3 point =
+          to_frame({corner & 1u ? box.max[0] : box.min[0], corner & 2u ? box.max[1] : box.min[1],
+                    corner & 4u ? box.max[2] : box.min[2]});
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        around.min[axis] = std::min(around.min[axis], place[axis]);
-        around.max[axis] = std::max(around.max[axis], place[axis]);
+        framed_box.min[axis] = std::min(framed_box.min[axis], point[axis]);
+        framed_box.max[axis] = std::max(framed_box.max[axis], point[axis]);
       }
     }
   }
   for (const Region& region : regions_) {
-    if (separate(region.box, around)) continue;
-    if (region.box.contains(around.min) && region.box.contains(around.max)) {
+    if (separate(region.box, framed_box)) continue;
+    if (region.box.contains(framed_box.min) && region.box.contains(framed_box.max)) {
       return region.metric.map();
     }
     return std::nullopt;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker's exception must not end the process. This is a separate program, because it replaces
-// operator new: each allocation fails in turn, on whatever thread it is.
+// A worker's exception must not end the process. Each allocation fails in turn, on any thread. This
+// is a separate program, because it replaces operator new.
 #include <atomic>
 #include <cstdlib>
 #include <limits>
@@ -15,13 +15,14 @@
 
 namespace {
 
-std::atomic<std::int64_t> left{std::numeric_limits<std::int64_t>::max()};
+std::atomic<std::int64_t> allocations_left{std::numeric_limits<std::int64_t>::max()};
 
 }  // namespace
 
 // Inlined into only one of new and delete, they look to GCC like malloc() with delete.
 [[gnu::noinline]] void* operator new(std::size_t size) {
-  void* memory = left.fetch_sub(1, std::memory_order_relaxed) > 0 ? std::malloc(size) : nullptr;
+  void* memory =
+      allocations_left.fetch_sub(1, std::memory_order_relaxed) > 0 ? std::malloc(size) : nullptr;
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
@@ -31,23 +32,23 @@ std::atomic<std::int64_t> left{std::numeric_limits<std::int64_t>::max()};
 namespace terrace::cluster {
 namespace {
 
-/// Calls work() repeatedly, about `times` times. Each time a later allocation and all allocations
-/// after it fail. Returns how often it threw std::bad_alloc.
+/// Calls work() about `times` times. In each call an allocation and all allocations after it fail,
+/// a later one each time. Returns the number of calls that threw std::bad_alloc.
 template <class Work>
 int fail_in_turn(int times, const Work& work) {
   constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
   work();  // one-time initialisation
-  left = kNever;
+  allocations_left = kNever;
   work();
-  const std::int64_t all = kNever - left.exchange(kNever);
+  const std::int64_t all = kNever - allocations_left.exchange(kNever);
   int thrown = 0;
   for (std::int64_t at = 0; at < all; at += std::max<std::int64_t>(1, all / times)) {
-    left = at;
+    allocations_left = at;
     try {
       work();
-      left = kNever;
+      allocations_left = kNever;
     } catch (const std::bad_alloc&) {
-      left = kNever;
+      allocations_left = kNever;
       ++thrown;
     }
   }

@@ -47,7 +47,7 @@ void expect_tree(const ClientTree& tree, const std::vector<Point3>& points,
   }
 }
 
-TEST(ClientTree, HoldsWhatItSaysWhileConnectionsChange) {
+TEST(ClientTree, StaysConsistentWhileConnectionsChange) {
   for (laws::OwnedProblem& p : laws::problems(500, 41)) {
     if (p.name == "collinear") {
       double size = 1.0;

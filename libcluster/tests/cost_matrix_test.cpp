@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "facility/matrix/strategies.hpp"
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "inputs.hpp"
 #include "search_laws.hpp"
 

@@ -134,7 +134,7 @@ TEST(Dendrogram, CutsHandleInversions) {
   EXPECT_EQ(cut_height(dendrogram, 1.0), (Labels{0, 0, 0, 1, 1}));
   EXPECT_EQ(cut_count(dendrogram, 1), (Labels{0, 0, 0, 0, 0}));
   EXPECT_EQ(cut_count(dendrogram, 2), (Labels{0, 0, 0, 1, 1}));
-  // Three clusters are not possible, because both merges of the triangle have the crest 1.
+  // Three clusters are not possible, because both merges of the triangle have the height 1.
   EXPECT_EQ(cut_count(dendrogram, 3), (Labels{0, 0, 0, 1, 1}));
   EXPECT_EQ(cut_count(dendrogram, 4), (Labels{0, 1, 2, 3, 3}));
   EXPECT_EQ(cut_count(dendrogram, 5), (Labels{0, 1, 2, 3, 4}));

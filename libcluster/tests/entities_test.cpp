@@ -85,7 +85,7 @@ TEST(Entities, PolylinesKeepTheOrderOfVertices) {
       for (std::size_t i = 0; i < k; ++i) line.push_back(random_point(random, scale));
     }
     const std::vector<Point3>&a = lines[0], &b = lines[1], &c = lines[2];
-    const auto whole = [&](const auto& at) {
+    const auto rms_distance = [&](const auto& at) {
       long double sum = 0.0L;
       for (std::size_t i = 0; i < k; ++i) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -96,8 +96,8 @@ TEST(Entities, PolylinesKeepTheOrderOfVertices) {
       return std::sqrt(sum / static_cast<long double>(k));
     };
     const auto expected =
-        static_cast<double>(std::min(whole([&](std::size_t i) { return b[i]; }),
-                                     whole([&](std::size_t i) { return b[k - 1 - i]; })));
+        static_cast<double>(std::min(rms_distance([&](std::size_t i) { return b[i]; }),
+                                     rms_distance([&](std::size_t i) { return b[k - 1 - i]; })));
     const double ab = polyline_distance(a, b);
     ASSERT_NEAR(ab, expected, 1e-14 * expected);
     ASSERT_EQ(polyline_distance(b, a), ab);

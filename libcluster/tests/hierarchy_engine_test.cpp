@@ -201,27 +201,27 @@ TEST(HierarchyEngine, EachBlockHasItsOwnSeed) {
 }
 
 TEST(HierarchyEngine, ClusteringSeesGroundPositions) {
-  std::vector<Box3> asked;
-  std::vector<std::vector<Point3>> seen;
+  std::vector<Box3> boxes;
+  std::vector<std::vector<Point3>> positions;
   const auto cluster = [&](std::span<const Point3> points, std::span<const double> weights,
                            const BlockOptions& options, BlockClustering& result) {
-    seen.emplace_back(points.begin(), points.end());
+    positions.emplace_back(points.begin(), points.end());
     runs_of_ten(points, weights, options, result);
   };
   HierarchyOptions options = small_blocks();
   options.ground = [&](const Box3& box) {
-    asked.push_back(box);
+    boxes.push_back(box);
     return GroundMap{2, 0, 0, 0, 3, 1, 0, 0, box.max[0]};
   };
   RecordingSink sink;
   HierarchyEngine engine(options, sink, [&] { return cluster; });
   push_all(engine, line(150), 50);
   engine.finish();
-  ASSERT_EQ(seen.size(), 2u);
-  EXPECT_EQ(asked[0], (Box3{{0, 0.5, -1}, {99, 0.5, -1}}));
-  EXPECT_EQ(asked[1], (Box3{{100, 0.5, -1}, {149, 0.5, -1}}));
-  EXPECT_EQ(seen[0][7], (Point3{14, 0, 0}));
-  EXPECT_EQ(seen[1][7], (Point3{14, 0, 0}))
+  ASSERT_EQ(positions.size(), 2u);
+  EXPECT_EQ(boxes[0], (Box3{{0, 0.5, -1}, {99, 0.5, -1}}));
+  EXPECT_EQ(boxes[1], (Box3{{100, 0.5, -1}, {149, 0.5, -1}}));
+  EXPECT_EQ(positions[0][7], (Point3{14, 0, 0}));
+  EXPECT_EQ(positions[1][7], (Point3{14, 0, 0}))
       << "positions must be relative to the minimum of the block";
 }
 
@@ -294,17 +294,17 @@ TEST(HierarchyEngine, ErrorHoldsWhereMapsDiffer) {
 TEST(HierarchyEngine, BadInputLeavesTheBuilderUnchanged) {
   const std::vector<Point3> points = line(330);
   for (const double bad : {kInfinity, -kInfinity, kNaN}) {
-    for (const std::size_t where : {0u, 1u, 5u, 128u, 229u}) {
+    for (const std::size_t location : {0u, 1u, 5u, 128u, 229u}) {
       RecordingSink sink;
       HierarchyEngine engine(small_blocks(), sink, [] { return runs_of_ten; });
       engine.push(std::span(points).first(100), numbered_payload(0, 100));
       std::vector<Point3> broken(points.begin() + 100, points.end());
-      broken[where][where % 3] = bad;
+      broken[location][location % 3] = bad;
       try {
         engine.push(broken, numbered_payload(100, 330));
         ADD_FAILURE() << "accepted";
       } catch (const std::invalid_argument& error) {
-        EXPECT_NE(std::string(error.what()).find("point " + std::to_string(where) + " "),
+        EXPECT_NE(std::string(error.what()).find("point " + std::to_string(location) + " "),
                   std::string::npos)
             << error.what();
       }
@@ -338,17 +338,17 @@ struct Failure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-enum class Where { prepare, commit, root, ground, cluster };
+enum class Location { prepare, commit, root, ground, cluster };
 
 /// Throws at the n-th visit to one place.
 struct Trap {
-  Where where;
-  int visits_left;
+  Location location;
+  int remaining_visits;
   std::mutex mutex;
 
-  void visit(Where place) {
+  void visit(Location place) {
     const std::lock_guard lock(mutex);
-    if (place == where && visits_left-- == 0) throw Failure("trap");
+    if (place == location && remaining_visits-- == 0) throw Failure("trap");
   }
 };
 
@@ -356,15 +356,15 @@ class TrappedSink : public RecordingSink {
  public:
   explicit TrappedSink(Trap& trap) : trap_(trap) {}
   std::unique_ptr<Prepared> prepare(const ClusteredBlock& block) override {
-    trap_.visit(Where::prepare);
+    trap_.visit(Location::prepare);
     return RecordingSink::prepare(block);
   }
   void commit(unsigned level, std::unique_ptr<Prepared> prepared) override {
-    trap_.visit(Where::commit);
+    trap_.visit(Location::commit);
     RecordingSink::commit(level, std::move(prepared));
   }
   void root(const ClusteredBlock& block) override {
-    trap_.visit(Where::root);
+    trap_.visit(Location::root);
     RecordingSink::root(block);
   }
 
@@ -373,23 +373,23 @@ class TrappedSink : public RecordingSink {
 };
 
 TEST(HierarchyEngine, ExceptionsAreRethrownOnce) {
-  for (const Where where :
-       {Where::prepare, Where::commit, Where::root, Where::ground, Where::cluster}) {
+  for (const Location location :
+       {Location::prepare, Location::commit, Location::root, Location::ground, Location::cluster}) {
     for (const int visit : {0, 1, 20, 55}) {
       for (const unsigned threads : {1u, 2u, 3u, 8u}) {
-        if (where == Where::root && visit > 0) continue;
-        SCOPED_TRACE(testing::Message() << "place " << static_cast<int>(where) << ", visit "
+        if (location == Location::root && visit > 0) continue;
+        SCOPED_TRACE(testing::Message() << "place " << static_cast<int>(location) << ", visit "
                                         << visit << ", threads " << threads);
-        Trap trap{where, visit, {}};
+        Trap trap{location, visit, {}};
         TrappedSink sink(trap);
         HierarchyOptions options = small_blocks(threads);
         options.ground = [&](const Box3&) {
-          trap.visit(Where::ground);
+          trap.visit(Location::ground);
           return GroundMap{2, 0, 0, 0, 1, 0, 0, 0, 1};
         };
         const auto cluster = [&](std::span<const Point3> points, std::span<const double> weights,
                                  const BlockOptions& block_options, BlockClustering& result) {
-          trap.visit(Where::cluster);
+          trap.visit(Location::cluster);
           runs_of_ten(points, weights, block_options, result);
         };
         HierarchyEngine engine(options, sink, [&] { return cluster; });
@@ -486,7 +486,7 @@ TEST(HierarchyEngine, DestructorStopsQuietly) {
     }
   }
   // The same with an additional failure.
-  Trap trap{Where::commit, 3, {}};
+  Trap trap{Location::commit, 3, {}};
   TrappedSink sink(trap);
   HierarchyEngine engine(small_blocks(2), sink, [] { return runs_of_ten; });
   push_all(engine, line(550), 50);

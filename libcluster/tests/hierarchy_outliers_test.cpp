@@ -13,7 +13,7 @@
 #include <gtest/gtest.h>
 
 #include "block/linear_block.hpp"
-#include "hierarchy/metric_block.hpp"
+#include "hierarchy/block_clusterers.hpp"
 #include "hierarchy_laws.hpp"
 #include "inputs.hpp"
 #include "recording_sink.hpp"
@@ -77,21 +77,22 @@ TEST(HierarchyOutliers, DoNotInfluenceClusters) {
   }
   const std::set<std::uint64_t> numbers{0, 701, 3002};  // positions after the later insertions
   // A point of the next block makes a level above.
-  std::vector<Point3> without = surface;
-  for (std::vector<Point3>* points : {&all, &without}) points->push_back(surface[0]);
+  std::vector<Point3> surface_only = surface;
+  for (std::vector<Point3>* points : {&all, &surface_only}) points->push_back(surface[0]);
 
   HierarchyOptions options;
   options.block.facility_cost = 1.0;
   options.outlier_price = 0.4;
   options.block_size = all.size() - 1;
-  const Built with(all, options);
-  EXPECT_EQ(with.outliers, numbers);
-  laws::check_hierarchy(with.sink, with.result, all, options.block_size, kIdentityMap);
+  const Built with_outliers(all, options);
+  EXPECT_EQ(with_outliers.outliers, numbers);
+  laws::check_hierarchy(with_outliers.sink, with_outliers.result, all, options.block_size,
+                        kIdentityMap);
   HierarchyOptions smaller = options;
-  smaller.block_size = without.size() - 1;
-  const Built plain(without, smaller);
+  smaller.block_size = surface_only.size() - 1;
+  const Built plain(surface_only, smaller);
   EXPECT_TRUE(plain.outliers.empty());
-  const RecordedBlock& a = with.sink.levels[0][0];
+  const RecordedBlock& a = with_outliers.sink.levels[0][0];
   const RecordedBlock& b = plain.sink.levels[0][0];
   ASSERT_EQ(a.representatives.size(), b.representatives.size());
   for (std::size_t c = 0; c < a.representatives.size(); ++c) {
@@ -107,7 +108,7 @@ TEST(HierarchyOutliers, DoNotInfluenceClusters) {
   options.outlier_price = std::numeric_limits<double>::infinity();
   const Built steered(all, options);
   EXPECT_TRUE(steered.outliers.empty());
-  EXPECT_NE(steered.representatives(0), with.representatives(0));
+  EXPECT_NE(steered.representatives(0), with_outliers.representatives(0));
 }
 
 TEST(HierarchyOutliers, AreMarkedInASingleBlock) {
@@ -138,7 +139,7 @@ TEST(HierarchyOutliers, GuaranteesHoldForEveryInputPriceAndStrategy) {
         const Built three(input.points, options);
         EXPECT_EQ(three.sink.levels, one.sink.levels);
         EXPECT_EQ(three.outliers, one.outliers);
-        // Only members of clusters can be outliers, not representatives.
+        // Representatives cannot be outliers.
         if (one.sink.levels.empty()) continue;
         for (const std::uint64_t id : one.representatives(0)) {
           EXPECT_FALSE(one.outliers.contains(id));
@@ -148,7 +149,8 @@ TEST(HierarchyOutliers, GuaranteesHoldForEveryInputPriceAndStrategy) {
   }
 }
 
-// leave_out() must lower the cost, and the points that it keeps must be no farther than the price.
+// assign_outliers() must lower the cost, and the points that it keeps must be no farther than the
+// price.
 TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
   std::mt19937_64 random(72);
   std::size_t left_out = 0;
@@ -167,7 +169,7 @@ TEST(HierarchyOutliers, LeavingOutLowersTheCost) {
     BlockClustering clustering;
     run_linear(clusterer, p.view(), {.effort = Effort::standard, .seed = 1}, clustering);
     BlockClustering trimmed = clustering;
-    leave_out(p.view(), trimmed);
+    assign_outliers(p.view(), trimmed);
     EXPECT_EQ(trimmed.facilities, clustering.facilities);
 
     const double unit = diagonal(p.metric, base::box_of(p.points));

@@ -38,8 +38,8 @@ TEST(LinkageMethods, MergeTheNearestClusters) {
         for (const LinkageMethod method : kMethods) {
           SCOPED_TRACE(testing::Message() << name << ", " << count << " points, seed " << seed
                                           << ", method " << static_cast<int>(method));
-          const Dendrogram made = linkage(points, method);
-          ASSERT_EQ(laws::linkage_fault(made, d, method, 1e-12, 1e-13), "");
+          const Dendrogram dendrogram = linkage(points, method);
+          ASSERT_EQ(laws::linkage_fault(dendrogram, d, method, 1e-12, 1e-13), "");
           const Dendrogram of_distances = linkage(count, distances_in(d), method);
           ASSERT_EQ(laws::linkage_fault(of_distances, d, method, 1e-12, 1e-13), "");
           // The distances of some sets exceed the range of float.
@@ -54,7 +54,7 @@ TEST(LinkageMethods, MergeTheNearestClusters) {
                       "");
           }
           if (has_inversions(method)) continue;
-          const std::vector<double> heights = laws::heights_of(made);
+          const std::vector<double> heights = laws::heights_of(dendrogram);
           ASSERT_TRUE(std::is_sorted(heights.begin(), heights.end()));
         }
       }
@@ -71,10 +71,10 @@ TEST(LinkageMethods, PointsAndTheirDistancesGiveTheSameRows) {
     for (const LinkageMethod method : kMethods) {
       SCOPED_TRACE(testing::Message()
                    << "method " << static_cast<int>(method) << ", seed " << seed);
-      const Dendrogram made = linkage(points, method);
+      const Dendrogram dendrogram = linkage(points, method);
       const Dendrogram of_distances = linkage(points.size(), distances_in(d), method);
-      for (std::size_t r = 0; r < made.merges.size(); ++r) {
-        const Merge &x = made.merges[r], &y = of_distances.merges[r];
+      for (std::size_t r = 0; r < dendrogram.merges.size(); ++r) {
+        const Merge &x = dendrogram.merges[r], &y = of_distances.merges[r];
         ASSERT_EQ(std::pair(x.a, x.b), std::pair(y.a, y.b)) << "row " << r;
         ASSERT_NEAR(x.height, y.height, 1e-13) << "row " << r;
       }
@@ -109,16 +109,16 @@ TEST(LinkageMethods, AcceptAnyDistances) {
 TEST(LinkageMethods, CentroidsHaveInversions) {
   const std::vector<Point3> points{{0, 0, 0}, {2, 0, 0}, {1, 1.75, 0}, {50, 0, 0}};
   for (const LinkageMethod method : {LinkageMethod::centroid, LinkageMethod::median}) {
-    const Dendrogram made = linkage(points, method);
-    EXPECT_EQ(made.merges[0], (Merge{0, 1, 2.0, 2}));
-    EXPECT_EQ(made.merges[1], (Merge{2, 4, 1.75, 3}));
-    EXPECT_EQ(cut_height(made, 1.9), (Labels{0, 1, 2, 3}));
-    EXPECT_EQ(cut_height(made, 2.0), (Labels{0, 0, 0, 1}));
-    EXPECT_EQ(cut_count(made, 3), (Labels{0, 0, 0, 1}));
+    const Dendrogram dendrogram = linkage(points, method);
+    EXPECT_EQ(dendrogram.merges[0], (Merge{0, 1, 2.0, 2}));
+    EXPECT_EQ(dendrogram.merges[1], (Merge{2, 4, 1.75, 3}));
+    EXPECT_EQ(cut_height(dendrogram, 1.9), (Labels{0, 1, 2, 3}));
+    EXPECT_EQ(cut_height(dendrogram, 2.0), (Labels{0, 0, 0, 1}));
+    EXPECT_EQ(cut_count(dendrogram, 3), (Labels{0, 0, 0, 1}));
   }
 }
 
-TEST(LinkageMethods, AreFoundByName) {
+TEST(LinkageMethods, HaveNames) {
   EXPECT_EQ(linkage_method_named("ward"), LinkageMethod::ward);
   EXPECT_EQ(linkage_method_named("weighted"), LinkageMethod::weighted);
   EXPECT_EQ(linkage_method_named("upgma"), std::nullopt);
@@ -144,9 +144,9 @@ TEST(LinkageMethods, DegenerateInputsAreNotCubic) {
   }
   for (const auto& points : sets) {
     for (const LinkageMethod method : kMethods) {
-      const Dendrogram made = linkage(points, method);
-      ASSERT_EQ(dendrogram_fault(made), "");
-      ASSERT_EQ(made.merges.back().size, points.size());
+      const Dendrogram dendrogram = linkage(points, method);
+      ASSERT_EQ(dendrogram_fault(dendrogram), "");
+      ASSERT_EQ(dendrogram.merges.back().size, points.size());
     }
   }
 }

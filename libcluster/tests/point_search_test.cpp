@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "facility/points/search_frame.hpp"
 #include "inputs.hpp"
 #include "search_laws.hpp"
@@ -396,14 +396,14 @@ TEST(PointSearch, ReportsProgressAndStops) {
     ++calls;
     return true;
   };
-  const FacilitySolution whole = solve(p.view(), options);
+  const FacilitySolution complete = solve(p.view(), options);
   EXPECT_EQ(last, 1000u);
   EXPECT_GT(calls, 100u);
   options.progress = [](std::size_t done, std::size_t) { return done < 100; };
   FacilityReport report;
   const FacilitySolution part = solve(p.view(), options, &report);
   EXPECT_LT(report.search.candidates, 120u);
-  EXPECT_GT(part.cost(), whole.cost());
+  EXPECT_GT(part.cost(), complete.cost());
   laws::expect_solution(p, part);
 }
 

@@ -100,7 +100,7 @@ TEST(SingleLinkage, HandlesManyPointsInFewPlaces) {
   expect_near({heights.end() - 999, heights.end()}, expected);
 }
 
-TEST(SingleLinkage, CandidatesThatContainTheTreeGiveTheSame) {
+TEST(SingleLinkage, CandidatesThatContainTheTreeGiveTheSameResult) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     std::mt19937_64 random(seed);
@@ -150,7 +150,7 @@ TEST(SingleLinkage, HandlesFewPointsAndNamesBadOnes) {
   }
 }
 
-TEST(SingleLinkage, ZerosOfBothSignsAreOnePlace) {
+TEST(SingleLinkage, ZerosOfBothSignsAreOnePoint) {
   const Dendrogram dendrogram =
       single_linkage(std::vector<Point3>{{0.0, 0.0, 1.0}, {-0.0, 0.0, 1.0}, {0.0, -0.0, 2.0}});
   EXPECT_EQ(heights_of(dendrogram), (std::vector<double>{0.0, 1.0}));

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "clustering_laws.hpp"
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "inputs.hpp"
 
 namespace terrace::cluster {

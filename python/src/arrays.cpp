@@ -85,23 +85,23 @@ py::dict crs_info(const stream::Crs& crs) {
 }
 
 py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type) {
-  auto* const kept = new std::vector<std::byte>(std::move(bytes));
-  const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<std::byte>*>(p); });
-  return {type, std::vector<py::ssize_t>{static_cast<py::ssize_t>(kept->size()) / type.itemsize()},
-          std::vector<py::ssize_t>{type.itemsize()}, kept->data(), owner};
+  auto* const owned = new std::vector<std::byte>(std::move(bytes));
+  const py::capsule owner(owned, [](void* p) { delete static_cast<std::vector<std::byte>*>(p); });
+  return {type, std::vector<py::ssize_t>{static_cast<py::ssize_t>(owned->size()) / type.itemsize()},
+          std::vector<py::ssize_t>{type.itemsize()}, owned->data(), owner};
 }
 
-std::vector<std::array<double, 3>> points3_of(const Array<double>& given) {
-  if (given.ndim() == 2 && given.shape(1) == 2) {
+std::vector<std::array<double, 3>> points3_of(const Array<double>& input) {
+  if (input.ndim() == 2 && input.shape(1) == 2) {
     std::vector<std::array<double, 3>> points;
-    points.reserve(static_cast<std::size_t>(given.shape(0)));
-    for (const auto& p : rows_of<2>(given, "points")) points.push_back({p[0], p[1], 0});
+    points.reserve(static_cast<std::size_t>(input.shape(0)));
+    for (const auto& p : rows_of<2>(input, "points")) points.push_back({p[0], p[1], 0});
     return points;
   }
-  if (given.ndim() != 2 || given.shape(1) != 3) {
+  if (input.ndim() != 2 || input.shape(1) != 3) {
     throw py::value_error("points must have the shape (n, 2) or (n, 3)");
   }
-  const auto rows = rows_of<3>(given, "points");
+  const auto rows = rows_of<3>(input, "points");
   return {rows.begin(), rows.end()};
 }
 
@@ -114,23 +114,23 @@ terrain::Region converted(const terrain::Region& region, terrain::RegionConversi
   return conversion(region);
 }
 
-std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store) {
-  std::optional<terrain::Region> region = region_of(given);
+std::optional<terrain::Region> region_of(const py::object& value, const stream::Store& store) {
+  std::optional<terrain::Region> region = region_of(value);
   if (region) region = converted(*region, terrain::RegionConversion(store));
   return region;
 }
 
-std::optional<terrain::Region> region_of(const py::object& given) {
-  if (given.is_none()) return std::nullopt;
-  if (py::isinstance<py::tuple>(given)) {
+std::optional<terrain::Region> region_of(const py::object& argument) {
+  if (argument.is_none()) return std::nullopt;
+  if (py::isinstance<py::tuple>(argument)) {
     stream::Box3 box;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      box.min[axis] = given.cast<py::tuple>()[axis].cast<double>();
-      box.max[axis] = given.cast<py::tuple>()[3 + axis].cast<double>();
+      box.min[axis] = argument.cast<py::tuple>()[axis].cast<double>();
+      box.max[axis] = argument.cast<py::tuple>()[3 + axis].cast<double>();
     }
     return terrain::Region::of_box(box);
   }
-  const auto geojson = given.cast<py::dict>();
+  const auto geojson = argument.cast<py::dict>();
   std::vector<terrain::Polygon> polygons;
   for (const py::handle polygon : geojson["polygons"].cast<py::list>()) {
     terrain::Polygon& rings = polygons.emplace_back();

@@ -40,7 +40,7 @@ std::span<const std::array<T, N>> rows_of(const Array<T>& array, const char* wha
 }
 
 /// Returns points of shape (n, 3), or of shape (n, 2) with z = 0. Throws: ValueError for others.
-std::vector<std::array<double, 3>> points3_of(const Array<double>& given);
+std::vector<std::array<double, 3>> points3_of(const Array<double>& input);
 
 /// Returns a one-dimensional array, without a copy.
 /// Throws: ValueError, which names `what`, for another shape.
@@ -53,21 +53,21 @@ std::span<const T> numbers_of(const Array<T>& array, const char* what) {
 /// Returns an array that takes over the vector's memory.
 template <class T>
 py::array_t<T> to_array(std::vector<T>&& values) {
-  auto* const kept = new std::vector<T>(std::move(values));
-  const py::capsule owner(kept, [](void* p) { delete static_cast<std::vector<T>*>(p); });
-  return py::array_t<T>({static_cast<py::ssize_t>(kept->size())}, kept->data(), owner);
+  auto* const owned = new std::vector<T>(std::move(values));
+  const py::capsule owner(owned, [](void* p) { delete static_cast<std::vector<T>*>(p); });
+  return py::array_t<T>({static_cast<py::ssize_t>(owned->size())}, owned->data(), owner);
 }
 template <class T, std::size_t N>
 py::array_t<T> to_array(std::vector<std::array<T, N>>&& values) {
-  auto* const kept = new std::vector<std::array<T, N>>(std::move(values));
-  const py::capsule owner(kept,
+  auto* const owned = new std::vector<std::array<T, N>>(std::move(values));
+  const py::capsule owner(owned,
                           [](void* p) { delete static_cast<std::vector<std::array<T, N>>*>(p); });
-  return py::array_t<T>({static_cast<py::ssize_t>(kept->size()), static_cast<py::ssize_t>(N)},
-                        reinterpret_cast<const T*>(kept->data()), owner);
+  return py::array_t<T>({static_cast<py::ssize_t>(owned->size()), static_cast<py::ssize_t>(N)},
+                        reinterpret_cast<const T*>(owned->data()), owner);
 }
 
 /// Returns the numbers with -1 in place of `missing`.
-inline py::array_t<std::int64_t> with_missing(std::span<const std::uint32_t> numbers,
+inline py::array_t<std::int64_t> mark_missing(std::span<const std::uint32_t> numbers,
                                               std::uint32_t missing) {
   std::vector<std::int64_t> result(numbers.begin(), numbers.end());
   std::replace(result.begin(), result.end(), std::int64_t{missing}, std::int64_t{-1});
@@ -106,12 +106,12 @@ py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type);
 /// Converts a region from the package: None; a box as a tuple of six numbers; or a dict with
 /// polygons (each a list of arrays (n, 2)), crs (None, or a name as in terrain::PlacesCrs) and name
 /// (for messages).
-std::optional<terrain::Region> region_of(const py::object& given);
+std::optional<terrain::Region> region_of(const py::object& value);
 /// Writes a line to the package's log.
 void log_note(const std::string& line);
 /// Converts a region to the CRS of the data and logs assumptions.
 terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion);
 /// Converts a region from the package to the CRS of a store.
-std::optional<terrain::Region> region_of(const py::object& given, const stream::Store& store);
+std::optional<terrain::Region> region_of(const py::object& value, const stream::Store& store);
 
 }  // namespace terrace::python

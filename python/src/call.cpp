@@ -40,7 +40,7 @@ void run_apart(const std::function<void()>& work, std::stop_source& stop) {
       if (raised) continue;
       lock.unlock();
       {
-        const py::gil_scoped_acquire held;
+        const py::gil_scoped_acquire gil;
         if (PyErr_CheckSignals() != 0) {
           raised = std::make_exception_ptr(py::error_already_set());
           stop.request_stop();
@@ -83,7 +83,7 @@ Call::Call(const py::tuple& settings) : progress_(settings[0]), note_(settings[1
 }
 
 void Call::call_python(const std::function<void()>& call) {
-  const py::gil_scoped_acquire held;
+  const py::gil_scoped_acquire gil;
   if (raised_) return;
   try {
     call();

@@ -24,10 +24,10 @@ namespace terrace::python {
 namespace {
 
 /// Returns rows of a, b, height, size.
-std::vector<std::array<double, 4>> rows_of_merges(const cluster::Dendrogram& made) {
+std::vector<std::array<double, 4>> rows_of_merges(const cluster::Dendrogram& result) {
   std::vector<std::array<double, 4>> rows;
-  rows.reserve(made.merges.size());
-  for (const cluster::Merge& merge : made.merges) {
+  rows.reserve(result.merges.size());
+  for (const cluster::Merge& merge : result.merges) {
     rows.push_back({static_cast<double>(merge.a), static_cast<double>(merge.b), merge.height,
                     static_cast<double>(merge.size)});
   }
@@ -47,9 +47,9 @@ cluster::LinkageOptions linkage_options(const py::dict& choices) {
 }
 
 /// Returns the linkage of points. edges: if given, single linkage considers only these pairs.
-py::array linkage(const Array<double>& given, const std::string& method,
+py::array linkage(const Array<double>& input, const std::string& method,
                   const std::optional<Array<std::uint32_t>>& edges, const py::dict& choices) {
-  const std::vector<cluster::Point3> points = points3_of(given);
+  const std::vector<cluster::Point3> points = points3_of(input);
   const cluster::LinkageMethod kind = named<cluster::LinkageMethod>(method);
   cluster::LinkageOptions options = linkage_options(choices);
   bool gpu = false;
@@ -88,10 +88,10 @@ py::array tree_linkage(const Array<std::uint32_t>& ends, const Array<double>& le
 }
 
 /// Returns the linkage of `count` things. distances: of all pairs i < j, ordered by i, then j.
-py::array linkage_of_distances(std::size_t count, const Array<double>& given,
+py::array linkage_of_distances(std::size_t count, const Array<double>& input,
                                const std::string& method, const py::dict& choices) {
   const cluster::LinkageMethod kind = named<cluster::LinkageMethod>(method);
-  const auto distances = numbers_of(given, "distances");
+  const auto distances = numbers_of(input, "distances");
   if (count == 0 || count > cluster::kMostDendrogramPoints ||
       distances.size() != count * (count - 1) / 2) {
     throw py::value_error("the number of distances does not match the number of pairs");
@@ -107,8 +107,8 @@ py::array linkage_of_distances(std::size_t count, const Array<double>& given,
 }
 
 /// Returns (ends of each edge, lengths).
-py::tuple spanning_tree(const Array<double>& given, unsigned threads) {
-  const std::vector<cluster::Point3> points = points3_of(given);
+py::tuple spanning_tree(const Array<double>& input, unsigned threads) {
+  const std::vector<cluster::Point3> points = points3_of(input);
   std::vector<std::array<std::uint32_t, 2>> edges;
   std::vector<double> lengths;
   released([&](const std::stop_token& stop) {
@@ -122,9 +122,9 @@ py::tuple spanning_tree(const Array<double>& given, unsigned threads) {
   return py::make_tuple(to_array(std::move(edges)), to_array(std::move(lengths)));
 }
 
-py::array cut(const Array<double>& given, std::optional<std::size_t> count,
+py::array cut(const Array<double>& input, std::optional<std::size_t> count,
               std::optional<double> height) {
-  const auto rows = rows_of<4>(given, "the linkage");
+  const auto rows = rows_of<4>(input, "the linkage");
   return to_array(released([&] {
     cluster::Dendrogram dendrogram{.points = rows.size() + 1, .merges = {}};
     dendrogram.merges.reserve(rows.size());
@@ -147,10 +147,10 @@ py::array cut(const Array<double>& given, std::optional<std::size_t> count,
 }
 
 /// Returns (centres, labels, sum of squared distances, iterations, converged).
-py::tuple k_means(const Array<double>& given, const py::object& start, std::size_t clusters,
+py::tuple k_means(const Array<double>& array, const py::object& start, std::size_t clusters,
                   const Array<double>& weights, std::uint64_t seed, std::size_t restarts,
                   std::size_t max_iterations, double tolerance, unsigned threads) {
-  const std::vector<cluster::Point3> points = points3_of(given);
+  const std::vector<cluster::Point3> points = points3_of(array);
   std::vector<cluster::Point3> centres;
   if (!start.is_none()) centres = points3_of(start.cast<Array<double>>());
   const auto weighing = numbers_of(weights, "weights");
@@ -164,21 +164,21 @@ py::tuple k_means(const Array<double>& given, const py::object& start, std::size
                                  .max_iterations = max_iterations,
                                  .tolerance = tolerance,
                                  .threads = all_or(threads)};
-  cluster::KMeansResult made = released([&](const std::stop_token& stop) {
+  cluster::KMeansResult result = released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     return centres.empty() ? cluster::k_means(points, weighing, options)
                            : cluster::k_means_from(centres, points, weighing, options);
   });
-  return py::make_tuple(to_array(std::move(made.centres)), to_array(std::move(made.assignment)),
-                        made.sse, made.iterations, made.converged);
+  return py::make_tuple(to_array(std::move(result.centres)), to_array(std::move(result.assignment)),
+                        result.sse, result.iterations, result.converged);
 }
 
 /// Returns (facilities, labels with -1 for outliers, opening cost, connection cost, outlier cost,
 /// lower bound).
-py::tuple arrays_of_solution(cluster::FacilitySolution&& made) {
-  return py::make_tuple(to_array(std::move(made.facilities)),
-                        with_missing(made.assignment, cluster::kOutlier), made.opening_cost,
-                        made.connection_cost, made.outlier_cost, made.lower_bound);
+py::tuple arrays_of_solution(cluster::FacilitySolution&& result) {
+  return py::make_tuple(to_array(std::move(result.facilities)),
+                        mark_missing(result.assignment, cluster::kOutlier), result.opening_cost,
+                        result.connection_cost, result.outlier_cost, result.lower_bound);
 }
 
 /// Options for solving a facility location problem.
@@ -202,17 +202,17 @@ struct Search {
       search.progress = keep_going;
       search.check_stop = stop_check(stop);
       if (start) search.start = &*start;
-      cluster::FacilitySolution made = cluster::solve(problem, search);
+      cluster::FacilitySolution result = cluster::solve(problem, search);
       // Searches for a better lower bound than the method's.
       if (bound_steps > 0) {
         const cluster::LowerBoundOptions bounding{.steps = bound_steps,
                                                   .threads = options.threads,
                                                   .progress = keep_going,
                                                   .check_stop = search.check_stop};
-        const double bound = cluster::lower_bound(problem, made, bounding).lower_bound;
-        made.lower_bound = std::max(made.lower_bound, bound);
+        const double bound = cluster::lower_bound(problem, result, bounding).lower_bound;
+        result.lower_bound = std::max(result.lower_bound, bound);
       }
-      return made;
+      return result;
     }));
   }
 
@@ -223,11 +223,11 @@ struct Search {
   std::size_t bound_steps = 0;
 };
 
-Search search_of(const py::dict& given) {
+Search search_of(const py::dict& arguments) {
   Search search;
-  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
-  take_named(given, "method", search.options.strategy);
-  take_named(given, "effort", search.options.effort);
+  const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
+  take_named(arguments, "method", search.options.strategy);
+  take_named(arguments, "effort", search.options.effort);
   set("seed", search.options.seed);
   set("threads", search.options.threads);
   search.options.threads = all_or(search.options.threads);
@@ -243,9 +243,9 @@ Search search_of(const py::dict& given) {
   search.median.threads = search.options.threads;
   search.median.bound_steps = static_cast<std::uint32_t>(
       std::min(search.bound_steps, std::size_t{std::numeric_limits<std::uint32_t>::max()}));
-  if (given.contains("start")) {
+  if (arguments.contains("start")) {
     const auto [facilities, labels] =
-        given["start"].cast<std::pair<Array<std::uint32_t>, Array<std::int64_t>>>();
+        arguments["start"].cast<std::pair<Array<std::uint32_t>, Array<std::int64_t>>>();
     const auto open = numbers_of(facilities, "facilities");
     cluster::FacilitySolution& start = search.start.emplace();
     start.facilities.assign(open.begin(), open.end());
@@ -262,14 +262,14 @@ Search search_of(const py::dict& given) {
 // The cast above turns -1 into kOutlier.
 static_assert(cluster::kOutlier == static_cast<std::uint32_t>(std::int64_t{-1}));
 
-py::tuple facility_location(const Array<double>& given, double facility_cost,
+py::tuple facility_location(const Array<double>& array, double facility_cost,
                             const std::string& metric, const Array<double>& weights,
                             const std::optional<Array<double>>& channels, double outlier_price,
                             const py::dict& choices) {
   Search search = search_of(choices);
   if (!search.options.restarts) search.median.restarts = 1;
   search.median.bound_steps = 0;
-  const std::vector<cluster::Point3> points = points3_of(given);
+  const std::vector<cluster::Point3> points = points3_of(array);
   cluster::FacilityPoints problem{
       .points = points,
       .weights = numbers_of(weights, "weights"),
@@ -290,14 +290,14 @@ py::tuple facility_location(const Array<double>& given, double facility_cost,
 
 /// Entities with the same number of corners each.
 struct Entities {
-  /// given: shape (n, corners, 2 or 3). ordered: whether three corners are a polyline.
-  Entities(const Array<double>& given, bool ordered_) : ordered(ordered_) {
-    if (given.ndim() != 3 || given.shape(1) < 1) {
+  /// array: shape (n, corners, 2 or 3). ordered: whether three corners are a polyline.
+  Entities(const Array<double>& array, bool ordered_) : ordered(ordered_) {
+    if (array.ndim() != 3 || array.shape(1) < 1) {
       throw py::value_error("entities must have the shape (n, corners, 2 or 3)");
     }
-    count = static_cast<std::size_t>(given.shape(0));
-    corners = static_cast<std::size_t>(given.shape(1));
-    places = points3_of(given.attr("reshape")(-1, given.shape(2)));
+    count = static_cast<std::size_t>(array.shape(0));
+    corners = static_cast<std::size_t>(array.shape(1));
+    places = points3_of(array.attr("reshape")(-1, array.shape(2)));
     for (std::size_t i = 0; i < places.size(); ++i) {
       for (const double coordinate : places[i]) {
         if (std::isfinite(coordinate)) continue;
@@ -323,11 +323,11 @@ struct Entities {
   bool ordered;
 };
 
-py::tuple entity_location(const Array<double>& given, bool ordered, double facility_cost,
+py::tuple entity_location(const Array<double>& array, bool ordered, double facility_cost,
                           const Array<double>& weights, double outlier_price,
                           const py::dict& choices) {
   const Search search = search_of(choices);
-  const Entities entities(given, ordered);
+  const Entities entities(array, ordered);
   const double diagonal = cluster::diagonal(cluster::Euclidean{}, base::box_of(entities.places));
   return search.solve(cluster::FacilityEntities{.count = entities.count,
                                                 .distance =
@@ -372,9 +372,9 @@ py::tuple facility_matrix(const Array<double>& connection, const Array<double>& 
       .connection = {connection.data(), static_cast<std::size_t>(connection.size())}});
 }
 
-py::array clusters_of_size(const Array<double>& given, double size, std::uint64_t seed,
+py::array clusters_of_size(const Array<double>& input, double size, std::uint64_t seed,
                            const py::tuple& settings) {
-  const std::vector<cluster::Point3> points = points3_of(given);
+  const std::vector<cluster::Point3> points = points3_of(input);
   return to_array(Call(settings).run([&](const terrain::Context& context) {
     const auto report = [&](std::uint64_t done) {
       if (!context.progress) return;

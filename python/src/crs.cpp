@@ -32,13 +32,14 @@ std::pair<std::vector<terrain::Polygon>, std::string> own_region(const OpenStore
                                                                  const py::object& region,
                                                                  const std::string& crs) {
   const stream::Store store = open.get();
-  const auto given = region_of(region);
-  const terrain::Region made = released([&]() -> std::optional<terrain::Region> {
-                                 return terrain::RegionConversion(
-                                     store, terrain::transformation_to(store, crs))(given.value());
-                               }).value();
-  const stream::Box3& box = made.box();
-  std::vector<terrain::Polygon> polygons = made.polygons();
+  const auto input = region_of(region);
+  const terrain::Region result =
+      released([&]() -> std::optional<terrain::Region> {
+        return terrain::RegionConversion(store,
+                                         terrain::transformation_to(store, crs))(input.value());
+      }).value();
+  const stream::Box3& box = result.box();
+  std::vector<terrain::Polygon> polygons = result.polygons();
   if (polygons.empty()) {
     polygons = {{{{box.min[0], box.min[1]},
                   {box.max[0], box.min[1]},
@@ -56,12 +57,12 @@ void bind_crs(py::module_& module) {
   py::class_<Transformation>(module, "Transformation")
       .def(py::init(&transformation))
       .def("convert",
-           [](const Transformation& change, const Array<double>& given, bool back) {
-             const auto places = rows_of<2>(given, "places");
+           [](const Transformation& change, const Array<double>& array, bool back) {
+             const auto places = rows_of<2>(array, "places");
              return to_array(released([&] {
-               std::vector<terrain::Point2> made(places.begin(), places.end());
-               back ? change.reverse(made) : change.forward(made);
-               return made;
+               std::vector<terrain::Point2> result(places.begin(), places.end());
+               back ? change.reverse(result) : change.forward(result);
+               return result;
              }));
            })
       .def("note", &Transformation::note)

@@ -41,10 +41,10 @@ using MetricRegions =
     std::vector<std::tuple<std::array<double, N>, std::array<double, N>, tri::LinearMap<N>>>;
 
 template <std::size_t N>
-tri::MetricField<N> field_of(const MetricRegions<N>& given) {
+tri::MetricField<N> field_of(const MetricRegions<N>& input) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::vector<typename tri::MetricField<N>::Region> regions;
-  for (const auto& [lower, upper, map] : given) {
+  for (const auto& [lower, upper, map] : input) {
     auto& region = regions.emplace_back();
     region.box.min.fill(-kInfinity);
     region.box.max.fill(kInfinity);
@@ -79,11 +79,11 @@ py::array adapted2(SharedDelaunay2& shared, const MetricRegions<2>& regions) {
 /// Returns (tetrahedra, the number of facets that cannot be flipped).
 py::tuple adapted3(SharedDelaunay3& shared, const MetricRegions<3>& regions) {
   const tri::MetricField3 field = field_of<3>(regions);
-  const tri::MetricTetrahedra made =
+  const tri::MetricTetrahedra result =
       shared.read(0, [&](const auto& mesh, const std::stop_token& stop) {
         return metric_tetrahedra(mesh, field, stop_check(stop));
       });
-  return py::make_tuple(to_array(numbers_of_corners(made.tetrahedra)), made.stuck);
+  return py::make_tuple(to_array(numbers_of_corners(result.tetrahedra)), result.stuck);
 }
 
 }  // namespace

@@ -142,16 +142,16 @@ class SharedDelaunay {
     }
   }
 
-  py::array_t<std::int32_t> insert(const Array<double>& given) {
-    const auto points = rows_of<N>(given, "points");
+  py::array_t<std::int32_t> insert(const Array<double>& input) {
+    const auto points = rows_of<N>(input, "points");
     return to_array(locked(points.size(), [&](const std::stop_token& stop) {
       std::vector<std::int32_t> handles(points.size());
       if (mesh_.vertex_count() == 0) {
-        const std::vector<tri::VertexId> made = build(points, stop);
-        for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i]);
+        const std::vector<tri::VertexId> solution = build(points, stop);
+        for (std::size_t i = 0; i < solution.size(); ++i) handles[i] = handle(solution[i]);
         return handles;
       }
-      std::vector<typename Mesh::Insertion> made(points.size());
+      std::vector<typename Mesh::Insertion> solution(points.size());
       // A stop ends the call between portions, and the points inserted so far stay. All points are
       // checked first, so that invalid ones change nothing; insert() names the first of them.
       constexpr std::size_t kPortion = 100'000;
@@ -159,17 +159,17 @@ class SharedDelaunay {
       const std::size_t portion = valid ? kPortion : points.size();
       for (std::size_t at = 0; at < points.size() && !stop.stop_requested(); at += portion) {
         const std::size_t count = std::min(portion, points.size() - at);
-        mesh_.insert(points.subspan(at, count), std::span(made).subspan(at, count));
+        mesh_.insert(points.subspan(at, count), std::span(solution).subspan(at, count));
       }
       Kind::settle(mesh_);
       if (stop.stop_requested()) throw stream::Stopped();
-      for (std::size_t i = 0; i < made.size(); ++i) handles[i] = handle(made[i].vertex);
+      for (std::size_t i = 0; i < solution.size(); ++i) handles[i] = handle(solution[i].vertex);
       return handles;
     }));
   }
 
-  void remove(const Array<std::int32_t>& given) {
-    const auto handles = numbers_of(given, "vertices");
+  void remove(const Array<std::int32_t>& input) {
+    const auto handles = numbers_of(input, "vertices");
     locked(handles.size(), [&](const std::stop_token& stop) {
       std::vector<tri::VertexId> vertices = checked(handles);
       std::vector<std::int32_t> sorted(handles.begin(), handles.end());
@@ -289,8 +289,8 @@ class SharedDelaunay {
     return result;
   }
 
-  [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& given) {
-    const auto places = rows_of<N>(given, "points");
+  [[nodiscard]] py::array_t<std::int32_t> find_simplex(const Array<double>& input) {
+    const auto places = rows_of<N>(input, "points");
     return to_array(locked(places.size() + size_, [&] {
       const std::vector<std::int32_t> rank = rows_of_simplices();
       std::vector<std::int32_t> found(places.size(), -1);
@@ -304,8 +304,8 @@ class SharedDelaunay {
     }));
   }
 
-  [[nodiscard]] py::array_t<std::int32_t> nearest(const Array<double>& given) {
-    const auto places = rows_of<N>(given, "points");
+  [[nodiscard]] py::array_t<std::int32_t> nearest(const Array<double>& input) {
+    const auto places = rows_of<N>(input, "points");
     return to_array(locked(places.size(), [&] {
       std::vector<std::int32_t> found(places.size(), -1);
       tri::VertexId last = tri::kNoVertex;
@@ -366,10 +366,10 @@ class SharedDelaunay {
   std::vector<tri::VertexId> build(std::span<const Point> points, const std::stop_token& stop) {
     mesh_.set_check_stop(stop_check(stop));
     try {
-      std::vector<tri::VertexId> made = mesh_.build(points);
+      std::vector<tri::VertexId> solution = mesh_.build(points);
       Kind::settle(mesh_);
       mesh_.set_check_stop({});
-      return made;
+      return solution;
     } catch (...) {
       if constexpr (requires { mesh_.clear(); }) {
         mesh_.clear();

@@ -35,23 +35,23 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
                  unsigned level, std::optional<double> max_edge, const std::string& crs,
                  const py::tuple& settings) {
   const stream::Store store = open.get();
-  const auto given = rows_of<2>(xy, "xy");
+  const auto input = rows_of<2>(xy, "xy");
   const terrain::SamplerOptions options = sampler_of(method, level, max_edge);
   std::vector<terrain::GroundPoint> found =
       Call(settings).run([&](const terrain::Context& context) {
         const auto change = change_to(store, crs);
-        if (!change) return sample_places(store, given, options, context);
-        std::vector<terrain::Point2> places(given.begin(), given.end());
+        if (!change) return sample_places(store, input, options, context);
+        std::vector<terrain::Point2> places(input.begin(), input.end());
         terrain::check_latitudes(places, change->to().most_latitude(), "`xy`");
         change->reverse(places);
         return sample_places(store, places, options, context);
       });
-  auto* const kept = new std::vector<terrain::GroundPoint>(std::move(found));
+  auto* const owned = new std::vector<terrain::GroundPoint>(std::move(found));
   const py::capsule owner(
-      kept, [](void* p) { delete static_cast<std::vector<terrain::GroundPoint>*>(p); });
+      owned, [](void* p) { delete static_cast<std::vector<terrain::GroundPoint>*>(p); });
   static_assert(sizeof(terrain::GroundPoint) == 3 * sizeof(double));
-  return py::array_t<double>({static_cast<py::ssize_t>(kept->size()), py::ssize_t{3}},
-                             reinterpret_cast<const double*>(kept->data()), owner);
+  return py::array_t<double>({static_cast<py::ssize_t>(owned->size()), py::ssize_t{3}},
+                             reinterpret_cast<const double*>(owned->data()), owner);
 }
 
 /// Returns rows of metres, x, y, height.

@@ -67,7 +67,7 @@ class CallSink final : public cluster::HierarchySink {
   };
 
   void call(Copy& of) {
-    const py::gil_scoped_acquire held;
+    const py::gil_scoped_acquire gil;
     py::dict block;
     block["level"] = of.level;
     block["number"] = of.number;
@@ -76,7 +76,7 @@ class CallSink final : public cluster::HierarchySink {
     block["children"] = to_array(std::move(of.children));
     block["first"] = to_array(std::move(of.first));
     block["order"] = to_array(std::move(of.order));
-    block["representatives"] = with_missing(of.representatives, cluster::kNoRepresentative);
+    block["representatives"] = mark_missing(of.representatives, cluster::kNoRepresentative);
     block["boxes"] = to_array(std::move(of.boxes));
     block["errors"] = to_array(std::move(of.errors));
     block["descendants"] = to_array(std::move(of.descendants));
@@ -102,18 +102,18 @@ struct Builder {
 
 /// batches: pairs of points (n, 3) and their payload (n, bytes).
 py::dict stream_clusters(const py::iterable& batches, const py::function& take,
-                         const py::dict& given) {
+                         const py::dict& arguments) {
   cluster::HierarchyOptions options;
-  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
   set("bytes", options.payload_size);
   set("block_points", options.block_size);
   set("facility_cost", options.block.facility_cost);
   set("seed", options.block.seed);
   set("threads", options.threads);
   options.threads = all_or(options.threads);
-  take_named(given, "effort", options.block.effort);
-  take_named(given, "method", options.strategy);
-  options.metric = terrain::MetricChoice::parse(given["metric"].cast<std::string>())
+  take_named(arguments, "effort", options.block.effort);
+  take_named(arguments, "method", options.strategy);
+  options.metric = terrain::MetricChoice::parse(arguments["metric"].cast<std::string>())
                        .on_ground({}, cluster::kIdentityMap);
   CallSink sink(take);
   Builder builder(std::move(options), sink);
@@ -125,12 +125,12 @@ py::dict stream_clusters(const py::iterable& batches, const py::function& take,
     const py::gil_scoped_release open;
     builder.work->push(places, std::as_bytes(bytes));
   }
-  const cluster::HierarchyResult made = released([&] { return builder.work->finish(); });
+  const cluster::HierarchyResult solution = released([&] { return builder.work->finish(); });
   py::dict result;
-  result["points"] = made.points;
-  result["top"] = made.top;
-  result["level_points"] = made.level_points;
-  result["level_clusters"] = made.level_clusters;
+  result["points"] = solution.points;
+  result["top"] = solution.top;
+  result["level_points"] = solution.level_points;
+  result["level_clusters"] = solution.level_clusters;
   return result;
 }
 

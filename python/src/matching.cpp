@@ -19,9 +19,10 @@ namespace {
 
 /// Returns (column of each row or -1, cost, row duals, column duals).
 template <class Number>
-py::tuple arrays_of_assignment(matching::BasicAssignment<Number>&& made) {
-  return py::make_tuple(with_missing(made.column, matching::kUnassigned), made.cost,
-                        to_array(std::move(made.row_dual)), to_array(std::move(made.column_dual)));
+py::tuple arrays_of_assignment(matching::BasicAssignment<Number>&& result) {
+  return py::make_tuple(mark_missing(result.column, matching::kUnassigned), result.cost,
+                        to_array(std::move(result.row_dual)),
+                        to_array(std::move(result.column_dual)));
 }
 
 template <class T>
@@ -39,11 +40,11 @@ py::tuple assign(const py::array_t<T, py::array::c_style>& costs) {
 py::tuple assign_rows(std::size_t rows, std::size_t columns, const py::function& row_of) {
   return arrays_of_assignment(released([&](const std::stop_token& stop) {
     return matching::assign_rows(rows, columns, [&](std::size_t row, std::span<double> costs) {
-      const py::gil_scoped_acquire held;
+      const py::gil_scoped_acquire gil;
       // Only Ctrl-C requests a stop, and it is raised instead of this.
       if (stop.stop_requested()) throw py::value_error("stopped");
-      const auto given = Array<double>(row_of(row));
-      const auto numbers = numbers_of(given, "a row of costs");
+      const auto input = Array<double>(row_of(row));
+      const auto numbers = numbers_of(input, "a row of costs");
       if (numbers.size() != costs.size()) {
         throw py::value_error("row " + std::to_string(row) + " has " +
                               std::to_string(numbers.size()) + " costs for " +
@@ -64,10 +65,10 @@ py::tuple assign_places(const Array<double>& a, const Array<double>& b) {
 
 /// Returns (mate of each point or -1, cost, bound, optimal).
 template <std::size_t N>
-py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
+py::tuple match(const Array<double>& array, const Array<std::uint32_t>& labels,
                 std::size_t exact_limit, std::size_t window, unsigned rounds, double tolerance,
                 unsigned threads) {
-  const auto points = rows_of<N>(given, "points");
+  const auto points = rows_of<N>(array, "points");
   matching::LargeMatchingOptions options;
   options.exact_limit = exact_limit;
   options.labels = numbers_of(labels, "labels");
@@ -75,17 +76,17 @@ py::tuple match(const Array<double>& given, const Array<std::uint32_t>& labels,
   options.window = window;
   options.rounds = rounds;
   options.threads = all_or(threads);
-  matching::LargeMatching made = released([&](const std::stop_token& stop) {
+  matching::LargeMatching result = released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     return match_large(points, options);
   });
-  return py::make_tuple(with_missing(made.mate, matching::kNone), made.cost, made.dual_bound,
-                        made.optimal);
+  return py::make_tuple(mark_missing(result.mate, matching::kNone), result.cost,
+                        result.dual_bound, result.optimal);
 }
 
 /// Returns (mates, cost, number of iterations, rows of iteration and cost for each improvement).
-/// distances: whether `given` is a matrix of distances instead of points.
-py::tuple match_by_halving(const Array<double>& given, bool distances, const std::string& method,
+/// distances: whether `input` is a matrix of distances instead of points.
+py::tuple match_by_halving(const Array<double>& input, bool distances, const std::string& method,
                            std::uint64_t iterations, double seconds, std::uint64_t seed,
                            unsigned threads) {
   matching::HalvingOptions options;
@@ -96,14 +97,14 @@ py::tuple match_by_halving(const Array<double>& given, bool distances, const std
   options.threads = all_or(threads);
   std::vector<std::array<double, 3>> points;
   if (!distances) {
-    points = points3_of(given);
-  } else if (given.ndim() != 2 || given.shape(0) != given.shape(1)) {
+    points = points3_of(input);
+  } else if (input.ndim() != 2 || input.shape(0) != input.shape(1)) {
     throw py::value_error("distances must have the shape (n, n)");
   }
-  const auto count = static_cast<std::size_t>(given.shape(0));
-  const double* const matrix = given.data();
+  const auto count = static_cast<std::size_t>(input.shape(0));
+  const double* const matrix = input.data();
   std::vector<std::array<double, 2>> steps;
-  matching::HalvingMatching made = released([&](const std::stop_token& stop) {
+  matching::HalvingMatching solution = released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     options.progress = [&](auto...) { return !stop.stop_requested(); };
     matching::HalvingMatching result =
@@ -117,8 +118,8 @@ py::tuple match_by_halving(const Array<double>& given, bool distances, const std
     }
     return result;
   });
-  return py::make_tuple(with_missing(made.mate, matching::kNone), made.cost, made.iterations,
-                        to_array(std::move(steps)));
+  return py::make_tuple(mark_missing(solution.mate, matching::kNone), solution.cost,
+                        solution.iterations, to_array(std::move(steps)));
 }
 
 /// Assigns rows to columns; the costs are compressed rows.
@@ -145,7 +146,7 @@ py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
                           std::to_string(pairs.size()) + " edges");
   }
   double bound = 0;
-  const matching::Matching made = released([&](const std::stop_token& stop) {
+  const matching::Matching solution = released([&](const std::stop_token& stop) {
     std::vector<matching::WeightedEdge> edges;
     edges.reserve(pairs.size());
     for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -156,7 +157,7 @@ py::tuple match_edges(std::size_t vertices, const Array<std::uint32_t>& ends,
     bound = result.dual_bound();
     return result;
   });
-  return py::make_tuple(with_missing(made.mate, matching::kNone), made.cost, bound, true);
+  return py::make_tuple(mark_missing(solution.mate, matching::kNone), solution.cost, bound, true);
 }
 
 }  // namespace

@@ -30,17 +30,17 @@ py::tuple to_python(const terrain::MeshUnits& units) {
 }
 
 terrain::MeshUnits units_from(const py::object& units) {
-  terrain::MeshUnits made;
-  if (units.is_none()) return made;
+  terrain::MeshUnits result;
+  if (units.is_none()) return result;
   const auto fields = units.cast<py::tuple>();
-  made.crs.epsg = fields[0].cast<int>();
-  made.crs.geographic = fields[1].cast<bool>();
+  result.crs.epsg = fields[0].cast<int>();
+  result.crs.geographic = fields[1].cast<bool>();
   std::size_t next = 2;
-  for (std::string* text : {&made.crs.name, &made.crs.wkt, &made.crs.horizontal_unit,
-                            &made.crs.vertical_unit, &made.height_unit}) {
+  for (std::string* text : {&result.crs.name, &result.crs.wkt, &result.crs.horizontal_unit,
+                            &result.crs.vertical_unit, &result.height_unit}) {
     *text = fields[next++].cast<std::string>();
   }
-  return made;
+  return result;
 }
 
 /// Returns (vertices, triangles, levels, units).
@@ -85,7 +85,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   take_option(heights, "replace", replace);
   if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
   terrain::MeshUnits units;
-  terrain::TriangleMesh made = Call(settings).run([&](const terrain::Context& context) {
+  terrain::TriangleMesh result = Call(settings).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
     std::optional<stream::Overlay> overlay;
     if (!overlay_path.empty()) {
@@ -103,7 +103,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
     units = terrain::MeshUnits(store, places);
     return mesh;
   });
-  return arrays_of(std::move(made), to_python(units));
+  return arrays_of(std::move(result), to_python(units));
 }
 
 /// Returns the surface as arrays_of() does, or (vertices, tetrahedra inside it).
@@ -111,14 +111,14 @@ py::tuple surface(const OpenStore& open, unsigned level, const py::object& regio
                   const std::string& where, bool tetrahedra, const py::tuple& settings) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, py::list());
-  terrain::ScanSurface made = Call(settings).run([&](const terrain::Context& context) {
+  terrain::ScanSurface result = Call(settings).run([&](const terrain::Context& context) {
     return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
   });
   if (!tetrahedra) {
-    return arrays_of(std::move(made.mesh), to_python(terrain::MeshUnits(store)));
+    return arrays_of(std::move(result.mesh), to_python(terrain::MeshUnits(store)));
   }
-  return py::make_tuple(to_array(std::move(made.mesh.positions)),
-                        to_array(std::move(made.tetrahedra)));
+  return py::make_tuple(to_array(std::move(result.mesh.positions)),
+                        to_array(std::move(result.tetrahedra)));
 }
 
 /// Returns (vertices, the offset of each line and the total, the number of each line).
@@ -126,34 +126,34 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
                 const py::list& focuses, const std::string& where, const py::tuple& settings) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, focuses);
-  terrain::LineSet made = Call(settings).run([&](const terrain::Context& context) {
+  terrain::LineSet result = Call(settings).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
     return detail_lines(store, detail, context);
   });
   std::vector<std::int64_t> begins{0}, numbers;
-  for (const terrain::LineSet::Line& line : made.lines) {
+  for (const terrain::LineSet::Line& line : result.lines) {
     begins.push_back(static_cast<std::int64_t>(line.end));
     numbers.push_back(line.number);
   }
-  return py::make_tuple(to_array(std::move(made.vertices)), to_array(std::move(begins)),
+  return py::make_tuple(to_array(std::move(result.vertices)), to_array(std::move(begins)),
                         to_array(std::move(numbers)));
 }
 
-py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& given,
+py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& arguments,
                       const py::tuple& settings) {
-  const stream::Store store = open.get(given["where"].cast<std::string>());
+  const stream::Store store = open.get(arguments["where"].cast<std::string>());
   format_of_output(terrain::outputs::kMeshFile, path);
   terrain::BoundedMeshOptions options;
   options.path = path;
-  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
   set("max_error", options.max_error);
   set("max_points", options.max_points);
   set("replace", options.writer.replace.replace);
-  options.region = region_of(given["region"], store);
-  take_named(given, "quality", options.quality);
-  take_named(given, "duplicates", options.duplicates);
-  take_named(given, "fill", options.fill);
-  const auto crs = given["crs"].cast<std::string>();
+  options.region = region_of(arguments["region"], store);
+  take_named(arguments, "quality", options.quality);
+  take_named(arguments, "duplicates", options.duplicates);
+  take_named(arguments, "fill", options.fill);
+  const auto crs = arguments["crs"].cast<std::string>();
   const terrain::BoundedMeshResult outcome =
       Call(settings).run([&](const terrain::Context& context) {
         options.places = places_to(store, crs);

@@ -11,8 +11,8 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "mesh_changes.hpp"
 #include "store.hpp"
-#include "view.hpp"
 
 namespace terrace::python {
 namespace {
@@ -48,20 +48,20 @@ class SharedModel {
   /// Applies step(model), which returns its delta.
   template <class Step>
   py::dict change(Step&& step) {
-    MeshChange made;
+    MeshChange result;
     released([&] {
       const std::lock_guard lock(mutex_);
-      made = changes().of(step(*model_));
+      result = changes().of(step(*model_));
     });
-    return dict_of(std::move(made));
+    return dict_of(std::move(result));
   }
   py::dict snapshot() {
-    MeshChange made;
+    MeshChange result;
     released([&] {
       const std::lock_guard lock(mutex_);
-      made = changes().snapshot();
+      result = changes().snapshot();
     });
-    return dict_of(std::move(made));
+    return dict_of(std::move(result));
   }
   template <class Question>
   auto ask(Question&& question) {

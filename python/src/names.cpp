@@ -41,7 +41,7 @@ const auto& tables() {
   using terrain::Fill, terrain::HeightReference, terrain::RasterValue;
   using tri::GradientFrom, tri::Interpolation, tri::PointDuplicates, tri::ShapeCriterion;
   using tri::ShapeRule, tri::Smoothing, tri::TinQuality;
-  static const std::tuple made{
+  static const std::tuple result{
       NameTable<Interpolation>{"Interpolation",
                                "method",
                                {{"linear", Interpolation::kLinear},
@@ -145,7 +145,7 @@ const auto& tables() {
           {{"mesh", ViewKind::mesh}, {"points", ViewKind::points}, {"surface", ViewKind::surface}}},
       NameTable<ViewReader>{
           "ViewReader", "reader", {{"thread", ViewReader::thread}, {"frame", ViewReader::frame}}}};
-  return made;
+  return result;
 }
 
 /// Parameters that have different names in the libraries (first) and in the module.

@@ -25,9 +25,10 @@ namespace {
 /// Reads the blocks of a source, in coordinates of its CRS. Python's threads may share one.
 class PointReader {
  public:
-  PointReader(const py::object& source, const py::dict& given, unsigned threads) : held_(source) {
+  PointReader(const py::object& source, const py::dict& arguments, unsigned threads)
+      : held_(source) {
     const OpenSource open = opener_of(source);
-    stream::SourceOptions options = reading_of(source, given, all_or(threads));
+    stream::SourceOptions options = reading_of(source, arguments, all_or(threads));
     source_ = released([&](const std::stop_token& stop) {
       options.stop = stop;
       return open(options);
@@ -80,7 +81,7 @@ class PointReader {
 };
 
 /// Returns (points written, points left out because a coordinate is NaN, largest rounding error).
-py::tuple write_points(const py::object& source, const py::dict& given, const std::string& path,
+py::tuple write_points(const py::object& source, const py::dict& arguments, const std::string& path,
                        const std::string& format, bool replace, const py::tuple& settings) {
   format_of_output(terrain::outputs::kPointFile, path, format);
   const OpenSource open = opener_of(source);
@@ -89,8 +90,8 @@ py::tuple write_points(const py::object& source, const py::dict& given, const st
   Call(settings).run([&](const terrain::Context& context) {
     stream::SourceOptions options;
     {
-      const py::gil_scoped_acquire held;
-      options = reading_of(source, given, context.threads, context.stop);
+      const py::gil_scoped_acquire gil;
+      options = reading_of(source, arguments, context.threads, context.stop);
     }
     const std::unique_ptr<stream::PointSource> from = open(options);
     const stream::SourceInfo& info = from->info();

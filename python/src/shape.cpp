@@ -26,14 +26,15 @@ py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule,
   tri::ShapeParts parts;
   bool open = false;
   const double volume = shared.read(0, [&](const auto& mesh, const std::stop_token& stop) {
-    tri::Shape3<double, Metric> made(options);
-    made.restore(mesh, threads, stop_check(stop));
-    for (const tri::TetrahedronId t : made.kept_tetrahedra()) {
+    tri::Shape3<double, Metric> result(options);
+    result.restore(mesh, threads, stop_check(stop));
+    for (const tri::TetrahedronId t : result.kept_tetrahedra()) {
       auto& row = kept.emplace_back();
       const auto corners = mesh.vertices(t);
       for (std::size_t i = 0; i < 4; ++i) row[i] = static_cast<std::int32_t>(corners[i]);
     }
-    const tri::ShapeSurface surface = lids ? made.surface(mesh) : made.surface_without_lids(mesh);
+    const tri::ShapeSurface surface =
+        lids ? result.surface(mesh) : result.surface_without_lids(mesh);
     for (const auto& face : surface.surface.faces) {
       auto& row = faces.emplace_back();
       for (std::size_t i = 0; i < 3; ++i) {
@@ -41,8 +42,8 @@ py::tuple shape(SharedDelaunay<3, Metric>& shared, const std::string& rule,
       }
     }
     open = surface.open;
-    parts = made.parts(mesh, surface);
-    return made.volume(mesh);
+    parts = result.parts(mesh, surface);
+    return result.volume(mesh);
   });
   return py::make_tuple(to_array(std::move(kept)), to_array(std::move(faces)), volume, open,
                         parts.components, parts.euler_characteristic);
@@ -56,18 +57,18 @@ tri::Surface surface_of(const Array<double>& vertices, const Array<std::uint32_t
 
 py::dict measure(const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
   const tri::Surface surface = surface_of(vertices, triangles);
-  const tri::SurfaceMeasures made = released([&] { return tri::measure(surface); });
+  const tri::SurfaceMeasures solution = released([&] { return tri::measure(surface); });
   py::dict result;
-  result["faces"] = made.faces;
-  result["vertices"] = made.vertices;
-  result["edges"] = made.edges;
-  result["area"] = made.area;
-  result["volume"] = made.volume;
-  result["components"] = made.components;
-  result["euler_characteristic"] = made.euler_characteristic;
-  result["border_edges"] = made.border_edges;
-  result["non_manifold_edges"] = made.non_manifold_edges;
-  result["closed"] = made.closed;
+  result["faces"] = solution.faces;
+  result["vertices"] = solution.vertices;
+  result["edges"] = solution.edges;
+  result["area"] = solution.area;
+  result["volume"] = solution.volume;
+  result["components"] = solution.components;
+  result["euler_characteristic"] = solution.euler_characteristic;
+  result["border_edges"] = solution.border_edges;
+  result["non_manifold_edges"] = solution.non_manifold_edges;
+  result["closed"] = solution.closed;
   return result;
 }
 

@@ -32,11 +32,11 @@ stream::MemoryColumn column_of(const py::dict& column) {
   return {static_cast<const std::byte*>(array.data()), array.strides(0)};
 }
 
-stream::MemoryPoints points_of_columns(const py::dict& given) {
+stream::MemoryPoints points_of_columns(const py::dict& arguments) {
   stream::MemoryPoints points;
-  points.info.files = {given["name"].cast<std::string>()};
+  points.info.files = {arguments["name"].cast<std::string>()};
   points.info.format = "array";
-  const auto columns = given["columns"].cast<std::vector<py::dict>>();
+  const auto columns = arguments["columns"].cast<std::vector<py::dict>>();
   for (std::size_t axis = 0; axis < 3; ++axis) {
     points.info.coordinates[axis] = channel_of(columns.at(axis));
     points.coordinates[axis] = column_of(columns[axis]);
@@ -49,26 +49,26 @@ stream::MemoryPoints points_of_columns(const py::dict& given) {
     xy[axis * 3 + 2] = channel.offset;
   }
   points.count = static_cast<std::uint64_t>(columns[0]["array"].cast<py::array>().shape(0));
-  for (const py::dict& attribute : given["attributes"].cast<std::vector<py::dict>>()) {
+  for (const py::dict& attribute : arguments["attributes"].cast<std::vector<py::dict>>()) {
     points.info.attributes.push_back(channel_of(attribute));
     points.attributes.push_back(column_of(attribute));
   }
   return points;
 }
 
-stream::MemoryRaster raster_of_samples(const py::dict& given) {
+stream::MemoryRaster raster_of_samples(const py::dict& arguments) {
   stream::MemoryRaster raster;
-  const auto samples = given["samples"].cast<py::array>();
-  raster.info.files = {given["name"].cast<std::string>()};
+  const auto samples = arguments["samples"].cast<py::array>();
+  raster.info.files = {arguments["name"].cast<std::string>()};
   raster.info.format = "array";
   raster.info.rows = static_cast<std::uint64_t>(samples.shape(0));
   raster.info.columns = static_cast<std::uint64_t>(samples.shape(1));
   raster.info.sample = {.name = "sample",
                         .type = scalar_type(samples.dtype(), "the raster"),
-                        .scale = given["scale"].cast<double>(),
-                        .offset = given["offset"].cast<double>()};
-  raster.info.world.xy = given["transform"].cast<std::array<double, 6>>();
-  raster.info.nodata = given["nodata"].cast<std::optional<double>>();
+                        .scale = arguments["scale"].cast<double>(),
+                        .offset = arguments["offset"].cast<double>()};
+  raster.info.world.xy = arguments["transform"].cast<std::array<double, 6>>();
+  raster.info.nodata = arguments["nodata"].cast<std::optional<double>>();
   raster.first = static_cast<const std::byte*>(samples.data());
   raster.row_stride = samples.strides(0);
   raster.column_stride = samples.strides(1);
@@ -82,15 +82,15 @@ bool opens_twice(const py::object& source) {
 }
 
 /// Reads where, keep, drop, resolution and region.
-stream::Selection selection_of(const py::object& source, const py::dict& given,
+stream::Selection selection_of(const py::object& source, const py::dict& arguments,
                                const stream::SourceOptions& options) {
   stream::Selection selection;
-  take_option(given, "where", selection.where);
-  take_option(given, "keep", selection.keep);
-  take_option(given, "drop", selection.drop);
-  take_option(given, "resolution", selection.resolution);
-  if (!given.contains("region")) return selection;
-  auto region = region_of(given["region"]);
+  take_option(arguments, "where", selection.where);
+  take_option(arguments, "keep", selection.keep);
+  take_option(arguments, "drop", selection.drop);
+  take_option(arguments, "resolution", selection.resolution);
+  if (!arguments.contains("region")) return selection;
+  auto region = region_of(arguments["region"]);
   if (region && terrain::RegionConversion::may_turn(*region) && opens_twice(source)) {
     const OpenSource open = opener_of(source);
     const auto info = released([&] { return open(options)->info(); });
@@ -109,38 +109,38 @@ OpenSource opener_of(const py::object& source) {
       return stream::open_source(names, options);
     };
   }
-  const auto given = source.cast<py::dict>();
-  if (given.contains("samples")) {
-    return [raster = raster_of_samples(given)](const stream::SourceOptions& options) {
+  const auto input = source.cast<py::dict>();
+  if (input.contains("samples")) {
+    return [raster = raster_of_samples(input)](const stream::SourceOptions& options) {
       return stream::open_memory(raster, options);
     };
   }
-  return [points = points_of_columns(given)](const stream::SourceOptions& options) {
+  return [points = points_of_columns(input)](const stream::SourceOptions& options) {
     return stream::open_memory(points, options);
   };
 }
 
-stream::SourceOptions reading_of(const py::object& source, const py::dict& given, unsigned threads,
-                                 std::stop_token stop) {
+stream::SourceOptions reading_of(const py::object& source, const py::dict& arguments,
+                                 unsigned threads, std::stop_token stop) {
   stream::SourceOptions options;
-  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
   set("input_format", options.format);
   set("block_points", options.block_points);
   set("band", options.band);
   set("cell", options.cell);
   if (options.block_points < 1) throw py::value_error("`block_points` must be positive");
   if (options.band < 1) throw py::value_error("`band` counts from 1");
-  if (given.contains("crs")) {
-    options.crs = terrain::crs_named(given["crs"].cast<std::string>());
+  if (arguments.contains("crs")) {
+    options.crs = terrain::crs_named(arguments["crs"].cast<std::string>());
   }
   bool skip_damaged = false;
   set("skip_damaged", skip_damaged);
   if (skip_damaged) options.on_damage = [](const stream::Error&, std::uint64_t) {};
-  take_named(given, "entities", options.entities);
-  take_named(given, "heights_of_colour", options.heights_of_colour);
+  take_named(arguments, "entities", options.entities);
+  take_named(arguments, "heights_of_colour", options.heights_of_colour);
   options.threads = threads;
   options.stop = std::move(stop);
-  options.selection = selection_of(source, given, options);
+  options.selection = selection_of(source, arguments, options);
   return options;
 }
 

@@ -301,13 +301,13 @@ void bind_store(py::module_& module) {
       .def("near", &near)
       .def("clusters", &clusters)
       .def("count",
-           [](const OpenStore& open, const py::object& given) {
+           [](const OpenStore& open, const py::object& argument) {
              const stream::Store store = open.get();
              const std::array<double, 6>& xy = store.schema().world.xy;
              if (xy[1] != 0 || xy[3] != 0)
                throw py::value_error(
                    "the raster is rotated: boxes do not follow its columns and rows");
-             const terrain::Region region = region_of(given, store).value();
+             const terrain::Region region = region_of(argument, store).value();
              return released([&](const std::stop_token& stop) {
                const stream::Store stoppable = store.with_stop(stop);
                std::uint64_t points = 0;

@@ -15,10 +15,10 @@
 namespace terrace::python {
 namespace {
 
-terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& given) {
+terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& arguments) {
   format_of_output(terrain::outputs::kTileSet, folder);
   terrain::TilesRequest request{.folder = folder};
-  const auto set = [&](const char* name, auto& to) { take_option(given, name, to); };
+  const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
   set("name", request.name);
   set("first_zoom", request.first_zoom);
   set("last_zoom", request.last_zoom);
@@ -32,9 +32,9 @@ terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& g
   set("gzip", request.gzip);
   set("resume", request.resume);
   set("replace", request.replace);
-  take_named(given, "quality", request.quality);
-  take_named(given, "vertical", request.vertical);
-  take_named(given, "fill", request.fill);
+  take_named(arguments, "quality", request.quality);
+  take_named(arguments, "vertical", request.vertical);
+  take_named(arguments, "fill", request.fill);
   if (request.fill == terrain::Fill::none)
     throw py::value_error("tiles cannot have holes: `fill` must be flat or interpolate");
   return request;
@@ -52,12 +52,12 @@ py::dict check_tiles(const std::string& folder, const OpenStore* open,
                                           .store = store ? &*store : nullptr,
                                           .vertical = named<terrain::HeightReference>(vertical),
                                           .geoid = geoid};
-  const terrain::TileCheckResult made = Call(settings).run(
+  const terrain::TileCheckResult solution = Call(settings).run(
       [&](const terrain::Context& context) { return terrain::check_tiles(request, context); });
   py::dict result;
   py::list faults, zooms;
-  for (const stream::Problem& problem : made.problems) faults.append(text_of(problem));
-  for (const terrain::ZoomCheck& of : made.zooms) {
+  for (const stream::Problem& problem : solution.problems) faults.append(text_of(problem));
+  for (const terrain::ZoomCheck& of : solution.zooms) {
     py::dict zoom;
     zoom["zoom"] = of.zoom;
     zoom["tiles"] = of.tiles;
@@ -67,9 +67,9 @@ py::dict check_tiles(const std::string& folder, const OpenStore* open,
     zooms.append(zoom);
   }
   result["faults"] = faults;
-  result["tiles"] = made.tiles;
-  result["samples"] = made.samples;
-  result["torn"] = made.torn;
+  result["tiles"] = solution.tiles;
+  result["samples"] = solution.samples;
+  result["torn"] = solution.torn;
   result["zooms"] = zooms;
   return result;
 }
@@ -79,9 +79,9 @@ py::dict check_tiles(const std::string& folder, const OpenStore* open,
 void bind_tiles(py::module_& module) {
   module.def("check_tiles", &check_tiles);
   module.def("write_tiles", [](const OpenStore& open, const std::string& folder,
-                               const py::dict& given, const py::tuple& settings) {
+                               const py::dict& arguments, const py::tuple& settings) {
     const stream::Store store = open.get();
-    const terrain::TilesRequest request = tiles_request(folder, given);
+    const terrain::TilesRequest request = tiles_request(folder, arguments);
     const terrain::TilesOutcome outcome = Call(settings).run([&](const terrain::Context& context) {
       return terrain::write_tiles(store, request, context);
     });

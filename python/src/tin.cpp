@@ -35,13 +35,13 @@ py::tuple tin_of_points(const Array<double>& x, const Array<double>& y, const Ar
   options.duplicates = named<tri::PointDuplicates>(duplicates);
   const auto corners = rows_of<3>(frame, "frame");
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
-  tri::PointTin made = released([&](const std::stop_token& stop) {
+  tri::PointTin result = released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     return tri::point_tin(xs, ys, zs, corners, options);
   });
-  const tri::TinErrors& errors = made.errors;
+  const tri::TinErrors& errors = result.errors;
   return py::make_tuple(
-      to_array(std::move(made.vertices)), to_array(std::move(made.triangles)),
+      to_array(std::move(result.vertices)), to_array(std::move(result.triangles)),
       measures(errors.largest, errors.rms, errors.covered + errors.uncovered, errors.uncovered));
 }
 
@@ -65,7 +65,7 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
                               .row_step = row_step,
                               .measure = true};
   std::vector<tri::Point3> vertices;
-  tri::GridTin made = released([&](const std::stop_token& stop) {
+  tri::GridTin result = released([&](const std::stop_token& stop) {
     options.check_stop = stop_check(stop);
     tri::GridTin tin = max_points > 0 ? grid_tin_of_points(window, max_points, options)
                                       : grid_tin(window, settle_sides(window, max_error), options);
@@ -75,8 +75,8 @@ py::tuple tin_of_grid(const py::array_t<T, py::array::c_style>& heights, double 
     }
     return tin;
   });
-  const tri::GridTinCheck& check = made.check;
-  return py::make_tuple(to_array(std::move(vertices)), to_array(std::move(made.triangles)),
+  const tri::GridTinCheck& check = result.check;
+  return py::make_tuple(to_array(std::move(vertices)), to_array(std::move(result.triangles)),
                         measures(check.max_error, check.rms_error, check.samples, check.uncovered));
 }
 
@@ -85,11 +85,11 @@ py::tuple simplify_line(const Array<double>& t, const Array<double>& heights, do
   const auto along = numbers_of(t, "t"), values = numbers_of(heights, "heights");
   double largest = 0;
   auto samples = released([&](const std::stop_token& stop) {
-    const tri::SimplifiedLine made =
+    const tri::SimplifiedLine result =
         tri::simplify_line(along, values, max_error, {}, stop_check(stop));
-    largest = made.largest_error;
+    largest = result.largest_error;
     std::vector<std::int64_t> kept;
-    for (const tri::LineVertex& vertex : made.vertices) kept.push_back(vertex.sample);
+    for (const tri::LineVertex& vertex : result.vertices) kept.push_back(vertex.sample);
     return kept;
   });
   return py::make_tuple(to_array(std::move(samples)), largest);
@@ -101,12 +101,12 @@ py::dict measure_surface(const Array<double>& x, const Array<double>& y, const A
   const auto xs = numbers_of(x, "x"), ys = numbers_of(y, "y"), zs = numbers_of(z, "z");
   const auto places = rows_of<3>(vertices, "vertices");
   const auto corners = rows_of<3>(triangles, "triangles");
-  const tri::TinErrors made = released([&](const std::stop_token& stop) {
+  const tri::TinErrors solution = released([&](const std::stop_token& stop) {
     return tri::measure_surface(xs, ys, zs, places, corners, stop_check(stop));
   });
-  py::dict result = measures(made.largest, made.rms, made.covered + made.uncovered, made.uncovered);
+  py::dict result = measures(solution.largest, solution.rms, solution.covered + solution.uncovered, solution.uncovered);
   result["worst"] =
-      made.largest_at == tri::kNoSample ? std::int64_t{-1} : std::int64_t{made.largest_at};
+      solution.largest_at == tri::kNoSample ? std::int64_t{-1} : std::int64_t{solution.largest_at};
   return result;
 }
 

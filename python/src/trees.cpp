@@ -20,12 +20,12 @@ namespace {
 
 /// Wraps a Python function from an array of positions to the partner of each position or -1.
 template <class Point>
-matching::LevelMatcher<Point> matcher_of(const py::object& given) {
-  if (given.is_none()) return {};
-  return [&given](std::span<const Point> nodes) {
-    const py::gil_scoped_acquire held;
+matching::LevelMatcher<Point> matcher_of(const py::object& value) {
+  if (value.is_none()) return {};
+  return [&value](std::span<const Point> nodes) {
+    const py::gil_scoped_acquire gil;
     const Array<std::int64_t> mates(
-        given(to_array(std::vector<Point>(nodes.begin(), nodes.end()))));
+        value(to_array(std::vector<Point>(nodes.begin(), nodes.end()))));
     std::vector<std::uint32_t> result;
     for (const std::int64_t mate : numbers_of(mates, "what `matcher` returns")) {
       if (mate < -1 || mate >= static_cast<std::int64_t>(nodes.size())) {
@@ -40,9 +40,9 @@ matching::LevelMatcher<Point> matcher_of(const py::object& given) {
 
 /// Returns (rows of a, b, distance, size; the level of each row; the positions of the rows' nodes).
 template <std::size_t N>
-py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
+py::tuple tree_of(const Array<double>& input, const Array<double>& weights,
                   const Array<std::uint32_t>& labels, const py::object& matcher, unsigned threads) {
-  const auto points = rows_of<N>(given, "points");
+  const auto points = rows_of<N>(input, "points");
   matching::MatchingTreeOptions<std::array<double, N>> options;
   options.weights = numbers_of(weights, "weights");
   options.labels = numbers_of(labels, "labels");
@@ -50,7 +50,7 @@ py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
   options.matcher = matcher_of<std::array<double, N>>(matcher);
   std::vector<std::array<double, 4>> rows;
   std::vector<std::uint32_t> levels;
-  auto made = released([&](const std::stop_token& stop) {
+  auto result = released([&](const std::stop_token& stop) {
     options.progress = [&](auto...) { return !stop.stop_requested(); };
     options.check_stop = stop_check(stop);
     auto tree = make_matching_tree(points, options);
@@ -64,13 +64,13 @@ py::tuple tree_of(const Array<double>& given, const Array<double>& weights,
     return tree;
   });
   return py::make_tuple(to_array(std::move(rows)), to_array(std::move(levels)),
-                        to_array(std::move(made.positions)));
+                        to_array(std::move(result.positions)));
 }
 
 /// Converts rows of two node numbers, such as the first two columns of a linkage.
-std::vector<matching::TreeChildren> children_of(const Array<double>& given) {
+std::vector<matching::TreeChildren> children_of(const Array<double>& array) {
   std::vector<matching::TreeChildren> children;
-  for (const auto& [a, b] : rows_of<2>(given, "the tree")) {
+  for (const auto& [a, b] : rows_of<2>(array, "the tree")) {
     constexpr double kMost = std::numeric_limits<std::uint32_t>::max();
     if (!(a >= 0 && a <= kMost && b >= 0 && b <= kMost)) {
       throw py::value_error("row " + std::to_string(children.size()) +
@@ -127,14 +127,14 @@ struct Found {
 template <std::size_t N>
 py::tuple nearest_points(const matching::PointHierarchy<N>& tree, const Array<double>& places,
                          std::size_t k) {
-  const auto asked = rows_of<N>(places, "places");
-  Found found(asked.size() * k);
+  const auto queries = rows_of<N>(places, "places");
+  Found found(queries.size() * k);
   released([&](const std::stop_token& stop) {
     base::StopTicks ticks(stop_check(stop));
     std::vector<matching::Neighbour> near;
-    for (std::size_t i = 0; i < asked.size(); ++i) {
+    for (std::size_t i = 0; i < queries.size(); ++i) {
       ticks(kTicksOfQuery);
-      tree.nearest(asked[i], k, near);
+      tree.nearest(queries[i], k, near);
       for (std::size_t j = 0; j < near.size(); ++j) found.set(i * k + j, near[j], near[j].distance);
     }
   });
@@ -165,9 +165,9 @@ template <std::size_t N>
 auto bind_points(py::module_& module, const char* name) {
   using Tree = matching::PointHierarchy<N>;
   return py::class_<Tree>(module, name)
-      .def(py::init([](const Array<double>& rows, const Array<double>& given) {
+      .def(py::init([](const Array<double>& rows, const Array<double>& array) {
         const auto children = children_of(rows);
-        const auto points = rows_of<N>(given, "points");
+        const auto points = rows_of<N>(array, "points");
         return released([&] { return std::make_unique<Tree>(children, points); });
       }))
       .def("nearest", &nearest_points<N>)
@@ -175,8 +175,8 @@ auto bind_points(py::module_& module, const char* name) {
       .def("depth", [](const Tree& tree) { return tree.tree().depth(); });
 }
 
-std::vector<matching::Triangle> triangles_of(const Array<std::uint32_t>& given) {
-  const auto rows = rows_of<3>(given, "triangles");
+std::vector<matching::Triangle> triangles_of(const Array<std::uint32_t>& array) {
+  const auto rows = rows_of<3>(array, "triangles");
   return {rows.begin(), rows.end()};
 }
 
@@ -200,21 +200,21 @@ void bind_trees(py::module_& module) {
   using Triangles = matching::TriangleHierarchy;
   py::class_<Triangles>(module, "TriangleTree")
       .def(py::init([](const Array<double>& rows, const Array<double>& corners,
-                       const Array<std::uint32_t>& given) {
+                       const Array<std::uint32_t>& array) {
         const auto children = children_of(rows);
         const auto places = rows_of<3>(corners, "vertices");
-        const auto triangles = triangles_of(given);
+        const auto triangles = triangles_of(array);
         return released([&] { return std::make_unique<Triangles>(children, places, triangles); });
       }))
       .def("nearest",
            [](const Triangles& tree, const Array<double>& places) {
-             const auto asked = rows_of<3>(places, "places");
-             Found found(asked.size());
+             const auto queries = rows_of<3>(places, "places");
+             Found found(queries.size());
              released([&](const std::stop_token& stop) {
                base::StopTicks ticks(stop_check(stop));
-               for (std::size_t i = 0; i < asked.size(); ++i) {
+               for (std::size_t i = 0; i < queries.size(); ++i) {
                  ticks(kTicksOfQuery);
-                 if (const auto near = tree.nearest(asked[i])) found.set(i, *near, near->distance);
+                 if (const auto near = tree.nearest(queries[i])) found.set(i, *near, near->distance);
                }
              });
              return std::move(found).arrays();

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "view.hpp"
-
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -15,6 +13,7 @@
 
 #include "arrays.hpp"
 #include "call.hpp"
+#include "mesh_changes.hpp"
 #include "names.hpp"
 #include "store.hpp"
 
@@ -106,8 +105,8 @@ class ViewOf final : public AnyView {
                        std::function<stream::Point3(tri::VertexId)>>(
         view_.model(), [this](tri::VertexId v) { return view_.in_view_frame(v); });
   }
-  ViewChange described(MeshChange&& made) const {
-    ViewChange change{std::move(made)};
+  ViewChange described(MeshChange&& result) const {
+    ViewChange change{std::move(result)};
     change.settled = view_.settled();
     change.points = view_.model().point_count();
     return change;
@@ -120,14 +119,14 @@ class ViewOf final : public AnyView {
 class SharedView {
  public:
   SharedView(const OpenStore& open, const std::string& kind_name, const std::string& reader_name,
-             const py::dict& given)
+             const py::dict& arguments)
       : process_(getpid()), store_(open.get_whole()) {
     tri::ViewOptions options;
-    take_option(given, "max_points", options.max_points);
-    take_option(given, "max_bytes", options.max_cached_bytes);
-    take_option(given, "collapse_below", options.collapse_below);
-    take_option(given, "guard", options.guard);
-    take_option(given, "silhouette", options.silhouette);
+    take_option(arguments, "max_points", options.max_points);
+    take_option(arguments, "max_bytes", options.max_cached_bytes);
+    take_option(arguments, "collapse_below", options.collapse_below);
+    take_option(arguments, "guard", options.guard);
+    take_option(arguments, "silhouette", options.silhouette);
     const auto kind = named<ViewKind>(kind_name);
     const bool reads_in_frame = named<ViewReader>(reader_name) == ViewReader::frame;
     const py::gil_scoped_release released;
@@ -180,14 +179,14 @@ class SharedView {
     if (expanded) pin = *expanded ? tri::ViewPin::expanded : tri::ViewPin::collapsed;
     locked([&] { view_->pin(cluster, pin); });
   }
-  py::array attributes(const Array<std::int32_t>& given) {
-    const auto vertices = numbers_of(given, "vertices");
+  py::array attributes(const Array<std::int32_t>& arguments) {
+    const auto vertices = numbers_of(arguments, "vertices");
     const py::dtype type = attributes_type(store_.schema());
     if (type.itemsize() == 0) throw py::value_error("the store's points have no attributes");
     return to_records(locked([&] { return view_->attributes(vertices); }), type);
   }
-  py::array to_metres(const Array<double>& given) {
-    const auto places = rows_of<3>(given, "points");
+  py::array to_metres(const Array<double>& arguments) {
+    const auto places = rows_of<3>(arguments, "points");
     std::vector<stream::Point3> points;
     for (const stream::Point3& p : places) points.push_back(stored_point(store_.schema(), p));
     locked([&] { view_->to_metres(points); });
@@ -201,8 +200,8 @@ class SharedView {
   std::unique_ptr<AnyView> view_;
 };
 
-tri::Point3 point_of(const py::object& given, const char* what) {
-  const auto array = given.cast<Array<double>>();
+tri::Point3 point_of(const py::object& value, const char* what) {
+  const auto array = value.cast<Array<double>>();
   const auto numbers = numbers_of(array, what);
   if (numbers.size() != 3) throw py::value_error(std::string(what) + " must be three numbers");
   return {numbers[0], numbers[1], numbers[2]};
@@ -212,32 +211,33 @@ tri::Box3 box_of(const std::array<double, 6>& box) {
   return {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}};
 }
 
-tri::View view_of(const py::dict& given) {
-  const auto number = [&](const char* name) { return given[name].cast<double>(); };
+tri::View view_of(const py::dict& arguments) {
+  const auto number = [&](const char* name) { return arguments[name].cast<double>(); };
   tri::View view;
   view.pixel_error = number("pixel_error");
   view.ground_error = number("ground_error");
-  if (!given["matrix"].is_none()) {
-    const auto array = given["matrix"].cast<Array<double>>();
+  if (!arguments["matrix"].is_none()) {
+    const auto array = arguments["matrix"].cast<Array<double>>();
     const auto rows = rows_of<4>(array, "matrix");
     if (rows.size() != 4) throw py::value_error("`matrix` must have the shape (4, 4)");
     std::array<double, 16> matrix{};
     std::copy_n(array.data(), 16, matrix.begin());
     view.camera = tri::matrix_camera(matrix, number("height"));
-  } else if (!given["position"].is_none()) {
-    const tri::Pose pose{point_of(given["position"], "position"),
-                         point_of(given["direction"], "direction"), point_of(given["up"], "up")};
+  } else if (!arguments["position"].is_none()) {
+    const tri::Pose pose{point_of(arguments["position"], "position"),
+                         point_of(arguments["direction"], "direction"),
+                         point_of(arguments["up"], "up")};
     const double aspect = number("width") / number("height");
     view.camera =
-        given["ground_height"].is_none()
+        arguments["ground_height"].is_none()
             ? tri::perspective_camera(pose, number("fov"), aspect, number("height"))
             : tri::orthographic_camera(pose, number("ground_height"), aspect, number("height"));
   }
-  for (const py::handle focus : given["focus"]) {
+  for (const py::handle focus : arguments["focus"]) {
     const auto [box, level] = focus.cast<std::pair<std::array<double, 6>, unsigned>>();
     view.focuses.push_back({box_of(box), level});
   }
-  for (const py::handle region : given["regions"]) {
+  for (const py::handle region : arguments["regions"]) {
     const auto [box, error] = region.cast<std::pair<std::array<double, 6>, double>>();
     view.regions.push_back({box_of(box), error});
   }

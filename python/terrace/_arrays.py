@@ -19,40 +19,40 @@ def filled(array: Any) -> Any:
     return floats.filled(np.nan)
 
 
-def as_array(given: Any, what: str) -> AnyArray:
+def as_array(value: Any, what: str) -> AnyArray:
     """Returns an array of any object with numpy's array interface, the buffer protocol or DLPack.
 
     Masked floats become NaN.
 
     Raises: TypeError for objects that are not numbers; ValueError for masked values of a type without NaN.
     """
-    if isinstance(given, np.ma.MaskedArray):
-        if given.dtype.kind == 'f':
-            return filled(given)
-        if np.ma.is_masked(given):
-            raise ValueError(f'{what} has masked values, which {given.dtype} cannot represent; remove or fill them')
-        return given.data
-    if isinstance(given, np.ndarray):
-        return given
-    if hasattr(given, '__dlpack__') and not hasattr(given, '__array__') and not hasattr(given, '__array_interface__'):
-        return np.from_dlpack(given)
-    array = np.asarray(given)
+    if isinstance(value, np.ma.MaskedArray):
+        if value.dtype.kind == 'f':
+            return filled(value)
+        if np.ma.is_masked(value):
+            raise ValueError(f'{what} has masked values, which {value.dtype} cannot represent; remove or fill them')
+        return value.data
+    if isinstance(value, np.ndarray):
+        return value
+    if hasattr(value, '__dlpack__') and not hasattr(value, '__array__') and not hasattr(value, '__array_interface__'):
+        return np.from_dlpack(value)
+    array = np.asarray(value)
     if array.dtype.kind == 'O':
         raise TypeError(f'{what} is not an array of numbers')
     return array
 
 
-def as_numbers(given: Any, what: str) -> Float64Array:
+def as_numbers(value: Any, what: str) -> Float64Array:
     """Returns as_array() as contiguous float64. Raises: TypeError unless it holds real numbers."""
-    array = as_array(filled(given), what)
+    array = as_array(filled(value), what)
     if array.dtype.kind not in 'iufb':
         raise TypeError(f'{what} has the type {array.dtype}; real numbers are needed')
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def as_rows(given: Any, what: str, widths: Sequence[int] = (2, 3)) -> Float64Array:
+def as_rows(value: Any, what: str, widths: Sequence[int] = (2, 3)) -> Float64Array:
     """Returns points as float64 rows, shape (n, w) with w in ``widths``. An empty list gives zero points."""
-    array = as_numbers(given, what)
+    array = as_numbers(value, what)
     if array.size == 0 and array.ndim == 1:
         array = array.reshape(0, widths[0])
     if array.ndim != 2 or array.shape[1] not in widths:
@@ -72,12 +72,12 @@ def as_native(array: AnyArray, what: str) -> AnyArray:
     return array if array.dtype.isnative else array.astype(array.dtype.newbyteorder('='))
 
 
-def as_numbered(given: Any, what: str, width: int | None = None, least: int = 0, most: int = 2 ** 32 - 2) -> AnyArray:
+def as_numbered(value: Any, what: str, width: int | None = None, least: int = 0, most: int = 2 ** 32 - 2) -> AnyArray:
     """Returns integers from ``least`` to ``most``, in one dimension or in rows of ``width``, in the given type.
 
     Raises: TypeError, ValueError.
     """
-    array = as_array(given, what)
+    array = as_array(value, what)
     if array.size == 0:
         array = np.empty((0,) if width is None else (0, width), np.uint32)
     if array.dtype.kind not in 'iu':

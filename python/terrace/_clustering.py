@@ -158,11 +158,11 @@ def kmeans(points: Array, clusters: int | Array, *, weights: Array | None = None
     <terrace.KMeans: 2 clusters, inertia 1>
     """
     points = as_rows(points, 'points')
-    start, count, given = None, 0, as_array(clusters, 'clusters')
-    if given.ndim == 0:
+    start, count, initial = None, 0, as_array(clusters, 'clusters')
+    if initial.ndim == 0:
         count = as_integer(clusters, 'clusters', 1)
     else:
-        start = as_rows(given, 'clusters', points.shape[1:])
+        start = as_rows(initial, 'clusters', points.shape[1:])
         if len(start) == 0:
             raise ValueError('`clusters` has no centres to start from')
     centres, labels, inertia, iterations, converged = _core.k_means(
@@ -198,13 +198,13 @@ class Clusters:
 
 def _search(method: ClusterMethod, effort: Effort, count: int | None, seed: int, threads: int | None, bound_steps: int,
             restarts: int | None, **more: Any) -> dict[str, Any]:
-    given: dict[str, Any] = {'method': method, 'effort': effort, 'seed': as_integer(seed, 'seed'), 'threads': thread_count(threads),
+    arguments: dict[str, Any] = {'method': method, 'effort': effort, 'seed': as_integer(seed, 'seed'), 'threads': thread_count(threads),
                              'bound_steps': as_integer(bound_steps, 'bound_steps')}
     if count is not None:
-        given['count'] = as_integer(count, 'count', 1)
+        arguments['count'] = as_integer(count, 'count', 1)
     if restarts is not None:
-        given['restarts'] = as_integer(restarts, 'restarts', 1)
-    return {**given, **more}
+        arguments['restarts'] = as_integer(restarts, 'restarts', 1)
+    return {**arguments, **more}
 
 
 def cluster(points: Array, facility_cost: float = 1.0, *, count: int | None = None, method: ClusterMethod | None = None,
@@ -399,8 +399,8 @@ def stream_clusters(batches: Iterable[Array], sink: Callable[[ClusterBlock], obj
     """
     if not callable(sink):
         raise TypeError('`sink` must be a function')
-    given = iter(batches)
-    heads = [as_array(batch, 'a batch') for batch in itertools.islice(given, 1)]
+    iterator = iter(batches)
+    heads = [as_array(batch, 'a batch') for batch in itertools.islice(iterator, 1)]
     names = heads[0].dtype.names if heads else None
     fields = [name for name in names or () if name not in ('x', 'y', 'z')]
     kind = np.dtype([(name, heads[0].dtype[name]) for name in fields])
@@ -408,7 +408,7 @@ def stream_clusters(batches: Iterable[Array], sink: Callable[[ClusterBlock], obj
         raise TypeError('the fields of points must be numbers, not objects')
 
     def pairs() -> Iterator[tuple[Float64Array, UInt8Array]]:
-        for item in itertools.chain(heads, given):
+        for item in itertools.chain(heads, iterator):
             batch = as_array(item, 'a batch')
             if not batch.dtype.names:
                 if fields:

@@ -48,10 +48,10 @@ class Transformation:
             raise ValueError('`area` must be a box')
         self._core = _core.Transformation(*texts, shift, box)
 
-    def _convert(self, given: Array, back: bool) -> Float64Array:
-        places = as_rows(given, 'places')
-        made = self._core.convert(np.ascontiguousarray(places[:, :2]), back)
-        return made if places.shape[1] == 2 else np.column_stack((made, places[:, 2]))
+    def _convert(self, value: Array, back: bool) -> Float64Array:
+        places = as_rows(value, 'places')
+        result = self._core.convert(np.ascontiguousarray(places[:, :2]), back)
+        return result if places.shape[1] == 2 else np.column_stack((result, places[:, 2]))
 
     def forward(self, places: Array) -> Float64Array:
         """Converts places from the source to the target system.

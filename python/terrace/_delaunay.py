@@ -61,8 +61,8 @@ def _map(metric: Array, width: int) -> list[float]:
     return array.ravel().tolist()
 
 
-def _handles(given: Array) -> Int32Array:
-    vertices = as_array(given, 'vertices')
+def _handles(value: Array) -> Int32Array:
+    vertices = as_array(value, 'vertices')
     if vertices.dtype.kind not in 'iu' and vertices.size > 0:
         raise TypeError(f'vertices must be whole numbers, not {vertices.dtype}')
     vertices = np.atleast_1d(vertices)
@@ -357,8 +357,8 @@ class _Delaunay(_PointMesh):
 
     def _regions(self, regions: Iterable[tuple[Array, Array]]) -> list[tuple[list[float], list[float], list[float]]]:
         checked = []
-        for given, metric in regions:
-            box = as_numbers(given, 'a box')
+        for value, metric in regions:
+            box = as_numbers(value, 'a box')
             if box.shape != (2 * self._width,):
                 raise ValueError(f'a box must be {2 * self._width} numbers: the minima, then the maxima')
             checked.append((box[:self._width].tolist(), box[self._width:].tolist(), _map(metric, self._width)))
@@ -405,15 +405,15 @@ class Delaunay2(_Delaunay):
         <terrace.Delaunay2: 6 vertices, 4 triangles>
         """
         x, y = map(float, origin)
-        made = cls()
+        result = cls()
         columns, rows = as_integer(columns, 'columns'), as_integer(rows, 'rows')
         if columns * rows > 2 ** 29:
             raise ValueError('a triangulation can have at most 2^29 vertices')
-        first = made._core.build_grid(x, y, float(step), columns, rows)
+        first = result._core.build_grid(x, y, float(step), columns, rows)
         if columns * rows:
-            made._numbers.take_all(first, columns * rows)
-            made.ids = np.arange(columns * rows, dtype=np.int32)
-        return made
+            result._numbers.take_all(first, columns * rows)
+            result.ids = np.arange(columns * rows, dtype=np.int32)
+        return result
 
     def weights(self, places: Array, method: Interpolation = 'linear') -> tuple[Float64Array, Int32Array, Int64Array]:
         """Returns the weights with which heights() combines the values of vertices at places.
@@ -528,9 +528,9 @@ class Delaunay2(_Delaunay):
             others), area, surface_area, volume_above and volume_below.
         """
         with self._lock:
-            made = _core.triangle_quality(self._euclidean(), self._values(values), float(datum))
+            result = _core.triangle_quality(self._euclidean(), self._values(values), float(datum))
         names = ('min_angle', 'aspect', 'area', 'surface_area', 'volume_above', 'volume_below')
-        return made.view([(name, 'f8') for name in names]).reshape(-1)
+        return result.view([(name, 'f8') for name in names]).reshape(-1)
 
     def adapted(self, regions: Iterable[tuple[Array, Array]]) -> Int32Array:
         """Returns the triangles after edge flips that adapt them to a metric in each region.

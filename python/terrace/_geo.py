@@ -57,30 +57,30 @@ def _polygons(geometry: Any) -> list[Polygon]:
     return [polygon for part in geometry[parts] for polygon in _polygons(part)]
 
 
-def geojson(given: Any) -> tuple[Any, str | None]:
+def geojson(value: Any) -> tuple[Any, str | None]:
     """Returns (a GeoJSON dict, the name of its CRS) for a dict, an object with ``__geo_interface__`` or a file name.
 
     The name comes from the object's ``crs``, as in geopandas, or from the dict's ``crs``. It is '' if neither is
     given, None if the dict says that the CRS is unknown.
     """
     crs: Any = None
-    if isinstance(given, (str, os.PathLike)):
-        with open(given, encoding='utf-8') as file:
-            given = json.load(file)
-    if hasattr(given, '__geo_interface__'):
-        crs = crs_text(getattr(given, 'crs', None))
-        given = given.__geo_interface__
-    if not isinstance(given, dict) or crs is not None:
-        return given, crs or ''
-    crs = given.get('crs', '')
+    if isinstance(value, (str, os.PathLike)):
+        with open(value, encoding='utf-8') as file:
+            value = json.load(file)
+    if hasattr(value, '__geo_interface__'):
+        crs = crs_text(getattr(value, 'crs', None))
+        value = value.__geo_interface__
+    if not isinstance(value, dict) or crs is not None:
+        return value, crs or ''
+    crs = value.get('crs', '')
     if isinstance(crs, dict):
         crs = (crs.get('properties') or {}).get('name')
         if not isinstance(crs, str) or not crs:
             raise ValueError('the `crs` of GeoJSON does not name a CRS')
-    return given, crs
+    return value, crs
 
 
-def region(given: Any) -> CoreRegion | None:
+def region(value: Any) -> CoreRegion | None:
     """Returns a region in the form that the core expects; None, for everywhere, stays None.
 
     given: a box of four or six numbers, (min x, min y[, min z], max x, max y[, max z]), in the CRS of the store or
@@ -90,20 +90,20 @@ def region(given: Any) -> CoreRegion | None:
 
     Raises: ValueError, TypeError.
     """
-    if given is None:
+    if value is None:
         return None
-    name = os.fspath(given) if isinstance(given, (str, os.PathLike)) else '`region`'
-    given, crs = geojson(given)
-    if isinstance(given, dict):
+    name = os.fspath(value) if isinstance(value, (str, os.PathLike)) else '`region`'
+    value, crs = geojson(value)
+    if isinstance(value, dict):
         try:
-            polygons = _polygons(given)
+            polygons = _polygons(value)
         except (KeyError, IndexError, TypeError, AttributeError, RecursionError) as fault:
             raise ValueError('`region` is not GeoJSON of polygons') from fault
         if not polygons:
             raise ValueError('`region` has no polygons')
         return {'polygons': polygons, 'crs': crs, 'name': name}
     try:
-        numbers = [float(number) for number in given]
+        numbers = [float(number) for number in value]
     except TypeError:
         raise TypeError('`region` must be a box of four or six numbers, or polygons') from None
     if len(numbers) not in (4, 6):

@@ -41,10 +41,10 @@ class Mesh:
         self.vertices, self.triangles, self.levels = vertices, triangles, levels
 
     @classmethod
-    def _of(cls, made: Any) -> Mesh:
+    def _of(cls, result: Any) -> Mesh:
         """Wraps what the core returns: the arrays, and the units of the coordinates."""
-        mesh = Mesh(*made[:3])
-        mesh._units = made[3]
+        mesh = Mesh(*result[:3])
+        mesh._units = result[3]
         return mesh
 
     @property

@@ -24,13 +24,13 @@ _READ_OPTIONS = {
 
 def _reading(sources: Any, transform: Iterable[float] | None, crs: Crs | None, nodata: float | None,
              attributes: Mapping[str, Array] | None, options: dict[str, Any], function: str) -> tuple[Any, dict[str, Any]]:
-    given = checked(options, _READ_OPTIONS, function)
-    if 'region' in given:
-        given['region'] = as_region(given['region'])
+    arguments = checked(options, _READ_OPTIONS, function)
+    if 'region' in arguments:
+        arguments['region'] = as_region(arguments['region'])
     source, text = source_of(sources, transform, crs, nodata, attributes)
     if text is not None:
-        given['crs'] = text
-    return source, given
+        arguments['crs'] = text
+    return source, arguments
 
 
 class PointReader:
@@ -77,8 +77,8 @@ def point_batches(sources: Any, *, transform: Iterable[float] | None = None, crs
     >>> [len(batch) for batch in point_batches(np.zeros((25000, 3)))]
     [10000, 10000, 5000]
     """
-    source, given = _reading(sources, transform, crs, nodata, attributes, options, 'point_batches')
-    return PointReader(_core.PointReader(source, given, thread_count(threads)))
+    source, arguments = _reading(sources, transform, crs, nodata, attributes, options, 'point_batches')
+    return PointReader(_core.PointReader(source, arguments, thread_count(threads)))
 
 
 def read_points(sources: Any, *, transform: Iterable[float] | None = None, crs: Crs | None = None, nodata: float | None = None,
@@ -115,7 +115,7 @@ def write_points(path: Path, points: Any, *, transform: Iterable[float] | None =
     ...     write_points(folder + '/cube.laz', np.arange(6.0).reshape(2, 3))
     {'points': 2, 'nodata': 0, 'rounding': 0.0}
     """
-    source, given = _reading(points, transform, crs, nodata, attributes, options, 'write_points')
-    written, missing, rounding = _core.write_points(source, given, os.fsencode(path), format or '', bool(replace),
+    source, arguments = _reading(points, transform, crs, nodata, attributes, options, 'write_points')
+    written, missing, rounding = _core.write_points(source, arguments, os.fsencode(path), format or '', bool(replace),
                                                     call_settings(progress, threads))
     return {'points': written, 'nodata': missing, 'rounding': rounding}

@@ -134,7 +134,7 @@ def _alone(kind: str, transform: Any, nodata: float | None, attributes: Any) -> 
         raise ValueError(f'{kind} do not support `transform`, `nodata` and `attributes`')
 
 
-def source_of(given: Any, transform: Iterable[float] | None = None, crs: Any = None, nodata: float | None = None,
+def source_of(source: Any, transform: Iterable[float] | None = None, crs: Any = None, nodata: float | None = None,
               attributes: Mapping[str, Any] | None = None) -> tuple[dict[str, Any] | list[bytes], str | None]:
     """Returns (the source in the form that the core expects, its CRS as text or None).
 
@@ -142,55 +142,55 @@ def source_of(given: Any, transform: Iterable[float] | None = None, crs: Any = N
     """
     if attributes is not None and not hasattr(attributes, 'items'):
         raise TypeError('`attributes` is a dict of columns')
-    if isinstance(given, (str, os.PathLike)):
-        given = [given]
-    if isinstance(given, (list, tuple)) and not given:
+    if isinstance(source, (str, os.PathLike)):
+        source = [source]
+    if isinstance(source, (list, tuple)) and not source:
         raise ValueError('there is no source: pass a file name or an array')
-    if isinstance(given, (list, tuple)) and any(isinstance(name, (str, os.PathLike)) for name in given):
-        for number, name in enumerate(given):
+    if isinstance(source, (list, tuple)) and any(isinstance(name, (str, os.PathLike)) for name in source):
+        for number, name in enumerate(source):
             if not isinstance(name, (str, os.PathLike)):
                 raise TypeError(f'source {number} is of type {type(name).__name__}: files and arrays cannot be mixed')
-    if isinstance(given, (list, tuple)) and all(isinstance(name, (str, os.PathLike)) for name in given):
+    if isinstance(source, (list, tuple)) and all(isinstance(name, (str, os.PathLike)) for name in source):
         if transform is not None or nodata is not None or attributes is not None:
             raise ValueError('files do not support `transform`, `nodata` and `attributes`: they have their own')
-        return [os.fsencode(name) for name in given], crs_text(crs)
-    records = getattr(given, 'points', given)
+        return [os.fsencode(name) for name in source], crs_text(crs)
+    records = getattr(source, 'points', source)
     if hasattr(records, 'point_format') and hasattr(records, 'scales'):  # laspy.LasData, or its points
         return (_records(records, list(records.point_format.dimension_names), '<laspy>', records.scales, records.offsets),
-                crs_text(_laspy_crs(given) if crs is None else crs))
-    if hasattr(given, 'dims') and hasattr(given, 'coords') and hasattr(given, 'values'):  # xarray.DataArray
-        transform, crs, nodata = _xarray(given, transform, crs, nodata)
-        return _raster(np.asarray(given.values), transform, nodata, '<xarray>'), crs_text(crs)
-    if hasattr(given, 'GetGeoTransform'):  # gdal.Dataset
-        band = given.GetRasterBand(1)
-        c, a, b, f, d, e = given.GetGeoTransform()
+                crs_text(_laspy_crs(source) if crs is None else crs))
+    if hasattr(source, 'dims') and hasattr(source, 'coords') and hasattr(source, 'values'):  # xarray.DataArray
+        transform, crs, nodata = _xarray(source, transform, crs, nodata)
+        return _raster(np.asarray(source.values), transform, nodata, '<xarray>'), crs_text(crs)
+    if hasattr(source, 'GetGeoTransform'):  # gdal.Dataset
+        band = source.GetRasterBand(1)
+        c, a, b, f, d, e = source.GetGeoTransform()
         samples = band.ReadAsArray()
         if band.GetMaskFlags() == 2:  # gdal.GMF_PER_DATASET: a mask, not an alpha band
             samples = filled(np.ma.array(samples, mask=band.GetMaskBand().ReadAsArray() == 0))
         return _raster(samples, (a, b, c, d, e, f) if transform is None else transform, band.GetNoDataValue() if nodata is None else nodata,
-                       '<gdal>', band.GetScale() or 1.0, band.GetOffset() or 0.0), crs_text(crs or given.GetProjection())
-    if hasattr(given, 'transform'):  # a rasterio dataset, a Raster, or another array with an affine transform
-        samples, scale, offset = given, 1.0, 0.0
-        if hasattr(given, 'read'):
-            masked = [flag.name for flag in given.mask_flag_enums[0]] == ['per_dataset']
-            samples = filled(given.read(1, masked=masked))
-            scale, offset = given.scales[0], given.offsets[0]
-        nodata = getattr(given, 'nodata', None) if nodata is None else nodata
-        return (_raster(as_array(filled(samples), 'the raster'), given.transform if transform is None else transform, nodata,
+                       '<gdal>', band.GetScale() or 1.0, band.GetOffset() or 0.0), crs_text(crs or source.GetProjection())
+    if hasattr(source, 'transform'):  # a rasterio dataset, a Raster, or another array with an affine transform
+        samples, scale, offset = source, 1.0, 0.0
+        if hasattr(source, 'read'):
+            masked = [flag.name for flag in source.mask_flag_enums[0]] == ['per_dataset']
+            samples = filled(source.read(1, masked=masked))
+            scale, offset = source.scales[0], source.offsets[0]
+        nodata = getattr(source, 'nodata', None) if nodata is None else nodata
+        return (_raster(as_array(filled(samples), 'the raster'), source.transform if transform is None else transform, nodata,
                         '<raster>', scale, offset),
-                crs_text(crs or getattr(given, 'crs', None)))
-    if hasattr(given, 'columns') and all(axis in given.columns for axis in 'xyz'):  # a pandas.DataFrame, or another frame
-        given = {name: given[name] for name in given.columns}
-    if isinstance(given, dict):
+                crs_text(crs or getattr(source, 'crs', None)))
+    if hasattr(source, 'columns') and all(axis in source.columns for axis in 'xyz'):  # a pandas.DataFrame, or another frame
+        source = {name: source[name] for name in source.columns}
+    if isinstance(source, dict):
         _alone('columns', transform, nodata, attributes)
-        wrong = [axis for axis in 'xyz' if axis not in given]
+        wrong = [axis for axis in 'xyz' if axis not in source]
         if wrong:
             raise ValueError(f'points need x, y and z: {", ".join(wrong)} is missing')
-        arrays = {name: as_array(column, f'"{name}"') for name, column in given.items()}
+        arrays = {name: as_array(column, f'"{name}"') for name, column in source.items()}
         return _points([_column(axis, arrays[axis]) for axis in 'xyz'],
                        [_column(name, column) for name, column in arrays.items() if name not in ('x', 'y', 'z')],
                        '<dict>'), crs_text(crs)
-    array = as_array(filled(given), 'the source')
+    array = as_array(filled(source), 'the source')
     if array.dtype.names:
         _alone('structured arrays', transform, nodata, attributes)
         return _records(array.reshape(-1), array.dtype.names, '<array>'), crs_text(crs)

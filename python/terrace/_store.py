@@ -137,16 +137,16 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
     ...         print(len(store.points(where='class == 3')))
     400
     """
-    given = checked(options, _BUILD_OPTIONS, 'build')
-    if 'region' in given:
-        given['region'] = as_region(given['region'])
+    arguments = checked(options, _BUILD_OPTIONS, 'build')
+    if 'region' in arguments:
+        arguments['region'] = as_region(arguments['region'])
     source, text = source_of(sources, transform, crs, nodata, attributes)
     if text is not None:
-        given['crs'] = text
+        arguments['crs'] = text
     path = os.fspath(store)
-    if os.path.lexists(path) and not given.get('replace'):
+    if os.path.lexists(path) and not arguments.get('replace'):
         raise FileExistsError(errno.EEXIST, 'already exists; pass another name or replace=True', path)
-    _core.build(source, os.fsencode(path), given, call_settings(progress, threads, memory))
+    _core.build(source, os.fsencode(path), arguments, call_settings(progress, threads, memory))
     return Store(path)
 
 
@@ -311,8 +311,8 @@ class Store:
             below), error (metres; no point below is farther from the representative), descendants (the number of
             points of level 0 below) and members. Row N describes the cluster ``points(cluster=(level, N))``.
         """
-        made = self._core.clusters(as_integer(level, 'level', bits=32), call_settings(progress, threads))
-        return made.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
+        result = self._core.clusters(as_integer(level, 'level', bits=32), call_settings(progress, threads))
+        return result.view([('bounds', 'f8', 6), ('error', 'f8'), ('descendants', 'f8'), ('members', 'f8')]).reshape(-1)
 
     def count(self, box: Sequence[float]) -> int:
         """Counts the points in a box of four or six numbers, reading only clusters on its border.
@@ -447,8 +447,8 @@ class Store:
         places: Any = line
         crs = None
         if hasattr(line, '__geo_interface__') or isinstance(line, dict):
-            given, crs = geojson(line)
-            places = np.asarray([place[:2] for place in given['coordinates']])
+            arguments, crs = geojson(line)
+            places = np.asarray([place[:2] for place in arguments['coordinates']])
         return _core.profile(self._core, as_rows(places, 'line', (2,)), crs, step, method, as_integer(level, 'level', bits=32), max_edge,
                              call_settings(progress, threads))
 
@@ -551,9 +551,9 @@ class Store:
 
         Source: J. Skala, section 8.3.
         """
-        made = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
+        result = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
                              call_settings(progress, threads, memory))
-        return made if tetrahedra else Mesh._of(made)
+        return result if tetrahedra else Mesh._of(result)
 
     def bounded_mesh(self, max_error: float | None = None, *, max_points: int | None = None, quality: Quality = 'removal',
                      duplicates: Duplicates = 'all',
@@ -620,10 +620,10 @@ class Store:
 
         Returns: a dict with tiles, bytes, made, kept, removed and zooms (zoom, tiles, max_error).
         """
-        given = checked(options, _TILE_OPTIONS, 'tiles')
+        arguments = checked(options, _TILE_OPTIONS, 'tiles')
         if zooms is not None:
-            given['first_zoom'], given['last_zoom'] = (as_integer(zoom, 'zooms', bits=32) for zoom in zooms)
-        return _core.write_tiles(self._core, os.fsencode(folder), given, call_settings(progress, threads, memory))
+            arguments['first_zoom'], arguments['last_zoom'] = (as_integer(zoom, 'zooms', bits=32) for zoom in zooms)
+        return _core.write_tiles(self._core, os.fsencode(folder), arguments, call_settings(progress, threads, memory))
 
     def verify(self, *, progress: Progress | None = None, threads: int | None = None) -> list[str]:
         """Checks every byte and invariant. Returns: a list of faults, empty if the store is sound."""

@@ -119,7 +119,7 @@ class View:
         if direction is None or up is None:
             raise TypeError('`direction` and `up` must be three numbers each')
         arrays = {'position': position, 'direction': direction, 'up': up, 'matrix': matrix}
-        camera: dict[str, Any] = {name: None if given is None else as_numbers(given, name) for name, given in arrays.items()}
+        camera: dict[str, Any] = {name: None if value is None else as_numbers(value, name) for name, value in arrays.items()}
         delta = self._core.frame(
             {**camera, 'fov': fov, 'width': width, 'height': height,
              'ground_height': None if ground_height is None else float(ground_height), 'pixel_error': pixel_error,

@@ -111,12 +111,12 @@ class Linkage(unittest.TestCase):
     def test_heights_match_scipy(self, points, method):
         with warnings.catch_warnings():
             warnings.simplefilter('ignore')  # points may look like a matrix of distances
-            made, expected = terrace.linkage(points, method), hierarchy.linkage(points, method)
-        self.assertTrue(hierarchy.is_valid_linkage(made))
+            result, expected = terrace.linkage(points, method), hierarchy.linkage(points, method)
+        self.assertTrue(hierarchy.is_valid_linkage(result))
         if method in ('average', 'weighted'):
-            np.testing.assert_array_equal(made, expected)
+            np.testing.assert_array_equal(result, expected)
         elif method == 'single' or one_way(points, method):
-            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(result[:, 2], expected[:, 2], rtol=1e-9, atol=1e-9)
 
     def test_ties_merge_a_nearest_pair(self):
         # Any of several equally near pairs may merge first, and later heights depend on the choice. So each row is
@@ -132,24 +132,24 @@ class Linkage(unittest.TestCase):
     def test_rows_and_cuts_match_scipy(self):
         points = np.random.default_rng(2).random((400, 3))
         for method in METHODS:
-            made = terrace.linkage(points, method)
+            result = terrace.linkage(points, method)
             expected = hierarchy.linkage(points, method)
-            np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
-            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-9)
+            np.testing.assert_array_equal(result[:, [0, 1, 3]], expected[:, [0, 1, 3]])
+            np.testing.assert_allclose(result[:, 2], expected[:, 2], rtol=1e-9)
             np.testing.assert_allclose(terrace.linkage(pdist(points), method), expected, rtol=1e-9)
             if fastcluster is not None:
-                np.testing.assert_allclose(fastcluster.linkage(points, method)[:, 2], made[:, 2], rtol=1e-9)
-            height = float(np.median(made[:, 2]))
-            ours = terrace.flat_clusters(made, height=height)
+                np.testing.assert_allclose(fastcluster.linkage(points, method)[:, 2], result[:, 2], rtol=1e-9)
+            height = float(np.median(result[:, 2]))
+            ours = terrace.flat_clusters(result, height=height)
             theirs = hierarchy.fcluster(expected, height, 'distance')
             self.assertEqual(len({*zip(ours, theirs)}), len(set(theirs)))
             if method in ('centroid', 'median'):  # SciPy's count may be exceeded after an inversion
-                self.assertLessEqual(len(set(terrace.flat_clusters(made, count=40))), 40)
-                self.assertFalse(hierarchy.is_monotonic(made))
+                self.assertLessEqual(len(set(terrace.flat_clusters(result, count=40))), 40)
+                self.assertFalse(hierarchy.is_monotonic(result))
                 continue
-            self.assertTrue(hierarchy.is_monotonic(made))
+            self.assertTrue(hierarchy.is_monotonic(result))
             for count in (1, 5, 40):
-                ours = terrace.flat_clusters(made, count=count)
+                ours = terrace.flat_clusters(result, count=count)
                 theirs = hierarchy.fcluster(expected, count, 'maxclust')
                 self.assertEqual(len({*zip(ours, theirs)}), count)
 
@@ -174,10 +174,10 @@ class Linkage(unittest.TestCase):
     def test_linkage_of_distances_matches_scipy(self):
         points = np.random.default_rng(12).random((150, 3))
         for method in METHODS:
-            made = terrace.linkage(pdist(points, 'cityblock'), method)
+            result = terrace.linkage(pdist(points, 'cityblock'), method)
             expected = hierarchy.linkage(pdist(points, 'cityblock'), method)
-            np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
-            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-12)
+            np.testing.assert_array_equal(result[:, [0, 1, 3]], expected[:, [0, 1, 3]])
+            np.testing.assert_allclose(result[:, 2], expected[:, 2], rtol=1e-12)
         for wrong, method in ((np.ones(4), 'complete'), (np.ones(3), 'mean'), (-np.ones(3), 'complete'), ([np.nan], 'ward')):
             with self.assertRaises(ValueError):
                 terrace.linkage(wrong, method)
@@ -199,9 +199,9 @@ class Linkage(unittest.TestCase):
         triangulation = terrace.Delaunay2(points)
         number = triangulation.by_vertex(np.arange(300))
         sides = number[triangulation.simplices[:, [0, 1, 1, 2, 2, 0]]].astype(int).reshape(-1, 2)
-        for made in (terrace.tree_linkage(edges[shuffled], lengths[shuffled]), terrace.linkage(points, edges=sides)):
-            np.testing.assert_array_equal(made[:, [0, 1, 3]], expected[:, [0, 1, 3]])
-            np.testing.assert_allclose(made[:, 2], expected[:, 2], rtol=1e-12)
+        for result in (terrace.tree_linkage(edges[shuffled], lengths[shuffled]), terrace.linkage(points, edges=sides)):
+            np.testing.assert_array_equal(result[:, [0, 1, 3]], expected[:, [0, 1, 3]])
+            np.testing.assert_allclose(result[:, 2], expected[:, 2], rtol=1e-12)
         self.assertEqual(terrace.tree_linkage([], []).shape, (0, 4))
         for wrong in (lambda: terrace.tree_linkage([[0, 1], [1, 0]], [1, 1]), lambda: terrace.tree_linkage([[0, 1]], [1, 2]),
                       lambda: terrace.tree_linkage([[0, 9]], [1]), lambda: terrace.tree_linkage([[0, 1]], [np.nan]),
@@ -233,13 +233,13 @@ class Streams(unittest.TestCase):
 
     def check(self, batches, **options):
         blocks = []
-        made = terrace.stream_clusters(batches, blocks.append, **options)
+        result = terrace.stream_clusters(batches, blocks.append, **options)
         rows = np.concatenate(batches)
         fields = [name for name in rows.dtype.names or () if name not in 'xyz']
         places = np.column_stack([rows[axis] for axis in 'xyz']) if rows.dtype.names else rows
         tops = {0: np.arange(len(rows))}
         below, error = {}, {}  # the points that each cluster represents
-        counts = [0] * (made['top'] + 1)
+        counts = [0] * (result['top'] + 1)
         by_place = {tuple(place): at for at, place in enumerate(places)}
         seen = []
         for block in sorted(blocks, key=lambda block: (block.level, block.number)):
@@ -250,21 +250,21 @@ class Streams(unittest.TestCase):
             self.assertEqual(block.children.shape, (len(ids), block.level))
             for c, (first, last) in enumerate(zip(block.first, block.first[1:])):
                 members = block.order[first:last]
-                stands = []
+                expected = []
                 for member in members:
-                    stands += below[block.level - 1, block.children[member, -1]] if block.level else [ids[member]]
-                below[block.level, counts[block.level]] = stands
+                    expected += below[block.level - 1, block.children[member, -1]] if block.level else [ids[member]]
+                below[block.level, counts[block.level]] = expected
                 counts[block.level] += 1
-                np.testing.assert_array_equal(block.boxes[c], np.concatenate((places[stands].min(axis=0), places[stands].max(axis=0))))
-                self.assertEqual(block.descendants[c], len(stands))
+                np.testing.assert_array_equal(block.boxes[c], np.concatenate((places[expected].min(axis=0), places[expected].max(axis=0))))
+                self.assertEqual(block.descendants[c], len(expected))
                 head = block.representatives[c]
                 if head >= 0:
                     self.assertIn(head, members)
-                    farthest = np.linalg.norm(places[stands] - places[ids[head]], axis=1).max()
+                    farthest = np.linalg.norm(places[expected] - places[ids[head]], axis=1).max()
                     self.assertLessEqual(farthest, block.errors[c] * (1 + 1e-12))
                 seen += [ids[member] for member in members if member != head]
         self.assertEqual(sorted(seen), sorted(tops[0]))  # each point is a non-representative member exactly once
-        self.assertEqual((made['points'], made['level_clusters']), (len(rows), counts))
+        self.assertEqual((result['points'], result['level_clusters']), (len(rows), counts))
         return blocks
 
     def test_blocks_form_a_hierarchy(self):
@@ -336,23 +336,23 @@ class KMeans(unittest.TestCase):
     @settings(max_examples=40, deadline=None, derandomize=True)
     @given(some_points(80, width=3, least=5), st.integers(1, 5))
     def test_result_is_a_fixed_point_of_lloyd(self, points, clusters):
-        made = terrace.kmeans(points, clusters)
-        self.assertTrue(made.converged)
-        squares = cdist(points, made.centres, 'sqeuclidean')
-        chosen = squares[np.arange(len(points)), made.labels]
+        result = terrace.kmeans(points, clusters)
+        self.assertTrue(result.converged)
+        squares = cdist(points, result.centres, 'sqeuclidean')
+        chosen = squares[np.arange(len(points)), result.labels]
         np.testing.assert_allclose(chosen, squares.min(axis=1), rtol=1e-6, atol=1e-6)
-        self.assertAlmostEqual(made.inertia, chosen.sum(), delta=1e-6 * (1 + chosen.sum()))
-        for label in np.unique(made.labels):
-            np.testing.assert_allclose(made.centres[label], points[made.labels == label].mean(axis=0), rtol=0, atol=1e-6)
+        self.assertAlmostEqual(result.inertia, chosen.sum(), delta=1e-6 * (1 + chosen.sum()))
+        for label in np.unique(result.labels):
+            np.testing.assert_allclose(result.centres[label], points[result.labels == label].mean(axis=0), rtol=0, atol=1e-6)
 
     def test_given_centres_and_weights(self):
         points = np.random.default_rng(3).random((500, 2))
         weights = np.random.default_rng(4).random(500) + 0.5
-        made = terrace.kmeans(points, points[:7], weights=weights)
+        result = terrace.kmeans(points, points[:7], weights=weights)
         for label in range(7):
-            of = made.labels == label
-            np.testing.assert_allclose(made.centres[label], np.average(points[of], axis=0, weights=weights[of]), atol=1e-9)
-        self.assertEqual(made.centres.shape, (7, 2))
+            of = result.labels == label
+            np.testing.assert_allclose(result.centres[label], np.average(points[of], axis=0, weights=weights[of]), atol=1e-9)
+        self.assertEqual(result.centres.shape, (7, 2))
         for wrong, kind in ((0, ValueError), (501, ValueError), ([], ValueError), (1.5, TypeError)):
             with self.assertRaises((kind, ValueError)):
                 terrace.kmeans(points, wrong)
@@ -369,12 +369,12 @@ class Facilities(unittest.TestCase):
             best = min(price * size + distances[list(chosen)].min(axis=0).sum()
                        for size in range(1, 12) for chosen in itertools.combinations(range(11), size))
             for method in ('interchange', 'automatic', 'fast', 'jain-vazirani', 'greedy-stars'):
-                made = terrace.cluster(points, 0.3, method=method, effort='full')
-                cost = price * len(made.facilities) + distances[made.facilities[made.labels], np.arange(11)].sum()
-                self.assertAlmostEqual(made.cost, cost, places=9)
+                result = terrace.cluster(points, 0.3, method=method, effort='full')
+                cost = price * len(result.facilities) + distances[result.facilities[result.labels], np.arange(11)].sum()
+                self.assertAlmostEqual(result.cost, cost, places=9)
                 self.assertGreaterEqual(cost, best - 1e-9)
                 self.assertLessEqual(cost, best * (1 + 1e-9 if method == 'interchange' else 1.9))
-                self.assertLessEqual(made.lower_bound, best + 1e-9)
+                self.assertLessEqual(result.lower_bound, best + 1e-9)
 
     def test_arbitrary_costs(self):
         for seed in range(6):
@@ -387,12 +387,12 @@ class Facilities(unittest.TestCase):
             subsets = [chosen for size in range(1, 10) for chosen in itertools.combinations(range(9), size)]
             best = min(opening[list(chosen)].sum() + cost_of(chosen) for chosen in subsets)
             for method in ('interchange', 'jain-vazirani', 'greedy-stars'):
-                made = terrace.facility_location(connection, opening, method=method, effort='full')
-                cost = opening[made.facilities].sum() + connection[made.facilities[made.labels], np.arange(14)].sum()
-                self.assertAlmostEqual(made.cost, cost, places=9)
-                self.assertLessEqual(made.lower_bound, best + 1e-9)
-                self.assertGreater(made.lower_bound, 0.8 * best)
-                self.assertGreaterEqual(made.cost, best - 1e-9)
+                result = terrace.facility_location(connection, opening, method=method, effort='full')
+                cost = opening[result.facilities].sum() + connection[result.facilities[result.labels], np.arange(14)].sum()
+                self.assertAlmostEqual(result.cost, cost, places=9)
+                self.assertLessEqual(result.lower_bound, best + 1e-9)
+                self.assertGreater(result.lower_bound, 0.8 * best)
+                self.assertGreaterEqual(result.cost, best - 1e-9)
             self.assertAlmostEqual(terrace.facility_location(connection, opening, effort='full').cost, best, places=9)
             median = terrace.facility_location(connection, count=3)
             self.assertEqual(len(median.facilities), 3)
@@ -414,18 +414,18 @@ class Facilities(unittest.TestCase):
         points = np.random.default_rng(5).random((12, 2))
         distances = cdist(points, points)
         best = min(distances[list(chosen)].min(axis=0).sum() for chosen in itertools.combinations(range(12), 3))
-        made = terrace.cluster(points, count=3)
-        self.assertEqual(len(made.facilities), 3)
-        self.assertAlmostEqual(made.cost, distances[made.facilities[made.labels], np.arange(12)].sum(), places=9)
-        self.assertLessEqual(made.cost, 1.2 * best)
+        result = terrace.cluster(points, count=3)
+        self.assertEqual(len(result.facilities), 3)
+        self.assertAlmostEqual(result.cost, distances[result.facilities[result.labels], np.arange(12)].sum(), places=9)
+        self.assertLessEqual(result.cost, 1.2 * best)
         for wrong in (0, 13):
             with self.assertRaises(ValueError):
                 terrace.cluster(points, count=wrong)
 
     def test_outliers_and_metrics(self):
         points = np.vstack((np.random.default_rng(1).random((200, 2)), [[50, 50]]))
-        made = terrace.cluster(points, 0.05, method='automatic', outlier_price=0.03)
-        self.assertEqual(made.labels[200], -1)
+        result = terrace.cluster(points, 0.05, method='automatic', outlier_price=0.03)
+        self.assertEqual(result.labels[200], -1)
         terrace.cluster(points, metric='minkowski:1', method='automatic')
         for wrong in ({'metric': 'minkowski:-1'}, {'method': 'best'}, {'facility_cost': 0}, {'facility_cost': np.nan},
                       {'weights': [1.0]}, {'outlier_price': 0.1}, {'effort': 'none'}):
@@ -447,10 +447,10 @@ class Facilities(unittest.TestCase):
             expected = np.array([[min(np.sqrt(((a[list(order)] - b) ** 2).sum(axis=1).mean()) for order in orders) for b in entities]
                                  for a in entities])
             np.testing.assert_allclose(terrace.entity_distances(entities, ordered=ordered), expected, rtol=1e-12, atol=1e-12)
-            made = terrace.cluster(entities, 0.1, ordered=ordered, effort='full')
+            result = terrace.cluster(entities, 0.1, ordered=ordered, effort='full')
             price = 0.1 * np.linalg.norm(np.ptp(entities.reshape(-1, 3), axis=0))
-            self.assertAlmostEqual(made.opening_cost, price * len(made.facilities), places=9)
-            self.assertAlmostEqual(made.connection_cost, expected[made.facilities[made.labels], np.arange(9)].sum(), places=9)
+            self.assertAlmostEqual(result.opening_cost, price * len(result.facilities), places=9)
+            self.assertAlmostEqual(result.connection_cost, expected[result.facilities[result.labels], np.arange(9)].sum(), places=9)
         flat = random.random((4, 2, 2))
         np.testing.assert_allclose(terrace.entity_distances(flat, flat[:2]), terrace.entity_distances(np.dstack((flat, np.zeros((4, 2)))))[:, :2])
         for wrong in (lambda: terrace.entity_distances(flat, np.zeros((1, 3, 2))), lambda: terrace.entity_distances([[1, 2]]),
@@ -502,13 +502,13 @@ class Assignments(unittest.TestCase):
                          st.tuples(st.integers(1, 12), st.integers(1, 12)),
                          elements={'min_value': 0, 'max_value': 100}))
     def test_cost_matches_scipy(self, costs):
-        made = terrace.assignment(costs)
-        rows, columns = made
+        result = terrace.assignment(costs)
+        rows, columns = result
         best = costs[linear_sum_assignment(costs)].astype(float).sum()
         self.assertEqual(len(rows), min(costs.shape))
         self.assertEqual(len(set(columns)), len(columns))
-        self.assertAlmostEqual(made.cost, best, delta=1e-5 * (1 + best))
-        slack = costs - np.add.outer(made.row_duals, made.column_duals)
+        self.assertAlmostEqual(result.cost, best, delta=1e-5 * (1 + best))
+        slack = costs - np.add.outer(result.row_duals, result.column_duals)
         self.assertGreater(slack.min(), -1e-4)
 
     def test_points(self):
@@ -522,18 +522,18 @@ class Assignments(unittest.TestCase):
         for rows, columns in ((40, 60), (60, 40), (50, 50)):
             costs = np.where(random.random((rows, columns)) < 0.2, random.random((rows, columns)) + 0.1, 0)
             costs[np.arange(min(rows, columns)), np.arange(min(rows, columns))] = 1  # guarantees an assignment
-            made = terrace.assignment(sparse.csc_matrix(costs))
+            result = terrace.assignment(sparse.csc_matrix(costs))
             dear = np.where(costs > 0, costs, 1e6)
-            self.assertAlmostEqual(made.cost, dear[linear_sum_assignment(dear)].sum(), places=6)
-            self.assertTrue((costs[made.columns >= 0, made.columns[made.columns >= 0]] > 0).all())
+            self.assertAlmostEqual(result.cost, dear[linear_sum_assignment(dear)].sum(), places=6)
+            self.assertTrue((costs[result.columns >= 0, result.columns[result.columns >= 0]] > 0).all())
         with self.assertRaises(ValueError):
             terrace.assignment(sparse.csr_matrix(([1.0, 1.0], ([0, 1], [0, 0])), shape=(2, 2)))
 
     def test_costs_from_a_function_of_rows(self):
         costs = np.random.default_rng(27).random((40, 60))
-        made = terrace.assignment(lambda row: costs[row], shape=costs.shape)
-        np.testing.assert_array_equal(made.columns, terrace.assignment(costs).columns)
-        self.assertEqual(made.cost, terrace.assignment(costs).cost)
+        result = terrace.assignment(lambda row: costs[row], shape=costs.shape)
+        np.testing.assert_array_equal(result.columns, terrace.assignment(costs).columns)
+        self.assertEqual(result.cost, terrace.assignment(costs).cost)
 
         class Enough(Exception):
             pass
@@ -569,12 +569,12 @@ class Matchings(unittest.TestCase):
     @given(st.integers(1, 4), st.sampled_from([2, 3]), st.integers(0, 10 ** 6))
     def test_matching_is_optimal(self, pairs, width, seed):
         points = np.random.default_rng(seed).random((2 * pairs, width))
-        made = terrace.matching(points)
-        self.assertAlmostEqual(made.cost, self.brute(cdist(points, points)), places=9)
-        self.assertAlmostEqual(made.cost, made.bound, places=9)
-        self.assertTrue(made.optimal)
-        np.testing.assert_array_equal(made.mates[made.mates], np.arange(2 * pairs))
-        self.assertEqual(made.pairs.shape, (pairs, 2))
+        result = terrace.matching(points)
+        self.assertAlmostEqual(result.cost, self.brute(cdist(points, points)), places=9)
+        self.assertAlmostEqual(result.cost, result.bound, places=9)
+        self.assertTrue(result.optimal)
+        np.testing.assert_array_equal(result.mates[result.mates], np.arange(2 * pairs))
+        self.assertEqual(result.pairs.shape, (pairs, 2))
 
     def test_matching_of_a_graph(self):
         random = np.random.default_rng(15)
@@ -582,10 +582,10 @@ class Matchings(unittest.TestCase):
             distances = np.round(random.normal(size=(8, 8)), 3)
             distances = np.minimum(distances, distances.T)
             edges = np.array([*itertools.combinations(range(8), 2)])
-            made = terrace.edge_matching(edges, distances[tuple(edges.T)])
-            self.assertAlmostEqual(made.cost, self.brute(distances), places=9)
-            self.assertAlmostEqual(made.bound, made.cost, places=9)
-            np.testing.assert_array_equal(made.mates[made.mates], np.arange(8))
+            result = terrace.edge_matching(edges, distances[tuple(edges.T)])
+            self.assertAlmostEqual(result.cost, self.brute(distances), places=9)
+            self.assertAlmostEqual(result.bound, result.cost, places=9)
+            np.testing.assert_array_equal(result.mates[result.mates], np.arange(8))
         self.assertEqual(terrace.edge_matching([], []).pairs.shape, (0, 2))
         star = [[0, 1], [0, 2], [0, 3]]  # no perfect matching
         for wrong in ((star, [1, 1, 1]), ([[0, 1]], [1, 2]), ([[0, 0]], [1]), ([[0, -1]], [1]), ([[0, 1]], [np.nan]),
@@ -597,17 +597,17 @@ class Matchings(unittest.TestCase):
         for width, count in ((2, 40), (3, 31)):
             points = np.random.default_rng(count).random((count, width))
             best = terrace.matching(points)
-            made = terrace.halving_matching(points, iterations=400)
-            self.assertLess(made.cost, 1.2 * best.cost)
-            self.assertGreaterEqual(made.cost, best.cost - 1e-9)
-            self.assertAlmostEqual(made.cost, np.linalg.norm(points[made.pairs[:, 0]] - points[made.pairs[:, 1]], axis=1).sum(), places=9)
-            self.assertEqual((made.mates == -1).sum(), count % 2)
-            self.assertTrue((np.diff(made.steps, axis=0) * [1, -1] > 0).all())
-            self.assertEqual((made.steps[-1, 1], made.iterations), (made.cost, 400))
+            result = terrace.halving_matching(points, iterations=400)
+            self.assertLess(result.cost, 1.2 * best.cost)
+            self.assertGreaterEqual(result.cost, best.cost - 1e-9)
+            self.assertAlmostEqual(result.cost, np.linalg.norm(points[result.pairs[:, 0]] - points[result.pairs[:, 1]], axis=1).sum(), places=9)
+            self.assertEqual((result.mates == -1).sum(), count % 2)
+            self.assertTrue((np.diff(result.steps, axis=0) * [1, -1] > 0).all())
+            self.assertEqual((result.steps[-1, 1], result.iterations), (result.cost, 400))
             by_matrix = terrace.halving_matching(cdist(points, points), distances=True, iterations=400)
-            np.testing.assert_allclose(by_matrix.cost, made.cost, rtol=1e-9)
+            np.testing.assert_allclose(by_matrix.cost, result.cost, rtol=1e-9)
             random = terrace.halving_matching(points, method='monte-carlo', iterations=50, threads=3)
-            self.assertGreater(random.cost, made.cost)
+            self.assertGreater(random.cost, result.cost)
             np.testing.assert_array_equal(random.mates, terrace.halving_matching(points, method='monte-carlo', iterations=50, threads=1).mates)
         self.assertEqual(terrace.halving_matching(np.zeros((0, 2))).pairs.shape, (0, 2))
         self.assertLess(terrace.halving_matching(np.random.default_rng(1).random((200, 2)), iterations=10 ** 9, seconds=0.1).iterations, 10 ** 6)
@@ -618,10 +618,10 @@ class Matchings(unittest.TestCase):
 
     def test_labels_are_matched_first(self):
         points, labels = np.random.default_rng(28).random((90, 2)), np.repeat([5, -2, 10 ** 12], [31, 29, 30])
-        made = terrace.matching(points, labels=labels, rounds=0)
-        apart = sum(labels[a] != labels[b] for a, b in made.pairs)
+        result = terrace.matching(points, labels=labels, rounds=0)
+        apart = sum(labels[a] != labels[b] for a, b in result.pairs)
         self.assertEqual(apart, 1)  # the points left over from the two odd clusters
-        self.assertLessEqual(terrace.matching(points, labels=labels).cost, made.cost)
+        self.assertLessEqual(terrace.matching(points, labels=labels).cost, result.cost)
         for wrong, options, kind in ((points, {'labels': labels[:3]}, ValueError), (points, {'labels': labels * 0.5}, TypeError),
                                      (points, {'tolerance': -1}, ValueError)):
             with self.assertRaises(kind):

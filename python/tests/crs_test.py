@@ -19,27 +19,27 @@ class Transformations(unittest.TestCase):
         random = np.random.default_rng(1)
         lonlat = random.random((2000, 2)) * [6, 8] + [6, 44]
         for code in (32632, 3035, 3857, 2056, 25832, 5514):
-            made = terrace.Transformation('EPSG:4326', f'EPSG:{code}', area=(6, 44, 12, 52))
+            result = terrace.Transformation('EPSG:4326', f'EPSG:{code}', area=(6, 44, 12, 52))
             from_, to = osr.SpatialReference(), osr.SpatialReference()
             from_.ImportFromEPSG(4326)
             to.ImportFromEPSG(code)
             for system in (from_, to):
                 system.SetAxisMappingStrategy(osr.OAMS_TRADITIONAL_GIS_ORDER)
             expected = np.array(osr.CoordinateTransformation(from_, to).TransformPoints(lonlat.tolist()))[:, :2]
-            got = made.forward(lonlat)
+            got = result.forward(lonlat)
             # Operations between datums may differ by their accuracy.
             np.testing.assert_allclose(got, expected, rtol=0, atol=1e-3 if code in (32632, 3035, 3857, 25832) else 3)
-            np.testing.assert_allclose(made.reverse(got), lonlat, rtol=0, atol=5e-8)
+            np.testing.assert_allclose(result.reverse(got), lonlat, rtol=0, atol=5e-8)
 
     def test_heights_are_kept_and_places_out_of_range_are_nan(self):
-        made = terrace.Transformation('EPSG:4326', 3857)
-        got = made.forward([[10, 50, 7.5], [10, 90, 1], [np.nan, 0, 2]])
+        result = terrace.Transformation('EPSG:4326', 3857)
+        got = result.forward([[10, 50, 7.5], [10, 90, 1], [np.nan, 0, 2]])
         self.assertEqual(got[:, 2].tolist(), [7.5, 1, 2])
         self.assertFalse(np.isnan(got[0]).any())
         self.assertTrue(np.isnan(got[2, :2]).all())
-        self.assertEqual(made.forward([]).shape, (0, 2))
+        self.assertEqual(result.forward([]).shape, (0, 2))
         np.testing.assert_array_equal(terrace.Transformation(4326, 4326).forward([[1, 2]]), [[1, 2]])
-        self.assertIn('WGS 84', repr(made))
+        self.assertIn('WGS 84', repr(result))
 
     def test_datum_shift_to_wgs84(self):
         class Wkt:
@@ -63,10 +63,10 @@ class Transformations(unittest.TestCase):
         for options in ({'area': (1, 1, 0, 0)}, {'datum_shift': (1, 2)}, {'area': (0, 0)}):
             with self.assertRaises(ValueError):
                 terrace.Transformation('EPSG:4326', 'EPSG:3857', **options)
-        made = terrace.Transformation('EPSG:4326', 'EPSG:3857')
+        result = terrace.Transformation('EPSG:4326', 'EPSG:3857')
         for wrong, kind in (([[1, 2, 3, 4]], ValueError), ([1, 2], ValueError), ('ab', TypeError)):
             with self.assertRaises(kind):
-                made.forward(wrong)
+                result.forward(wrong)
 
 
 if __name__ == '__main__':

@@ -135,8 +135,8 @@ class Meshes(StoreCase):
             near = np.flatnonzero(((samples[:, :2] >= low[:2] - 1e-6) & (samples[:, :2] <= high[:2] + 1e-6)).all(axis=1))
             plane = np.linalg.solve(np.column_stack((corners[:, :2] - low[:2], np.ones(3))), np.eye(3))
             weights = np.column_stack((samples[near, :2] - low[:2], np.ones(len(near)))) @ plane
-            held = (weights >= -1e-9).all(axis=1)
-            error[near[held]] = np.minimum(error[near[held]], abs(weights[held] @ corners[:, 2] - samples[near[held], 2]))
+            covered = (weights >= -1e-9).all(axis=1)
+            error[near[covered]] = np.minimum(error[near[covered]], abs(weights[covered] @ corners[:, 2] - samples[near[covered], 2]))
         self.assertLessEqual(error.max(), 1.0 + 1e-6)
 
     def test_store_without_triangles_has_an_empty_mesh(self):
@@ -195,12 +195,12 @@ class Meshes(StoreCase):
         path = self.path('degrees.glb')
         model = terrace.Multiresolution(store)
         model.set_detail(0)
-        for made in (store.mesh(level=0), store.mesh(level=0).turned_outward(), store.bounded_mesh(2), store.bounded_mesh(2, crs=4326),
+        for result in (store.mesh(level=0), store.mesh(level=0).turned_outward(), store.bounded_mesh(2), store.bounded_mesh(2, crs=4326),
                      model.mesh):
             with self.assertLogs('terrace', 'INFO') as notes:
-                made.save(path, replace=True)
+                result.save(path, replace=True)
             self.assertIn('in metres, as glTF asks', notes.output[0])
-            self.check_metres(path, np.ptp(made.vertices[:, :2], axis=0) * metres, np.ptp(made.vertices[:, 2]))
+            self.check_metres(path, np.ptp(result.vertices[:, :2], axis=0) * metres, np.ptp(result.vertices[:, 2]))
         with self.assertLogs('terrace', 'INFO') as notes:
             store.bounded_mesh(2, path=path, replace=True)
             store.bounded_mesh(2, path=self.path('degrees.ply'))

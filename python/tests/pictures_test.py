@@ -17,9 +17,9 @@ def grid_mesh(heights, x, y):
     rows, columns = heights.shape
     vertices = np.column_stack((np.tile(x, rows), np.repeat(y, columns), heights.ravel()))
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    below, beside = corner + columns, corner + 1
-    return terrace.Mesh(vertices, np.concatenate((np.column_stack((corner, beside, below)),
-                                                  np.column_stack((beside, below + 1, below)))).astype(np.uint32))
+    below, other = corner + columns, corner + 1
+    return terrace.Mesh(vertices, np.concatenate((np.column_stack((corner, other, below)),
+                                                  np.column_stack((other, below + 1, below)))).astype(np.uint32))
 
 
 class Pictures(StoreCase):
@@ -39,13 +39,13 @@ class Pictures(StoreCase):
         lon, lat = 10 + metres / 55_800.0, 60 + metres / 111_412.0
         terrace.build(grid_mesh(heights, lon, lat).vertices, self.path('degrees'), crs='EPSG:4326')
         with terrace.open(self.path('degrees')) as store:
-            made = store.mesh(level=0)
-            degrees = pixels_of(made._repr_png_())
+            result = store.mesh(level=0)
+            degrees = pixels_of(result._repr_png_())
             elsewhere = pixels_of(store.mesh(level=0, crs='EPSG:32632')._repr_png_())
             bounded = pixels_of(store.bounded_mesh(max_error=5)._repr_png_())
             model = pixels_of(terrace.Multiresolution(store, 0)._repr_png_())
             lines = pixels_of(store.contours(500)._repr_png_())
-            made.save(self.path('degrees.svg'))
+            result.save(self.path('degrees.svg'))
         flat = pixels_of(grid_mesh(heights, metres, metres)._repr_png_())
         for pixels, most in ((degrees, 4), (model, 4), (bounded, 15)):  # the sides of few triangles are drawn
             self.assertLess(abs(pixels.shape[0] / pixels.shape[1] - 1), 0.02)  # rather than twice as wide

@@ -12,12 +12,12 @@ from python_case import ALPS, StoreCase
 
 class Points(StoreCase):
     def records(self, count=5000):
-        made = np.zeros(count, [('x', 'f8'), ('y', 'f8'), ('z', 'f8'), ('intensity', 'u2'), ('classification', 'u1')])
+        result = np.zeros(count, [('x', 'f8'), ('y', 'f8'), ('z', 'f8'), ('intensity', 'u2'), ('classification', 'u1')])
         places = np.round(self.points[:count], 2)
         for i, axis in enumerate('xyz'):
-            made[axis] = places[:, i]
-        made['intensity'], made['classification'] = np.arange(count) % 4000, np.arange(count) % 5
-        return made
+            result[axis] = places[:, i]
+        result['intensity'], result['classification'] = np.arange(count) % 4000, np.arange(count) % 5
+        return result
 
     def test_written_points_are_read_back(self):
         records = self.records()
@@ -100,8 +100,8 @@ class Points(StoreCase):
 
     def test_streams_clusters_of_a_file(self):
         blocks = []
-        made = terrace.stream_clusters(terrace.point_batches(self.records(20000)), blocks.append, block_points=2000)
-        self.assertEqual(made['points'], 20000)
+        result = terrace.stream_clusters(terrace.point_batches(self.records(20000)), blocks.append, block_points=2000)
+        self.assertEqual(result['points'], 20000)
         total = sum(np.bincount(block.values['classification'], minlength=5) for block in blocks if block.level == 0)
         np.testing.assert_array_equal(total, [4000] * 5)
 

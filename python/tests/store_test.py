@@ -174,20 +174,20 @@ class Stores(StoreCase):
 
     def test_table_of_clusters(self):
         for level in range(self.scan.top + 1):
-            told = self.scan.clusters(level)
-            self.assertEqual(len(told), self.scan.info['levels'][level]['clusters'])
-            self.assertEqual(told['descendants'].sum() if level < self.scan.top else len(self.points), len(self.points))
-            for number in range(0, len(told), 7):
+            described = self.scan.clusters(level)
+            self.assertEqual(len(described), self.scan.info['levels'][level]['clusters'])
+            self.assertEqual(described['descendants'].sum() if level < self.scan.top else len(self.points), len(self.points))
+            for number in range(0, len(described), 7):
                 if level == self.scan.top:
                     continue
                 below = terrace.xyz(self.scan.points(cluster=(level, number), level=0))
-                self.assertEqual(len(below), told['descendants'][number])
+                self.assertEqual(len(below), described['descendants'][number])
                 box = np.concatenate((below.min(axis=0), below.max(axis=0)))
-                grown = (told['bounds'][number] - box) * [-1, -1, -1, 1, 1, 1]
+                grown = (described['bounds'][number] - box) * [-1, -1, -1, 1, 1, 1]
                 self.assertTrue((grown >= 0).all() and (grown < 0.05 * np.tile(np.ptp(self.points, axis=0), 2)).all())
                 # The representative is last.
                 farthest = np.linalg.norm(below - terrace.xyz(self.scan.points(cluster=(level, number)))[-1], axis=1).max()
-                self.assertLessEqual(farthest, told['error'][number] * 1.001)
+                self.assertLessEqual(farthest, described['error'][number] * 1.001)
         with self.assertRaises(ValueError):
             self.scan.clusters(99)
 
@@ -541,8 +541,8 @@ class Sources(StoreCase):
         store = self.built(points, attributes={'number': np.arange(len(points))})
         self.assertEqual((len(store), store.info['nodata']), (len(points) - 4, 4))
         self.assertEqual(set(range(len(points))) - set(store.points()['number']), {3, 17, 4000, len(points) - 1})
-        told = terrace.write_points(self.path('without.ply'), points)
-        self.assertEqual((told['points'], told['nodata']), (len(points) - 4, 4))
+        clusters = terrace.write_points(self.path('without.ply'), points)
+        self.assertEqual((clusters['points'], clusters['nodata']), (len(points) - 4, 4))
 
     def test_masks_are_respected(self):
         points = np.ma.array(self.points[:100])

@@ -270,33 +270,33 @@ class Metrics(unittest.TestCase):
         for kind, metric, count in ((terrace.Delaunay2, terrace.ellipse(4, 1, 30), 2000),
                                     (terrace.Delaunay3, terrace.ellipsoid([3, 1, 2]), 600)):
             points = random.random((count, len(metric)))
-            made, mapped = kind(points, metric=metric), kind(points @ metric.T)
-            self.assertEqual(corner_sets(made.points, made.simplices), corner_sets(points, mapped.simplices))
-            self.assertNotEqual(made.digest(), kind(points).digest())
-            asked = random.random((200, len(metric)))
-            closest = np.argmin((((asked[:, None] - points) @ metric.T) ** 2).sum(axis=2), axis=1)
-            np.testing.assert_array_equal(made.nearest(asked), made.ids[closest])
-            made.remove(made.insert(asked))
-            self.assertEqual(made.digest(), kind(points, metric=metric).digest())
+            result, mapped = kind(points, metric=metric), kind(points @ metric.T)
+            self.assertEqual(corner_sets(result.points, result.simplices), corner_sets(points, mapped.simplices))
+            self.assertNotEqual(result.digest(), kind(points).digest())
+            queries = random.random((200, len(metric)))
+            closest = np.argmin((((queries[:, None] - points) @ metric.T) ** 2).sum(axis=2), axis=1)
+            np.testing.assert_array_equal(result.nearest(queries), result.ids[closest])
+            result.remove(result.insert(queries))
+            self.assertEqual(result.digest(), kind(points, metric=metric).digest())
 
     def test_one_region_matches_one_metric(self):
         random = np.random.default_rng(12)
         for kind, metric, count in ((terrace.Delaunay2, terrace.ellipse(3, 1, 45), 1000),
                                     (terrace.Delaunay3, terrace.ellipsoid([2, 1, 1]), 300)):
             points = random.random((count, len(metric)))
-            made, expected = kind(points), kind(points, metric=metric)
+            result, expected = kind(points), kind(points, metric=metric)
             everywhere = [-np.inf] * len(metric) + [np.inf] * len(metric)
-            simplices = made.adapted([(everywhere, metric)])
+            simplices = result.adapted([(everywhere, metric)])
             if kind is terrace.Delaunay3:
                 simplices, stuck = simplices
                 self.assertEqual(stuck, 0)
-            self.assertEqual(corner_sets(made.points, simplices), corner_sets(expected.points, expected.simplices))
+            self.assertEqual(corner_sets(result.points, simplices), corner_sets(expected.points, expected.simplices))
 
     def test_triangles_outside_regions_do_not_change(self):
         points = np.random.default_rng(13).random((2000, 2))
-        made = terrace.Delaunay2(points)
-        before = corner_sets(made.points, made.simplices)
-        after = corner_sets(made.points, made.adapted([((0.5, -np.inf, np.inf, np.inf), terrace.ellipse(4, 1))]))
+        result = terrace.Delaunay2(points)
+        before = corner_sets(result.points, result.simplices)
+        after = corner_sets(result.points, result.adapted([((0.5, -np.inf, np.inf, np.inf), terrace.ellipse(4, 1))]))
         changed = {corner for triangle in before ^ after for corner in triangle}
         self.assertGreater(len(changed), 100)
         self.assertGreaterEqual(min(x for x, _ in changed), 0.5)
@@ -320,11 +320,11 @@ class Shapes(unittest.TestCase):
         u, v = random.random((2, 6000)) * 2 * np.pi
         ring = np.column_stack(((2 + 0.7 * np.cos(v)) * np.cos(u), (2 + 0.7 * np.cos(v)) * np.sin(u), 0.7 * np.sin(v)))
         for points, volume, euler in ((ball, 4 / 3 * np.pi, 2), (ring, 2 * np.pi ** 2 * 2 * 0.7 ** 2, 0)):
-            made = terrace.Delaunay3(points)
-            shape = made.shape()
+            result = terrace.Delaunay3(points)
+            shape = result.shape()
             self.assertEqual((shape.open, shape.components, shape.euler_characteristic), (False, 1, euler))
             self.assertAlmostEqual(shape.volume / volume, 1, delta=0.05)
-            a, b, c, d = (made.points[shape.tetrahedra[:, i]] for i in range(4))
+            a, b, c, d = (result.points[shape.tetrahedra[:, i]] for i in range(4))
             inside = np.einsum('ij,ij->i', np.cross(b - a, c - a), d - a) / 6
             self.assertGreater(inside.min(), 0)
             self.assertAlmostEqual(inside.sum(), shape.volume, places=9)
@@ -342,35 +342,35 @@ class Shapes(unittest.TestCase):
         self.assertFalse(bowl.shape(lids=True).open)
 
     def test_criteria(self):
-        made = terrace.Delaunay3(np.random.default_rng(16).random((300, 3)))
-        wide, narrow = (len(made.shape('flood', criterion='edge-length', edge_factor=factor, keep_vertices=False).tetrahedra) for factor in (1.5, 0.4))
+        result = terrace.Delaunay3(np.random.default_rng(16).random((300, 3)))
+        wide, narrow = (len(result.shape('flood', criterion='edge-length', edge_factor=factor, keep_vertices=False).tetrahedra) for factor in (1.5, 0.4))
         self.assertGreater(wide, narrow)
-        self.assertGreaterEqual(len(made.shape('flood', criterion='edge-length', edge_factor=0.4).tetrahedra), narrow)
+        self.assertGreaterEqual(len(result.shape('flood', criterion='edge-length', edge_factor=0.4).tetrahedra), narrow)
         for wrong in ({'criterion': 'best'}, {'edge_factor': 0}, {'edge_factor': np.nan}):
             with self.assertRaises(ValueError):
-                made.shape('flood', **wrong)
+                result.shape('flood', **wrong)
 
     def test_surface_follows_changes(self):
         random = np.random.default_rng(17)
         ball = random.normal(size=(2000, 3))
         ball /= np.linalg.norm(ball, axis=1)[:, None]
-        made = terrace.DynamicSurface(ball)
+        result = terrace.DynamicSurface(ball)
         fixed = terrace.Delaunay3(ball).shape(lids=True).surface
-        self.assertEqual(corner_sets(made.points, made.simplices), corner_sets(fixed.vertices, fixed.triangles))
+        self.assertEqual(corner_sets(result.points, result.simplices), corner_sets(fixed.vertices, fixed.triangles))
         more = random.normal(size=(200, 3))
         more /= np.linalg.norm(more, axis=1)[:, None]
-        made.remove(made.ids[:150])
-        made.insert(more)
-        report = made.mesh().measures()
+        result.remove(result.ids[:150])
+        result.insert(more)
+        report = result.mesh().measures()
         self.assertEqual((report['components'], report['euler_characteristic'], report['closed']), (1, 2, True))
         self.assertAlmostEqual(report['volume'], 4 / 3 * np.pi, delta=0.1)
-        made.restore()
-        self.assertEqual(made.digest(), terrace.DynamicSurface(np.vstack((ball[150:], more))).digest())
-        self.assertIn('triangles', repr(made))
-        self.assertLess(len(made._repr_png_()), 400_000)
-        made.remove(made.vertices)
-        self.assertEqual((len(made), made.simplices.shape, made.mesh().triangles.shape), (0, (0, 3), (0, 3)))
-        for wrong in (lambda: made.insert([[np.nan, 0, 0]]), lambda: made.remove([3]), lambda: terrace.DynamicSurface([[1, 2]])):
+        result.restore()
+        self.assertEqual(result.digest(), terrace.DynamicSurface(np.vstack((ball[150:], more))).digest())
+        self.assertIn('triangles', repr(result))
+        self.assertLess(len(result._repr_png_()), 400_000)
+        result.remove(result.vertices)
+        self.assertEqual((len(result), result.simplices.shape, result.mesh().triangles.shape), (0, (0, 3), (0, 3)))
+        for wrong in (lambda: result.insert([[np.nan, 0, 0]]), lambda: result.remove([3]), lambda: terrace.DynamicSurface([[1, 2]])):
             with self.assertRaises(ValueError):
                 wrong()
 

@@ -14,38 +14,38 @@ except ImportError as missing:
 
 
 class MatchingTrees(unittest.TestCase):
-    def check_tree(self, points, weights, made):
+    def check_tree(self, points, weights, result):
         n = len(points)
         mass, places, sizes = list(weights), list(points), [1] * n
-        for row, (a, b, distance, size) in enumerate(made.rows):
+        for row, (a, b, distance, size) in enumerate(result.rows):
             a, b = int(a), int(b)
             self.assertTrue(a < b < n + row)
             mass.append(mass[a] + mass[b])
             places.append((places[a] * mass[a] + places[b] * mass[b]) / mass[-1])
             sizes.append(sizes[a] + sizes[b])
-            np.testing.assert_allclose(made.positions[row], places[-1], atol=1e-9)
+            np.testing.assert_allclose(result.positions[row], places[-1], atol=1e-9)
             self.assertAlmostEqual(distance, np.linalg.norm(places[a] - places[b]), places=9)
             self.assertEqual(size, sizes[-1])
-        self.assertEqual(len(set(made.rows[:, :2].ravel())), 2 * (n - 1))
+        self.assertEqual(len(set(result.rows[:, :2].ravel())), 2 * (n - 1))
         self.assertEqual(sizes[-1], n)
 
     def test_tree_is_repeated_matching(self):
         random = np.random.default_rng(1)
         for width in (2, 3):
             points = random.random((301, width))
-            made = terrace.matching_tree(points)
-            self.check_tree(points, np.ones(301), made)
-            first = made.rows[made.levels == 1][:, :2].astype(int)
+            result = terrace.matching_tree(points)
+            self.check_tree(points, np.ones(301), result)
+            first = result.rows[result.levels == 1][:, :2].astype(int)
             self.assertEqual({*map(tuple, first)}, {*map(tuple, terrace.matching(points).pairs)})
-            self.assertEqual(made.levels.max(), 9)  # the binary logarithm of 301, rounded up
+            self.assertEqual(result.levels.max(), 9)  # the binary logarithm of 301, rounded up
             weights = random.random(301) + 0.1
             self.check_tree(points, weights, terrace.matching_tree(points, weights=weights, threads=2))
 
     def test_each_label_is_a_subtree(self):
         points, labels = np.random.default_rng(2).random((60, 2)), np.repeat([-7, 10 ** 12, 3], 20)
-        made = terrace.matching_tree(points, labels=labels)
+        result = terrace.matching_tree(points, labels=labels)
         below = [{label} for label in labels]
-        for a, b in made.rows[:, :2].astype(int):
+        for a, b in result.rows[:, :2].astype(int):
             below.append(below[a] | below[b])
         self.assertEqual(sum(len(mixed) == 1 for mixed in below[60:]), 3 * 19)
 
@@ -57,10 +57,10 @@ class MatchingTrees(unittest.TestCase):
             sizes.append(len(nodes))
             return terrace.halving_matching(nodes, iterations=50).mates
 
-        made = terrace.matching_tree(points, matcher=halves)
-        self.check_tree(points, np.ones(37), made)
+        result = terrace.matching_tree(points, matcher=halves)
+        self.check_tree(points, np.ones(37), result)
         self.assertEqual(sizes, [37, 19, 10, 5, 3, 2])
-        first = made.rows[made.levels == 1][:, :2].astype(int)
+        first = result.rows[result.levels == 1][:, :2].astype(int)
         self.assertEqual({*map(tuple, first)}, {*map(tuple, terrace.halving_matching(points, iterations=50).pairs)})
 
         class Enough(Exception):
@@ -95,8 +95,8 @@ class MatchingTrees(unittest.TestCase):
                     return total
 
                 self.assertLess(area_sum(rows), area_sum(tree[:, :2]))
-            asked = random.random((50, width))
-            for given, want in zip(terrace.PointTree(lower, rows).nearest(asked, 3), terrace.PointTree(lower, tree).nearest(asked, 3)):
+            queries = random.random((50, width))
+            for given, want in zip(terrace.PointTree(lower, rows).nearest(queries, 3), terrace.PointTree(lower, tree).nearest(queries, 3)):
                 np.testing.assert_array_equal(given, want)
         self.assertAlmostEqual(terrace.PointTree(lower, terrace.rotate_tree(tree, lower, passes=0)).cost, terrace.PointTree(lower, tree).cost)
         for wrong in (lambda: terrace.rotate_tree(tree, lower[:5]), lambda: terrace.rotate_tree(tree, lower, lower[:5]),
@@ -120,11 +120,11 @@ class Queries(unittest.TestCase):
     def test_nearest_points_match_scipy_on_any_tree(self):
         random = np.random.default_rng(4)
         for width in (2, 3):
-            points, asked = random.random((2000, width)), random.random((500, width)) * 2 - 0.5
-            expected = cKDTree(points).query(asked, 5)
+            points, queries = random.random((2000, width)), random.random((500, width)) * 2 - 0.5
+            expected = cKDTree(points).query(queries, 5)
             for tree in (None, terrace.linkage(points), terrace.matching_tree(points)):
-                made = terrace.PointTree(points, tree)
-                found, distances = made.nearest(asked, 5)
+                result = terrace.PointTree(points, tree)
+                found, distances = result.nearest(queries, 5)
                 np.testing.assert_array_equal(found, expected[1])
                 np.testing.assert_allclose(distances, expected[0], rtol=1e-12)
         self.assertLess(terrace.PointTree(points).cost, terrace.PointTree(points, terrace.linkage(points)).cost)
@@ -155,8 +155,8 @@ class Queries(unittest.TestCase):
         triangles = np.array([random.choice(300, 3, replace=False) for _ in range(200)])
         origins = random.random((300, 3)) * 3 - 1
         directions = 0.5 - origins + random.random((300, 3)) * 0.2
-        made = terrace.TriangleTree(vertices, triangles)
-        found, t = made.hit(origins, directions)
+        result = terrace.TriangleTree(vertices, triangles)
+        found, t = result.hit(origins, directions)
         a, b, c = (vertices[triangles[:, i]] for i in range(3))
         across = np.cross(b - a, c - a)
         steep = directions @ across.T
@@ -170,7 +170,7 @@ class Queries(unittest.TestCase):
         np.testing.assert_allclose(t, times.min(axis=1), rtol=0, atol=1e-9)
         self.assertGreater((found >= 0).sum(), 50)
 
-        near, distances = made.nearest(origins)
+        near, distances = result.nearest(origins)
         weights = random.dirichlet([1, 1, 1], 4000)
         for place, triangle, distance in zip(origins[:40], near, distances):
             on = np.einsum('wk,tkd->twd', weights, vertices[triangles])

@@ -42,8 +42,8 @@ void operator delete(void* memory, std::size_t, std::align_val_t) noexcept { rel
 
 namespace terrace::research {
 
-PeakMemory::PeakMemory() : before_(live.load()) { peak.store(before_); }
+PeakMemory::PeakMemory() : initial_(live.load()) { peak.store(initial_); }
 
-std::size_t PeakMemory::bytes() const { return peak.load() - before_; }
+std::size_t PeakMemory::bytes() const { return peak.load() - initial_; }
 
 }  // namespace terrace::research

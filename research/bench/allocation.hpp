@@ -16,7 +16,7 @@ class PeakMemory {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  std::size_t before_;
+  std::size_t initial_;
 };
 
 }  // namespace terrace::research

@@ -72,7 +72,7 @@ BlockSizeRun run_once(std::uint64_t points, std::size_t block, Effort effort,
   return result;
 }
 
-/// By how much the short search raises the cost of the blocks.
+/// The increase of the cost of the blocks by the short search.
 struct Errors {
   double low = std::numeric_limits<double>::infinity(), mean = 0.0, high = -low;
 };
@@ -102,12 +102,12 @@ std::vector<std::string> row_7_5(const std::string& name, const BlockSizeRun& te
 /// Returns the runs for the six block sizes of both tables, which share them.
 const std::vector<BlockSizeRun>& block_size_runs(const Setting& setting) {
   static const std::vector<BlockSizeRun> runs = [&] {
-    std::vector<BlockSizeRun> done;
+    std::vector<BlockSizeRun> runs;
     for (const ThesisRow& row : kThesis) {
-      done.push_back(run_once(setting.points(lucy().thesis_points), setting.block(row.block),
+      runs.push_back(run_once(setting.points(lucy().thesis_points), setting.block(row.block),
                               Effort::fine, FacilityStrategy::facilities));
     }
-    return done;
+    return runs;
   }();
   return runs;
 }

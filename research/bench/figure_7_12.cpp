@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "inputs.hpp"
 #include "setting.hpp"
 #include "terrace/cluster/facility_location.hpp"

@@ -46,10 +46,10 @@ double seconds_of(const std::vector<double>& costs, std::size_t n, bool once) {
   while (times.empty() || (!once && (times.size() < 3 || (sum < 0.1 && times.size() < 1001)))) {
     const auto start = std::chrono::steady_clock::now();
     const matching::Assignment assignment = matching::assign(costs, n, n);
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
     if (!(assignment.cost > 0.0)) throw std::logic_error("the assignment costs 0");
-    times.push_back(taken.count());
-    sum += taken.count();
+    times.push_back(elapsed.count());
+    sum += elapsed.count();
   }
   std::nth_element(times.begin(), times.begin() + times.size() / 2, times.end());
   return times[times.size() / 2];

@@ -5,7 +5,7 @@
 #include <array>
 #include <random>
 
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "sets.hpp"
 #include "setting.hpp"
 #include "terrace/cluster/facility_location.hpp"

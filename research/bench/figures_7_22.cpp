@@ -72,14 +72,14 @@ const std::vector<SearchRun>& search_runs(const Setting& setting) {
   static const std::vector<SearchRun> runs = [&] {
     const bool small = setting.is_small();
     const std::uint64_t few = small ? 50 : 10'000;
-    const std::uint64_t many = small ? 20 : setting.is_full() ? 50'000 : 20'000;
-    std::vector<SearchRun> done;
+    const std::uint64_t iterations = small ? 20 : setting.is_full() ? 50'000 : 20'000;
+    std::vector<SearchRun> runs;
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
       const std::string set = std::string("100") + "abc"[seed - 1];
-      done.push_back(search(setting, set, small ? 20 : 100, few, seed));
+      runs.push_back(search(setting, set, small ? 20 : 100, few, seed));
     }
-    done.push_back(search(setting, "500", small ? 50 : 500, many, 4));
-    return done;
+    runs.push_back(search(setting, "500", small ? 50 : 500, iterations, 4));
+    return runs;
   }();
   return runs;
 }
@@ -166,15 +166,15 @@ void figure_7_22(Setting& setting) {
              fixed(correlation_of_neighbours(each.y, mean), 2)});
   setting.report.table(table);
   setting.report.data(data);
-  const Series known{.name = "the optimum",
-                     .x = {1.0, static_cast<double>(iterations)},
-                     .y = {optimum, optimum},
-                     .mark = Series::Mark::dashes};
+  const Series optimum_line{.name = "the optimum",
+                       .x = {1.0, static_cast<double>(iterations)},
+                       .y = {optimum, optimum},
+                       .mark = Series::Mark::dashes};
   setting.report.plot("figure-7.22",
                       {.title = "Iterations of the Monte Carlo method (figure 7.22)",
                        .x = {.label = "iteration, " + std::to_string(count) + " points"},
                        .y = {.label = "sum of distances", .low = 0.0, .high = 1.35 * most},
-                       .series = {each, best, known}});
+                       .series = {each, best, optimum_line}});
 }
 
 void figure_7_23(Setting& setting) {

@@ -84,8 +84,8 @@ class Scan final : public PointSet {
   Scan(std::uint64_t size, std::uint64_t seed) : PointSet(size), seed_(seed) {
     rows_ = std::max<std::uint64_t>(
         1, static_cast<std::uint64_t>(std::sqrt(static_cast<double>(size) / 2)));
-    around_ = (size + rows_ - 1) / rows_;
-    width_ = std::min<std::uint64_t>(500, (around_ + 3) / 4);
+    per_ring_ = (size + rows_ - 1) / rows_;
+    width_ = std::min<std::uint64_t>(500, (per_ring_ + 3) / 4);
   }
 
   void read(std::uint64_t first, std::span<Point3> points) override {
@@ -96,13 +96,13 @@ class Scan final : public PointSet {
   [[nodiscard]] Point3 point(std::uint64_t index) const {
     const std::uint64_t swath = index / (width_ * rows_);
     // the last swath is narrower
-    const std::uint64_t width = std::min(width_, around_ - swath * width_);
+    const std::uint64_t width = std::min(width_, per_ring_ - swath * width_);
     const std::uint64_t in_swath = index - swath * width_ * rows_;
     Hash random(seed_, index);
     const double u =
         static_cast<double>(swath * width_ + in_swath % width) + 0.3 * random.uniform();
     const double v = static_cast<double>(in_swath / width) + 0.3 * random.uniform();
-    const double a = 2 * kPi * u / static_cast<double>(around_);
+    const double a = 2 * kPi * u / static_cast<double>(per_ring_);
     const double b = kPi * v / static_cast<double>(rows_);
     const double noise = random.uniform() + random.uniform() + random.uniform() - 1.5;
     const double r =
@@ -111,7 +111,7 @@ class Scan final : public PointSet {
     return {out * std::sin(b) * std::cos(a), out * std::sin(b) * std::sin(a), out * std::cos(b)};
   }
 
-  std::uint64_t seed_, rows_ = 0, around_ = 0, width_ = 0;
+  std::uint64_t seed_, rows_ = 0, per_ring_ = 0, width_ = 0;
 };
 
 class Plant final : public PointSet {

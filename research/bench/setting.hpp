@@ -12,7 +12,7 @@
 
 namespace terrace::research {
 
-/// How large to run, and where to report the results.
+/// The size of the runs, and the report of their results.
 struct Setting {
   enum class Size { small, standard, full };  ///< small: as a test, in a second or two
   Size size;
@@ -22,12 +22,13 @@ struct Setting {
   [[nodiscard]] bool is_small() const { return size == Size::small; }
   [[nodiscard]] bool is_full() const { return size == Size::full; }
   /// Returns the number of points that a set of the thesis has here.
-  [[nodiscard]] std::uint64_t points(std::uint64_t of_thesis) const {
-    if (is_full()) return of_thesis;
-    return std::min<std::uint64_t>(of_thesis, is_small() ? 3000 : 1'000'000);
+  [[nodiscard]] std::uint64_t points(std::uint64_t thesis_size) const {
+    if (is_full()) return thesis_size;
+    return std::min<std::uint64_t>(thesis_size, is_small() ? 3000 : 1'000'000);
   }
-  [[nodiscard]] std::size_t block(std::size_t of_thesis) const {
-    return is_small() ? of_thesis / 25 : of_thesis;
+  /// Returns the number of points that a block of the thesis has here.
+  [[nodiscard]] std::size_t block(std::size_t thesis_size) const {
+    return is_small() ? thesis_size / 25 : thesis_size;
   }
 };
 

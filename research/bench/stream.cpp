@@ -81,10 +81,10 @@ void StreamClustering::push(std::span<const Point3> points) {
   // Fills blocks, as in the thesis. A batch that does not fit into the current block would begin
   // another one.
   while (!points.empty()) {
-    const std::size_t count = std::min(points.size(), block_ - held_);
+    const std::size_t count = std::min(points.size(), block_ - pending_);
     builder_->push(points.first(count));
     points = points.subspan(count);
-    held_ = (held_ + count) % block_;
+    pending_ = (pending_ + count) % block_;
   }
 }
 

@@ -12,8 +12,8 @@
 
 #include "sets.hpp"
 
-/// libcluster's HierarchyBuilder with the searches of the thesis (4.3, 7.1), one block at a time,
-/// with time and cost measured.
+/// Runs libcluster's HierarchyBuilder with the searches of the thesis (4.3, 7.1), one block at a
+/// time, and measures time and cost.
 
 namespace terrace::research {
 
@@ -34,6 +34,7 @@ struct StreamBlock {
   double cost = 0.0;           ///< cost of all facilities and connections
 };
 
+/// Clusters a stream of points and adds up the cost of its blocks.
 class StreamClustering {
  public:
   using OnBlock = std::function<void(const StreamBlock&)>;
@@ -54,15 +55,15 @@ class StreamClustering {
  private:
   class Weighing;
 
-  std::size_t block_, held_ = 0;  ///< points per block, and in the current one
+  std::size_t block_, pending_ = 0;  ///< points per block, and in the current one
   std::unique_ptr<Weighing> sink_;
   std::unique_ptr<cluster::HierarchyBuilder> builder_;
   cluster::HierarchyResult result_;
   double seconds_ = 0.0;
 };
 
-/// Reads a set to its end, a few points at a time, and gives all points to each of the streams, so
-/// that disturbances of the machine affect all streams.
+/// Reads a set to its end, a few points at a time, and pushes all points into each of the streams.
+/// So disturbances of the machine affect all streams alike.
 void run(PointSet& set, std::span<StreamClustering> streams);
 
 }  // namespace terrace::research

@@ -143,7 +143,8 @@ std::string axes(const Plot& plot, const Scale& x, const Scale& y) {
   return out;
 }
 
-std::string drawn(const Series& series, const std::string& colour, const Scale& x, const Scale& y) {
+std::string series_svg(const Series& series, const std::string& colour, const Scale& x,
+                       const Scale& y) {
   std::string out;
   if (series.mark == Series::Mark::dots) {
     out += "<g fill='" + colour + "'>\n";
@@ -236,7 +237,7 @@ std::string svg(const Plot& plot) {
   out += axes(plot, x, y);
   out += "<g clip-path='url(#inside)'>\n";
   for (std::size_t i = 0; i < plot.series.size(); ++i)
-    out += drawn(plot.series[i], colours[i], x, y);
+    out += series_svg(plot.series[i], colours[i], x, y);
   out += "</g>\n" + legend(plot, colours, x, y) + "</svg>\n";
   return out;
 }

@@ -32,8 +32,8 @@ struct Plot {
   bool equal_scales = false;  ///< a unit of x is as long as a unit of y
 };
 
-/// On a logarithmic axis, values that are not positive break lines. A plot without data shows only
-/// its frame.
+/// Returns a plot as SVG text. On a logarithmic axis, values that are not positive break lines. A
+/// plot without data shows only its frame.
 [[nodiscard]] std::string svg(const Plot& plot);
 
 }  // namespace terrace::research

@@ -33,10 +33,11 @@ constexpr std::array<ThesisRow, 4> kThesis{{{"Objects", 1420, "2.855", "2.434", 
 
 /// Throws: std::runtime_error if `dendrogram` is not a valid result of complete linkage with
 /// floats.
-void check(const Dendrogram& dendrogram, const laws::Distances& distances, const char* where) {
+void check(const Dendrogram& dendrogram, const laws::Distances& distances,
+           const char* device_name) {
   const std::string fault = laws::complete_fault(dendrogram, distances, laws::kFloatTolerance);
   if (!fault.empty()) {
-    throw std::runtime_error(std::string("complete linkage ") + where + ": " + fault);
+    throw std::runtime_error(std::string("complete linkage ") + device_name + ": " + fault);
   }
 }
 
@@ -72,20 +73,21 @@ void table_7_8(Setting& setting) {
     std::vector<Point3> points(static_cast<std::size_t>(count));
     make_scan(count, count)->read(0, points);
 
-    Dendrogram one, many, device;
+    Dendrogram single, threaded, device;
     LinkageOptions options;
     options.entry = MatrixEntry::float32;
-    const double one_time = shortest([&] { return complete_linkage(points, options); }, one);
+    const double single_time = shortest([&] { return complete_linkage(points, options); }, single);
     options.threads = setting.threads;
-    const double many_time = shortest([&] { return complete_linkage(points, options); }, many);
-    if (many != one) throw std::runtime_error("complete linkage depends on the threads");
+    const double threaded_time =
+        shortest([&] { return complete_linkage(points, options); }, threaded);
+    if (threaded != single) throw std::runtime_error("complete linkage depends on the threads");
     const laws::Distances distances = laws::distances_of(points);
-    check(one, distances, "on the processor");
+    check(single, distances, "on the processor");
     std::vector<std::string> row{"scan, as " + std::string(thesis.name),
                                  grouped(count),
-                                 fixed(1e3 * one_time, 2),
+                                 fixed(1e3 * single_time, 2),
                                  cited(thesis.cpu),
-                                 fixed(1e3 * many_time, 2),
+                                 fixed(1e3 * threaded_time, 2),
                                  "no device",
                                  cited(thesis.gpu),
                                  "-",
@@ -96,7 +98,7 @@ void table_7_8(Setting& setting) {
       // Not necessarily the processor's dendrogram, because floats can be equal.
       check(device, distances, "on the GPU");
       row[5] = fixed(1e3 * gpu_time, 2);
-      row[7] = time_saved(one_time, gpu_time);
+      row[7] = time_saved(single_time, gpu_time);
     }
     table.add(row);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Table 8.1: removal of clusters. Random clusters of an elevation model, expanded on top of a
-// coarse triangulation, are collapsed: by the model (as sets, and its bookkeeping with the
-// journal), point by point, and point by point by CGAL.
+// Table 8.1: removal of clusters. Random clusters of an elevation model are expanded on top of a
+// coarse triangulation and then collapsed in three ways: by the model, which removes sets and keeps
+// a journal; point by point; and point by point with CGAL.
 #include <algorithm>
 #include <array>
 #include <ctime>
@@ -57,13 +57,13 @@ Plain::Point plane(const Point3& p) {
 std::vector<ClusterId> draw(const ArraySource& source, std::size_t count, std::mt19937_64& random) {
   std::vector<std::uint64_t> all(source.cluster_count(0));
   for (std::size_t k = 0; k < all.size(); ++k) all[k] = k;
-  std::vector<ClusterId> drawn;
+  std::vector<ClusterId> sample;
   for (std::size_t k = 0; k < std::min(count, all.size()); ++k) {
-    const auto rest = static_cast<double>(all.size() - k);
-    std::swap(all[k], all[k + static_cast<std::size_t>(unit(random) * rest)]);
-    drawn.push_back(cluster_id(0, all[k]));
+    const auto remaining = static_cast<double>(all.size() - k);
+    std::swap(all[k], all[k + static_cast<std::size_t>(unit(random) * remaining)]);
+    sample.push_back(cluster_id(0, all[k]));
   }
-  return drawn;
+  return sample;
 }
 
 struct Times {

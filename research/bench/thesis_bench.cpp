@@ -56,13 +56,13 @@ std::string_view take(std::string_view& list) {
 struct Options {
   bool full = false;
   std::optional<std::filesystem::path> out;
-  std::array<bool, kParts.size()> wanted{};
+  std::array<bool, kParts.size()> selected{};
   unsigned threads = std::max(1u, std::thread::hardware_concurrency());
 };
 
 Options parse(int argc, char** argv) {
   Options options;
-  options.wanted.fill(true);
+  options.selected.fill(true);
   for (int i = 1; i < argc; ++i) {
     const std::string_view option = argv[i];
     if (option == "--full") {
@@ -83,14 +83,14 @@ Options parse(int argc, char** argv) {
       }
       options.threads = static_cast<unsigned>(threads);
     } else {
-      options.wanted.fill(false);
+      options.selected.fill(false);
       while (!value.empty()) {
         const std::string_view name = take(value);
         std::size_t part = 0;
         while (part < kParts.size() && kParts[part].name != name) ++part;
         if (part == kParts.size())
           throw std::invalid_argument("--tables: unknown name " + std::string(name));
-        options.wanted[part] = true;
+        options.selected[part] = true;
       }
     }
   }
@@ -117,7 +117,7 @@ int main(int argc, char** argv) {
     report.note(machine());
     const auto start = std::chrono::steady_clock::now();
     for (std::size_t part = 0; part < kParts.size(); ++part) {
-      if (options.wanted[part]) kParts[part].run(setting);
+      if (options.selected[part]) kParts[part].run(setting);
     }
     const std::chrono::duration<double> all = std::chrono::steady_clock::now() - start;
     report.note("\n" + fixed(all.count(), 1) + " s in all" +

@@ -120,7 +120,7 @@ std::vector<std::uint32_t> rounded(const Relaxation& relaxation, const FacilityM
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return duals[a] < duals[b]; });
-  std::vector<char> taken(problem.facilities, 0);
+  std::vector<char> blocked(problem.facilities, 0);
   std::vector<std::uint32_t> open;
   for (const std::uint32_t i : order) {
     std::vector<std::uint32_t> near;
@@ -128,10 +128,10 @@ std::vector<std::uint32_t> rounded(const Relaxation& relaxation, const FacilityM
     for (std::uint32_t j = 0; j < problem.facilities; ++j) {
       if (!relaxation.uses(static_cast<int>(j), static_cast<int>(i))) continue;
       near.push_back(j);
-      free = free && !taken[j];
+      free = free && !blocked[j];
     }
     if (!free || near.empty()) continue;
-    for (const std::uint32_t j : near) taken[j] = 1;
+    for (const std::uint32_t j : near) blocked[j] = 1;
     open.push_back(*std::min_element(
         near.begin(), near.end(),
         [&](std::uint32_t a, std::uint32_t b) { return problem.opening[a] < problem.opening[b]; }));

@@ -7,9 +7,9 @@
 //
 // The powers are rounded, so the order is only approximate, and arbitrary among equal powers.
 // Before an ear is cut, exact perturbed tests check that its sphere contains none of the hole's
-// vertices. Such a tetrahedron belongs to the result whenever it is made, so the result is exact,
-// ties included. An ear that fails will always fail and is dropped. If no ear is left before the
-// hole is full (possible with ties and at the hull), the rest is wrapped.
+// vertices. Such a tetrahedron belongs to the result in any order, so the result is exact, ties
+// included. An ear that fails will always fail and is dropped. With ties and at the hull, the queue
+// may become empty before the hole is full. The rest is then wrapped.
 #include "ear_queue.hpp"
 
 #include <algorithm>

@@ -20,6 +20,7 @@
 #include <terrace/terrain/store_view.hpp>
 #include <unistd.h>
 
+#include "cloud_colours.hpp"
 #include "sample/store_probe.hpp"
 #include "scene.hpp"
 
@@ -87,12 +88,13 @@ constexpr std::size_t kWasmPage = 65536;
 /// A frame reserves more memory if less than this is free.
 constexpr std::size_t kLeastMemory = std::size_t{8} << 20;
 
-std::size_t memory_left() {
+std::size_t free_memory() {
   return __builtin_wasm_memory_size(0) * kWasmPage - reinterpret_cast<std::uintptr_t>(sbrk(0));
 }
 void reserve_memory(std::size_t bytes) {
-  const std::size_t left = memory_left();
-  if (left < bytes) __builtin_wasm_memory_grow(0, (bytes - left + kWasmPage - 1) / kWasmPage);
+  const std::size_t available = free_memory();
+  if (available < bytes)
+    __builtin_wasm_memory_grow(0, (bytes - available + kWasmPage - 1) / kWasmPage);
 }
 
 /// Returns whether the module for bodies should take over the store.
@@ -197,7 +199,7 @@ TERRACE_EXPORT(frame) int terrace_frame() {
       constexpr double kFar = 1e30;
       view.focuses = {{{{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}}, static_cast<unsigned>(in[15])}};
     }
-    if (memory_left() < kLeastMemory) reserve_memory(8 * kLeastMemory);
+    if (free_memory() < kLeastMemory) reserve_memory(8 * kLeastMemory);
     const viewer::SceneState s = m.scene->frame(view, in[13], in[14]);
     m.numbers = {static_cast<double>(s.points),
                  static_cast<double>(s.triangles),
@@ -272,7 +274,7 @@ TERRACE_EXPORT(pick) int terrace_pick() {
                    static_cast<double>(m.hit->level),
                    static_cast<double>(tri::level_of(m.hit->cluster)),
                    static_cast<double>(tri::ordinal_of(m.hit->cluster)),
-                   m.hit->reach,
+                   m.hit->corner_distance,
                    static_cast<double>(m.hit->attributes.size())};
       m.numbers.insert(m.numbers.end(), m.hit->attributes.begin(), m.hit->attributes.end());
     }

@@ -15,7 +15,7 @@
 
 #include "blocks.hpp"
 #include "body_normals.hpp"
-#include "waiting.hpp"
+#include "transitions.hpp"
 
 namespace terrace::viewer {
 namespace {
@@ -34,9 +34,9 @@ template <class Shown>
 class SceneOf final : public Scene {
   /// Bits of SceneBodyPoint::start without the sign; one is left for rounding.
   static constexpr int kStartBits = 14;
-  /// Seconds of a slide on the page, seconds for which removed parts stay drawn (a little longer),
-  /// and the limit for parts that change again and again.
-  static constexpr double kSlide = 0.45, kWait = 0.5, kLongestWait = 3.0;
+  /// Seconds that a slide takes on the page; seconds for which removed parts stay drawn, a little
+  /// longer; and the limit of the latter for parts that change repeatedly.
+  static constexpr double kSlide = 0.45, kRemovalDelay = 0.5, kLongestDelay = 3.0;
 
  public:
   using View = terrain::StoreView<Shown>;
@@ -45,13 +45,13 @@ class SceneOf final : public Scene {
   static constexpr bool kTriangles = !std::is_same_v<Shown, tri::PointCloud>;
   using Vertex = std::conditional_t<kRaster, SceneVertex,
                                     std::conditional_t<kTriangles, SceneBodyPoint, ScenePoint>>;
-  static constexpr std::uint32_t kSpareVertices = kTriangles ? Waiting<Vertex>::kVertices : 0,
-                                 kSpareTriangles = kTriangles ? Waiting<Vertex>::kTriangles : 0;
+  static constexpr std::uint32_t kSpareVertices = kTriangles ? Transitions<Vertex>::kVertices : 0,
+                                 kSpareTriangles = kTriangles ? Transitions<Vertex>::kTriangles : 0;
 
   SceneOf(const stream::Store& store, const stream::LinearMap& ground,
           const tri::ViewOptions& options,
-          const std::function<bool(const stream::ByteRange&)>& given)
-      : store_(store), view_(store, ground, options, given), bounds_(store.bounds()) {
+          const std::function<bool(const stream::ByteRange&)>& has_bytes)
+      : store_(store), view_(store, ground, options, has_bytes), bounds_(store.bounds()) {
     const stream::Box3 all = box();
     base_[2] = (all.min[2] + all.max[2]) / 2;
     vertices_.reserve(options.max_points);
@@ -68,29 +68,29 @@ class SceneOf final : public Scene {
     for (const tri::VertexId vertex : mesh().all_vertices()) place(vertex);
     if constexpr (kTriangles) {
       for (const tri::TriangleId triangle : mesh().all_triangles()) {
-        triangles_.change(drawn(triangle)) = add(triangle);
+        triangles_.change(draw_slot(triangle)) = add(triangle);
       }
-      renew_normals();
+      update_normals();
     }
   }
 
-  SceneState frame(const tri::View& wish, double seconds, double time) override {
+  SceneState frame(const tri::View& view, double seconds, double time) override {
     const double start = now();
-    waiting_.end_until(time);
-    waiting_.sweep();
-    renew_gaps(start + seconds / 2);
-    const auto& step = view_.frame(wish, seconds - (now() - start), after_rate_);
+    transitions_.end_until(time);
+    transitions_.sweep();
+    update_gaps(start + seconds / 2);
+    const auto& step = view_.frame(view, seconds - (now() - start), point_cost_);
     const double begin = now();
     apply(*step.delta, time);
-    came_ += static_cast<double>(step.delta->changes.added_vertices.size());
-    went_ += static_cast<double>(step.delta->changes.removed_vertices.size());
-    after_ += now() - begin;
+    added_points_ += static_cast<double>(step.delta->changes.added_vertices.size());
+    removed_points_ += static_cast<double>(step.delta->changes.removed_vertices.size());
+    apply_seconds_ += now() - begin;
     const terrain::ViewTraffic traffic = view_.traffic();
     SceneState state{.points = view_.model().point_count(),
                      .expanded = view_.model().expanded_count(),
                      .vertex_slots = kSpareVertices + mesh().vertex_slots(),
                      .settled = view_.settled(),
-                     .waiting = !waiting_.empty() || unsure_ > 0,
+                     .waiting = !transitions_.empty() || unsure_ > 0,
                      .worst = step.worst,
                      .clusters = static_cast<std::size_t>(traffic.clusters),
                      .stored_bytes = static_cast<std::size_t>(traffic.bytes)};
@@ -105,9 +105,9 @@ class SceneOf final : public Scene {
     vertices_.take(changes_.vertex_blocks, changed_vertices_);
     changes_.vertices = std::as_bytes(std::span(changed_vertices_));
     triangles_.take(changes_.triangle_blocks, changes_.triangles);
-    // Copying the result costs as much again as collecting it.
-    learn_after(after_ + 2 * (now() - begin));
-    came_ = went_ = after_ = 0;
+    // Copying the result costs as much as collecting it.
+    learn_point_cost(apply_seconds_ + 2 * (now() - begin));
+    added_points_ = removed_points_ = apply_seconds_ = 0;
     return changes_;
   }
   [[nodiscard]] std::span<const stream::ByteRange> missing() const override {
@@ -156,28 +156,30 @@ class SceneOf final : public Scene {
     return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch())
         .count();
   }
-  /// Learns the cost of an added and of a removed point by normalised least mean squares. Estimates
-  /// rise fast and fall slowly. A measurement disturbed from outside counts as at most twice the
-  /// expected cost.
-  void learn_after(double measured) {
-    const double size = came_ * came_ + went_ * went_;
+  /// Estimates the cost of an added and of a removed point by normalised least mean squares.
+  /// Estimates rise fast and fall slowly. A measurement counts as at most twice the expected cost,
+  /// because other programs may have disturbed it. measured: in seconds.
+  void learn_point_cost(double measured) {
+    const double size = added_points_ * added_points_ + removed_points_ * removed_points_;
     if (size < 64 * 64) return;
-    const double expected = came_ * after_rate_[0] + went_ * after_rate_[1];
+    const double expected = added_points_ * point_cost_[0] + removed_points_ * point_cost_[1];
     if (expected > 0) measured = std::min(measured, 2 * expected + 5e-4);
     const double error = measured - expected;
     const double step = (expected == 0 ? 1.0 : error > 0 ? 0.5 : 0.02) * error / size;
-    after_rate_[0] = std::max(0.0, after_rate_[0] + step * came_);
-    after_rate_[1] = std::max(0.0, after_rate_[1] + step * went_);
+    point_cost_[0] = std::max(0.0, point_cost_[0] + step * added_points_);
+    point_cost_[1] = std::max(0.0, point_cost_[1] + step * removed_points_);
   }
   [[nodiscard]] const auto& mesh() const { return view_.model().triangulation(); }
-  [[nodiscard]] static std::uint32_t drawn(tri::VertexId v) { return kSpareVertices + slot(v); }
-  [[nodiscard]] static std::uint32_t drawn(tri::TriangleId t) { return kSpareTriangles + slot(t); }
-  [[nodiscard]] static SceneTriangle drawn(const std::array<tri::VertexId, 3>& corners) {
-    return {drawn(corners[0]), drawn(corners[1]), drawn(corners[2])};
+  [[nodiscard]] static std::uint32_t draw_slot(tri::VertexId v) { return kSpareVertices + slot(v); }
+  [[nodiscard]] static std::uint32_t draw_slot(tri::TriangleId t) {
+    return kSpareTriangles + slot(t);
+  }
+  [[nodiscard]] static SceneTriangle draw_slot(const std::array<tri::VertexId, 3>& corners) {
+    return {draw_slot(corners[0]), draw_slot(corners[1]), draw_slot(corners[2])};
   }
   void grow() {
     vertices_.grow(kSpareVertices + mesh().vertex_slots());
-    listed_.resize(mesh().vertex_slots());
+    is_queued_.resize(mesh().vertex_slots());
     if constexpr (kTriangles) triangles_.grow(kSpareTriangles + mesh().triangle_slots());
     if constexpr (kRaster) spans_gap_.resize(has_gaps_ ? mesh().triangle_slots() : 0);
     if constexpr (kTriangles && !kRaster) normals_.grow(mesh().vertex_slots());
@@ -185,7 +187,7 @@ class SceneOf final : public Scene {
   /// Places a vertex without sliding.
   void place(tri::VertexId vertex) {
     const Point3 p = difference(view_.in_view_frame(vertex), base_);
-    Vertex& v = vertices_.change(drawn(vertex));
+    Vertex& v = vertices_.change(draw_slot(vertex));
     v.x = static_cast<float>(p[0]);
     v.y = static_cast<float>(p[1]);
     v.z = static_cast<float>(p[2]);
@@ -201,19 +203,19 @@ class SceneOf final : public Scene {
   }
   template <class Delta>
   void apply(const Delta& delta, double time);
-  /// Returns the triangle as it is drawn.
+  /// Adds a triangle. Returns its corners as they are drawn.
   SceneTriangle add(tri::TriangleId triangle) {
     const auto corners = mesh().vertices(triangle);
-    for (const tri::VertexId corner : corners) list(corner);
+    for (const tri::VertexId corner : corners) queue_normal(corner);
     if constexpr (!kRaster) normals_.add({slot(corners[0]), slot(corners[1]), slot(corners[2])});
-    return look_at(triangle);
+    return drawn_triangle(triangle);
   }
-  void list(tri::VertexId vertex) {
-    if (slot(vertex) >= listed_.size() || listed_[slot(vertex)]) return;
-    listed_[slot(vertex)] = true;
-    without_normal_.push_back(vertex);
+  void queue_normal(tri::VertexId vertex) {
+    if (slot(vertex) >= is_queued_.size() || is_queued_[slot(vertex)]) return;
+    is_queued_[slot(vertex)] = true;
+    stale_normals_.push_back(vertex);
   }
-  void renew_normals();
+  void update_normals();
   template <class Visit>
   void for_triangles_around(tri::VertexId vertex, const Visit& visit) const {
     // Go counter-clockwise, and from the hull the other way as well.
@@ -229,15 +231,15 @@ class SceneOf final : public Scene {
     }
   }
   /// Returns where the page draws a vertex at a time.
-  [[nodiscard]] static Point3 place_at(const Vertex& v, double time) {
+  [[nodiscard]] static Point3 position_at(const Vertex& v, double time) {
     const double t = std::clamp((time - v.start_time) / kSlide, 0.0, 1.0);
-    const double left = 1 - t * t * (3 - 2 * t);
+    const double remaining = 1 - t * t * (3 - 2 * t);
     Point3 place{v.x, v.y, v.z};
     if constexpr (kRaster) {
-      place[2] += left * (v.start_z - v.z);
+      place[2] += remaining * (v.start_z - v.z);
     } else {
       for (std::size_t k = 0; k < 3; ++k)
-        place[k] += left * std::ldexp(v.start[k], v.start_exponent);
+        place[k] += remaining * std::ldexp(v.start[k], v.start_exponent);
     }
     return place;
   }
@@ -250,13 +252,14 @@ class SceneOf final : public Scene {
     if constexpr (kRaster) {
       v.start_z = static_cast<float>(from[2]);
     } else {
-      const Point3 way = difference(from, to);
+      const Point3 offset = difference(from, to);
       int exponent = 0;
-      std::frexp(std::max({std::abs(way[0]), std::abs(way[1]), std::abs(way[2])}), &exponent);
+      std::frexp(std::max({std::abs(offset[0]), std::abs(offset[1]), std::abs(offset[2])}),
+                 &exponent);
       exponent = std::clamp(exponent - kStartBits, -128, 127);
       v.start_exponent = static_cast<std::int8_t>(exponent);
       for (std::size_t k = 0; k < 3; ++k) {
-        v.start[k] = static_cast<std::int16_t>(std::lround(std::ldexp(way[k], -exponent)));
+        v.start[k] = static_cast<std::int16_t>(std::lround(std::ldexp(offset[k], -exponent)));
       }
     }
   }
@@ -266,21 +269,21 @@ class SceneOf final : public Scene {
   }
   void slide(const tri::Slides& slides, double time) {
     for (std::size_t i = 0; i < slides.size(); ++i) {
-      move(vertices_.change(drawn(slides.vertices[i])), to_draw(slides.start[i]),
+      move(vertices_.change(draw_slot(slides.vertices[i])), to_draw(slides.start[i]),
            to_draw(slides.end[i]), time);
     }
   }
   template <class Delta>
-  void wait(const Delta& delta, double time);
+  void delay_removals(const Delta& delta, double time);
   [[nodiscard]] Point3 position(tri::VertexId vertex) const {
-    const Vertex& v = vertices_[drawn(vertex)];
+    const Vertex& v = vertices_[draw_slot(vertex)];
     return {v.x + base_[0], v.y + base_[1], v.z + base_[2]};
   }
 
   /// Returns the triangle as it is drawn: empty where a raster has no data.
-  [[nodiscard]] SceneTriangle look_at(tri::TriangleId triangle) {
+  [[nodiscard]] SceneTriangle drawn_triangle(tri::TriangleId triangle) {
     if (has_gaps_) set_gap(triangle, view_.spans_gap(triangle));
-    return is_gap(triangle) ? SceneTriangle{} : drawn(mesh().vertices(triangle));
+    return is_gap(triangle) ? SceneTriangle{} : draw_slot(mesh().vertices(triangle));
   }
   void set_gap(tri::TriangleId triangle, bool spans) {
     gaps_ += static_cast<std::size_t>(spans) - static_cast<std::size_t>(is_gap(triangle));
@@ -289,7 +292,7 @@ class SceneOf final : public Scene {
   [[nodiscard]] bool is_gap(tri::TriangleId triangle) const {
     return has_gaps_ && spans_gap_[slot(triangle)];
   }
-  void renew_gaps(double until);
+  void update_gaps(double until);
 
   stream::Store store_;
   View view_;
@@ -302,159 +305,162 @@ class SceneOf final : public Scene {
   std::vector<Vertex> changed_vertices_;
   Blocks<SceneTriangle> triangles_;
   SceneChanges changes_;
-  std::vector<bool> listed_;  // in without_normal_, by slot
-  std::vector<tri::VertexId> without_normal_, ring_;
+  std::vector<bool> is_queued_;  // in stale_normals_, by slot
+  std::vector<tri::VertexId> stale_normals_, ring_;
   std::vector<tri::ClusterId> pinned_;
   bool has_gaps_ = view_.has_gaps();
   std::vector<bool> spans_gap_;  ///< whether a triangle spans a gap, by slot
   std::size_t gaps_ = 0;         ///< number of triangles that span one
-  /// Triangle slots to check from next_unsure_ on, see renew_gaps().
+  /// Triangle slots to check from next_unsure_ on; see update_gaps().
   std::uint32_t unsure_ = 0, next_unsure_ = 0;
   mutable tri::VertexId picked_ = tri::kNoVertex;
   /// Seconds that the changes of an added, or removed, point cost after a step.
-  std::array<double, 2> after_rate_{};
-  double after_ = 0, came_ = 0, went_ = 0;  ///< since changes were last taken
+  std::array<double, 2> point_cost_{};
+  double apply_seconds_ = 0, added_points_ = 0,
+         removed_points_ = 0;  ///< since changes were last taken
   /// Unused for points.
   std::conditional_t<kTriangles, tri::Geomorph<typename Triangulation::type>, std::monostate>
       morph_;
   BodyNormals normals_;  // for surfaces in space
-  Waiting<Vertex> waiting_{vertices_, triangles_};
+  Transitions<Vertex> transitions_{vertices_, triangles_};
   /// A connected part of the last step.
   struct Part {
     std::uint32_t vertices = 0, triangles = 0;  ///< removed ones
-    bool waits = true;
+    bool delayed = true;
     std::uint32_t group = 0;
   };
   std::vector<Part> parts_;
-  /// By drawn slot, unset between calls: the part that removes a vertex, then the slot where it
-  /// stays drawn.
-  std::vector<std::uint32_t> leaving_;
-  /// Removed triangles that are still drawn with such a vertex, and their groups.
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> leaving_kept_;
+  /// By drawn slot of a removed vertex: the part that removes it, then the slot where it stays
+  /// drawn. Unset between calls.
+  std::vector<std::uint32_t> redirect_;
+  /// Removed triangles that are still drawn and have such a vertex, and their groups.
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> redirected_triangles_;
 };
 
-/// Newly read clusters can change whether a triangle far from them spans a gap, so all triangles
-/// are checked in turn: a thousand per frame, and more if nothing else is left to do, for up to
-/// half of the time.
+/// Checks whether triangles span gaps. Newly read clusters can change that for triangles far from
+/// them, so all triangles are checked in turn, a thousand per frame. If there is no other work, the
+/// check continues for up to half of the frame.
 template <class Shown>
-void SceneOf<Shown>::renew_gaps(double until) {
+void SceneOf<Shown>::update_gaps(double until) {
   constexpr std::uint32_t kAtOnce = 1024;
-  const bool settled = view_.settled() && waiting_.empty();
+  const bool settled = view_.settled() && transitions_.empty();
   if constexpr (kRaster) {
     if (!has_gaps_) return;
     const std::uint32_t slots = mesh().triangle_slots();
     if (!settled) unsure_ = slots;
-    for (std::uint32_t looks = 0; unsure_ > 0; --unsure_) {
-      if (++looks % kAtOnce == 0 && (!settled || now() > until)) break;
+    for (std::uint32_t checks = 0; unsure_ > 0; --unsure_) {
+      if (++checks % kAtOnce == 0 && (!settled || now() > until)) break;
       next_unsure_ = (next_unsure_ + 1) % slots;
       const tri::TriangleId triangle{next_unsure_};
-      const std::uint32_t at = drawn(triangle);
-      if (!mesh().alive(triangle) || waiting_.hiding(at) != Waiting<Vertex>::kNone) continue;
-      const SceneTriangle corners = look_at(triangle);
+      const std::uint32_t at = draw_slot(triangle);
+      if (!mesh().alive(triangle) || transitions_.hiding(at) != Transitions<Vertex>::kNone)
+        continue;
+      const SceneTriangle corners = drawn_triangle(triangle);
       if (triangles_[at] == corners) continue;
       triangles_.change(at) = corners;
-      for (const tri::VertexId corner : mesh().vertices(triangle)) list(corner);
+      for (const tri::VertexId corner : mesh().vertices(triangle)) queue_normal(corner);
     }
-    renew_normals();
+    update_normals();
   }
 }
 
-/// Makes the connected parts of a step that only remove vertices (collapses) wait. A part that
-/// changes hidden triangles joins the group that hides them, or ends that group if the part itself
-/// does not wait.
+/// Delays the removal of the connected parts of a step that only remove vertices (collapses). If a
+/// part changes hidden triangles, it joins the group that hides them. If the part is not delayed,
+/// that group ends.
 template <class Shown>
 template <class Delta>
-void SceneOf<Shown>::wait(const Delta& delta, double time) {
-  constexpr std::uint32_t kNone = Waiting<Vertex>::kNone;
+void SceneOf<Shown>::delay_removals(const Delta& delta, double time) {
+  constexpr std::uint32_t kNone = Transitions<Vertex>::kNone;
   const auto& changes = delta.changes;
   const auto& numbers = morph_.parts;
   parts_.assign(numbers.count, {});
   for (const std::uint32_t p : numbers.removed) ++parts_[p].vertices;
   for (const std::uint32_t p : numbers.removed_triangles) ++parts_[p].triangles;
-  for (const std::uint32_t p : numbers.added) parts_[p].waits = false;
-  std::size_t vertices = waiting_.vertex_room(), triangles = waiting_.triangle_room();
+  for (const std::uint32_t p : numbers.added) parts_[p].delayed = false;
+  std::size_t vertices = transitions_.vertex_room(), triangles = transitions_.triangle_room();
   for (Part& part : parts_) {
-    part.waits =
-        part.waits && part.vertices > 0 && part.vertices <= vertices && part.triangles <= triangles;
-    if (!part.waits) continue;
+    part.delayed = part.delayed && part.vertices > 0 && part.vertices <= vertices &&
+                   part.triangles <= triangles;
+    if (!part.delayed) continue;
     vertices -= part.vertices;
     triangles -= part.triangles;
   }
 
-  leaving_.resize(vertices_.size(), kNone);
+  redirect_.resize(vertices_.size(), kNone);
   for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
-    leaving_[drawn(morph_.removed.vertices[i])] = numbers.removed[i];
+    redirect_[draw_slot(morph_.removed.vertices[i])] = numbers.removed[i];
   }
-  const auto for_touched = [&](const auto& visit) {
-    if (waiting_.empty()) return;
+  const auto for_each_affected = [&](const auto& visit) {
+    if (transitions_.empty()) return;
     for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
-      const std::uint32_t group = waiting_.hiding(drawn(changes.removed_triangles[i]));
+      const std::uint32_t group = transitions_.hiding(draw_slot(changes.removed_triangles[i]));
       if (group != kNone) visit(parts_[numbers.removed_triangles[i]], group);
     }
-    for (const auto& [kept, group] : leaving_kept_) {
-      for (const std::uint32_t corner : triangles_[kept]) {
-        if (leaving_[corner] != kNone) visit(parts_[leaving_[corner]], group);
+    for (const auto& [removed_slot, group] : redirected_triangles_) {
+      for (const std::uint32_t corner : triangles_[removed_slot]) {
+        if (redirect_[corner] != kNone) visit(parts_[redirect_[corner]], group);
       }
     }
   };
-  // On the hull a vertex may have lost all its triangles without new ones, so check the removed
-  // triangles that are still drawn too.
-  const auto find_kept = [&] {
-    leaving_kept_.clear();
+  // On the hull a vertex may lose all its triangles without getting new ones, so this also checks
+  // the removed triangles that are still drawn.
+  const auto find_redirected_triangles = [&] {
+    redirected_triangles_.clear();
     if (numbers.removed.empty()) return;
-    waiting_.for_kept([&](std::uint32_t kept, std::uint32_t group) {
-      const auto& [a, b, c] = triangles_[kept];
-      if ((leaving_[a] & leaving_[b] & leaving_[c]) != kNone)
-        leaving_kept_.emplace_back(kept, group);
+    transitions_.for_each_triangle([&](std::uint32_t removed_slot, std::uint32_t group) {
+      const auto& [a, b, c] = triangles_[removed_slot];
+      if ((redirect_[a] & redirect_[b] & redirect_[c]) != kNone)
+        redirected_triangles_.emplace_back(removed_slot, group);
     });
   };
-  find_kept();
-  for_touched([&](const Part& part, std::uint32_t group) {
-    if (!part.waits || time - waiting_.begin(group) > kLongestWait) waiting_.end(group);
+  find_redirected_triangles();
+  for_each_affected([&](const Part& part, std::uint32_t group) {
+    if (!part.delayed || time - transitions_.begin(group) > kLongestDelay) transitions_.end(group);
   });
-  if (waiting_.sweep()) find_kept();
+  if (transitions_.sweep()) find_redirected_triangles();
   for (Part& part : parts_) {
-    if (part.waits) part.group = waiting_.open(time, time + kWait);
+    if (part.delayed) part.group = transitions_.open(time, time + kRemovalDelay);
   }
-  for_touched([&](const Part& part, std::uint32_t group) { waiting_.join(part.group, group); });
+  for_each_affected(
+      [&](const Part& part, std::uint32_t group) { transitions_.join(part.group, group); });
 
-  for (std::size_t i = 0; i < waiting_.anchors().size(); ++i) {
-    const tri::Anchor& anchor = waiting_.anchors()[i];
+  for (std::size_t i = 0; i < transitions_.anchors().size(); ++i) {
+    const tri::Anchor& anchor = transitions_.anchors()[i];
     if (!anchor.moved) continue;
-    Vertex& v = vertices_.change(waiting_.slot_of_anchor(i));
-    move(v, place_at(v, time), to_draw(anchor.end), time);
+    Vertex& v = vertices_.change(transitions_.slot_of_anchor(i));
+    move(v, position_at(v, time), to_draw(anchor.end), time);
   }
   for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
     const Part& part = parts_[numbers.removed[i]];
-    std::uint32_t& on = leaving_[drawn(morph_.removed.vertices[i])];
+    std::uint32_t& on = redirect_[draw_slot(morph_.removed.vertices[i])];
     on = kNone;
-    if (!part.waits) continue;
-    Vertex v = vertices_[drawn(morph_.removed.vertices[i])];
-    move(v, place_at(v, time), to_draw(morph_.removed.end[i]), time);
-    on = waiting_.keep(
+    if (!part.delayed) continue;
+    Vertex v = vertices_[draw_slot(morph_.removed.vertices[i])];
+    move(v, position_at(v, time), to_draw(morph_.removed.end[i]), time);
+    on = transitions_.keep(
         part.group, v,
         {morph_.removed.start[i], morph_.removed.end[i], morph_.removed_on[i], false});
   }
-  const auto drawn_on = [&](SceneTriangle corners) {
+  const auto redirected = [&](SceneTriangle corners) {
     for (std::uint32_t& corner : corners) {
-      if (leaving_[corner] != kNone) corner = leaving_[corner];
+      if (redirect_[corner] != kNone) corner = redirect_[corner];
     }
     return corners;
   };
-  for (const auto& [kept, group] : leaving_kept_) {
-    triangles_.change(kept) = drawn_on(triangles_[kept]);
+  for (const auto& [removed_slot, group] : redirected_triangles_) {
+    triangles_.change(removed_slot) = redirected(triangles_[removed_slot]);
   }
   for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
     const Part& part = parts_[numbers.removed_triangles[i]];
-    const std::uint32_t triangle = drawn(changes.removed_triangles[i]);
-    if (!part.waits) continue;
-    if (waiting_.hiding(triangle) != kNone) {
-      waiting_.forget(triangle);
+    const std::uint32_t triangle = draw_slot(changes.removed_triangles[i]);
+    if (!part.delayed) continue;
+    if (transitions_.hiding(triangle) != kNone) {
+      transitions_.forget(triangle);
     } else if (triangles_[triangle] != SceneTriangle{}) {
-      waiting_.keep(part.group, drawn_on(triangles_[triangle]));
+      transitions_.keep(part.group, redirected(triangles_[triangle]));
     }
   }
-  for (const tri::VertexId vertex : morph_.removed.vertices) leaving_[drawn(vertex)] = kNone;
+  for (const tri::VertexId vertex : morph_.removed.vertices) redirect_[draw_slot(vertex)] = kNone;
 }
 
 template <class Shown>
@@ -468,16 +474,17 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
         delta.reassigned.empty()) {
       return;
     }
-    morph_.make(view_.model(), delta, true, waiting_.anchors());
-    wait(delta, time);
+    morph_.make(view_.model(), delta, true, transitions_.anchors());
+    delay_removals(delta, time);
     for (std::size_t i = 0; i < changes.removed_triangles.size(); ++i) {
       const auto& c = changes.removed_corners[i];
       if constexpr (!kRaster) normals_.remove({slot(c[0]), slot(c[1]), slot(c[2])});
-      triangles_.change(drawn(changes.removed_triangles[i])) = {};
+      triangles_.change(draw_slot(changes.removed_triangles[i])) = {};
       if (has_gaps_) set_gap(changes.removed_triangles[i], false);
     }
   }
-  for (const tri::VertexId vertex : changes.removed_vertices) vertices_.change(drawn(vertex)) = {};
+  for (const tri::VertexId vertex : changes.removed_vertices)
+    vertices_.change(draw_slot(vertex)) = {};
   for (const tri::VertexId vertex : changes.added_vertices) place(vertex);
   for (const tri::VertexId vertex : delta.reassigned) place(vertex);
   if constexpr (kTriangles) {
@@ -485,40 +492,40 @@ void SceneOf<Shown>::apply(const Delta& delta, double time) {
       const tri::TriangleId triangle = changes.added_triangles[i];
       const Part& part = parts_[morph_.parts.added_triangles[i]];
       const SceneTriangle corners = add(triangle);
-      if (part.waits) {
-        waiting_.hide(part.group, drawn(triangle), corners);
+      if (part.delayed) {
+        transitions_.hide(part.group, draw_slot(triangle), corners);
       } else {
-        triangles_.change(drawn(triangle)) = corners;
+        triangles_.change(draw_slot(triangle)) = corners;
       }
     }
     for (const auto& corners : changes.removed_corners) {
-      for (const tri::VertexId vertex : corners) list(vertex);
+      for (const tri::VertexId vertex : corners) queue_normal(vertex);
     }
     if constexpr (kRaster) {
       for (const tri::VertexId vertex : delta.reassigned) {
-        list(vertex);
+        queue_normal(vertex);
         mesh().adjacent(vertex, ring_);
-        for (const tri::VertexId other : ring_) list(other);
+        for (const tri::VertexId other : ring_) queue_normal(other);
       }
     }
-    renew_normals();
+    update_normals();
     slide(morph_.added, time);
     slide(morph_.reassigned, time);
   }
 }
 
 template <class Shown>
-void SceneOf<Shown>::renew_normals() {
+void SceneOf<Shown>::update_normals() {
   if constexpr (kTriangles && !kRaster) {
-    for (const tri::VertexId vertex : without_normal_) {
-      listed_[slot(vertex)] = false;
-      if (mesh().alive(vertex)) vertices_.change(drawn(vertex)).normal = normals_[slot(vertex)];
+    for (const tri::VertexId vertex : stale_normals_) {
+      is_queued_[slot(vertex)] = false;
+      if (mesh().alive(vertex)) vertices_.change(draw_slot(vertex)).normal = normals_[slot(vertex)];
     }
-    without_normal_.clear();
+    stale_normals_.clear();
   }
   if constexpr (kRaster) {
-    for (const tri::VertexId vertex : without_normal_) {
-      listed_[slot(vertex)] = false;
+    for (const tri::VertexId vertex : stale_normals_) {
+      is_queued_[slot(vertex)] = false;
       if (!mesh().alive(vertex)) continue;
       Point3 sum{};
       for_triangles_around(vertex, [&](tri::TriangleId triangle) {
@@ -531,13 +538,13 @@ void SceneOf<Shown>::renew_normals() {
         for (std::size_t k = 0; k < 3; ++k) sum[k] += sign * normal[k];
       });
       const double length = std::sqrt(dot(sum, sum));
-      SceneVertex& v = vertices_.change(drawn(vertex));
+      SceneVertex& v = vertices_.change(draw_slot(vertex));
       for (std::size_t k = 0; k < 3; ++k) {
         v.normal[k] = length > 0 ? static_cast<std::int8_t>(std::lround(127 * sum[k] / length))
                                  : static_cast<std::int8_t>(k == 2 ? 127 : 0);
       }
     }
-    without_normal_.clear();
+    stale_normals_.clear();
   }
 }
 
@@ -545,7 +552,7 @@ template <class Shown>
 std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3& direction,
                                              double angle) const {
   const double length = std::sqrt(dot(direction, direction));
-  const Point3 way{direction[0] / length, direction[1] / length, direction[2] / length};
+  const Point3 unit{direction[0] / length, direction[1] / length, direction[2] / length};
   double best = std::numeric_limits<double>::infinity();
   std::optional<SceneHit> hit;
   const auto hit_at = [&](tri::VertexId vertex, const Point3& stored, const Point3& place) {
@@ -567,30 +574,30 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
     if (mesh().triangle_count() > gaps_) {
       // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
       // doi:10.1080/10867651.1997.10487468.
-      tri::TriangleId found = tri::kNoTriangle;
+      tri::TriangleId hit_triangle = tri::kNoTriangle;
       std::array<double, 3> weights{};
       for (const tri::TriangleId triangle : mesh().all_triangles()) {
         const auto corners = mesh().vertices(triangle);
         const Point3 a = position(corners[0]);
         const Point3 ab = difference(position(corners[1]), a),
                      ac = difference(position(corners[2]), a);
-        const Point3 p = cross(way, ac);
+        const Point3 p = cross(unit, ac);
         const double determinant = dot(ab, p);
         if (determinant == 0) continue;
         const Point3 from = difference(origin, a);
         const double u = dot(from, p) / determinant;
         if (!(u >= 0 && u <= 1)) continue;
         const Point3 q = cross(from, ab);
-        const double v = dot(way, q) / determinant;
+        const double v = dot(unit, q) / determinant;
         if (!(v >= 0 && u + v <= 1)) continue;
         const double distance = dot(ac, q) / determinant;
         if (!(distance > 0 && distance < best) || is_gap(triangle)) continue;
         best = distance;
-        found = triangle;
+        hit_triangle = triangle;
         weights = {1 - u - v, u, v};
       }
-      if (found == tri::kNoTriangle) return {};
-      const auto vertices = mesh().vertices(found);
+      if (hit_triangle == tri::kNoTriangle) return {};
+      const auto vertices = mesh().vertices(hit_triangle);
       Point3 stored{};
       std::size_t nearest = 0;
       for (std::size_t i = 0; i < 3; ++i) {
@@ -599,17 +606,18 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
         if (weights[i] > weights[nearest]) nearest = i;
       }
       hit_at(vertices[nearest], stored,
-             {origin[0] + best * way[0], origin[1] + best * way[1], origin[2] + best * way[2]});
+             {origin[0] + best * unit[0], origin[1] + best * unit[1], origin[2] + best * unit[2]});
       const Point3 aside = difference(position(vertices[nearest]), hit->place);
       // Positions were rounded to floats.
       const Point3 size = difference(box().max, box().min);
-      hit->reach = 1.001 * std::sqrt(dot(aside, aside)) + 1e-6 * std::sqrt(dot(size, size));
+      hit->corner_distance =
+          1.001 * std::sqrt(dot(aside, aside)) + 1e-6 * std::sqrt(dot(size, size));
       return hit;
     }
   }
   for (const tri::VertexId vertex : mesh().all_vertices()) {
     const Point3 place = position(vertex), to = difference(place, origin);
-    const double along = dot(to, way);
+    const double along = dot(to, unit);
     if (along <= 0) continue;
     const double aside = std::sqrt(std::max(0.0, dot(to, to) - along * along)) / along;
     // Among points that are about equally near to the line, the one nearest to the eye hides the
@@ -626,30 +634,30 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
   std::vector<std::array<std::uint32_t, 2>> lines;
   const auto& model = view_.model();
   if (tri::level_of(cluster) >= model.top() || !model.is_expanded(cluster)) return lines;
-  std::vector<tri::ClusterId> below{cluster}, children;
-  for (std::size_t i = 0; i < below.size(); ++i) {
-    model.children(below[i], children);
+  std::vector<tri::ClusterId> inside{cluster}, children;
+  for (std::size_t i = 0; i < inside.size(); ++i) {
+    model.children(inside[i], children);
     for (const tri::ClusterId child : children) {
-      if (model.is_expanded(child)) below.push_back(child);
+      if (model.is_expanded(child)) inside.push_back(child);
     }
   }
-  std::sort(below.begin(), below.end());
-  std::vector<bool> belongs(vertices_.size());
+  std::sort(inside.begin(), inside.end());
+  std::vector<bool> is_inside(vertices_.size());
   for (const tri::VertexId vertex : mesh().all_vertices()) {
-    belongs[drawn(vertex)] =
-        std::binary_search(below.begin(), below.end(), model.point_id(vertex).cluster);
+    is_inside[draw_slot(vertex)] =
+        std::binary_search(inside.begin(), inside.end(), model.point_id(vertex).cluster);
   }
-  belongs[drawn(model.head_vertex(cluster))] = true;
+  is_inside[draw_slot(model.head_vertex(cluster))] = true;
   if constexpr (!kTriangles) {
-    for (std::uint32_t i = 0; i < belongs.size(); ++i) {
-      if (belongs[i]) lines.push_back({i, i});
+    for (std::uint32_t i = 0; i < is_inside.size(); ++i) {
+      if (is_inside[i]) lines.push_back({i, i});
     }
   } else {
     // An edge between two triangles inside appears twice, once in each direction.
     std::vector<std::array<std::uint32_t, 2>> edges;
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
-      const SceneTriangle c = drawn(mesh().vertices(triangle));
-      if (!belongs[c[0]] || !belongs[c[1]] || !belongs[c[2]]) continue;
+      const SceneTriangle c = draw_slot(mesh().vertices(triangle));
+      if (!is_inside[c[0]] || !is_inside[c[1]] || !is_inside[c[2]]) continue;
       for (std::size_t i = 0; i < 3; ++i) edges.push_back({c[i], c[(i + 1) % 3]});
     }
     std::sort(edges.begin(), edges.end());
@@ -666,7 +674,7 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
 
 std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::LinearMap& ground,
                                    std::size_t max_points,
-                                   const std::function<bool(const stream::ByteRange&)>& given) {
+                                   const std::function<bool(const stream::ByteRange&)>& has_bytes) {
   if (store.points() == 0) throw std::invalid_argument("the store has no points");
   tri::ViewOptions options;
   options.max_points = max_points;
@@ -674,13 +682,13 @@ std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::Lin
   options.model.reserve = max_points;
 #ifdef TERRACE_VIEWER_BODY
   return std::make_unique<SceneOf<tri::DynamicSurface<std::int32_t>>>(store, ground, options,
-                                                                      given);
+                                                                      has_bytes);
 #else
   if (store.schema().grid) {
     options.model.old_heights = true;  // for the slides
-    return std::make_unique<SceneOf<std::int32_t>>(store, ground, options, given);
+    return std::make_unique<SceneOf<std::int32_t>>(store, ground, options, has_bytes);
   }
-  return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options, given);
+  return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options, has_bytes);
 #endif
 }
 

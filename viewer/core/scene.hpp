@@ -77,7 +77,8 @@ struct SceneHit {
   stream::Point3 place{};    ///< the same in the view frame
   unsigned level = 0;        ///< level of the nearest corner
   tri::ClusterId cluster{};  ///< the cluster that has that corner as a member
-  double reach = 0;  ///< on a surface: upper bound of the metres to that corner; for points 0
+  double corner_distance =
+      0;  ///< on a surface: upper bound of the metres to that corner; for points 0
   std::vector<double> attributes{};  ///< stored values of that corner; empty if no longer kept
 };
 
@@ -86,11 +87,11 @@ struct SceneHit {
 /// Bytes of the store may be missing.
 class Scene {
  public:
-  /// Opens a store; `given` is as in terrain::StoreView. Throws stream::MissingBytes,
+  /// Opens a store; `has_bytes` is as in terrain::StoreView. Throws stream::MissingBytes,
   /// stream::Error, and std::invalid_argument for a store without points.
   static std::unique_ptr<Scene> open(
       const stream::Store& store, const stream::LinearMap& ground, std::size_t max_points,
-      const std::function<bool(const stream::ByteRange&)>& given = {});
+      const std::function<bool(const stream::ByteRange&)>& has_bytes = {});
   virtual ~Scene() = default;
 
   /// Works as terrain::StoreView::frame() does. The cost of the changes, here and in

@@ -11,38 +11,40 @@ namespace {
 constexpr unsigned kDigitBits = 11;
 constexpr unsigned kDigits = 1u << kDigitBits;
 constexpr unsigned kKeyBits = 2 * kDigitBits;
-constexpr unsigned kMostAxisBits = 11;
+constexpr unsigned kMaxAxisBits = 11;
 
-/// Places on the Z-order curve through a grid of equal cells over the block's box. Short sides have
-/// fewer cells and so fewer bits in the key, which leaves more bits for the long sides.
+/// The Z-order curve through a grid of equal cells over the block's box. Short sides have fewer
+/// cells and so fewer bits in the key, which leaves more bits for the long sides.
 struct CurveTable {
-  float cells = 0;  ///< per unit of length
-  std::array<std::array<std::uint32_t, 1u << kMostAxisBits>, 3> place;
-  std::array<std::uint32_t, 3> last;  ///< cell of each axis
+  float cells_per_unit = 0;
+  /// By axis and cell: the bits that the cell contributes to the key.
+  std::array<std::array<std::uint32_t, 1u << kMaxAxisBits>, 3> key_bits;
+  std::array<std::uint32_t, 3> last_cell;  ///< by axis
 
   explicit CurveTable(const Point3& extent) {
     // The longest side is in [1/2, 1). A side that is half as long gets one bit less.
-    std::array<unsigned, 3> fewer{};
+    std::array<unsigned, 3> missing_bits{};
     for (unsigned axis = 0; axis < 3; ++axis) {
       double side = extent[axis];
-      while (fewer[axis] < kMostAxisBits && side < 0.5) {
+      while (missing_bits[axis] < kMaxAxisBits && side < 0.5) {
         side *= 2;
-        ++fewer[axis];
+        ++missing_bits[axis];
       }
     }
-    unsigned bits = kMostAxisBits;
+    unsigned bits = kMaxAxisBits;
     const auto total = [&] {
       unsigned sum = 0;
-      for (unsigned axis = 0; axis < 3; ++axis) sum += bits > fewer[axis] ? bits - fewer[axis] : 0;
+      for (unsigned axis = 0; axis < 3; ++axis)
+        sum += bits > missing_bits[axis] ? bits - missing_bits[axis] : 0;
       return sum;
     };
     while (total() > kKeyBits) --bits;
-    cells = static_cast<float>(1u << bits);
+    cells_per_unit = static_cast<float>(1u << bits);
     std::array<unsigned, 3> axis_bits{};
     for (unsigned axis = 0; axis < 3; ++axis) {
-      axis_bits[axis] = bits > fewer[axis] ? bits - fewer[axis] : 0;
-      last[axis] = (1u << axis_bits[axis]) - 1;
-      place[axis][0] = 0;
+      axis_bits[axis] = bits > missing_bits[axis] ? bits - missing_bits[axis] : 0;
+      last_cell[axis] = (1u << axis_bits[axis]) - 1;
+      key_bits[axis][0] = 0;
     }
     unsigned key_bit = 0;
     for (unsigned bit = 0; bit < bits; ++bit) {
@@ -50,7 +52,7 @@ struct CurveTable {
         if (bit >= axis_bits[axis]) continue;
         const std::uint32_t half = 1u << bit;
         for (std::uint32_t cell = 0; cell < half; ++cell) {
-          place[axis][half + cell] = place[axis][cell] | (1u << key_bit);
+          key_bits[axis][half + cell] = key_bits[axis][cell] | (1u << key_bit);
         }
         ++key_bit;
       }
@@ -58,12 +60,13 @@ struct CurveTable {
   }
 
   [[nodiscard]] std::uint32_t key(float x, float y, float z) const {
-    return place[0][cell(x, 0)] | place[1][cell(y, 1)] | place[2][cell(z, 2)];
+    return key_bits[0][cell(x, 0)] | key_bits[1][cell(y, 1)] | key_bits[2][cell(z, 2)];
   }
 
  private:
   [[nodiscard]] std::uint32_t cell(float v, unsigned axis) const {
-    return std::min(static_cast<std::uint32_t>(static_cast<std::int32_t>(v * cells)), last[axis]);
+    return std::min(static_cast<std::uint32_t>(static_cast<std::int32_t>(v * cells_per_unit)),
+                    last_cell[axis]);
   }
 };
 
@@ -77,7 +80,7 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
     column->reserve(padded);
   }
   for (Column<std::uint32_t>* column :
-       {&key_, &other_key_, &order_, &state.original, &state.nearest}) {
+       {&key_, &high_digit_, &order_, &state.original, &state.nearest}) {
     column->reserve(padded);
   }
   for (Column<float>* column :
@@ -85,8 +88,8 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
     column->reserve(padded / kLanes);
   }
   state.scratch_pool.reserve(padded);
-  if (places_.size() < padded) {
-    places_.resize(padded);
+  if (unsorted_.size() < padded) {
+    unsorted_.resize(padded);
     sorted_.resize(padded);
   }
   state.count = count;
@@ -96,10 +99,10 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
   std::array<std::uint32_t, kDigits> high{};
   for (std::uint32_t i = 0; i < count; ++i) {
     const Point3 p = scaling.scaled(points[i]);
-    const Place place{static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2]),
-                      i};
-    places_[i] = place;
-    const std::uint32_t key = table.key(place.x, place.y, place.z);
+    const FloatPoint point{static_cast<float>(p[0]), static_cast<float>(p[1]),
+                           static_cast<float>(p[2]), i};
+    unsorted_[i] = point;
+    const std::uint32_t key = table.key(point.x, point.y, point.z);
     key_[i] = key;
     ++low[key % kDigits];
     ++high[key / kDigits];
@@ -112,19 +115,19 @@ void CurveSorter::load(std::span<const Point3> points, std::span<const double> w
     high_sum += std::exchange(high[digit], high_sum);
   }
   for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint32_t place = low[key_[i] % kDigits]++;
-    order_[place] = i;
-    other_key_[place] = key_[i] / kDigits;
+    const std::uint32_t position = low[key_[i] % kDigits]++;
+    order_[position] = i;
+    high_digit_[position] = key_[i] / kDigits;
   }
   for (std::uint32_t i = 0; i < count; ++i) {
-    sorted_[high[other_key_[i]]++] = places_[order_[i]];
+    sorted_[high[high_digit_[i]]++] = unsorted_[order_[i]];
   }
   for (std::uint32_t i = 0; i < count; ++i) {
-    const Place& place = sorted_[i];
-    state.x[i] = place.x;
-    state.y[i] = place.y;
-    state.z[i] = place.z;
-    state.original[i] = place.original;
+    const FloatPoint& point = sorted_[i];
+    state.x[i] = point.x;
+    state.y[i] = point.y;
+    state.z[i] = point.z;
+    state.original[i] = point.original;
   }
   if (weights.empty()) {
     std::fill_n(static_cast<float*>(state.w), count, 1.0f);

@@ -7,12 +7,12 @@
 
 namespace terrace::cluster {
 
-/// How long the engine searches.
+/// The steps of a search and their lengths.
 struct SearchPlan {
-  std::uint32_t random_candidates = 0;  ///< if not 0, replaces the sweeps
+  std::uint32_t random_candidates = 0;  ///< if positive, replaces the sweeps
   std::uint32_t sweeps = 1;             ///< number of sweeps along the curve
-  float candidates = 3.0f;              ///< least number of candidates per facility and sweep
-  std::uint32_t most_spacing = 32;      ///< largest number of points between candidates
+  float candidates = 3.0f;              ///< candidates per facility and sweep, at least
+  std::uint32_t max_spacing = 32;       ///< largest number of points between candidates
   std::uint32_t polish = 1;             ///< rounds of moving facilities and assigning all points
   std::uint64_t seed = 1;               ///< seed of the random candidates
 };

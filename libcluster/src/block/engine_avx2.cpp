@@ -5,7 +5,7 @@
 
 #include "block/engine_impl.hpp"
 
-/// Sixteen floats in two AVX2 registers; see engine_portable.cpp.
+/// Sixteen floats in two AVX2 registers. engine_portable.cpp describes the operations.
 
 namespace terrace::cluster::simd {
 
@@ -14,9 +14,9 @@ struct CompressTable {
   alignas(32) std::uint32_t order[256][8] = {};
   constexpr CompressTable() {
     for (unsigned set = 0; set < 256; ++set) {
-      unsigned place = 0;
+      unsigned position = 0;
       for (unsigned lane = 0; lane < 8; ++lane) {
-        if (((set >> lane) & 1u) != 0) order[set][place++] = lane;
+        if (((set >> lane) & 1u) != 0) order[set][position++] = lane;
       }
     }
   }
@@ -41,9 +41,11 @@ struct Avx2 {
 
   __m256 low, high;
 
-  static Avx2 load(const float* from) { return {_mm256_loadu_ps(from), _mm256_loadu_ps(from + 8)}; }
-  static Avx2 load_integers(const std::uint32_t* from) {
-    const auto* const eight = reinterpret_cast<const __m256i*>(from);
+  static Avx2 load(const float* source) {
+    return {_mm256_loadu_ps(source), _mm256_loadu_ps(source + 8)};
+  }
+  static Avx2 load_integers(const std::uint32_t* source) {
+    const auto* const eight = reinterpret_cast<const __m256i*>(source);
     return {_mm256_cvtepi32_ps(_mm256_loadu_si256(eight)),
             _mm256_cvtepi32_ps(_mm256_loadu_si256(eight + 1))};
   }
@@ -51,13 +53,13 @@ struct Avx2 {
   static Avx2 iota() {
     return {_mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), _mm256_setr_ps(8, 9, 10, 11, 12, 13, 14, 15)};
   }
-  void store(float* to) const {
-    _mm256_storeu_ps(to, low);
-    _mm256_storeu_ps(to + 8, high);
+  void store(float* target) const {
+    _mm256_storeu_ps(target, low);
+    _mm256_storeu_ps(target + 8, high);
   }
-  void store_as_integers(std::uint32_t* to) const {
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm256_cvttps_epi32(low));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + 8), _mm256_cvttps_epi32(high));
+  void store_as_integers(std::uint32_t* target) const {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(target), _mm256_cvttps_epi32(low));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(target + 8), _mm256_cvttps_epi32(high));
   }
 
   friend Avx2 operator+(Avx2 a, Avx2 b) {
@@ -107,15 +109,16 @@ struct Avx2 {
     const __m128 two = _mm_max_ps(four, _mm_movehl_ps(four, four));
     return _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps(two, two, 1)));
   }
-  friend void compress(float* to, Mask m, Avx2 a) {
+  friend void compress(float* target, Mask m, Avx2 a) {
     const auto first = static_cast<unsigned>(_mm256_movemask_ps(m.low));
     const auto second = static_cast<unsigned>(_mm256_movemask_ps(m.high));
-    _mm256_storeu_ps(to, permuted(a.low, first));
-    _mm256_storeu_ps(to + __builtin_popcount(first), permuted(a.high, second));
+    _mm256_storeu_ps(target, compressed(a.low, first));
+    _mm256_storeu_ps(target + __builtin_popcount(first), compressed(a.high, second));
   }
 
  private:
-  static __m256 permuted(__m256 value, unsigned set) {
+  /// Returns the lanes of the set, moved to the front.
+  static __m256 compressed(__m256 value, unsigned set) {
     const auto* order = reinterpret_cast<const __m256i*>(kCompress.order[set]);
     return _mm256_permutevar8x32_ps(value, _mm256_load_si256(order));
   }

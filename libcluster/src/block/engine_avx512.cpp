@@ -5,7 +5,7 @@
 
 #include "block/engine_impl.hpp"
 
-/// Sixteen floats in one AVX-512 register; see engine_portable.cpp.
+/// Sixteen floats in one AVX-512 register. engine_portable.cpp describes the operations.
 
 namespace terrace::cluster::simd {
 
@@ -19,17 +19,17 @@ struct Avx512 {
 
   __m512 v;
 
-  static Avx512 load(const float* from) { return {_mm512_loadu_ps(from)}; }
-  static Avx512 load_integers(const std::uint32_t* from) {
-    return {_mm512_cvtepi32_ps(_mm512_loadu_si512(from))};
+  static Avx512 load(const float* source) { return {_mm512_loadu_ps(source)}; }
+  static Avx512 load_integers(const std::uint32_t* source) {
+    return {_mm512_cvtepi32_ps(_mm512_loadu_si512(source))};
   }
   static Avx512 broadcast(float value) { return {_mm512_set1_ps(value)}; }
   static Avx512 iota() {
     return {_mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)};
   }
-  void store(float* to) const { _mm512_storeu_ps(to, v); }
-  void store_as_integers(std::uint32_t* to) const {
-    _mm512_storeu_si512(to, _mm512_cvttps_epi32(v));
+  void store(float* target) const { _mm512_storeu_ps(target, v); }
+  void store_as_integers(std::uint32_t* target) const {
+    _mm512_storeu_si512(target, _mm512_cvttps_epi32(v));
   }
 
   friend Avx512 operator+(Avx512 a, Avx512 b) { return {_mm512_add_ps(a.v, b.v)}; }
@@ -63,9 +63,9 @@ struct Avx512 {
     const __m128 two = _mm_max_ps(four, _mm_movehl_ps(four, four));
     return _mm_cvtss_f32(_mm_max_ss(two, _mm_shuffle_ps(two, two, 1)));
   }
-  friend void compress(float* to, Mask m, Avx512 a) {
+  friend void compress(float* target, Mask m, Avx512 a) {
     // Not the variant that stores to memory, which is microcoded on Zen 4.
-    _mm512_storeu_ps(to, _mm512_maskz_compress_ps(m.lanes, a.v));
+    _mm512_storeu_ps(target, _mm512_maskz_compress_ps(m.lanes, a.v));
   }
 
  private:

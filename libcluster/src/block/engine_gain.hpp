@@ -8,13 +8,14 @@
 
 namespace terrace::cluster {
 
-/// One step of the local search: evaluates a candidate and opens it.
+/// A step of the local search: computes the gain of a candidate and opens it.
 template <class V>
 class Gain {
  public:
   explicit Gain(BlockState& state) : s_(state), facilities_(state) {}
 
-  /// Returns the saving from opening a facility at (x, y, z). Fills `near` and `closes`.
+  /// Returns the saving from opening a facility at (x, y, z). Fills `nearby` and
+  /// `close_flag`.
   float gain(float x, float y, float z) {
     const V cx = V::broadcast(x);
     const V cy = V::broadcast(y);
@@ -24,39 +25,40 @@ class Gain {
     std::uint32_t count = 0;
     for (std::uint32_t j = 0; j < facilities; j += kLanes) {
       const V d = squared(V::load(s_.fx + j), V::load(s_.fy + j), V::load(s_.fz + j), cx, cy, cz);
-      std::uint32_t bits = less(d, V::load(s_.reach + j)).bits();
+      std::uint32_t bits = less(d, V::load(s_.gain_range + j)).bits();
       while (bits != 0) {
-        s_.near[count++] = j + static_cast<std::uint32_t>(__builtin_ctz(bits));
+        s_.nearby[count++] = j + static_cast<std::uint32_t>(__builtin_ctz(bits));
         bits &= bits - 1;
       }
     }
-    s_.near_count = count;
+    s_.nearby_count = count;
     float gain = -s_.facility_cost;
-    V spared = zero;
+    V savings = zero;
     for (std::uint32_t k = 0; k < count; ++k) {
-      const std::uint32_t j = s_.near[k];
+      const std::uint32_t j = s_.nearby[k];
       const std::uint32_t first = s_.begin[j];
       const std::uint32_t end = first + round_to_lanes(s_.size[j]);
-      // Closing j loses at least load * |candidate - mean| - spent, because distance is convex.
+      // Distance is convex, so closing j loses at least
+      // weight_sum * |candidate - mean| - connection_cost.
       const float mx = s_.mean_x[j] - x;
       const float my = s_.mean_y[j] - y;
       const float mz = s_.mean_z[j] - z;
-      const float mean_loss = s_.facility_cost + s_.spent[j];
-      const float load = s_.load[j];
-      s_.closes[k] = 0;
-      if (load * load * (mx * mx + my * my + mz * mz) < mean_loss * mean_loss) {
-        V lost = zero;
+      const float loss_limit = s_.facility_cost + s_.connection_cost[j];
+      const float weight = s_.weight_sum[j];
+      s_.close_flag[k] = 0;
+      if (weight * weight * (mx * mx + my * my + mz * mz) < loss_limit * loss_limit) {
+        V losses = zero;
         for (std::uint32_t i = first; i < end; i += kLanes) {
           const V d =
               sqrt(squared(V::load(s_.px + i), V::load(s_.py + i), V::load(s_.pz + i), cx, cy, cz));
           const V change = (V::load(s_.pd + i) - d) * V::load(s_.pw + i);
           const V better = max(change, zero);
-          spared = spared + better;
-          lost = lost + (better - change);
+          savings = savings + better;
+          losses = losses + (better - change);
         }
-        const float loss = sum(lost);
+        const float loss = sum(losses);
         if (loss < s_.facility_cost) {
-          s_.closes[k] = 1;
+          s_.close_flag[k] = 1;
           gain += s_.facility_cost - loss;
         }
       } else {
@@ -64,30 +66,31 @@ class Gain {
           const V d =
               sqrt(squared(V::load(s_.px + i), V::load(s_.py + i), V::load(s_.pz + i), cx, cy, cz));
           const V change = (V::load(s_.pd + i) - d) * V::load(s_.pw + i);
-          spared = spared + max(change, zero);
+          savings = savings + max(change, zero);
         }
       }
     }
-    return gain + sum(spared);
+    return gain + sum(savings);
   }
 
-  /// Opens a facility at the point. The last call must have been gain() for the same point.
+  /// Opens a facility at the point. Requires that the last call was gain() for the same point.
   void open(std::uint32_t point) {
-    std::uint32_t most = kLanes;
-    for (std::uint32_t k = 0; k < s_.near_count; ++k) most += round_to_lanes(s_.size[s_.near[k]]);
-    s_.reserve_pool(most);
+    std::uint32_t capacity = kLanes;
+    for (std::uint32_t k = 0; k < s_.nearby_count; ++k)
+      capacity += round_to_lanes(s_.size[s_.nearby[k]]);
+    s_.reserve_pool(capacity);
     const std::uint32_t first = s_.pool_used;
-    std::uint32_t out = first;
+    std::uint32_t move_end = first;
     const V cx = V::broadcast(s_.x[point]);
     const V cy = V::broadcast(s_.y[point]);
     const V cz = V::broadcast(s_.z[point]);
     const V zero = V::broadcast(0);
-    for (std::uint32_t k = 0; k < s_.near_count; ++k) {
-      const std::uint32_t j = s_.near[k];
-      const bool closes = s_.closes[k] != 0;
+    for (std::uint32_t k = 0; k < s_.nearby_count; ++k) {
+      const std::uint32_t j = s_.nearby[k];
+      const bool close = s_.close_flag[k] != 0;
       const std::uint32_t begin = s_.begin[j];
       const std::uint32_t end = begin + round_to_lanes(s_.size[j]);
-      std::uint32_t kept = begin;
+      std::uint32_t stay_end = begin;
       bool changed = false;
       for (std::uint32_t i = begin; i < end; i += kLanes) {
         const V x = V::load(s_.px + i);
@@ -97,39 +100,39 @@ class Gain {
         const V old = V::load(s_.pd + i);
         const V w = V::load(s_.pw + i);
         const Mask client = less(zero, w);
-        // The last lanes of a vector may be surplus. They have no weight and are not moved.
-        const Mask moves = closes ? client : client & less(d, old);
-        const std::uint32_t bits = moves.bits();
+        // The last lanes of a vector may be surplus. They have no weight, so they do not move.
+        const Mask move_mask = close ? client : client & less(d, old);
+        const std::uint32_t bits = move_mask.bits();
         if (bits == 0 && !changed) {
-          kept = i + kLanes;
+          stay_end = i + kLanes;
           continue;
         }
         const V p = V::load(s_.pp + i);
         if (bits != 0) {
-          compress_points(s_, out, moves, x, y, z, w, d, p);
-          out += static_cast<std::uint32_t>(__builtin_popcount(bits));
+          compress_points(s_, move_end, move_mask, x, y, z, w, d, p);
+          move_end += static_cast<std::uint32_t>(__builtin_popcount(bits));
         }
-        if (!closes) {
-          const Mask stays = client & ~moves;
-          compress_points(s_, kept, stays, x, y, z, w, old, p);
-          kept += static_cast<std::uint32_t>(__builtin_popcount(stays.bits()));
+        if (!close) {
+          const Mask stay_mask = client & ~move_mask;
+          compress_points(s_, stay_end, stay_mask, x, y, z, w, old, p);
+          stay_end += static_cast<std::uint32_t>(__builtin_popcount(stay_mask.bits()));
           changed = true;
         }
       }
       if (changed) {
-        s_.size[j] = kept - begin;
-        clear_surplus(kept);
+        s_.size[j] = stay_end - begin;
+        clear_surplus(stay_end);
         facilities_.summarise(j);
       }
     }
-    for (std::uint32_t k = s_.near_count; k-- > 0;) {
-      if (s_.closes[k] != 0) s_.remove_facility(s_.near[k]);
+    for (std::uint32_t k = s_.nearby_count; k-- > 0;) {
+      if (s_.close_flag[k] != 0) s_.remove_facility(s_.nearby[k]);
     }
     const std::uint32_t j = s_.add_facility(point);
     s_.begin[j] = first;
-    s_.size[j] = out - first;
-    clear_surplus(out);
-    s_.pool_used = first + round_to_lanes(out - first);
+    s_.size[j] = move_end - first;
+    clear_surplus(move_end);
+    s_.pool_used = first + round_to_lanes(move_end - first);
     facilities_.summarise(j);
     facilities_.recentre(j);
   }

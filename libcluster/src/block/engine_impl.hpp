@@ -17,7 +17,7 @@
 
 namespace terrace::cluster {
 
-/// Makes one clustering of the block that the state holds.
+/// The clustering engine: seeds facilities, improves them by local search, and assigns all points.
 template <class V>
 class Engine {
  public:
@@ -55,6 +55,7 @@ class Engine {
     for (std::uint32_t j = 0; j < s_.facility_count; ++j) facilities_.recentre(j);
   }
 
+  /// Opens a facility at the point if that lowers the cost.
   void consider(std::uint32_t point) {
     s_.tick(s_.facility_count / kLanes + 64);
     if (gain_.gain(s_.x[point], s_.y[point], s_.z[point]) > 0) gain_.open(point);
@@ -62,12 +63,12 @@ class Engine {
 
   /// Tries points at equal distances along the curve.
   void sweep(std::uint32_t round, const SearchPlan& plan) {
-    const float wanted = plan.candidates * static_cast<float>(s_.facility_count);
-    auto spacing = static_cast<std::uint32_t>(static_cast<float>(s_.count) / wanted);
-    spacing = spacing < 1 ? 1 : spacing > plan.most_spacing ? plan.most_spacing : spacing;
+    const float candidates = plan.candidates * static_cast<float>(s_.facility_count);
+    auto spacing = static_cast<std::uint32_t>(static_cast<float>(s_.count) / candidates);
+    spacing = spacing < 1 ? 1 : spacing > plan.max_spacing ? plan.max_spacing : spacing;
     const std::uint32_t visits = (s_.count + spacing - 1) / spacing;
-    // Visits in steps near the golden section of their number, so that points affected by a change
-    // are seldom judged right after it.
+    // The steps are near the golden section of the number of visits. So points that a change
+    // affects are seldom tried right after it.
     auto step = static_cast<std::uint32_t>(static_cast<float>(visits) * 0.618034f);
     if (step == 0) step = 1;
     while (common_divisor(step, visits) != 1) ++step;
@@ -82,21 +83,22 @@ class Engine {
 
   /// Opens facilities at points that pay more than a facility costs.
   void open_overpriced() {
-    std::uint32_t found = 0;
+    std::uint32_t count = 0;
     const V limit = V::broadcast(s_.facility_cost);
     for (std::uint32_t j = 0; j < s_.facility_count; ++j) {
       const std::uint32_t end = s_.begin[j] + round_to_lanes(s_.size[j]);
       for (std::uint32_t i = s_.begin[j]; i < end; i += kLanes) {
         const typename V::Mask overpriced = less(limit, V::load(s_.pw + i) * V::load(s_.pd + i));
         for (std::uint32_t bits = overpriced.bits(); bits != 0; bits &= bits - 1) {
-          const std::uint32_t place = i + static_cast<std::uint32_t>(__builtin_ctz(bits));
-          s_.nearest[found++] = static_cast<std::uint32_t>(s_.pp[place]);
+          const std::uint32_t slot = i + static_cast<std::uint32_t>(__builtin_ctz(bits));
+          s_.nearest[count++] = static_cast<std::uint32_t>(s_.pp[slot]);
         }
       }
     }
-    for (std::uint32_t k = 0; k < found; ++k) consider(s_.nearest[k]);
+    for (std::uint32_t k = 0; k < count; ++k) consider(s_.nearest[k]);
   }
 
+  /// Tries random points.
   void search_random(const SearchPlan& plan) {
     std::uint64_t state = plan.seed;
     for (std::uint32_t k = 0; k < plan.random_candidates; ++k) {

@@ -4,9 +4,9 @@
 
 #include "block/engine_impl.hpp"
 
-/// Sixteen floats in plain C++. The operations and their results are the same, to the bit, in
-/// engine_avx2.cpp and engine_avx512.cpp: IEEE arithmetic without contraction, one fixed reduction
-/// tree, and min and max that return the second operand if neither is less.
+/// Sixteen floats in plain C++. The types in engine_avx2.cpp and engine_avx512.cpp have the same
+/// operations, and the results are equal to the last bit. That requires IEEE arithmetic without
+/// contraction, a fixed reduction tree, and min and max that return the second operand on ties.
 
 namespace terrace::cluster::simd {
 
@@ -31,12 +31,12 @@ struct Portable {
     return {bits};
   }
 
-  static Portable load(const float* from) {
-    return each([=](int i) { return from[i]; });
+  static Portable load(const float* source) {
+    return each([=](int i) { return source[i]; });
   }
   /// Loads integers from 0 to 2^24.
-  static Portable load_integers(const std::uint32_t* from) {
-    return each([=](int i) { return static_cast<float>(from[i]); });
+  static Portable load_integers(const std::uint32_t* source) {
+    return each([=](int i) { return static_cast<float>(source[i]); });
   }
   static Portable broadcast(float value) {
     return each([=](int) { return value; });
@@ -45,13 +45,13 @@ struct Portable {
   static Portable iota() {
     return each([](int i) { return static_cast<float>(i); });
   }
-  void store(float* to) const {
-    for (int i = 0; i < 16; ++i) to[i] = v[i];
+  void store(float* target) const {
+    for (int i = 0; i < 16; ++i) target[i] = v[i];
   }
 
   /// Stores integers from 0 to 2^24.
-  void store_as_integers(std::uint32_t* to) const {
-    for (int i = 0; i < 16; ++i) to[i] = static_cast<std::uint32_t>(v[i]);
+  void store_as_integers(std::uint32_t* target) const {
+    for (int i = 0; i < 16; ++i) target[i] = static_cast<std::uint32_t>(v[i]);
   }
 
   friend Portable operator+(Portable a, Portable b) {
@@ -105,10 +105,10 @@ struct Portable {
     }
     return a.v[0];
   }
-  /// Stores the lanes of the mask densely. May write all of to[0 .. 15].
-  friend void compress(float* to, Mask m, Portable a) {
-    for (std::uint32_t left = m.lanes; left != 0; left &= left - 1) {
-      *to++ = a.v[__builtin_ctz(left)];
+  /// Stores the lanes of the mask densely. May write all of target[0 .. 15].
+  friend void compress(float* target, Mask m, Portable a) {
+    for (std::uint32_t remaining = m.lanes; remaining != 0; remaining &= remaining - 1) {
+      *target++ = a.v[__builtin_ctz(remaining)];
     }
   }
 };

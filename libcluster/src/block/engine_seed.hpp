@@ -7,36 +7,36 @@
 
 namespace terrace::cluster {
 
-/// Makes the start: facilities at equal distances along the curve. Their number is derived from the
-/// cost of runs of the curve.
+/// Opens the initial facilities, at equal distances along the curve. Their number follows from the
+/// costs of runs of the curve.
 template <class V>
 class Seeder {
  public:
   explicit Seeder(BlockState& state) : s_(state) {}
 
   void seed() {
-    const float fitted = fitted_count() + 0.5f;
-    auto wanted = static_cast<std::uint32_t>(fitted);
-    wanted = wanted < 1 ? 1 : wanted > s_.count ? s_.count : wanted;
+    const float optimum = optimal_count() + 0.5f;
+    auto target = static_cast<std::uint32_t>(optimum);
+    target = target < 1 ? 1 : target > s_.count ? s_.count : target;
     s_.facility_count = 0;
-    s_.reserve_facilities(wanted + wanted / 2);
-    for (std::uint32_t k = 0; k < wanted; ++k) {
+    s_.reserve_facilities(target + target / 2);
+    for (std::uint32_t k = 0; k < target; ++k) {
       s_.add_facility(
-          static_cast<std::uint32_t>((std::uint64_t{2} * k + 1) * s_.count / (2 * wanted)));
+          static_cast<std::uint32_t>((std::uint64_t{2} * k + 1) * s_.count / (2 * target)));
     }
   }
 
  private:
   /// Returns the number of facilities of least cost if each serves a run of the curve.
-  float fitted_count() {
+  float optimal_count() {
     // Evaluates runs of 16, 32, 64, ... points until their cost has been rising for a while.
-    constexpr int kMost = 24;
-    float total[kMost];
-    float connection[kMost];
+    constexpr int kMaxLevels = 24;
+    float total[kMaxLevels];
+    float connection[kMaxLevels];
     int levels = 0;
     int best = 0;
     const float points = static_cast<float>(s_.count);
-    for (std::uint32_t length = kLanes; levels < kMost; length *= 2) {
+    for (std::uint32_t length = kLanes; levels < kMaxLevels; length *= 2) {
       connection[levels] = run_cost(length);
       total[levels] = s_.facility_cost * points / static_cast<float>(length) + connection[levels];
       if (total[levels] < total[best]) best = levels;
@@ -45,13 +45,13 @@ class Seeder {
     }
     const float count = points / static_cast<float>(kLanes << best);
     if (best + 1 >= levels) return count;
-    if (best == 0) return count_of_short_runs(count, total[0], connection[0], connection[1]);
+    if (best == 0) return extrapolated_count(count, total[0], connection[0], connection[1]);
 
     // Fits a parabola through the least cost and its neighbours, over the logarithm of the length.
-    const float before = total[best - 1];
-    const float after = total[best + 1];
-    const float curvature = before - 2 * total[best] + after;
-    const float shift = curvature > 0 ? 0.5f * (before - after) / curvature : 0.0f;
+    const float shorter_cost = total[best - 1];
+    const float longer_cost = total[best + 1];
+    const float curvature = shorter_cost - 2 * total[best] + longer_cost;
+    const float shift = curvature > 0 ? 0.5f * (shorter_cost - longer_cost) / curvature : 0.0f;
     // 2^-shift for |shift| <= 1/2
     const float stretch = 1.0f + shift * (-0.69315f + shift * (0.24023f - shift * 0.0555f));
     // Runs of a curve are longer than good clusters if the points fill an area or a volume, which
@@ -64,11 +64,11 @@ class Seeder {
     return count * stretch * (correction < 0.7f ? 0.7f : correction > 1.0f ? 1.0f : correction);
   }
 
-  /// Extrapolates to fewer than sixteen points per run, assuming that the cost keeps falling as it
-  /// did from 32 to 16.
-  float count_of_short_runs(float count, float total, float sixteen, float thirty_two) {
-    const float growth = sixteen > 0 ? thirty_two / sixteen : 1.0f;
-    float connection = sixteen;
+  /// Extrapolates to fewer than sixteen points per run, assuming that the cost falls as it does
+  /// from 32 points to 16.
+  float extrapolated_count(float count, float total, float cost16, float cost32) {
+    const float growth = cost16 > 0 ? cost32 / cost16 : 1.0f;
+    float connection = cost16;
     for (int halvings = 0; growth > 1 && halvings < 4; ++halvings) {
       connection /= growth;
       const float next = s_.facility_cost * 2 * count + connection;

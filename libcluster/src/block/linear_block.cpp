@@ -12,7 +12,8 @@ namespace terrace::cluster {
 void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, BlockOptions options,
                 BlockClustering& result) {
   const SearchFrame frame = make_frame(problem);
-  // The clusterer measures the box of the mapped points; the problem measures the mapped box.
+  // The clusterer multiplies the facility cost by the diagonal of the box of the mapped points. The
+  // problem means the diagonal of the mapped box, which is longer if the map rotates.
   const Scaling scaling(frame.points);
   if (scaling.diagonal > 0.0) {
     options.facility_cost = std::clamp(frame.facility_cost / scaling.unscaled(scaling.diagonal),

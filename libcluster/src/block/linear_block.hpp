@@ -13,11 +13,12 @@ namespace terrace::cluster {
 /// (thesis table 7.5).
 inline constexpr std::size_t kFullSearchBelow = 2500;
 
-/// Runs BlockClusterer on points under a metric that is linear on their bounding box, with the
-/// diagonal of that metric. The costs in `result` are those of the mapped points and must not be
-/// used. The problem sets the facility cost of the options.
-/// Requires: the metric has a linear_map() there, no channels, no outliers, check(problem) has
-/// passed.
+/// Runs BlockClusterer under a metric that a linear map of the points makes Euclidean. The facility
+/// cost comes from the problem, as a multiple of the diagonal in that metric, and not from the
+/// options. The costs in `result` are those of the mapped points, so callers must not use them.
+///
+/// Requires: check(problem) has passed, linear_map() exists on the bounding box of the points, and
+/// the problem has neither channels nor outliers.
 void run_linear(BlockClusterer& clusterer, const FacilityPoints& problem, BlockOptions options,
                 BlockClustering& result);
 

@@ -14,13 +14,13 @@ Column<T>::~Column() {
 }
 
 template <class T>
-void Column<T>::reserve(std::size_t count, std::size_t kept) {
+void Column<T>::reserve(std::size_t count, std::size_t preserved) {
   if (count <= capacity_) return;
   const std::size_t capacity =
       (std::max(count, capacity_ + capacity_ / 2) + kLanes - 1) / kLanes * kLanes;
   T* data = static_cast<T*>(::operator new (capacity * sizeof(T), std::align_val_t{64}));
-  if (kept > 0) std::memcpy(data, data_, kept * sizeof(T));
-  std::memset(data + kept, 0, (capacity - kept) * sizeof(T));
+  if (preserved > 0) std::memcpy(data, data_, preserved * sizeof(T));
+  std::memset(data + preserved, 0, (capacity - preserved) * sizeof(T));
   if (data_ != nullptr) ::operator delete (data_, std::align_val_t{64});
   data_ = data;
   capacity_ = capacity;
@@ -38,16 +38,16 @@ template class Column<std::uint32_t>;
 void BlockState::reserve_facilities(std::uint32_t facilities) {
   const std::size_t room = facilities + kLanes;
   if (room <= facility.capacity()) return;
-  for (Column<std::uint32_t>* column : {&facility, &begin, &size, &near, &closes}) {
+  for (Column<std::uint32_t>* column : {&facility, &begin, &size, &nearby, &close_flag, &cursor}) {
     column->reserve(room, facility_count);
   }
-  for (Column<float>* column :
-       {&fx, &fy, &fz, &reach, &furthest, &load, &spent, &mean_x, &mean_y, &mean_z, &scratch}) {
+  for (Column<float>* column : {&fx, &fy, &fz, &gain_range, &longest, &weight_sum, &connection_cost,
+                                &mean_x, &mean_y, &mean_z, &scratch}) {
     column->reserve(room, facility_count);
   }
   for (std::size_t j = facility_count; j < room; ++j) {
     fx[j] = kFarAway;
-    reach[j] = 0;
+    gain_range[j] = 0;
   }
 }
 
@@ -58,12 +58,12 @@ std::uint32_t BlockState::add_facility(std::uint32_t point) {
   fx[j] = x[point];
   fy[j] = y[point];
   fz[j] = z[point];
-  reach[j] = furthest[j] = load[j] = spent[j] = 0;
+  gain_range[j] = longest[j] = weight_sum[j] = connection_cost[j] = 0;
   size[j] = 0;
   // Fills the surplus lanes of the last vector.
   for (std::uint32_t k = facility_count; k < round_to_lanes(facility_count); ++k) {
     fx[k] = kFarAway;
-    fy[k] = fz[k] = reach[k] = 0;
+    fy[k] = fz[k] = gain_range[k] = 0;
   }
   return j;
 }
@@ -72,21 +72,21 @@ void BlockState::remove_facility(std::uint32_t j) {
   const std::uint32_t last = --facility_count;
   if (j != last) {
     for (Column<std::uint32_t>* column : {&facility, &begin, &size}) (*column)[j] = (*column)[last];
-    for (Column<float>* column :
-         {&fx, &fy, &fz, &reach, &furthest, &load, &spent, &mean_x, &mean_y, &mean_z}) {
+    for (Column<float>* column : {&fx, &fy, &fz, &gain_range, &longest, &weight_sum,
+                                  &connection_cost, &mean_x, &mean_y, &mean_z}) {
       (*column)[j] = (*column)[last];
     }
   }
   fx[last] = kFarAway;
-  reach[last] = 0;
+  gain_range[last] = 0;
 }
 
-void BlockState::reserve_pool(std::uint32_t more) {
-  if (pool_used + more <= px.capacity()) return;
-  std::uint32_t live = 0;
-  for (std::uint32_t j = 0; j < facility_count; ++j) live += round_to_lanes(size[j]);
+void BlockState::reserve_pool(std::uint32_t extra) {
+  if (pool_used + extra <= px.capacity()) return;
+  std::uint32_t used = 0;
+  for (std::uint32_t j = 0; j < facility_count; ++j) used += round_to_lanes(size[j]);
   // Leaves half of the pool free, so that compaction is rare.
-  const std::size_t room = std::max<std::size_t>(px.capacity(), 2 * (std::size_t{live} + more));
+  const std::size_t room = std::max<std::size_t>(px.capacity(), 2 * (std::size_t{used} + extra));
   Column<float>* columns[6] = {&px, &py, &pz, &pw, &pd, &pp};
   for (Column<float>& column : spare_) column.reserve(room);
   std::uint32_t end = 0;
@@ -103,31 +103,31 @@ void BlockState::reserve_pool(std::uint32_t more) {
 }
 
 void BlockState::place_segments() {
-  std::uint32_t kept = 0;
+  std::uint32_t number = 0;
   std::uint32_t end = 0;
   for (std::uint32_t j = 0; j < facility_count; ++j) {
-    closes[j] = end;
-    // Its clients belong to a duplicate.
+    cursor[j] = end;
+    // A facility has no clients if a facility with a lower number is at the same position.
     if (size[j] == 0) continue;
-    facility[kept] = facility[j];
-    fx[kept] = fx[j];
-    fy[kept] = fy[j];
-    fz[kept] = fz[j];
-    begin[kept] = end;
+    facility[number] = facility[j];
+    fx[number] = fx[j];
+    fy[number] = fy[j];
+    fz[number] = fz[j];
+    begin[number] = end;
     end += round_to_lanes(size[j]) + kLanes;
-    size[kept++] = size[j];
+    size[number++] = size[j];
   }
-  for (std::uint32_t j = kept; j < facility_count; ++j) {
+  for (std::uint32_t j = number; j < facility_count; ++j) {
     fx[j] = kFarAway;
-    reach[j] = 0;
+    gain_range[j] = 0;
   }
-  facility_count = kept;
+  facility_count = number;
   for (Column<float>* column : {&px, &py, &pz, &pw, &pd, &pp})
     column->reserve(2 * std::size_t{end});
   pool_used = end;
 }
 
-void BlockState::look() {
+void BlockState::check_now() {
   vectors_since_check = 0;
   if (*check_stop) (*check_stop)();
 }

@@ -13,8 +13,8 @@
 
 namespace terrace::cluster {
 
-/// A grow-only array, aligned for vectors, whose capacity is a multiple of sixteen. It manages only
-/// its storage; the owner tracks the number of elements. Defined for float and std::uint32_t.
+/// A grow-only array, aligned for vectors, whose capacity is a multiple of sixteen. It manages
+/// storage only, and its owner tracks the number of elements. Defined for float and std::uint32_t.
 template <class T>
 class Column {
  public:
@@ -22,11 +22,11 @@ class Column {
   Column(const Column&) = delete;
   Column& operator=(const Column&) = delete;
   ~Column();
-  /// Makes room for `count` elements and preserves the first `kept`.
-  void reserve(std::size_t count, std::size_t kept = 0);
+  /// Makes room for `count` elements and preserves the first `preserved`.
+  void reserve(std::size_t count, std::size_t preserved = 0);
   [[nodiscard]] std::size_t capacity() const { return capacity_; }
   void swap(Column& other) noexcept;
-  // Always inlined, see tests/check_symbols.sh.
+  // Always inlined. tests/check_symbols.sh says why.
   [[gnu::always_inline]] operator T*() { return data_; }
   [[gnu::always_inline]] operator const T*() const { return data_; }
 
@@ -67,9 +67,10 @@ struct BlockState {
   std::uint32_t facility_count = 0;
   Column<std::uint32_t> facility;        ///< the point, by its position on the curve
   Column<float> fx, fy, fz;              ///< its position
-  Column<float> reach;                   ///< squared; candidates farther away cannot gain here
-  Column<float> furthest;                ///< longest connection
-  Column<float> load, spent;             ///< sums of w and of w d
+  Column<float> gain_range;              ///< squared; candidates farther away gain nothing here
+  Column<float> longest;                 ///< longest connection
+  Column<float> weight_sum;              ///< sum of w over the clients
+  Column<float> connection_cost;         ///< sum of w d over the clients
   Column<float> mean_x, mean_y, mean_z;  ///< centre of mass of the clients
   Column<std::uint32_t> begin, size;     ///< the segment
 
@@ -79,38 +80,41 @@ struct BlockState {
   Column<float> pp;  ///< the client's position on the curve, as a float (exact below 2^24)
 
   // Facilities near the current candidate.
-  std::uint32_t near_count = 0;
-  Column<std::uint32_t> near, closes;
+  std::uint32_t nearby_count = 0;
+  Column<std::uint32_t> nearby;
+  Column<std::uint32_t> close_flag;  ///< 1 if the candidate would close the facility
+  Column<std::uint32_t> cursor;      ///< while segments are built: where the next client goes
   Column<float> scratch;
   Column<float> scratch_pool;
 
   /// The stop check of the options; never null.
   const base::StopCheck* check_stop = nullptr;
   std::uint32_t vectors_since_check = 0;
-  /// Counts vectors of work and calls the stop check from time to time. Throws whatever it throws.
+  /// Counts vectors of work and calls the stop check once per kVectorsBetweenChecks of them. Throws
+  /// whatever the check throws.
   [[gnu::always_inline]] void tick(std::uint32_t vectors) {
     vectors_since_check += vectors;
-    if (vectors_since_check >= kVectorsBetweenChecks) look();
+    if (vectors_since_check >= kVectorsBetweenChecks) check_now();
   }
 
   /// Makes room for `facilities` facilities.
   void reserve_facilities(std::uint32_t facilities);
-  /// Makes room for `more` additional floats at the end of the pool; may move all segments.
-  void reserve_pool(std::uint32_t more);
-  /// Appends a facility without clients.
+  /// Makes room for `extra` floats at the end of the pool. May move all segments.
+  void reserve_pool(std::uint32_t extra);
+  /// Appends a facility without clients at a point of the curve. Returns its number.
   std::uint32_t add_facility(std::uint32_t point);
   /// Removes facility j. The last facility takes its number.
   void remove_facility(std::uint32_t j);
   /// Makes room for a segment of `size` clients per facility, followed by sixteen lanes. Drops
-  /// facilities without clients. Sets `closes` to the beginnings of the segments, by the old
-  /// numbers.
+  /// facilities without clients. Sets `cursor` to the beginnings of the segments, by the old
+  /// facility numbers.
   void place_segments();
   /// Sorts the facilities in the order of the curve.
   void sort_facilities();
 
  private:
   static constexpr std::uint32_t kVectorsBetweenChecks = 1u << 16;
-  void look();
+  void check_now();
 
   Column<float> spare_[6];
 };
@@ -118,20 +122,20 @@ struct BlockState {
 /// Sorts the points of a block along a space-filling curve and converts them to single precision.
 class CurveSorter {
  public:
-  /// Fills the points of `state`, with weights divided by their mean, and makes room for the
+  /// Fills in the points of `state`, with weights divided by their mean, and makes room for the
   /// groups.
   void load(std::span<const Point3> points, std::span<const double> weights, double mean_weight,
             const Scaling& scaling, BlockState& state);
 
  private:
   /// A point in single precision: sixteen bytes that move at once.
-  struct alignas(16) Place {
+  struct alignas(16) FloatPoint {
     float x, y, z;
-    std::uint32_t original;
+    std::uint32_t original;  ///< number of the point in the block
   };
 
-  std::vector<Place> places_, sorted_;
-  Column<std::uint32_t> key_, other_key_, order_;
+  std::vector<FloatPoint> unsorted_, sorted_;
+  Column<std::uint32_t> key_, high_digit_, order_;
 };
 
 }  // namespace terrace::cluster

@@ -8,7 +8,7 @@
 
 /// The vocabulary of kernels. A kernel is a function object whose body is plain code marked
 /// TERRACE_CLUSTER_HOST_DEVICE. A *device* runs it once for each index, in any order and
-/// concurrently. On a GPU the device is a CudaDevice (cuda_device.cuh). Tests have one that loops
+/// concurrently. On a GPU the device is a CudaDevice (device.cuh). Tests have one that loops
 /// over shuffled indices. A device has
 ///     allocate<T>(count)           memory that lives as long as the returned object
 ///     upload, download, clear      copy to the device, copy to the host, set to zero

@@ -13,13 +13,12 @@
 #include <terrace/base/random.hpp>
 
 #include "ground.hpp"
-#include "hierarchy/summary.hpp"
 
 namespace terrace::cluster {
 namespace {
 
-// Returns counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
-void normalised_weights(std::span<const ClusterSummary> heads, std::vector<double>& weights) {
+// Sets the weights to the counts of level-0 points, scaled to mean 1 (thesis 7.1.2).
+void set_normalised_weights(std::span<const ClusterSummary> heads, std::vector<double>& weights) {
   std::uint64_t total = 0;
   for (const ClusterSummary& head : heads) total += head.descendants;
   const double scale = static_cast<double>(heads.size()) / static_cast<double>(total);
@@ -29,19 +28,20 @@ void normalised_weights(std::span<const ClusterSummary> heads, std::vector<doubl
   }
 }
 
-// Each further attempt to cluster a block uses four times the facility cost, and at least the cost
-// at which neighbours in a block of 10,000 points on a surface no longer deserve a facility each.
-// The last attempt's cost exceeds the sum of all weighted distances in any block.
+// If a block gets too many facilities, it is clustered again with four times the facility cost. The
+// cost of the last attempt exceeds the sum of all weighted distances in any block.
 constexpr int kAttempts = 20;
-constexpr double kLeastRaisedCost = 0x1p-8;
+// Least cost after the first attempt. In a block of 10,000 points on a surface, it is too high for
+// every point to have its own facility.
+constexpr double kMinRaisedCost = 0x1p-8;
 
-// Counting sort of the points by cluster, in ascending order within each cluster.
+// Sorts the points by cluster (counting sort). Within each cluster they are in ascending order.
 void group_by_cluster(const BlockClustering& clustering, std::vector<std::uint32_t>& first,
                       std::vector<std::uint32_t>& order) {
   const std::vector<std::uint32_t>& cluster_of = clustering.assignment;
   const std::size_t clusters = clustering.facilities.size();
-  // first[c + 2] counts the points of cluster c; after summing, first[c + 1] is where its next
-  // point goes. When all points are placed, that is where the next cluster begins.
+  // At first, first[c + 2] counts the points of cluster c. After summing, first[c + 1] is the
+  // position of its next point, and in the end that of the first point of the next cluster.
   first.assign(clusters + 2, 0);
   for (const std::uint32_t c : cluster_of) ++first[c + 2];
   for (std::size_t c = 2; c < first.size(); ++c) first[c] += first[c - 1];
@@ -50,7 +50,7 @@ void group_by_cluster(const BlockClustering& clustering, std::vector<std::uint32
   first.pop_back();
 }
 
-// Makes cluster i of points 2 i and 2 i + 1.
+// Clusters by number: cluster i consists of points 2 i and 2 i + 1.
 void pair_up(std::size_t points, BlockClustering& clustering) {
   clustering.facilities.clear();
   for (std::uint32_t i = 0; i < points; i += 2) clustering.facilities.push_back(i);
@@ -116,12 +116,12 @@ void BlockProcessor::process(HierarchyBlock& block) {
   } else if (map == kIdentityMap) {
     cluster(block, block.positions);
   } else {
-    // The minimum is subtracted first, so that large offsets cost no digits in the product. That is
-    // not possible if the metric depends on the place.
-    const bool anywhere = !std::holds_alternative<EllipticalField>(metric_) &&
-                          !std::holds_alternative<CustomMetric>(metric_);
+    // Subtracts the minimum first, so that large offsets cost no digits in the product. That is not
+    // possible if the metric depends on the position.
+    const bool translation_invariant = !std::holds_alternative<EllipticalField>(metric_) &&
+                                       !std::holds_alternative<CustomMetric>(metric_);
     ground_.resize(block.size());
-    to_ground(block.positions, anywhere ? box.min : Point3{}, map, ground_);
+    to_ground(block.positions, translation_invariant ? box.min : Point3{}, map, ground_);
     cluster(block, ground_);
   }
   group_by_cluster(block.clustering, block.first, block.order);
@@ -177,8 +177,8 @@ void BlockProcessor::read_corners(const HierarchyBlock& block, const Point3& ori
   to_ground(corners_, origin, map, corners_);
 }
 
-// In a block with fewer points they are farther apart relative to its diagonal: on a surface, by
-// the square root of the ratio.
+// If a block has fewer points, they are farther apart relative to its diagonal. On a surface the
+// factor is the square root of the ratio.
 double BlockProcessor::outlier_price(const HierarchyBlock& block) const {
   if (block.level > 0) return std::numeric_limits<double>::infinity();
   return options_.outlier_price *
@@ -187,12 +187,12 @@ double BlockProcessor::outlier_price(const HierarchyBlock& block) const {
 
 void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> ground) {
   weights_.clear();
-  if (block.level > 0) normalised_weights(block.heads, weights_);
+  if (block.level > 0) set_normalised_weights(block.heads, weights_);
   read_channels(block);
   BlockOptions options = options_.block;
   options.seed = block_seed(options_.block.seed, block.level, block.number);
 
-  const std::size_t most = (block.size() + 1) / 2;
+  const std::size_t max_facilities = (block.size() + 1) / 2;
   const FacilityOptions search{
       .strategy = options_.strategy,
       .effort = options.effort,
@@ -216,11 +216,11 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
       cluster_(ground, weights_, options, block.clustering);
     }
     assert(block.clustering.assignment.size() == block.size());
-    if (block.clustering.facilities.size() <= most) {
+    if (block.clustering.facilities.size() <= max_facilities) {
       if (std::isfinite(options_.outlier_price)) place_outliers(block, ground);
       return;
     }
-    options.facility_cost = std::max(4.0 * options.facility_cost, kLeastRaisedCost);
+    options.facility_cost = std::max(4.0 * options.facility_cost, kMinRaisedCost);
   }
   pair_up(block.size(), block.clustering);
 }

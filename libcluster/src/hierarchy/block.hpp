@@ -9,8 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "hierarchy/entity_block.hpp"
-#include "hierarchy/metric_block.hpp"
+#include "hierarchy/block_clusterers.hpp"
 #include "terrace/cluster/block.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
@@ -27,8 +26,8 @@ struct HierarchyBlock {
   std::vector<Point3> positions;
   std::vector<std::byte> payload;
   std::vector<std::uint64_t> children;  ///< `level` ordinals per point
-  std::vector<ClusterSummary>
-      heads;  ///< above level 0, per point: summary of the cluster one level below
+  /// Above level 0, per point: the summary of the cluster that it heads one level below.
+  std::vector<ClusterSummary> heads;
 
   BlockClustering clustering;
   std::vector<std::uint32_t> first, order;  ///< as in ClusteredBlock
@@ -39,19 +38,32 @@ struct HierarchyBlock {
 
   /// Empties the block for reuse.
   void reset(unsigned new_level);
-  /// Appends the representative of cluster c of a processed block one level below, whose ordinal is
-  /// now known.
+  /// Appends the representative of cluster c of a processed block one level below. ordinal: of the
+  /// cluster, on its level.
   void append_representative(const HierarchyBlock& below, std::size_t c, std::uint64_t ordinal,
                              std::size_t payload_size);
+  /// Returns the processed block as the sink receives it.
   [[nodiscard]] ClusteredBlock finished() const;
 };
 
-/// Clusters a block by Euclidean distances: BlockClusterer::run, or a stand-in in tests.
+/// Clusters a block by Euclidean distances. It is BlockClusterer::run, which tests can replace.
 using ClusterFunction = std::function<void(std::span<const Point3>, std::span<const double>,
                                            const BlockOptions&, BlockClustering&)>;
 
 /// Returns the seed of one block. It is a fixed mixture, so blocks may be clustered in any order.
 std::uint64_t block_seed(std::uint64_t seed, unsigned level, std::uint64_t block);
+
+/// Summarises a cluster of level 0. members: point numbers, including `representative`.
+ClusterSummary summarise_points(std::span<const Point3> positions,
+                                std::span<const std::uint32_t> members,
+                                std::uint32_t representative, const GroundMap& map);
+
+/// Summarises a cluster above level 0. heads[i] is the summary of the cluster one level below that
+/// is headed by point i.
+ClusterSummary summarise_heads(std::span<const Point3> positions,
+                               std::span<const ClusterSummary> heads,
+                               std::span<const std::uint32_t> members, std::uint32_t representative,
+                               const GroundMap& map);
 
 /// Clusters blocks and computes their summaries. One object per thread.
 class BlockProcessor {
@@ -60,9 +72,9 @@ class BlockProcessor {
   BlockProcessor(const HierarchyOptions& options, ClusterFunction cluster);
 
   /// Fills in clustering, first, order and summaries. At most half of the points, rounded up,
-  /// become representatives; otherwise the hierarchy might never end. If the facility cost is too
-  /// low for that, it is raised for this block.
-  /// Throws: std::invalid_argument as check_ground_map() does.
+  /// become representatives, because otherwise the hierarchy might never end. If the facility cost
+  /// is too low for that, raises it for this block. Throws: std::invalid_argument as
+  /// check_ground_map() does.
   void process(HierarchyBlock& block);
 
  private:

@@ -22,7 +22,8 @@ BlockPipeline::BlockPipeline(unsigned threads, Stages stages)
   } catch (const std::system_error&) {
     // No more threads are available. The existing ones do the same work more slowly.
   } catch (const std::bad_alloc&) {
-    // No memory for a thread. Not rethrown, because the running threads would never be joined.
+    // There is no memory for another thread. Not rethrown, because the destructor, which joins the
+    // running threads, would not run.
   }
 }
 
@@ -56,10 +57,10 @@ void BlockPipeline::submit(BlockPtr block) {
     if (failed_ || stop_) return;
     if (lanes_.size() <= block->level) lanes_.resize(block->level + 1);
     queue_.push_back(std::move(block));
-    ++under_way_;
+    ++in_progress_;
   }
   work_.notify_one();
-  progress_.notify_all();  // the owner may be waiting for something to do
+  progress_.notify_all();  // the owner may be waiting for work
 }
 
 void BlockPipeline::run_thread(unsigned thread) {
@@ -71,9 +72,9 @@ void BlockPipeline::run_thread(unsigned thread) {
   }
 }
 
-void BlockPipeline::wait_below(std::size_t limit) {
+void BlockPipeline::wait_until_below(std::size_t limit) {
   Lock lock(mutex_);
-  while (!failed_ && under_way_ >= limit) {
+  while (!failed_ && in_progress_ >= limit) {
     if (queue_.empty()) {
       progress_.wait(lock);
     } else {
@@ -127,7 +128,7 @@ void BlockPipeline::commit_ready(Lock& lock) {
     }
     ++lanes_[block->level].next;
     free_.push_back(std::move(block));
-    --under_way_;
+    --in_progress_;
     progress_.notify_all();
   }
   committing_ = false;
@@ -136,11 +137,11 @@ void BlockPipeline::commit_ready(Lock& lock) {
 BlockPipeline::BlockPtr BlockPipeline::next_ready() {
   if (failed_ || stop_) return nullptr;
   for (Lane& lane : lanes_) {
-    const auto turn = std::find_if(lane.ready.begin(), lane.ready.end(),
+    const auto next = std::find_if(lane.ready.begin(), lane.ready.end(),
                                    [&](const BlockPtr& b) { return b->number == lane.next; });
-    if (turn == lane.ready.end()) continue;
-    BlockPtr block = std::move(*turn);
-    lane.ready.erase(turn);
+    if (next == lane.ready.end()) continue;
+    BlockPtr block = std::move(*next);
+    lane.ready.erase(next);
     return block;
   }
   return nullptr;

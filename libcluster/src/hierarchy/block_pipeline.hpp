@@ -23,8 +23,8 @@ namespace terrace::cluster {
 /// of the threads and works whenever it would have to wait. With one thread everything happens
 /// there, immediately.
 ///
-/// The first exception of a stage ends the work: queued blocks are dropped, and the owner's next
-/// waiting call throws it, once, when all threads are idle.
+/// The first exception of a stage ends the work. Queued blocks are dropped. When all threads are
+/// idle, the owner's next waiting call throws the exception, once.
 class BlockPipeline {
  public:
   using BlockPtr = std::unique_ptr<HierarchyBlock>;
@@ -36,7 +36,8 @@ class BlockPipeline {
     std::function<void()> failed{};
   };
 
-  /// Starts threads - 1 threads, or fewer if the system grants fewer. `thread` is below `threads`.
+  /// Starts threads - 1 threads, or as many as the system grants. The numbers of threads that
+  /// stages get are below `threads`.
   BlockPipeline(unsigned threads, Stages stages);
   /// Drops queued blocks and waits for running ones.
   ~BlockPipeline();
@@ -45,27 +46,27 @@ class BlockPipeline {
 
   /// Returns an empty block of that level, recycled or new.
   BlockPtr take(unsigned level);
-  /// Never waits, so commit may call it. Drops the block after a failure.
+  /// Queues a block. Never waits, so commit may call it. Drops the block after a failure.
   void submit(BlockPtr block);
 
   // Only for the owner's thread:
 
-  /// Returns when another block may be submitted: a few per thread may be in progress.
-  void wait_for_room() { wait_below(limit_); }
-  /// Returns when all blocks are committed, including those submitted by commit.
-  void wait_for_all() { wait_below(1); }
+  /// Waits until another block may be submitted. A few per thread may be in progress.
+  void wait_for_room() { wait_until_below(limit_); }
+  /// Waits until all blocks are committed, including those that commit submits.
+  void wait_for_all() { wait_until_below(1); }
 
  private:
   using Lock = std::unique_lock<std::mutex>;
 
   void run_thread(unsigned thread);
-  void wait_below(std::size_t limit);
+  void wait_until_below(std::size_t limit);
   void run_one(Lock& lock, unsigned thread);
   void commit_ready(Lock& lock);
   BlockPtr next_ready();
   void fail(std::exception_ptr failure);
 
-  // Processed blocks that cannot be committed yet. They are few, so they are not sorted.
+  // The blocks of one level that are processed but not committed. They are few, so not sorted.
   struct Lane {
     std::uint64_t next = 0;
     std::vector<BlockPtr> ready;
@@ -77,10 +78,10 @@ class BlockPipeline {
   std::mutex mutex_;  // guards all members below except threads_
   std::condition_variable work_, progress_;
   std::deque<BlockPtr> queue_;
-  std::vector<Lane> lanes_;     // by level
-  std::vector<BlockPtr> free_;  // for reuse
-  std::size_t under_way_ = 0;   // blocks submitted but not yet committed
-  std::size_t running_ = 0;     // threads inside run_one()
+  std::vector<Lane> lanes_;      // by level
+  std::vector<BlockPtr> free_;   // for reuse
+  std::size_t in_progress_ = 0;  // blocks submitted but not yet committed
+  std::size_t running_ = 0;      // threads inside run_one()
   bool committing_ = false;
   bool stop_ = false;
   bool failed_ = false;

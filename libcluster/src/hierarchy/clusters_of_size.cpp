@@ -12,8 +12,8 @@
 namespace terrace::cluster {
 namespace {
 
-/// Records the cluster of each point on level 0 and, above, the cluster of each cluster one level
-/// below.
+/// Records parents: on level 0 the cluster of each point, on higher levels the cluster that
+/// contains each cluster of the level below.
 class ParentSink final : public HierarchySink {
  public:
   explicit ParentSink(std::size_t points) : parents_(1) { parents_[0].resize(points); }
@@ -55,8 +55,8 @@ class ParentSink final : public HierarchySink {
     std::size_t count = 0;
   };
 
-  // On level 0 the payload numbers the points. Above, a point represents the cluster that it heads
-  // on the level below.
+  // Returns the number of the point on level 0, which is its payload, or of the cluster that the
+  // point heads on the level below.
   static std::size_t child(const ClusteredBlock& block, std::uint32_t point) {
     if (block.level > 0) {
       return block.children[point * std::size_t{block.level} + block.level - 1];
@@ -70,18 +70,18 @@ class ParentSink final : public HierarchySink {
   std::vector<std::size_t> counts_;
 };
 
-/// Returns the ends of consecutive ranges of `order` that are compact sets of at most `most`
-/// points.
-std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::size_t most,
+/// Sorts `order` into consecutive ranges of at most `max_size` points, each compact in space.
+/// Returns the ends of the ranges.
+std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::size_t max_size,
                                         std::vector<std::uint32_t>& order,
                                         const base::StopCheck& check_stop) {
   base::StopTicks ticks(check_stop);
   std::vector<std::size_t> ends;
-  std::vector<std::pair<std::size_t, std::size_t>> open{{0, order.size()}};
-  while (!open.empty()) {
-    const auto [begin, end] = open.back();
-    open.pop_back();
-    if (end - begin <= most) {
+  std::vector<std::pair<std::size_t, std::size_t>> pending{{0, order.size()}};
+  while (!pending.empty()) {
+    const auto [begin, end] = pending.back();
+    pending.pop_back();
+    if (end - begin <= max_size) {
       ends.push_back(end);
       continue;
     }
@@ -98,15 +98,15 @@ std::vector<std::size_t> compact_ranges(std::span<const Point3> points, std::siz
     const auto axis =
         static_cast<std::size_t>(std::max_element(extent.begin(), extent.end()) - extent.begin());
     // Splits at whole blocks.
-    const std::size_t blocks = (end - begin + most - 1) / most;
-    const std::size_t middle = begin + blocks / 2 * most;
+    const std::size_t blocks = (end - begin + max_size - 1) / max_size;
+    const std::size_t middle = begin + blocks / 2 * max_size;
     const auto at = [&](std::size_t k) { return order.begin() + static_cast<std::ptrdiff_t>(k); };
     std::nth_element(at(begin), at(middle), at(end), [&](std::uint32_t a, std::uint32_t b) {
       ticks(4);
       return std::tie(points[a][axis], a) < std::tie(points[b][axis], b);
     });
-    open.emplace_back(middle, end);
-    open.emplace_back(begin, middle);
+    pending.emplace_back(middle, end);
+    pending.emplace_back(begin, middle);
   }
   return ends;
 }
@@ -146,7 +146,7 @@ std::vector<std::uint32_t> clusters_of_size(std::span<const Point3> points, doub
   }
   // If all points fit one block, the root is the only cluster.
   std::vector<std::uint32_t> labels(points.size(), 0);
-  // By which factor the mean size is too large or too small.
+  // Returns the factor by which a mean size is too large or too small.
   const auto ratio = [size](double mean) { return std::max(mean / size, size / mean); };
   double nearest = ratio(static_cast<double>(std::max<std::size_t>(points.size(), 1)));
   std::size_t levels = 0;

@@ -14,7 +14,7 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr unsigned kMostBlocksAtOnce = 1024;
+constexpr unsigned kMaxThreads = 1024;
 
 void check_corners(const HierarchyOptions& options) {
   const PayloadCorners& corners = options.corners;
@@ -59,7 +59,7 @@ HierarchyOptions checked(HierarchyOptions options) {
         "outlier_price is set, but there is no function that marks outliers");
   }
   check_corners(options);
-  options.threads = std::clamp(options.threads, 1u, kMostBlocksAtOnce);
+  options.threads = std::clamp(options.threads, 1u, kMaxThreads);
   return options;
 }
 
@@ -97,11 +97,11 @@ void HierarchyEngine::push(std::span<const Point3> positions, std::span<const st
     throw std::invalid_argument("point " + std::to_string(bad) +
                                 " of the batch has a coordinate that is not finite");
   }
-  const std::size_t held = base_.open ? base_.open->size() : 0;
+  const std::size_t open_points = base_.open ? base_.open->size() : 0;
   const bool fits_a_block = positions.size() <= options_.block_size;
   ended_ = true;  // in case anything below throws
   if (positions.empty()) pipeline_.wait_for_room();
-  if (fits_a_block && held + positions.size() > options_.block_size) submit(base_);
+  if (fits_a_block && open_points + positions.size() > options_.block_size) submit(base_);
   while (!positions.empty()) {
     if (base_.open && base_.open->size() == options_.block_size) submit(base_);
     const std::size_t room = options_.block_size - (base_.open ? base_.open->size() : 0);
@@ -140,12 +140,12 @@ void HierarchyEngine::commit(HierarchyBlock& block) {
   }
   outliers_ += block.outliers;
   Level& level = levels_[block.level];
-  Level& above = levels_[block.level + 1];
+  Level& upper = levels_[block.level + 1];
   for (std::size_t c = 0; c < block.summaries.size(); ++c) {
-    if (above.open && above.open->size() == options_.block_size) submit(above);
-    if (!above.open) above.open = pipeline_.take(above.level);
-    above.open->append_representative(block, c, level.clusters++, options_.payload_size);
-    ++above.points;
+    if (upper.open && upper.open->size() == options_.block_size) submit(upper);
+    if (!upper.open) upper.open = pipeline_.take(upper.level);
+    upper.open->append_representative(block, c, level.clusters++, options_.payload_size);
+    ++upper.points;
   }
 }
 

@@ -13,13 +13,15 @@
 #include "hierarchy/block_pipeline.hpp"
 #include "terrace/cluster/hierarchy.hpp"
 
-/// The implementation of HierarchyBuilder, in which tests can replace the clustering. Private.
+/// The implementation of HierarchyBuilder. Private to the hierarchy.
 
 namespace terrace::cluster {
 
+/// Cuts points into blocks, passes blocks through a pipeline, and collects the representatives of
+/// each level in the next one.
 class HierarchyEngine {
  public:
-  /// Calls make_cluster once per thread of the options.
+  /// Calls make_cluster once per thread of the options. Tests pass a different clustering.
   HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
                   const std::function<ClusterFunction()>& make_cluster);
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hierarchy/summary.hpp"
+#include <algorithm>
+#include <cmath>
 
 #include "ground.hpp"
+#include "hierarchy/block.hpp"
 
 // A distance is computed as |map * (a - b)|. With u = 2^-53 the difference is off by at most u,
 // each row of the product by 4 u, and the length by 3 u more, all relative to the sum of the

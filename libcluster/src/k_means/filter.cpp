@@ -10,13 +10,13 @@
 namespace terrace::cluster {
 namespace {
 
-/// Returns the level of the chunks, which are long compared with k, so that their sums take less
-/// memory than the points.
+/// Returns the level whose nodes threads divide among them. Its chunks are long compared with k, so
+/// that their sums take less memory than the points.
 std::size_t chunk_level(const KMeansTree& tree, std::size_t clusters) {
-  const std::size_t least = std::max<std::size_t>(8192, 4 * clusters);
+  const std::size_t min_points = std::max<std::size_t>(8192, 4 * clusters);
   std::size_t level = 0;
-  for (std::size_t points = KMeansTree::kBlock; points < least && level + 1 < tree.levels.size();
-       ++level) {
+  for (std::size_t points = KMeansTree::kBlock;
+       points < min_points && level + 1 < tree.levels.size(); ++level) {
     points *= KMeansTree::kFan;
   }
   return level;
@@ -56,19 +56,18 @@ KMeansFilter::KMeansFilter(const KMeansTree& tree, std::size_t clusters, base::T
   }
 }
 
-KMeansFilter::Candidates KMeansFilter::room(Scratch& scratch, std::size_t level) const {
-  const std::size_t at = level * clusters_;
-  return {&scratch.x[at], &scratch.y[at], &scratch.z[at], &scratch.number[at], 0};
+KMeansFilter::Candidates KMeansFilter::candidate_buffer(Scratch& scratch, std::size_t level) const {
+  const std::size_t offset = level * clusters_;
+  return {&scratch.x[offset], &scratch.y[offset], &scratch.z[offset], &scratch.number[offset], 0};
 }
 
 bool KMeansFilter::assign(std::span<const Point3> centres) {
-  bool flat = true;
   const KMeansTree::Node& root = tree_.levels.back().front();
-  flat = root.box.max[2] == 0.0;
+  bool flat = root.box.max[2] == 0.0;
   for (const Point3& c : centres) flat = flat && c[2] == 0.0;
   for (Scratch& scratch : scratch_) {
     scratch.changed = false;
-    const Candidates all = room(scratch, chunk_level_ + 1);
+    const Candidates all = candidate_buffer(scratch, chunk_level_ + 1);
     for (std::uint32_t c = 0; c < centres.size(); ++c) {
       all.x[c] = centres[c][0];
       all.y[c] = centres[c][1];
@@ -80,7 +79,7 @@ bool KMeansFilter::assign(std::span<const Point3> centres) {
   team_.run(chunks, [&](std::size_t chunk, unsigned thread) {
     const std::span<Sum> sums(chunk_sums_.data() + chunk * clusters_, clusters_);
     std::fill(sums.begin(), sums.end(), Sum{});
-    Candidates all = room(scratch_[thread], chunk_level_ + 1);
+    Candidates all = candidate_buffer(scratch_[thread], chunk_level_ + 1);
     all.count = centres.size();
     if (flat) {
       visit<2>(chunk_level_, chunk, all, scratch_[thread], sums);
@@ -100,60 +99,60 @@ bool KMeansFilter::assign(std::span<const Point3> centres) {
 }
 
 template <int D>
-void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates& from,
+void KMeansFilter::visit(std::size_t level, std::size_t index, const Candidates& candidates,
                          Scratch& scratch, std::span<Sum> sums) {
-  scratch.ticks(from.count);
+  scratch.ticks(candidates.count);
   const KMeansTree::Node& node = tree_.levels[level][index];
   const double mx = 0.5 * (node.box.min[0] + node.box.max[0]);
   const double my = 0.5 * (node.box.min[1] + node.box.max[1]);
   const double mz = 0.5 * (node.box.min[2] + node.box.max[2]);
-  double least = distance2<D>(mx, my, mz, from.x[0], from.y[0], from.z[0]);
+  double least = distance2<D>(mx, my, mz, candidates.x[0], candidates.y[0], candidates.z[0]);
   std::size_t best = 0;
-  for (std::size_t k = 1; k < from.count; ++k) {
-    const double d = distance2<D>(mx, my, mz, from.x[k], from.y[k], from.z[k]);
+  for (std::size_t k = 1; k < candidates.count; ++k) {
+    const double d = distance2<D>(mx, my, mz, candidates.x[k], candidates.y[k], candidates.z[k]);
     best = d < least ? k : best;
     least = std::min(least, d);
   }
 
-  // Compares each centre c with the best: |p - c|^2 - |p - best|^2 is linear in p and least at the
-  // corner farthest in the direction from the best to c. The margin covers the relative rounding
-  // errors of both squares anywhere in the box.
-  const double bx = from.x[best];
-  const double by = from.y[best];
-  const double bz = from.z[best];
-  Candidates kept = room(scratch, level);
-  for (std::size_t k = 0; k < from.count; ++k) {
-    const double x = from.x[k];
-    const double y = from.y[k];
-    const double z = from.z[k];
+  // Compares each centre c with the best. |p - c|^2 - |p - best|^2 is linear in p and has its
+  // minimum at the corner that is farthest in the direction from the best to c. The margin covers
+  // the rounding errors of both squares anywhere in the box.
+  const double bx = candidates.x[best];
+  const double by = candidates.y[best];
+  const double bz = candidates.z[best];
+  Candidates remaining = candidate_buffer(scratch, level);
+  for (std::size_t k = 0; k < candidates.count; ++k) {
+    const double x = candidates.x[k];
+    const double y = candidates.y[k];
+    const double z = candidates.z[k];
     const double px = x > bx ? node.box.max[0] : node.box.min[0];
     const double py = y > by ? node.box.max[1] : node.box.min[1];
     const double pz = z > bz ? node.box.max[2] : node.box.min[2];
-    const double to_this = distance2<D>(px, py, pz, x, y, z);
+    const double to_centre = distance2<D>(px, py, pz, x, y, z);
     const double to_best = distance2<D>(px, py, pz, bx, by, bz);
-    kept.x[kept.count] = x;
-    kept.y[kept.count] = y;
-    kept.z[kept.count] = z;
-    kept.number[kept.count] = from.number[k];
-    const double margin = 4e-15 * (to_this + to_best + 2 * node.diagonal2);
-    kept.count += to_this - to_best > margin ? 0 : 1;
+    remaining.x[remaining.count] = x;
+    remaining.y[remaining.count] = y;
+    remaining.z[remaining.count] = z;
+    remaining.number[remaining.count] = candidates.number[k];
+    const double margin = 4e-15 * (to_centre + to_best + 2 * node.diagonal2);
+    remaining.count += to_centre - to_best > margin ? 0 : 1;
   }
 
-  if (kept.count == 1) {
-    own(level, index, kept.number[0], scratch, sums);
+  if (remaining.count == 1) {
+    assign_node(level, index, remaining.number[0], scratch, sums);
   } else if (level == 0) {
-    assign_block<D>(index, kept, scratch, sums);
+    assign_block<D>(index, remaining, scratch, sums);
   } else {
     const std::size_t first = index * KMeansTree::kFan;
     const std::size_t end = std::min(first + KMeansTree::kFan, tree_.levels[level - 1].size());
     for (std::size_t child = first; child < end; ++child) {
-      visit<D>(level - 1, child, kept, scratch, sums);
+      visit<D>(level - 1, child, remaining, scratch, sums);
     }
   }
 }
 
-void KMeansFilter::own(std::size_t level, std::size_t index, std::uint32_t cluster,
-                       Scratch& scratch, std::span<Sum> sums) {
+void KMeansFilter::assign_node(std::size_t level, std::size_t index, std::uint32_t cluster,
+                               Scratch& scratch, std::span<Sum> sums) {
   const KMeansTree::Node& node = tree_.levels[level][index];
   for (unsigned axis = 0; axis < 3; ++axis) sums[cluster].sum[axis] += node.sum[axis];
   sums[cluster].weight += node.weight;
@@ -161,10 +160,10 @@ void KMeansFilter::own(std::size_t level, std::size_t index, std::uint32_t clust
   for (std::size_t b = tree_.first_block(level, index); b < end; ++b) {
     if (owner_[b] == cluster) continue;
     owner_[b] = cluster;
-    for (std::size_t place = b * KMeansTree::kBlock; place < (b + 1) * KMeansTree::kBlock;
-         ++place) {
-      scratch.changed = scratch.changed || cluster_[place] != cluster;
-      cluster_[place] = cluster;
+    for (std::size_t position = b * KMeansTree::kBlock; position < (b + 1) * KMeansTree::kBlock;
+         ++position) {
+      scratch.changed = scratch.changed || cluster_[position] != cluster;
+      cluster_[position] = cluster;
     }
   }
 }
@@ -178,8 +177,8 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
   const double* const z = &tree_.z[block * KMeansTree::kBlock];
   const double* const w = &tree_.w[block * KMeansTree::kBlock];
   std::array<double, KMeansTree::kBlock> least;
-  std::array<double, KMeansTree::kBlock>
-      nearest{};  // doubles, because vectors of doubles select them
+  // Doubles, because the selection below works on vectors of doubles.
+  std::array<double, KMeansTree::kBlock> nearest{};
   for (std::size_t i = 0; i < KMeansTree::kBlock; ++i) {
     least[i] = distance2<D>(x[i], y[i], z[i], candidates.x[0], candidates.y[0], candidates.z[0]);
   }
@@ -210,13 +209,13 @@ void KMeansFilter::assign_block(std::size_t block, const Candidates& candidates,
   owner_[block] = kMixed;
 }
 
-void KMeansFilter::move_point(std::size_t place, std::uint32_t cluster) {
-  cluster_[place] = cluster;
-  owner_[place / KMeansTree::kBlock] = kMixed;
-  // The copies that fill the last block move with the last point, so that they do not count as a
-  // change.
-  if (place + 1 == tree_.count) {
-    std::fill(cluster_.begin() + static_cast<std::ptrdiff_t>(place), cluster_.end(), cluster);
+void KMeansFilter::move_point(std::size_t position, std::uint32_t cluster) {
+  cluster_[position] = cluster;
+  owner_[position / KMeansTree::kBlock] = kMixed;
+  // The copies of the last point that fill the last block move with it, so that they do not count
+  // as a change.
+  if (position + 1 == tree_.count) {
+    std::fill(cluster_.begin() + static_cast<std::ptrdiff_t>(position), cluster_.end(), cluster);
   }
 }
 

@@ -13,11 +13,11 @@
 
 namespace terrace::cluster {
 
-/// Assigns the points of a tree to the nearest of k centres. From the root down, each node keeps
-/// the centres that may be nearest to some point of its box. If only one is left, the whole node is
-/// assigned to it. An excluded centre is farther from all of the box than another one, by more than
-/// rounding. So the assignment equals that from comparing all computed distances, with the lowest
-/// number on ties.
+/// Assigns the points of a tree to the nearest of k centres. It descends from the root and keeps,
+/// for each node, the centres that may be nearest to some point of its box. If only one remains,
+/// the whole node is assigned to it. A centre is excluded only if another one is nearer to the
+/// whole box by more than rounding. So the assignment equals that of comparing all computed
+/// distances, where the lowest number wins ties.
 class KMeansFilter {
  public:
   struct Sum {
@@ -29,15 +29,15 @@ class KMeansFilter {
   KMeansFilter(const KMeansTree& tree, std::size_t clusters, base::ThreadTeam& team,
                const base::StopCheck& check_stop);
 
-  /// Makes one assignment. Returns whether any point has changed its cluster since the last one.
+  /// Assigns all points. Returns whether any point changed its cluster.
   bool assign(std::span<const Point3> centres);
 
-  /// Returns the sums of the clusters, always added up in the same order.
+  /// Returns the sums of the clusters. The order of the additions does not depend on threads.
   [[nodiscard]] std::span<Sum> sums() { return sums_; }
   /// Returns the cluster of the point at a position.
-  [[nodiscard]] std::uint32_t cluster(std::size_t place) const { return cluster_[place]; }
+  [[nodiscard]] std::uint32_t cluster(std::size_t position) const { return cluster_[position]; }
   /// Overrides the last assignment of one point.
-  void move_point(std::size_t place, std::uint32_t cluster);
+  void move_point(std::size_t position, std::uint32_t cluster);
 
  private:
   // Centres that may be nearest to a point of a node, in ascending order.
@@ -58,14 +58,16 @@ class KMeansFilter {
   };
 
   template <int D>
-  void visit(std::size_t level, std::size_t node, const Candidates& from, Scratch& scratch,
+  void visit(std::size_t level, std::size_t node, const Candidates& candidates, Scratch& scratch,
              std::span<Sum> sums);
   template <int D>
   void assign_block(std::size_t block, const Candidates& candidates, Scratch& scratch,
                     std::span<Sum> sums);
-  void own(std::size_t level, std::size_t node, std::uint32_t cluster, Scratch& scratch,
-           std::span<Sum> sums);
-  [[nodiscard]] Candidates room(Scratch& scratch, std::size_t level) const;
+  /// Assigns all points of a node to one cluster.
+  void assign_node(std::size_t level, std::size_t node, std::uint32_t cluster, Scratch& scratch,
+                   std::span<Sum> sums);
+  /// Returns an empty list for the candidates of a level, in the scratch memory.
+  [[nodiscard]] Candidates candidate_buffer(Scratch& scratch, std::size_t level) const;
 
   static constexpr std::uint32_t kMixed = UINT32_MAX;
 

@@ -13,7 +13,7 @@
 
 namespace terrace::cluster {
 
-/// Returns the squared distance.
+/// Returns the squared distance of two points.
 inline double squared(const Point3& a, const Point3& b) {
   const double x = a[0] - b[0];
   const double y = a[1] - b[1];
@@ -21,8 +21,8 @@ inline double squared(const Point3& a, const Point3& b) {
   return x * x + y * y + z * z;
 }
 
-/// Points in Z-order, in blocks of kBlock points, and a tree over the blocks. Each node has up to
-/// kFan consecutive children, a box, and sums.
+/// Points in Z-order and a tree over them. A leaf is a block of kBlock points, and an inner node
+/// has up to kFan consecutive children. Each node has a box and sums over its points.
 struct KMeansTree {
   static constexpr std::size_t kBlock = 32;
   static constexpr std::size_t kFan = 4;
@@ -38,10 +38,13 @@ struct KMeansTree {
   KMeansTree(std::span<const Point3> points, std::span<const double> weights,
              const Scaling& scaling, const base::StopCheck& check_stop);
 
+  /// Returns the number of blocks.
   [[nodiscard]] std::size_t block_count() const { return levels.front().size(); }
   /// Returns the first block below a node.
   [[nodiscard]] std::size_t first_block(std::size_t level, std::size_t node) const;
-  [[nodiscard]] Point3 point(std::size_t place) const { return {x[place], y[place], z[place]}; }
+  [[nodiscard]] Point3 point(std::size_t position) const {
+    return {x[position], y[position], z[position]};
+  }
 
   std::size_t count = 0;
   // Scaled columns, padded to whole blocks with copies of the last point at weight 0.

@@ -4,23 +4,24 @@
 namespace terrace::cluster {
 namespace {
 
-/// The factor of a squared distance in Ward's method: 2 |a| |b| / (|a| + |b|). Exactly symmetric.
+/// Returns the factor of a squared distance in Ward's method: 2 |a| |b| / (|a| + |b|). Symmetric to
+/// the last bit.
 double ward_factor(double a, double b) { return 2.0 * a * b / (a + b); }
 
-/// Subtracts the least coordinate of an axis if that is exact for all points. Otherwise means of
-/// places far from the origin would lose digits that their differences have.
+/// Subtracts the least coordinate of an axis if that is exact for all points. Without it, means of
+/// points far from the origin would lose digits.
 void move_to_origin(std::vector<double>& axis) {
   if (axis.empty()) return;
   const double low = *std::min_element(axis.begin(), axis.end());
-  std::vector<double> moved(axis.size());
+  std::vector<double> shifted(axis.size());
   for (std::size_t i = 0; i < axis.size(); ++i) {
     const double difference = axis[i] - low;
     // The rounding error of the difference (D. Knuth).
-    const double back = axis[i] - difference;
-    if ((axis[i] - (difference + back)) + (back - low) != 0.0) return;
-    moved[i] = difference;
+    const double restored = axis[i] - difference;
+    if ((axis[i] - (difference + restored)) + (restored - low) != 0.0) return;
+    shifted[i] = difference;
   }
-  axis = std::move(moved);
+  axis = std::move(shifted);
 }
 
 }  // namespace
@@ -28,7 +29,7 @@ void move_to_origin(std::vector<double>& axis) {
 ClusterMeans::ClusterMeans(const LinkagePoints& points, LinkageMethod method,
                            const LinkageOptions& options)
     : ClusterSlots(points.scaled().size(), options.check_stop),
-      points_of_(points),
+      linkage_points_(points),
       method_(method),
       kernels_(linkage_kernels<double>(options.path)),
       row_(points.scaled().size()) {
@@ -53,9 +54,9 @@ NearCluster ClusterMeans::nearest(std::uint32_t x, std::uint32_t begin, std::uin
                      count, axis_[0][x], axis_[1][x], axis_[2][x], row_.data());
   if (method_ == LinkageMethod::ward) {
     // Dead slots become NaN, which is never nearer than anything.
-    const double own = points(x);
+    const double own_points = points(x);
     const double* const others = points() + begin;
-    for (std::size_t k = 0; k < count; ++k) row_[k] *= ward_factor(others[k], own);
+    for (std::size_t k = 0; k < count; ++k) row_[k] *= ward_factor(others[k], own_points);
   }
   if (x >= begin && x < end) row_[x - begin] = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < count; ++k) {
@@ -68,16 +69,16 @@ void ClusterMeans::join(std::uint32_t low, std::uint32_t high, double /*between*
   const bool middle = method_ == LinkageMethod::median;
   const double a = middle ? 1.0 : points(low), b = middle ? 1.0 : points(high);
   for (std::vector<double>& axis : axis_) {
-    // Equal places do not move.
+    // Equal coordinates stay exactly equal.
     axis[high] = axis[low] == axis[high] ? axis[high] : (a * axis[low] + b * axis[high]) / (a + b);
     axis[low] = std::numeric_limits<double>::infinity();
   }
 }
 
-void ClusterMeans::move(const std::vector<std::uint32_t>& kept) {
+void ClusterMeans::move(const std::vector<std::uint32_t>& slots) {
   for (std::vector<double>& axis : axis_) {
-    for (std::size_t k = 0; k < kept.size(); ++k) axis[k] = axis[kept[k]];
-    axis.resize(kept.size());
+    for (std::size_t k = 0; k < slots.size(); ++k) axis[k] = axis[slots[k]];
+    axis.resize(slots.size());
   }
 }
 

@@ -8,14 +8,15 @@
 #include "linkage/points.hpp"
 #include "terrace/cluster/linkage.hpp"
 
-/// Clusters of points, each represented by one place instead of a matrix of distances. Private to
-/// linkage.
+/// Clusters of points that are represented by one position each. Private to linkage.
 
 namespace terrace::cluster {
 
-/// Distances are squares, of the scaled points. For ward the place is the mean, and the distance is
-/// the growth of the sum of squares. For centroid the place is the mean. For median it is midway
-/// between the places of the two parts.
+/// Clusters for ward, centroid and median linkage, without a matrix. Distances are squared
+/// distances of scaled positions.
+/// - ward: the position is the mean, and the distance is the growth of the sum of squares.
+/// - centroid: the position is the mean.
+/// - median: the position is midway between the positions of the two parts.
 class ClusterMeans : public ClusterSlots {
  public:
   ClusterMeans(const LinkagePoints& points, LinkageMethod method, const LinkageOptions& options);
@@ -24,11 +25,11 @@ class ClusterMeans : public ClusterSlots {
   [[nodiscard]] NearCluster nearest(std::uint32_t x, std::uint32_t begin, std::uint32_t end,
                                     NearCluster best);
   void join(std::uint32_t low, std::uint32_t high, double between);
-  void move(const std::vector<std::uint32_t>& kept);
-  [[nodiscard]] double height(double distance) const { return points_of_.height(distance); }
+  void move(const std::vector<std::uint32_t>& slots);
+  [[nodiscard]] double height(double distance) const { return linkage_points_.height(distance); }
 
  private:
-  const LinkagePoints& points_of_;
+  const LinkagePoints& linkage_points_;
   const LinkageMethod method_;
   const LinkageKernels<double>& kernels_;
   std::vector<double> axis_[3];  ///< infinite for dead slots

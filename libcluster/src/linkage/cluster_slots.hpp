@@ -22,8 +22,8 @@
 ///   strictly nearer than `best`, otherwise `best`. On ties the first slot wins.
 /// - join(low, high, between): updates the distances of `high` for the merged cluster. `between` is
 ///   the distance of the two.
-/// - move(kept): the slots `kept` become 0, 1, ..
-/// - height(distance), as in the dendrogram.
+/// - move(slots): makes `slots`, which are ascending, the slots 0, 1, ...
+/// - height(distance): returns the height in the dendrogram.
 
 namespace terrace::cluster {
 
@@ -52,17 +52,19 @@ class ClusterSlots {
   /// Counts distances and calls the stop check from time to time. Throws whatever it throws.
   void tick(std::size_t distances) { ticks_(distances); }
 
-  void count_as_one(std::uint32_t low, std::uint32_t high) {
+  /// Adds the points of `low` to `high`. `low` is then dead.
+  void merge_counts(std::uint32_t low, std::uint32_t high) {
     points_[high] += points_[low];
     points_[low] = 0.0;
   }
-  void keep(const std::vector<std::uint32_t>& kept) {
-    for (std::size_t k = 0; k < kept.size(); ++k) {
-      points_[k] = points_[kept[k]];
-      name_[k] = name_[kept[k]];
+  /// Makes the given slots, which are ascending, the slots 0, 1, ...
+  void compact(const std::vector<std::uint32_t>& slots) {
+    for (std::size_t k = 0; k < slots.size(); ++k) {
+      points_[k] = points_[slots[k]];
+      name_[k] = name_[slots[k]];
     }
-    points_.resize(kept.size());
-    name_.resize(kept.size());
+    points_.resize(slots.size());
+    name_.resize(slots.size());
   }
 
  private:
@@ -77,40 +79,40 @@ Link merge_slots(Clusters& clusters, std::uint32_t a, std::uint32_t b, double di
   const auto [low, high] = std::minmax({a, b});
   const Link link{clusters.name(low), clusters.name(high), clusters.height(distance)};
   clusters.join(low, high, distance);
-  clusters.count_as_one(low, high);
+  clusters.merge_counts(low, high);
   return link;
 }
 
-/// Returns the live slots if at least half of the slots are dead and there are enough to be worth
-/// moving, otherwise an empty list.
+/// Returns the live slots if at least half of the slots are dead and there are enough slots for
+/// compaction to pay off. Otherwise returns an empty list.
 template <class Clusters>
-std::vector<std::uint32_t> slots_to_keep(const Clusters& clusters, std::uint32_t alive) {
-  constexpr std::uint32_t kWorthMoving = 64;
-  std::vector<std::uint32_t> kept;
-  if (clusters.size() < kWorthMoving || 2 * alive > clusters.size()) return kept;
-  kept.reserve(alive);
+std::vector<std::uint32_t> live_slots_if_sparse(const Clusters& clusters, std::uint32_t alive) {
+  constexpr std::uint32_t kMinSlots = 64;
+  std::vector<std::uint32_t> slots;
+  if (clusters.size() < kMinSlots || 2 * alive > clusters.size()) return slots;
+  slots.reserve(alive);
   for (std::uint32_t slot = 0; slot < clusters.size(); ++slot) {
-    if (clusters.alive(slot)) kept.push_back(slot);
+    if (clusters.alive(slot)) slots.push_back(slot);
   }
-  return kept;
+  return slots;
 }
 
-/// Returns all merges, for methods in which a merge never brings the new cluster nearer to others
-/// than its parts were. A chain leads from cluster to nearest cluster until two are each other's
-/// nearest; these merge. Takes O(n^2) distances. On ties the previous cluster of the chain is
-/// preferred, then the lowest slot. A chain begins at the lowest live slot. Links are in no
-/// particular order, except that parts come before wholes.
+/// Returns all merges, for methods in which a new cluster is never nearer to others than its parts
+/// were. A chain begins at the lowest live slot and leads from each cluster to its nearest, until
+/// two are each other's nearest and merge. On ties the previous cluster of the chain is preferred,
+/// then the lowest slot. Takes O(n^2) distances. The links of the parts of a cluster precede the
+/// link of the cluster, but otherwise links are in no particular order.
 template <class Clusters>
 std::vector<Link> chain_links(Clusters& clusters) {
   std::vector<Link> links;
   std::vector<double> height(clusters.size(), 0.0);
-  std::vector<std::uint32_t> chain, place(clusters.size(), kNoCluster);
+  std::vector<std::uint32_t> chain, chain_position(clusters.size(), kNoCluster);
   std::uint32_t alive = clusters.size(), start = 0;
   const auto cut = [&](std::size_t length) {
-    for (; chain.size() > length; chain.pop_back()) place[chain.back()] = kNoCluster;
+    for (; chain.size() > length; chain.pop_back()) chain_position[chain.back()] = kNoCluster;
   };
   const auto push = [&](std::uint32_t slot) {
-    place[slot] = static_cast<std::uint32_t>(chain.size());
+    chain_position[slot] = static_cast<std::uint32_t>(chain.size());
     chain.push_back(slot);
   };
   while (alive > 1) {
@@ -120,44 +122,44 @@ std::vector<Link> chain_links(Clusters& clusters) {
     }
     clusters.tick(clusters.size());
     const std::uint32_t x = chain.back();
-    NearCluster before;
+    NearCluster previous;
     if (chain.size() > 1) {
-      before.cluster = chain[chain.size() - 2];
-      before.distance = clusters.distance(x, before.cluster);
+      previous.cluster = chain[chain.size() - 2];
+      previous.distance = clusters.distance(x, previous.cluster);
     }
-    const NearCluster near = clusters.nearest(x, 0, clusters.size(), before);
-    if (near.cluster != before.cluster) {
+    const NearCluster near = clusters.nearest(x, 0, clusters.size(), previous);
+    if (near.cluster != previous.cluster) {
       // Only rounding can lead back into the chain.
-      if (place[near.cluster] != kNoCluster) cut(place[near.cluster]);
+      if (chain_position[near.cluster] != kNoCluster) cut(chain_position[near.cluster]);
       push(near.cluster);
       continue;
     }
     cut(chain.size() - 2);
     const auto [low, high] = std::minmax({x, near.cluster});
     Link link = merge_slots(clusters, low, high, near.distance);
-    // Keeps rounding from sorting a whole before its parts.
+    // Otherwise rounding might sort a cluster before its parts.
     link.height = height[high] = std::max({link.height, height[low], height[high]});
     links.push_back(link);
     --alive;
-    const std::vector<std::uint32_t> kept = slots_to_keep(clusters, alive);
-    if (kept.empty()) continue;
-    clusters.move(kept);
-    clusters.keep(kept);
-    std::vector<std::uint32_t> new_place(kept.size());
-    for (std::uint32_t k = 0; k < kept.size(); ++k) {
-      height[k] = height[kept[k]];
-      new_place[k] = place[kept[k]];
-      if (new_place[k] != kNoCluster) chain[new_place[k]] = k;
+    const std::vector<std::uint32_t> slots = live_slots_if_sparse(clusters, alive);
+    if (slots.empty()) continue;
+    clusters.move(slots);
+    clusters.compact(slots);
+    std::vector<std::uint32_t> new_position(slots.size());
+    for (std::uint32_t k = 0; k < slots.size(); ++k) {
+      height[k] = height[slots[k]];
+      new_position[k] = chain_position[slots[k]];
+      if (new_position[k] != kNoCluster) chain[new_position[k]] = k;
     }
-    place = std::move(new_place);
+    chain_position = std::move(new_position);
     start = 0;
   }
   return links;
 }
 
 /// Returns all merges in their order, for any distances. Each joins the two nearest clusters, on
-/// ties the pair of the lowest slots. Takes O(n^2) distances if each cluster is the nearest of few
-/// others, which always holds for places in space.
+/// ties the pair with the lowest slots. Takes O(n^2) distances if each cluster is the nearest of
+/// few others, which always holds for positions in space.
 template <class Clusters>
 std::vector<Link> nearest_pair_links(Clusters& clusters) {
   std::vector<Link> links;
@@ -193,17 +195,17 @@ std::vector<Link> nearest_pair_links(Clusters& clusters) {
       }
     }
     find(high);
-    const std::vector<std::uint32_t> kept = slots_to_keep(clusters, alive - 1);
-    if (kept.empty()) continue;
+    const std::vector<std::uint32_t> slots = live_slots_if_sparse(clusters, alive - 1);
+    if (slots.empty()) continue;
     std::vector<std::uint32_t> moved(clusters.size(), kNoCluster);
-    for (std::uint32_t k = 0; k < kept.size(); ++k) moved[kept[k]] = k;
-    clusters.move(kept);
-    clusters.keep(kept);
-    for (std::uint32_t k = 0; k < kept.size(); ++k) {
-      const NearCluster near = nearest[kept[k]];
+    for (std::uint32_t k = 0; k < slots.size(); ++k) moved[slots[k]] = k;
+    clusters.move(slots);
+    clusters.compact(slots);
+    for (std::uint32_t k = 0; k < slots.size(); ++k) {
+      const NearCluster near = nearest[slots[k]];
       nearest[k] = {near.distance, near.cluster == kNoCluster ? kNoCluster : moved[near.cluster]};
     }
-    nearest.resize(kept.size());
+    nearest.resize(slots.size());
   }
   return links;
 }

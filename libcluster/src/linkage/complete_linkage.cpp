@@ -17,7 +17,7 @@ namespace terrace::cluster {
 namespace {
 
 template <class T>
-Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& options) {
+Dendrogram cluster_points(std::span<const Point3> points, const LinkageOptions& options) {
   const LinkageKernels<T>& kernels = linkage_kernels<T>(options.path);
   const LinkagePoints linkage_points(points);
   BandMatrix<T> matrix(points.size(), options.memory_limit);
@@ -31,9 +31,9 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   const double* const z = tree.axis(2);
   CompleteRounds<T> rounds(matrix, kernels, options);
   std::vector<Link> links = rounds.run([&](std::size_t i, T* row) {
-    const std::size_t after = std::min(matrix.width(), points.size() - 1 - i);
-    kernels.distances(x + i + 1, y + i + 1, z + i + 1, after, x[i], y[i], z[i], row);
-    kernels.distances(x, y, z, matrix.width() - after, x[i], y[i], z[i], row + after);
+    const std::size_t until_end = std::min(matrix.width(), points.size() - 1 - i);
+    kernels.distances(x + i + 1, y + i + 1, z + i + 1, until_end, x[i], y[i], z[i], row);
+    kernels.distances(x, y, z, matrix.width() - until_end, x[i], y[i], z[i], row + until_end);
   });
   for (Link& link : links) {
     link = {tree.number(link.i), tree.number(link.j), linkage_points.height(link.height)};
@@ -41,47 +41,48 @@ Dendrogram of_points(std::span<const Point3> points, const LinkageOptions& optio
   return make_dendrogram(points.size(), links, options.check_stop);
 }
 
-/// Sorts items so that close ones are close in the order. Halves recursively by which of two
-/// distant items is nearer. Calls `distance` three times per item and level.
-void order_by_distance(std::span<std::uint32_t> things, const PairDistance& distance) {
-  constexpr std::size_t kEnough = 8;
-  if (things.size() <= kEnough) return;
+/// Sorts items so that items at a small distance are close in the order. Divides them recursively
+/// into halves that are nearer to one of two distant pivots. Calls `distance` three times per item
+/// and level.
+void order_by_distance(std::span<std::uint32_t> order, const PairDistance& distance) {
+  constexpr std::size_t kSmallest = 8;
+  if (order.size() <= kSmallest) return;
   struct Item {
     double key;
-    std::uint32_t thing;
+    std::uint32_t index;
   };
-  std::vector<Item> items(things.size());
-  const auto measure_from = [&](std::uint32_t pole, double sign) {
-    for (std::size_t i = 0; i < things.size(); ++i) {
-      const double d = things[i] == pole ? 0.0 : distance(pole, things[i]);
-      items[i] = {sign * d + (sign < 0 ? items[i].key : 0.0), things[i]};
+  std::vector<Item> items(order.size());
+  const auto measure_from = [&](std::uint32_t pivot, double sign) {
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      const double d = order[i] == pivot ? 0.0 : distance(pivot, order[i]);
+      items[i] = {sign * d + (sign < 0 ? items[i].key : 0.0), order[i]};
     }
   };
   const auto farthest = [&] {
     return std::max_element(items.begin(), items.end(),
                             [](const Item& x, const Item& y) { return x.key < y.key; })
-        ->thing;
+        ->index;
   };
-  measure_from(things.front(), 1.0);
-  const std::uint32_t pole = farthest();
-  measure_from(pole, 1.0);
+  measure_from(order.front(), 1.0);
+  const std::uint32_t pivot = farthest();
+  measure_from(pivot, 1.0);
   measure_from(farthest(), -1.0);
-  const std::size_t half = things.size() / 2;
+  const std::size_t half = order.size() / 2;
   std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(half), items.end(),
                    [](const Item& x, const Item& y) {
-                     return x.key < y.key || (x.key == y.key && x.thing < y.thing);
+                     return x.key < y.key || (x.key == y.key && x.index < y.index);
                    });
-  for (std::size_t i = 0; i < things.size(); ++i) things[i] = items[i].thing;
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = items[i].index;
   // The contents of a half do not depend on how the library finds a median, but their order would.
-  std::sort(things.begin(), things.begin() + static_cast<std::ptrdiff_t>(half));
-  std::sort(things.begin() + static_cast<std::ptrdiff_t>(half), things.end());
-  order_by_distance(things.first(half), distance);
-  order_by_distance(things.subspan(half), distance);
+  std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(half));
+  std::sort(order.begin() + static_cast<std::ptrdiff_t>(half), order.end());
+  order_by_distance(order.first(half), distance);
+  order_by_distance(order.subspan(half), distance);
 }
 
 template <class T>
-Dendrogram of_function(std::size_t count, const PairDistance& distance,
-                       const LinkageOptions& options) {
+Dendrogram cluster_items(std::size_t count, const PairDistance& distance,
+                         const LinkageOptions& options) {
   const LinkageKernels<T>& kernels = linkage_kernels<T>(options.path);
   BandMatrix<T> matrix(count, options.memory_limit);
   const auto checked = [&](std::uint32_t i, std::uint32_t j) {
@@ -90,10 +91,10 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
     return value;
   };
   // As for points, clusters that merge should have nearby rows in the matrix.
-  std::vector<std::uint32_t> thing(count);
-  std::iota(thing.begin(), thing.end(), 0u);
+  std::vector<std::uint32_t> order(count);
+  std::iota(order.begin(), order.end(), 0u);
   base::StopTicks ticks(options.check_stop);
-  order_by_distance(thing, [&](std::uint32_t i, std::uint32_t j) {
+  order_by_distance(order, [&](std::uint32_t i, std::uint32_t j) {
     ticks(kTicksOfDistance);
     return checked(i, j);
   });
@@ -102,24 +103,24 @@ Dendrogram of_function(std::size_t count, const PairDistance& distance,
     // Second copies of a pair are never read.
     const bool second_copy = count % 2 == 0 && i >= count / 2;
     for (std::size_t k = 0; k < matrix.width() - (second_copy ? 1 : 0); ++k) {
-      row[k] = static_cast<T>(checked(thing[i], thing[band_partner(count, {i, k})]));
+      row[k] = static_cast<T>(checked(order[i], order[band_partner(count, {i, k})]));
     }
   });
-  for (Link& link : links) link = {thing[link.i], thing[link.j], link.height};
+  for (Link& link : links) link = {order[link.i], order[link.j], link.height};
   return make_dendrogram(count, links, options.check_stop);
 }
 
 }  // namespace
 
 Dendrogram complete_linkage(std::span<const Point3> points, const LinkageOptions& options) {
-  return options.entry == MatrixEntry::float32 ? of_points<float>(points, options)
-                                               : of_points<double>(points, options);
+  return options.entry == MatrixEntry::float32 ? cluster_points<float>(points, options)
+                                               : cluster_points<double>(points, options);
 }
 
 Dendrogram complete_linkage(std::size_t count, const PairDistance& distance,
                             const LinkageOptions& options) {
-  return options.entry == MatrixEntry::float32 ? of_function<float>(count, distance, options)
-                                               : of_function<double>(count, distance, options);
+  return options.entry == MatrixEntry::float32 ? cluster_items<float>(count, distance, options)
+                                               : cluster_items<double>(count, distance, options);
 }
 
 template <class T>

@@ -12,7 +12,7 @@ namespace terrace::cluster {
 namespace {
 
 constexpr std::size_t kRowsPerBlock = 32;
-constexpr std::size_t kThreadsFrom = 512;  ///< with fewer clusters threads do not pay off
+constexpr std::size_t kMinThreadedSize = 512;  ///< with fewer clusters threads do not pay off
 /// After a round that merges less than 1/8 of the clusters, the chain takes over.
 constexpr std::size_t kChainBelow = 8;
 
@@ -56,7 +56,7 @@ std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
                           [&](std::size_t begin, std::size_t end, unsigned thread) {
                             check_stop();
                             for (std::size_t k = begin; k < end; ++k) {
-                              bring_in(static_cast<std::uint32_t>(k), columns_[thread]);
+                              fetch_entries(static_cast<std::uint32_t>(k), columns_[thread]);
                             }
                           });
     shrink();
@@ -70,7 +70,7 @@ std::vector<Link> CompleteRounds<T>::run(const FillRow& fill) {
 
 template <class T>
 unsigned CompleteRounds<T>::threads() const {
-  return size() < kThreadsFrom ? 1 : threads_;
+  return size() < kMinThreadedSize ? 1 : threads_;
 }
 
 template <class T>
@@ -82,7 +82,7 @@ typename CompleteRounds<T>::Pieces CompleteRounds<T>::pieces(std::uint32_t c) co
 
 template <class T>
 void CompleteRounds<T>::begin_minima(std::size_t count) {
-  ahead_.resize(count);
+  row_nearest_.resize(count);
   for (Columns& columns : columns_) {
     columns.best.assign(count, std::numeric_limits<T>::infinity());
     columns.row.assign(count, 0);
@@ -104,18 +104,18 @@ void CompleteRounds<T>::note_minima(std::uint32_t c, const Cluster& cluster, std
   const std::size_t second = kernels_.minima(cluster.row + after, wrapped, row, columns.best.data(),
                                              columns.row.data(), &least);
   if (second < wrapped) place = static_cast<std::uint32_t>(second);
-  ahead_[c] = {least, place};
+  row_nearest_[c] = {least, place};
 }
 
 /// Combines the threads' minima. Each thread took rows in ascending order, so the first on ties is
 /// the one with the lowest number.
 template <class T>
 void CompleteRounds<T>::end_minima() {
-  behind_.assign(ahead_.size(), {std::numeric_limits<T>::infinity(), kNone});
+  column_nearest_.assign(row_nearest_.size(), {std::numeric_limits<T>::infinity(), kNone});
   for (const Columns& columns : columns_) {
-    for (std::size_t c = 0; c < behind_.size(); ++c) {
+    for (std::size_t c = 0; c < column_nearest_.size(); ++c) {
       const auto row = static_cast<std::uint32_t>(columns.row[c]);
-      Nearest& best = behind_[c];
+      Nearest& best = column_nearest_[c];
       if (columns.best[c] < best.distance ||
           (columns.best[c] == best.distance && row < best.cluster)) {
         best = {columns.best[c], row};
@@ -126,18 +126,19 @@ void CompleteRounds<T>::end_minima() {
 
 template <class T>
 const typename CompleteRounds<T>::Nearest& CompleteRounds<T>::nearest(std::uint32_t c) const {
-  return behind_[c].distance < ahead_[c].distance ? behind_[c] : ahead_[c];
+  return column_nearest_[c].distance < row_nearest_[c].distance ? column_nearest_[c]
+                                                                : row_nearest_[c];
 }
 
-/// Pairs up clusters that are each other's nearest. On ties, which are everywhere on regular grids,
-/// a cluster can choose between the first ahead and the first behind, and takes whichever is free.
-/// If all insisted on one of their nearest, few pairs would agree.
+/// Pairs up clusters that are each other's nearest. Ties are frequent on regular grids. A cluster
+/// then chooses the nearest in its row or in its column, whichever is not yet paired. If every
+/// cluster had only one choice, few pairs would form.
 template <class T>
 std::size_t CompleteRounds<T>::match() {
   partner_.assign(size(), kNone);
   const std::size_t before = links_.size();
   for (std::uint32_t c = 0; c < size(); ++c) {
-    if (partner_[c] == kNone && !pair_up(c, ahead_[c])) pair_up(c, behind_[c]);
+    if (partner_[c] == kNone && !pair_up(c, row_nearest_[c])) pair_up(c, column_nearest_[c]);
   }
   assert(links_.size() > before);
   return links_.size() - before;
@@ -163,12 +164,12 @@ void CompleteRounds<T>::list_parts() {
   pair_first_.clear();
   pair_second_.clear();
   new_cluster_.resize(size());
-  firsts_before_.resize(size() + 1);
+  first_parts_before_.resize(size() + 1);
   for (std::uint32_t c = 0; c < size(); ++c) {
-    firsts_before_[c] = static_cast<std::uint32_t>(first_.size());
+    first_parts_before_[c] = static_cast<std::uint32_t>(first_.size());
     if (partner_[c] != kNone && partner_[c] < c) continue;
     const std::uint32_t other = partner_[c] == kNone ? c : partner_[c];
-    new_cluster_[c] = new_cluster_[other] = firsts_before_[c];
+    new_cluster_[c] = new_cluster_[other] = first_parts_before_[c];
     first_.push_back(c);
     second_.push_back(other);
     if (other != c) {
@@ -176,17 +177,18 @@ void CompleteRounds<T>::list_parts() {
       pair_second_.push_back(other);
     }
   }
-  firsts_before_[size()] = static_cast<std::uint32_t>(first_.size());
+  first_parts_before_[size()] = static_cast<std::uint32_t>(first_.size());
 }
 
-/// Makes the row of the new cluster k. bring_in() must have run.
+/// Returns the new cluster k with its row. Requires that fetch_entries(k) has run.
 template <class T>
-typename CompleteRounds<T>::Cluster CompleteRounds<T>::shrunk(std::uint32_t k, Columns& columns) {
+typename CompleteRounds<T>::Cluster CompleteRounds<T>::merged_row(std::uint32_t k,
+                                                                  Columns& columns) {
   const std::uint32_t a = first_[k];
   const std::uint32_t m = size();
   const Pieces own = pieces(a);
   T* const wide = columns.buffer.data();
-  // Zero where the row of a has no entry, so that the zero is never the larger value.
+  // Where the row of a has no entry, writes zeros, which are never the larger value.
   std::fill(wide + own.wrapped.end, wide + a + 1, T{0});
   std::fill(wide + own.after.end, wide + m, T{0});
   std::copy_n(own.after.values, own.after.end - own.after.begin, wide + own.after.begin);
@@ -203,8 +205,9 @@ typename CompleteRounds<T>::Cluster CompleteRounds<T>::shrunk(std::uint32_t k, C
     }
   }
   const auto count = static_cast<std::uint32_t>(first_.size());
-  const std::uint32_t after = firsts_before_[own.after.end] - firsts_before_[own.after.begin];
-  const std::uint32_t wrapped = firsts_before_[own.wrapped.end];
+  const std::uint32_t after =
+      first_parts_before_[own.after.end] - first_parts_before_[own.after.begin];
+  const std::uint32_t wrapped = first_parts_before_[own.wrapped.end];
   assert(wrapped == 0 || k + 1 + after == count);
   (void)count;
   T* const row = clusters_[a].row;
@@ -225,7 +228,7 @@ void CompleteRounds<T>::shrink() {
                           check_stop();
                           for (std::size_t k = begin; k < end; ++k) {
                             const auto c = static_cast<std::uint32_t>(k);
-                            next[k] = shrunk(c, columns_[thread]);
+                            next[k] = merged_row(c, columns_[thread]);
                             note_minima(c, next[k], count, columns_[thread]);
                           }
                         });
@@ -236,12 +239,12 @@ void CompleteRounds<T>::shrink() {
 // Entries of merged clusters can be in the rows of other clusters. If close clusters have close
 // rows these are few, but each is in a different row.
 
-/// shrunk() makes the row of the new cluster k from the rows of its parts. This function copies the
-/// entries that shrunk() needs from rows of other clusters into the row of the first part. It only
-/// reads entries with a second part, and only writes entries of two first parts, so all clusters
-/// may do it concurrently.
+/// merged_row() builds the row of the new cluster k from the rows of its parts. This function
+/// copies the entries that it needs from rows of other clusters into the row of the first part. It
+/// reads only entries with a second part and writes only entries of two first parts, so threads may
+/// call it for different clusters concurrently.
 template <class T>
-void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
+void CompleteRounds<T>::fetch_entries(std::uint32_t k, Columns& columns) {
   std::vector<std::uint32_t>& others = columns.others;
   list_others(k, others);
   const std::uint32_t a = first_[k];
@@ -263,9 +266,9 @@ void CompleteRounds<T>::bring_in(std::uint32_t k, Columns& columns) {
   }
 }
 
-/// Lists the new clusters whose entry belongs to the row of k but needs an entry from elsewhere:
-/// one that is neither in the row of the first part of k nor, in a column of that row, in the row
-/// of the second part.
+/// Lists the new clusters whose entry is in the row of k but depends on an entry of another
+/// cluster's row. Such an entry is neither in the row of the first part of k nor, in a column of
+/// that row, in the row of the second part.
 template <class T>
 void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const {
   others.clear();
@@ -306,13 +309,13 @@ void CompleteRounds<T>::list_others(std::uint32_t k, std::vector<std::uint32_t>&
   }
 }
 
-// The nearest-neighbour chain goes from any cluster to its nearest, from there to the next nearest,
-// and so on, until two are each other's nearest and merge. Each step examines m distances, half of
-// them in different rows, so it is used only if rounds would merge too few clusters.
+// The nearest-neighbour chain starts at any cluster and goes from each cluster to its nearest,
+// until two are each other's nearest and merge. Each step examines m distances, half of them in
+// different rows, so the chain is used only if rounds would merge too few clusters.
 
-/// Merges until three quarters of the clusters are left, and lists those. Entries of merged
-/// clusters become infinite. Takes O(m^2): a cluster joins the chain once for itself and at most
-/// twice for each merge.
+/// Merges until three quarters of the clusters remain, and lists those. Entries of merged clusters
+/// become infinite. Takes O(m^2) time, because a cluster joins the chain once for itself and at
+/// most twice for each merge.
 template <class T>
 void CompleteRounds<T>::chain() {
   const std::uint32_t m = size();
@@ -346,10 +349,10 @@ void CompleteRounds<T>::chain() {
   }
   first_.clear();
   for (std::uint32_t c = 0; c < m; ++c) {
-    firsts_before_[c] = static_cast<std::uint32_t>(first_.size());
+    first_parts_before_[c] = static_cast<std::uint32_t>(first_.size());
     if (!gone[c]) first_.push_back(c);
   }
-  firsts_before_[m] = static_cast<std::uint32_t>(first_.size());
+  first_parts_before_[m] = static_cast<std::uint32_t>(first_.size());
   second_ = first_;
 }
 

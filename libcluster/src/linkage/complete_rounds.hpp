@@ -18,15 +18,15 @@ namespace terrace::cluster {
 
 /// Complete linkage over a band matrix, which it consumes.
 ///
-/// Clusters are numbered 0..m-1 along the matrix. The row of cluster c holds its distances to the
-/// `length` clusters that follow, modulo m. When clusters merge or disappear, rows shrink in place.
-/// A pair always stays in the row of the same cluster, so lengths begin to differ, but no entry
-/// ever moves to another row. A new cluster takes the place of the first of its two parts.
+/// Clusters are numbered 0 ... m-1 along the matrix. The row of cluster c holds its distances to
+/// the next `length` clusters, modulo m. When clusters merge, rows shrink in place. The entry of a
+/// pair never moves to another row, so the lengths of rows begin to differ. A new cluster replaces
+/// the first of its two parts.
 template <class T>
 class CompleteRounds {
  public:
-  /// Makes or checks the entries of row i of the matrix. Called for several rows concurrently, in
-  /// any order.
+  /// Fills in or checks the entries of row i of the matrix. Several threads call it for different
+  /// rows, in any order.
   using FillRow = std::function<void(std::size_t i, T* row)>;
 
   /// options: must outlive this object.
@@ -94,9 +94,9 @@ class CompleteRounds {
   std::size_t match();
   bool pair_up(std::uint32_t c, const Nearest& candidate);
   void list_parts();
-  void bring_in(std::uint32_t k, Columns& columns);
+  void fetch_entries(std::uint32_t k, Columns& columns);
   void list_others(std::uint32_t k, std::vector<std::uint32_t>& others) const;
-  [[nodiscard]] Cluster shrunk(std::uint32_t k, Columns& columns);
+  [[nodiscard]] Cluster merged_row(std::uint32_t k, Columns& columns);
   void shrink();
 
   // The chain.
@@ -108,12 +108,13 @@ class CompleteRounds {
   const unsigned threads_;
   const base::StopCheck& check_stop_;
   std::vector<Cluster> clusters_;
-  std::vector<Columns> columns_;         ///< by thread
-  std::vector<Nearest> ahead_, behind_;  ///< nearest in the own row, and in the own column
-  std::vector<std::uint32_t> partner_;   ///< the cluster with which a cluster merges, or kNone
+  std::vector<Columns> columns_;  ///< by thread
+  std::vector<Nearest> row_nearest_,
+      column_nearest_;                  ///< by cluster: nearest in its row and in its column
+  std::vector<std::uint32_t> partner_;  ///< the cluster with which a cluster merges, or kNone
   /// The parts of each new cluster, twice the same if there is only one. For each old cluster, the
   /// new one and the number of first parts before it.
-  std::vector<std::uint32_t> first_, second_, new_cluster_, firsts_before_;
+  std::vector<std::uint32_t> first_, second_, new_cluster_, first_parts_before_;
   std::vector<std::uint32_t> pair_first_, pair_second_;  ///< parts of new clusters that have two
   std::vector<Link> links_;
 };

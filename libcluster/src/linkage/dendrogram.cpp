@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint32_t kNoLabel = 0xffffffffu;
 
-std::string text_of(const Link& link) {
+std::string link_text(const Link& link) {
   return "points " + std::to_string(link.i) + " and " + std::to_string(link.j);
 }
 
@@ -37,34 +37,35 @@ std::vector<std::uint32_t> by_height(std::span<const Link> links, base::StopTick
 }
 
 /// Returns the greatest height in the subtree of each merge, including its own.
-std::vector<double> crests_of(const Dendrogram& dendrogram) {
+std::vector<double> subtree_heights(const Dendrogram& dendrogram) {
   const std::size_t n = dendrogram.points;
-  std::vector<double> crest;
-  crest.reserve(dendrogram.merges.size());
+  std::vector<double> heights;
+  heights.reserve(dendrogram.merges.size());
   for (const Merge& merge : dendrogram.merges) {
     double most = merge.height;
     for (const std::uint32_t part : {merge.a, merge.b}) {
-      if (part >= n) most = std::max(most, crest[part - n]);
+      if (part >= n) most = std::max(most, heights[part - n]);
     }
-    crest.push_back(most);
+    heights.push_back(most);
   }
-  return crest;
+  return heights;
 }
 
-/// Returns the flat clusters formed by the merges whose crest is at most `height`.
+/// Returns the labels of the flat clusters that result from all merges with a subtree height of at
+/// most `height`.
 std::vector<std::uint32_t> labels_below(const Dendrogram& dendrogram,
-                                        const std::vector<double>& crest, double height) {
+                                        const std::vector<double>& heights, double height) {
   const std::size_t n = dendrogram.points;
   // A cluster that is not merged further gets its own name. Others get the name from above.
-  std::vector<std::uint32_t> name(n + crest.size(), kNoLabel);
-  for (std::size_t r = crest.size(); r-- > 0;) {
-    if (crest[r] > height) continue;
+  std::vector<std::uint32_t> name(n + heights.size(), kNoLabel);
+  for (std::size_t r = heights.size(); r-- > 0;) {
+    if (heights[r] > height) continue;
     const Merge& merge = dendrogram.merges[r];
     const auto self = static_cast<std::uint32_t>(n + r);
     if (name[self] == kNoLabel) name[self] = self;
     name[merge.a] = name[merge.b] = name[self];
   }
-  std::vector<std::uint32_t> label(n + crest.size(), kNoLabel);
+  std::vector<std::uint32_t> label(n + heights.size(), kNoLabel);
   std::vector<std::uint32_t> result(n);
   std::uint32_t next = 0;
   for (std::size_t i = 0; i < n; ++i) {
@@ -91,7 +92,7 @@ Dendrogram join(std::size_t points, std::span<const Link> links,
     const std::uint32_t x = sets.find(links[r].i);
     const std::uint32_t y = sets.find(links[r].j);
     if (!sets.unite(x, y)) {
-      throw std::invalid_argument("link " + std::to_string(r) + ": " + text_of(links[r]) +
+      throw std::invalid_argument("link " + std::to_string(r) + ": " + link_text(links[r]) +
                                   " are already in one cluster; links must form a tree");
     }
     const std::uint32_t root = std::min(x, y);
@@ -116,7 +117,7 @@ void check_links(std::size_t points, std::span<const Link> links) {
   for (std::size_t r = 0; r < links.size(); ++r) {
     const Link& link = links[r];
     const auto fail = [&](const char* what) {
-      throw std::invalid_argument("link " + std::to_string(r) + " of " + text_of(link) + " " +
+      throw std::invalid_argument("link " + std::to_string(r) + " of " + link_text(link) + " " +
                                   what);
     };
     if (link.i >= points || link.j >= points) fail("names a point that does not exist");
@@ -144,7 +145,7 @@ Dendrogram make_dendrogram_in_order(std::size_t points, std::span<const Link> li
 
 std::vector<std::uint32_t> cut_height(const Dendrogram& dendrogram, double height) {
   if (std::isnan(height)) throw std::invalid_argument("the height of the cut is NaN");
-  return labels_below(dendrogram, crests_of(dendrogram), height);
+  return labels_below(dendrogram, subtree_heights(dendrogram), height);
 }
 
 std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t count) {
@@ -153,13 +154,13 @@ std::vector<std::uint32_t> cut_count(const Dendrogram& dendrogram, std::size_t c
     throw std::invalid_argument(std::to_string(n) + " points cannot be cut into " +
                                 std::to_string(count) + " clusters; give from 1 to their number");
   }
-  const std::vector<double> crest = crests_of(dendrogram);
-  if (count == n) return labels_below(dendrogram, crest, -1.0);
+  const std::vector<double> heights = subtree_heights(dendrogram);
+  if (count == n) return labels_below(dendrogram, heights, -1.0);
   // The lowest height at which there are enough merges.
-  std::vector<double> sorted = crest;
+  std::vector<double> sorted = heights;
   const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(n - count - 1);
   std::nth_element(sorted.begin(), last, sorted.end());
-  return labels_below(dendrogram, crest, *last);
+  return labels_below(dendrogram, heights, *last);
 }
 
 std::string dendrogram_fault(const Dendrogram& dendrogram) {

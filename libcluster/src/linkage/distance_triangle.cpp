@@ -144,12 +144,12 @@ void DistanceTriangle<T>::join(std::uint32_t low, std::uint32_t high, double bet
 }
 
 template <class T>
-void DistanceTriangle<T>::move(const std::vector<std::uint32_t>& kept) {
+void DistanceTriangle<T>::move(const std::vector<std::uint32_t>& slots) {
   T* to = entries_.get();
-  for (std::size_t i = 1; i < kept.size(); ++i) {
+  for (std::size_t i = 1; i < slots.size(); ++i) {
     tick(i);
-    const T* const from = row(kept[i]);
-    for (std::size_t j = 0; j < i; ++j) *to++ = from[kept[j]];
+    const T* const from = row(slots[i]);
+    for (std::size_t j = 0; j < i; ++j) *to++ = from[slots[j]];
   }
 }
 

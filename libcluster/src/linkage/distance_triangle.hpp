@@ -31,7 +31,7 @@ class DistanceTriangle : public ClusterSlots {
   [[nodiscard]] NearCluster nearest(std::uint32_t x, std::uint32_t begin, std::uint32_t end,
                                     NearCluster best) const;
   void join(std::uint32_t low, std::uint32_t high, double between);
-  void move(const std::vector<std::uint32_t>& kept);
+  void move(const std::vector<std::uint32_t>& slots);
   [[nodiscard]] double height(double distance) const;
 
  private:

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/neighbour_lists.hpp"
 
-#include <algorithm>
 #include <limits>
 
 #include <terrace/base/parallel.hpp>
@@ -14,7 +13,7 @@ constexpr std::size_t kLeavesPerListBlock = 64;
 
 /// The best edges found so far for one point, in ascending order.
 struct Best {
-  TreeEdge edge[NeighbourLists::kMost];
+  TreeEdge edge[NeighbourLists::kMaxLength];
   unsigned length;
 
   void clear(unsigned entries) {
@@ -35,7 +34,8 @@ struct Best {
 
 NeighbourLists::NeighbourLists(const LinkageTree& tree, unsigned threads,
                                const base::StopCheck& check_stop)
-    : length_(static_cast<unsigned>(std::min<std::size_t>(NeighbourLists::kMost, tree.size() - 1))),
+    : length_(static_cast<unsigned>(
+          std::min<std::size_t>(NeighbourLists::kMaxLength, tree.size() - 1))),
       lists_(tree.size() * length_) {
   if (length_ == 0) return;
   base::parallel_blocks(tree.leaves(), kLeavesPerListBlock, threads,
@@ -90,33 +90,33 @@ void NeighbourLists::search(const LinkageTree& tree, std::size_t leaf) {
   };
 
   visit(own);
-  struct Waiting {
+  struct PendingNode {
     double square;
     std::size_t node;
   };
-  Waiting stack[128];
-  unsigned waiting = 0;
-  stack[waiting++] = {0.0, 1};
-  while (waiting > 0) {
-    const Waiting top = stack[--waiting];
+  PendingNode stack[128];
+  unsigned pending = 0;
+  stack[pending++] = {0.0, 1};
+  while (pending > 0) {
+    const PendingNode top = stack[--pending];
     // Ties are not skipped: among several neighbours at one distance the positions decide.
     if (top.square > reach || top.node == own) continue;
     if (tree.is_leaf(top.node)) {
       visit(top.node);
       continue;
     }
-    Waiting near{box.squared_distance(tree.box(2 * top.node)), 2 * top.node};
-    Waiting far{box.squared_distance(tree.box(2 * top.node + 1)), 2 * top.node + 1};
+    PendingNode near{box.squared_distance(tree.box(2 * top.node)), 2 * top.node};
+    PendingNode far{box.squared_distance(tree.box(2 * top.node + 1)), 2 * top.node + 1};
     if (far.square < near.square) std::swap(near, far);
-    if (far.square <= reach) stack[waiting++] = far;
-    if (near.square <= reach) stack[waiting++] = near;
+    if (far.square <= reach) stack[pending++] = far;
+    if (near.square <= reach) stack[pending++] = near;
   }
 
   for (std::size_t q = 0; q < count; ++q) {
-    const auto place = static_cast<std::uint32_t>(first + q);
+    const auto position = static_cast<std::uint32_t>(first + q);
     for (unsigned k = 0; k < length_; ++k) {
       const TreeEdge& e = best[q].edge[k];
-      of(place)[k] = e.low == place ? e.high : e.low;
+      list(position)[k] = e.low == position ? e.high : e.low;
     }
   }
 }

@@ -12,8 +12,8 @@
 
 namespace terrace::cluster {
 
-/// A pair of positions in a tree with the square of its length. Pairs are ordered by length, then
-/// by position. So no two are equal, and the minimum spanning tree is unique.
+/// An edge between two positions of a tree, with its squared length. Edges are ordered by length,
+/// then by position. So no two edges are equal, and the minimum spanning tree is unique.
 struct TreeEdge {
   double square;
   std::uint32_t low, high;  ///< low < high
@@ -27,15 +27,18 @@ struct TreeEdge {
   }
 };
 
-/// The nearest other points of each position of a tree, in the order of TreeEdge.
+/// The nearest other points of each point of a tree, by position and in the order of TreeEdge.
 class NeighbourLists {
  public:
-  static constexpr unsigned kMost = 8;
+  static constexpr unsigned kMaxLength = 8;
 
   NeighbourLists(const LinkageTree& tree, unsigned threads, const base::StopCheck& check_stop);
-  /// Returns the length of each list: kMost, or the number of all other points if that is less.
+  /// Returns the length of each list: kMaxLength, or the number of all other points if that is
+  /// less.
   [[nodiscard]] unsigned length() const { return length_; }
-  [[nodiscard]] std::uint32_t* of(std::size_t place) { return lists_.data() + place * length_; }
+  [[nodiscard]] std::uint32_t* list(std::size_t position) {
+    return lists_.data() + position * length_;
+  }
 
  private:
   void search(const LinkageTree& tree, std::size_t leaf);

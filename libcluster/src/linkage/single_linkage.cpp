@@ -7,6 +7,7 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/base/union_find.hpp>
 
+#include "linkage/neighbour_lists.hpp"
 #include "linkage/points.hpp"
 #include "linkage/spanning_tree.hpp"
 #include "linkage/tree.hpp"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/spanning_tree.hpp"
 
-#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <limits>
@@ -38,7 +37,8 @@ SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads,
   for (std::uint32_t i = 0; i < count_; ++i) {
     component_[i] = roots_[i] = i;
     if (lists_.length() > 0) {
-      bound_[i] = squared_distance(tree_.point(i), tree_.point(lists_.of(i)[lists_.length() - 1]));
+      bound_[i] =
+          squared_distance(tree_.point(i), tree_.point(lists_.list(i)[lists_.length() - 1]));
     }
   }
   while (roots_.size() > 1) {
@@ -47,7 +47,7 @@ SpanningTree::SpanningTree(const LinkageTree& tree, unsigned threads,
     base::parallel_blocks(count_, kPointsPerBlock, threads_,
                           [&](std::size_t begin, std::size_t end, unsigned) {
                             if (check_stop) check_stop();
-                            take_from_lists(begin, end);
+                            offer_list_edges(begin, end);
                           });
     label_nodes();
     base::parallel_blocks(tree_.leaves(), kLeavesPerBlock, threads_,
@@ -75,12 +75,12 @@ void SpanningTree::offer(std::uint32_t component, const TreeEdge& edge) {
   locks_.unlock(component);
 }
 
-void SpanningTree::take_from_lists(std::size_t begin, std::size_t end) {
+void SpanningTree::offer_list_edges(std::size_t begin, std::size_t end) {
   const unsigned length = lists_.length();
   for (std::size_t i = begin; i < end; ++i) {
     const std::uint32_t own = component_[i];
     if (own == largest_) continue;
-    const std::uint32_t* const list = lists_.of(i);
+    const std::uint32_t* const list = lists_.list(i);
     unsigned used = used_[i];
     while (used < length && component_[list[used]] == own) ++used;
     used_[i] = static_cast<std::uint8_t>(used);
@@ -115,7 +115,7 @@ void SpanningTree::search_tree(std::size_t begin, std::size_t end) {
     const auto last = static_cast<std::uint32_t>(tree_.leaf_begin(leaf + 1));
     unsigned searching = 0;
     for (std::uint32_t i = first; i < last; ++i) {
-      searching |= static_cast<unsigned>(must_search(i)) << (i - first);
+      searching |= static_cast<unsigned>(needs_search(i)) << (i - first);
     }
     while (searching != 0) {
       // Points of one component search together.
@@ -133,59 +133,60 @@ void SpanningTree::search_tree(std::size_t begin, std::size_t end) {
   }
 }
 
-bool SpanningTree::must_search(std::uint32_t place) {
-  const std::uint32_t own = component_[place];
-  return own != largest_ && used_[place] == lists_.length() && bound_[place] <= limit(own);
+bool SpanningTree::needs_search(std::uint32_t position) {
+  const std::uint32_t own = component_[position];
+  return own != largest_ && used_[position] == lists_.length() && bound_[position] <= limit(own);
 }
 
 /// Finds the shortest edge from the group to other components, unless it is longer than an edge
 /// that its own component has already found.
 void SpanningTree::search_from(const Group& group, std::uint32_t own) {
   TreeEdge best{limit(own), kMixed, kMixed};
-  std::uint32_t best_place = kMixed;
-  struct Waiting {
+  std::uint32_t best_position = kMixed;
+  struct PendingNode {
     double square;
     std::size_t node;
   };
-  Waiting stack[64];
-  unsigned waiting = 0;
-  stack[waiting++] = {0.0, 1};
-  while (waiting > 0) {
-    const Waiting top = stack[--waiting];
+  PendingNode stack[64];
+  unsigned pending = 0;
+  stack[pending++] = {0.0, 1};
+  while (pending > 0) {
+    const PendingNode top = stack[--pending];
     if (top.square > best.square) continue;
     if (!tree_.is_leaf(top.node)) {
-      Waiting near{group.box.squared_distance(tree_.box(2 * top.node)), 2 * top.node};
-      Waiting far{group.box.squared_distance(tree_.box(2 * top.node + 1)), 2 * top.node + 1};
+      PendingNode near{group.box.squared_distance(tree_.box(2 * top.node)), 2 * top.node};
+      PendingNode far{group.box.squared_distance(tree_.box(2 * top.node + 1)), 2 * top.node + 1};
       if (far.square < near.square) std::swap(near, far);
-      if (far.square <= best.square && label_[far.node] != own) stack[waiting++] = far;
-      if (near.square <= best.square && label_[near.node] != own) stack[waiting++] = near;
+      if (far.square <= best.square && label_[far.node] != own) stack[pending++] = far;
+      if (near.square <= best.square && label_[near.node] != own) stack[pending++] = near;
       continue;
     }
     const std::size_t leaf = top.node - tree_.leaves();
     const auto end = static_cast<std::uint32_t>(tree_.leaf_begin(leaf + 1));
     for (unsigned q = 0; q < group.count; ++q) {
-      const Point3 p = tree_.point(group.place[q]);
+      const Point3 p = tree_.point(group.position[q]);
       if (tree_.box(top.node).squared_distance(p) > best.square) continue;
       for (auto j = static_cast<std::uint32_t>(tree_.leaf_begin(leaf)); j < end; ++j) {
         if (component_[j] == own) continue;
-        const TreeEdge edge = TreeEdge::of(squared_distance(p, tree_.point(j)), group.place[q], j);
+        const TreeEdge edge =
+            TreeEdge::of(squared_distance(p, tree_.point(j)), group.position[q], j);
         if (edge < best) {
           best = edge;
-          best_place = group.place[q];
+          best_position = group.position[q];
         }
       }
     }
   }
   for (unsigned q = 0; q < group.count; ++q) {
-    double& bound = bound_[group.place[q]];
+    double& bound = bound_[group.position[q]];
     bound = std::max(bound, best.square);
   }
-  if (best_place == kMixed) return;
+  if (best_position == kMixed) return;
   offer(own, best);
   // The nearest point of another component replaces the last entry of the list.
   const unsigned last = lists_.length() - 1;
-  lists_.of(best_place)[last] = best.low == best_place ? best.high : best.low;
-  used_[best_place] = static_cast<std::uint8_t>(last);
+  lists_.list(best_position)[last] = best.low == best_position ? best.high : best.low;
+  used_[best_position] = static_cast<std::uint8_t>(last);
 }
 
 void SpanningTree::merge() {
@@ -202,14 +203,14 @@ void SpanningTree::merge() {
                         });
   std::vector<std::uint32_t> size(count_, 0);
   for (const std::uint32_t component : component_) ++size[component];
-  std::size_t kept = 0;
+  std::size_t count = 0;
   largest_ = roots_.front();
   for (const std::uint32_t root : roots_) {
     if (size[root] == 0) continue;
-    roots_[kept++] = root;
+    roots_[count++] = root;
     if (size[root] > size[largest_]) largest_ = root;
   }
-  roots_.resize(kept);
+  roots_.resize(count);
 }
 
 }  // namespace terrace::cluster

@@ -19,12 +19,13 @@ namespace terrace::cluster {
 
 /// The Euclidean minimum spanning tree of the points of a kD-tree, all of them different.
 ///
-/// Uses Borůvka's method: in each round every component except the largest takes its shortest edge
-/// to another one. A point's candidate is the first neighbour in its list that is in another
-/// component. When its list is exhausted, the point has a bound instead. It searches the tree only
-/// if that bound is below the best edge that its component has found so far, together with other
-/// points of its leaf. The search skips nodes that are entirely in the component. The largest
-/// component does not search, as that would take longest; the others find its edges.
+/// Uses Borůvka's method: in each round every component takes its shortest edge to another one. The
+/// largest component is skipped, because it would take longest and the others find its edges.
+///
+/// A point first offers the first neighbour in its list that is in another component. When the list
+/// is exhausted, the point has a lower bound of that distance instead. If the bound is below the
+/// best edge of its component so far, the point searches the tree, together with other points of
+/// its leaf. The search skips nodes that are entirely in the component.
 class SpanningTree {
  public:
   SpanningTree(const LinkageTree& tree, unsigned threads, const base::StopCheck& check_stop);
@@ -49,18 +50,18 @@ class SpanningTree {
   /// Points of one leaf and one component, with their box.
   struct Group {
     Box3 box;
-    std::uint32_t place[LinkageTree::kLeaf];
+    std::uint32_t position[LinkageTree::kLeaf];
     unsigned count = 0;
     void add(std::uint32_t i, const Point3& p) {
       box.include(p);
-      place[count++] = i;
+      position[count++] = i;
     }
   };
 
   void label_nodes();
-  void take_from_lists(std::size_t begin, std::size_t end);
+  void offer_list_edges(std::size_t begin, std::size_t end);
   void search_tree(std::size_t begin, std::size_t end);
-  [[nodiscard]] bool must_search(std::uint32_t place);
+  [[nodiscard]] bool needs_search(std::uint32_t position);
   void search_from(const Group& group, std::uint32_t own);
   void offer(std::uint32_t component, const TreeEdge& edge);
   [[nodiscard]] double limit(std::uint32_t component);
@@ -70,8 +71,10 @@ class SpanningTree {
   const unsigned threads_;
   const std::uint32_t count_;
   NeighbourLists lists_;
-  std::vector<std::uint8_t> used_;  ///< number of leading list entries in the own component
-  std::vector<double> bound_;       ///< after the list is exhausted: no other component is nearer
+  std::vector<std::uint8_t>
+      used_;  ///< by position: number of leading list entries in its component
+  std::vector<double>
+      bound_;  ///< by position: lower bound of the distance, if its list is exhausted
   std::vector<std::uint32_t> component_;  ///< by position: the lowest position of its component
   std::vector<std::uint32_t> label_;      ///< by node: its component, or kMixed
   std::vector<TreeEdge> shortest_;        ///< by a component's lowest position: its best edge

@@ -9,6 +9,7 @@
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_names.hpp"
+#include "cli/progress.hpp"
 #include "cli/terminal.hpp"
 
 // Separate from cli.cpp, which depends on all verbs.

@@ -5,7 +5,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <terrace/base/stop_check.hpp>
 
-#include "scan/cgal_calls.hpp"
+#include "scan/cgal_surface.hpp"
 
 namespace terrace::tools {
 

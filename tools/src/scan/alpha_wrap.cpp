@@ -3,7 +3,7 @@
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
 
-#include "scan/cgal_calls.hpp"
+#include "scan/cgal_surface.hpp"
 
 namespace terrace::tools {
 

@@ -15,8 +15,6 @@
 #include <terrace/base/stop_check.hpp>
 #include <terrace/tri/delaunay3.hpp>
 
-#include "scan/cgal_calls.hpp"
-
 namespace terrace::tools {
 namespace {
 

@@ -4,10 +4,16 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <list>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -23,12 +29,12 @@
 #include <unistd.h>
 
 #include "serve/http_rules.hpp"
-#include "serve/own_session.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::tools {
 namespace {
 
+namespace fs = std::filesystem;
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
@@ -48,6 +54,57 @@ std::string random_token() {
     for (const unsigned digit : {byte >> 4U, byte & 15U}) text += "0123456789abcdef"[digit];
   }
   return text;
+}
+
+/// Returns an endpoint in the notation of /proc/net/tcp.
+std::string end_text(std::uint32_t address, std::uint16_t port) {
+  char text[16];
+  std::snprintf(text, sizeof text, "%08X:%04X", address, port);
+  return text;
+}
+
+/// Returns the number of the client's socket if it belongs to this user, otherwise an empty string.
+std::string socket_of_client(const std::string& client, std::uint16_t server_port) {
+  std::ifstream table("/proc/net/tcp");
+  std::string line, skipped, local, remote, user, socket;
+  std::getline(table, line);
+  while (std::getline(table, line)) {
+    std::istringstream fields(line);
+    fields >> skipped >> local >> remote;
+    if (local != client || !remote.ends_with(end_text(0, server_port).substr(8))) continue;
+    for (int i = 0; i < 4; ++i) fields >> skipped;  // state, queues, timer, retransmissions
+    fields >> user >> skipped >> socket;
+    return user == fmt::format("{}", ::geteuid()) && socket != "0" ? socket : std::string();
+  }
+  return {};
+}
+
+/// Returns whether the program at the other end of a connection over 127.0.0.1 belongs to this
+/// process's user and session, like a command typed in the same terminal. Returns false if the
+/// system does not say. `address` is that of the other end, as in sockaddr_in; ports are in host
+/// byte order.
+bool is_of_this_session(std::uint32_t address, std::uint16_t client_port,
+                        std::uint16_t server_port) {
+  const std::string socket = socket_of_client(end_text(address, client_port), server_port);
+  const pid_t session = ::getsid(0);
+  if (socket.empty() || session <= 0) return false;
+  const std::string link = "socket:[" + socket + "]";
+  std::error_code error;
+  for (fs::directory_iterator process("/proc", error), end; !error && process != end;
+       process.increment(error)) {
+    const std::string name = process->path().filename().string();
+    pid_t number = 0;
+    const auto [last, fault] = std::from_chars(name.data(), name.data() + name.size(), number);
+    if (fault != std::errc() || last != name.data() + name.size()) continue;
+    if (::getsid(number) != session) continue;
+    std::error_code ended;
+    for (fs::directory_iterator file(process->path() / "fd", ended), none; !ended && file != none;
+         file.increment(ended)) {
+      std::error_code closed;
+      if (fs::read_symlink(file->path(), closed) == link) return true;
+    }
+  }
+  return false;
 }
 
 class Session;

@@ -11,7 +11,7 @@
 
 namespace terrace::base {
 
-/// Standard types, so that points are the same types in every library of the workspace.
+/// Standard types, so that points have the same type in every library.
 using Point2 = std::array<double, 2>;
 using Point3 = std::array<double, 3>;
 
@@ -25,7 +25,7 @@ struct Box {
   Point min = filled(kGreatest);
   Point max = filled(kLeast);
 
-  /// True if no point is inside: min > max, or a bound is NaN, on some axis.
+  /// Returns whether the box contains no point: on some axis min > max, or a bound is NaN.
   [[nodiscard]] constexpr bool empty() const {
     for (std::size_t axis = 0; axis < D; ++axis) {
       if (!(min[axis] <= max[axis])) return true;
@@ -52,14 +52,14 @@ struct Box {
     }
     return true;
   }
-  /// True if all of `other` is inside; false if a bound is NaN.
+  /// Returns whether `other` is entirely inside this box; false if a bound is NaN.
   [[nodiscard]] constexpr bool covers(const Box& other) const {
     for (std::size_t axis = 0; axis < D; ++axis) {
       if (!(min[axis] <= other.min[axis] && other.max[axis] <= max[axis])) return false;
     }
     return true;
   }
-  /// True if the boxes have a point in common; false if a bound is NaN.
+  /// Returns whether the boxes have a point in common; false if a bound is NaN.
   [[nodiscard]] constexpr bool intersects(const Box& other) const {
     for (std::size_t axis = 0; axis < D; ++axis) {
       if (!(min[axis] <= other.max[axis] && other.min[axis] <= max[axis])) return false;
@@ -114,7 +114,7 @@ struct Box {
 using Box2 = Box<2>;
 using Box3 = Box<3>;
 
-/// The smallest box that contains all the points; empty without points.
+/// Returns the smallest box that contains all points; an empty box if there are none.
 [[nodiscard]] constexpr Box2 box_of(std::span<const Point2> points) {
   Box2 box;
   for (const Point2& p : points) box.include(p);

@@ -9,8 +9,8 @@
 
 namespace terrace::base {
 
-/// `count` copies of `value`. The first touch of gigabytes takes seconds, so the check is called in
-/// between.
+/// Returns a vector of `count` copies of `value`. The first touch of gigabytes takes seconds, so
+/// the check is called every 4 MiB. Throws whatever the check throws, and std::bad_alloc.
 template <class T>
 std::vector<T> filled(std::size_t count, const T& value, const StopCheck& check_stop) {
   constexpr std::size_t kStep = std::max<std::size_t>((std::size_t{1} << 22) / sizeof(T), 1);

@@ -17,14 +17,17 @@ namespace terrace::base {
 
 /// Runs a pipeline on `threads` threads, including the caller's.
 ///
-/// next(worker) returns the next item, or nullopt at the end. make(worker, item) computes its
-/// result on the same thread, whose number is `worker` (0 to threads - 1). commit(result) receives
-/// the results in the order of the items, on any thread. Neither next nor commit is called while
-/// another call of it runs, so the effect does not depend on the number of threads. No thread waits
-/// for another's commit while there is work. At most two results per thread are waiting.
+/// - next(worker) returns the next item, or nullopt at the end.
+/// - make(worker, item) computes the result of an item on the same thread, whose number is `worker`
+///   (0 to threads - 1).
+/// - commit(result) receives the results in the order of the items, on any thread.
 ///
-/// Rethrows the exception of the first item that failed; an exception from next counts for the item
-/// that it did not return. Other threads then stop after their current result.
+/// Calls of next never overlap, nor do calls of commit, so the effect does not depend on the number
+/// of threads. A thread waits only if there is nothing to commit and two results per thread are
+/// uncommitted.
+///
+/// Rethrows the exception of the first item that failed. An exception from next counts for the item
+/// that it did not return. After a failure the other threads finish their current result and stop.
 template <class Next, class Make, class Commit>
 void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& commit) {
   using Item = typename std::invoke_result_t<Next&, unsigned>::value_type;
@@ -39,19 +42,19 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
     std::exception_ptr error;
     [[nodiscard]] bool ready() const { return result.has_value() || error != nullptr; }
   };
-  const std::size_t ahead = 2 * std::size_t{threads};
-  std::vector<Slot> slots(ahead);  // result i waits in slot i % ahead
+  const std::size_t capacity = 2 * std::size_t{threads};
+  std::vector<Slot> slots(capacity);  // result i waits in slot i % capacity
   std::mutex mutex;
   std::condition_variable changed;
-  std::size_t given = 0, committed = 0;
-  bool giving = false, ended = false, committing = false, stop = false;
+  std::size_t issued = 0, committed = 0;
+  bool issuing = false, ended = false, committing = false, stop = false;
   std::exception_ptr failure;
 
-  // Commits ready results in order. The lock is held before and after, but not during a commit.
+  // Commits ready results in order. Unlocks `lock` during each commit.
   const auto commit_ready = [&](std::unique_lock<std::mutex>& lock) {
     committing = true;
-    while (!stop && slots[committed % ahead].ready()) {
-      Slot slot = std::exchange(slots[committed % ahead], Slot{});
+    while (!stop && slots[committed % capacity].ready()) {
+      Slot slot = std::exchange(slots[committed % capacity], Slot{});
       lock.unlock();
       if (!slot.error) {
         try {
@@ -75,13 +78,13 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
     std::unique_lock lock(mutex);
     for (;;) {
       if (!committing) commit_ready(lock);
-      if (stop || ended) return;  // the threads that still make or commit take the rest
-      if (giving || given == committed + ahead) {
+      if (stop || ended) return;  // the threads that still make or commit do the rest
+      if (issuing || issued == committed + capacity) {
         changed.wait(lock);
         continue;
       }
-      const std::size_t i = given;
-      giving = true;
+      const std::size_t i = issued;
+      issuing = true;
       lock.unlock();
       Slot slot;
       std::optional<Item> item;
@@ -91,9 +94,9 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
         slot.error = std::current_exception();
       }
       lock.lock();
-      giving = false;
+      issuing = false;
       ended = ended || !item;
-      if (item || slot.error) ++given;
+      if (item || slot.error) ++issued;
       changed.notify_all();
       if (item) {
         lock.unlock();
@@ -104,7 +107,7 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
         }
         lock.lock();
       }
-      if (slot.ready()) slots[i % ahead] = std::move(slot);
+      if (slot.ready()) slots[i % capacity] = std::move(slot);
     }
   };
 
@@ -123,10 +126,10 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
 /// Runs make(worker, i) for i = 0 to count - 1 on several threads, and commit(i, result) in order.
 template <class Make, class Commit>
 void in_order(std::size_t count, unsigned threads, const Make& make, const Commit& commit) {
-  std::size_t given = 0, committed = 0;
+  std::size_t issued = 0, committed = 0;
   each_in_order(
       static_cast<unsigned>(std::min<std::size_t>(threads, count)),
-      [&](unsigned) { return given < count ? std::optional(given++) : std::nullopt; }, make,
+      [&](unsigned) { return issued < count ? std::optional(issued++) : std::nullopt; }, make,
       [&](auto&& result) { commit(committed++, std::forward<decltype(result)>(result)); });
 }
 

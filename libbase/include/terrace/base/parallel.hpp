@@ -12,14 +12,15 @@
 #include "terrace/base/thread_team.hpp"
 #endif
 
-/// Loops on several threads that live for one loop: for work that takes milliseconds. Which thread
-/// takes which part varies from run to run, so each call must write only to its own memory, or to
-/// that of its thread. In WebAssembly the caller's thread does everything.
+/// Loops on several threads, which live for one loop. They pay off for work that takes
+/// milliseconds. The distribution of work to threads varies from run to run, so each call must
+/// write only to its own memory or to that of its thread. In WebAssembly the caller's thread does
+/// everything.
 
 namespace terrace::base {
 
-/// The number of threads for that many parts of work: the number asked for (0: one per core), at
-/// most 256, and no more than there are parts.
+/// Returns the number of threads for `parts` independent parts of work: `threads`, where 0 means
+/// one per core, but at most 256 and at most one per part.
 [[nodiscard]] inline unsigned threads_for(std::size_t parts, unsigned threads) {
   if (threads == 0) threads = std::max(1u, std::thread::hardware_concurrency());
   constexpr std::size_t kMost = 256;
@@ -27,9 +28,9 @@ namespace terrace::base {
       std::clamp<std::size_t>(parts, 1, std::min<std::size_t>(threads, kMost)));
 }
 
-/// Calls work(i), or work(i, thread), once for every i below `count`, where `thread` is below
-/// threads_for(count, threads). Calls begin in ascending order. If calls throw, no more begin, and
-/// the exception of the smallest i is rethrown when all have ended.
+/// Calls work(i), or work(i, thread), once for every i below `count`. `thread` is below
+/// threads_for(count, threads). Calls begin in ascending order. After an exception no more calls
+/// begin. When all have ended, the exception of the smallest i is rethrown.
 template <class Work>
 void parallel_for(std::size_t count, unsigned threads, Work&& work) {
 #ifdef __EMSCRIPTEN__
@@ -46,8 +47,8 @@ void parallel_for(std::size_t count, unsigned threads, Work&& work) {
 #endif
 }
 
-/// Calls work(begin, end), or work(begin, end, thread), for consecutive blocks of `block` numbers
-/// out of 0 .. count - 1.
+/// Calls work(begin, end), or work(begin, end, thread), for each block of `block` consecutive
+/// numbers of 0 ... count - 1. The last block may be shorter. Otherwise as parallel_for().
 template <class Work>
 void parallel_blocks(std::size_t count, std::size_t block, unsigned threads, Work&& work) {
   parallel_for((count + block - 1) / block, threads, [&](std::size_t b, unsigned thread) {
@@ -60,8 +61,8 @@ void parallel_blocks(std::size_t count, std::size_t block, unsigned threads, Wor
   });
 }
 
-/// The same with a helper per thread, such as scratch memory: work(begin, end, helper), where
-/// make() gives each thread its helper when the thread begins its first block.
+/// Calls work(begin, end, helper), where each thread has its own helper, such as scratch memory.
+/// The thread creates it with make() before its first block. Otherwise as above.
 template <class Make, class Work>
 void parallel_blocks(std::size_t count, std::size_t block, unsigned threads, Make&& make,
                      Work&& work) {

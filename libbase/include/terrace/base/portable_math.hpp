@@ -10,10 +10,10 @@
 #include <limits>
 #include <numbers>
 
-/// Functions with the same bits on every machine. The C library's versions round differently from
-/// release to release and from processor to processor, and results would differ. These use only
-/// +, -, *, / and sqrt, which IEEE 754 defines exactly, and fmod, remquo, frexp, ldexp and
-/// nearbyint, which are exact. Compile with -ffp-contract=off.
+/// Mathematical functions with the same bits on every machine. The functions of the C library round
+/// differently from release to release and from processor to processor. These use only +, -, *, /
+/// and sqrt, which IEEE 754 defines exactly, and fmod, remquo, frexp, ldexp and nearbyint, which
+/// are exact. Requires -ffp-contract=off.
 
 namespace terrace::base {
 
@@ -24,44 +24,45 @@ namespace portable {
 /// ln 2 in two parts, the first with trailing zeros, so that integer multiples of it are exact.
 inline constexpr double kLn2High = 0x1.62e42fefa0000p-1, kLn2Low = 0x1.cf79abc9e3b3ap-40;
 
-/// sin(x) for |x| <= pi / 4: Taylor's series.
+/// Returns sin(x) for |x| <= pi / 4 by Taylor's series.
 inline double sine_series(double x) {
   double sum = 0.0;
   for (int k = 9; k >= 1; --k) sum = (1.0 + sum) * (-x * x / (2 * k * (2 * k + 1)));
   return x + x * sum;
 }
-/// cos(x) likewise.
+/// Returns cos(x) for |x| <= pi / 4 by Taylor's series.
 inline double cosine_series(double x) {
   double sum = 0.0;
   for (int k = 9; k >= 1; --k) sum = (1.0 + sum) * (-x * x / (2 * k * (2 * k - 1)));
   return 1.0 + sum;
 }
-/// Radians from the nearest multiple of 90 degrees, and that multiple modulo 4.
+/// Returns the radians from the nearest multiple of 90 degrees, and that multiple modulo 4.
 struct Reduced {
   double radians;
   int quarter;
 };
 inline Reduced reduced(double degrees) {
   int quarter = 0;
-  const double rest = std::remquo(degrees, 90.0, &quarter);
-  return {rest * kRadiansPerDegree, quarter & 3};
+  const double remainder = std::remquo(degrees, 90.0, &quarter);
+  return {remainder * kRadiansPerDegree, quarter & 3};
 }
 
 }  // namespace portable
 
-/// Sine of an angle in degrees, within 2e-16; exact at multiples of 90; NaN for infinite angles.
+/// Returns the sine of an angle in degrees, within 2e-16. It is exact at multiples of 90, and NaN
+/// for infinite angles.
 inline double sin_degrees(double degrees) {
   const auto [x, quarter] = portable::reduced(degrees);
   const double value = quarter % 2 == 0 ? portable::sine_series(x) : portable::cosine_series(x);
   return quarter < 2 ? value : -value;
 }
-/// Cosine likewise.
+/// Returns the cosine of an angle in degrees, as sin_degrees() returns the sine.
 inline double cos_degrees(double degrees) {
   const auto [x, quarter] = portable::reduced(degrees);
   const double value = quarter % 2 == 0 ? portable::cosine_series(x) : portable::sine_series(x);
   return quarter == 1 || quarter == 2 ? -value : value;
 }
-/// Both at once: {sine, cosine}.
+/// Returns {sine, cosine} of an angle in degrees.
 inline std::array<double, 2> sin_cos_degrees(double degrees) {
   const auto [x, quarter] = portable::reduced(degrees);
   const double s = portable::sine_series(x), c = portable::cosine_series(x);
@@ -77,13 +78,14 @@ inline std::array<double, 2> sin_cos_degrees(double degrees) {
   }
 }
 
-/// The angle of the vector (x, y) from the x axis in degrees, -180 to 180, with a relative error of
-/// 4e-16; exact at multiples of 45. As with atan2(y, x): 0 or 180 with the sign of y if y is zero.
+/// Returns the angle of the vector (x, y) from the x axis in degrees, from -180 to 180, with a
+/// relative error of 4e-16. It is exact at multiples of 45. If y is zero, the result is 0 or 180
+/// with the sign of y, as for atan2(y, x).
 inline double atan2_degrees(double y, double x) {
   const double a = std::abs(x), b = std::abs(y);
   if (std::isnan(a) || std::isnan(b)) return a + b;
-  // The tangent, at most 1: the angle of the nearest eighth is known; the series gives the
-  // difference.
+  // The tangent is at most 1. The table has the angle of the nearest eighth, and the series adds
+  // the difference.
   double t = a == b ? 1.0 : std::min(a, b) / std::max(a, b);
   if (b == 0.0) t = 0.0;
   constexpr std::array<double, 9> kEighths{0.0,
@@ -95,7 +97,7 @@ inline double atan2_degrees(double y, double x) {
                                            36.86989764584402,
                                            41.18592516570965,
                                            45.0};
-  // Either eighth will do next to the middle between two.
+  // In the middle between two eighths either will do.
   const int eighth = static_cast<int>(t * 8.0 + 0.5);  // NOLINT(bugprone-incorrect-roundings)
   t = (t - eighth / 8.0) / (1.0 + t * (eighth / 8.0));
   const double q = t * t;  // at most 1 / 256
@@ -111,7 +113,7 @@ inline double atan2_degrees(double y, double x) {
   return std::copysign(degrees, y);
 }
 
-/// sqrt(x^2 + y^2), also where the squares would overflow or underflow.
+/// Returns sqrt(x^2 + y^2), even if the squares would overflow or underflow.
 inline double hypot(double x, double y) {
   const double squares = x * x + y * y;
   if (squares > 1e-280 && squares < 1e300) return std::sqrt(squares);
@@ -122,7 +124,7 @@ inline double hypot(double x, double y) {
   return largest * std::sqrt(x * x + y * y);
 }
 
-/// e^x, within 1e-15 relative for |x| <= 700; clamped beyond.
+/// Returns e^x with a relative error of 1e-15. Clamps x to [-700, 700].
 inline double exp(double x) {
   if (std::isnan(x)) return x;
   x = std::clamp(x, -700.0, 700.0);
@@ -133,10 +135,10 @@ inline double exp(double x) {
   for (int n = 17; n >= 1; --n) sum = 1.0 + sum * (r / n);
   return std::ldexp(sum, static_cast<int>(k));
 }
-/// 2^x likewise.
+/// Returns 2^x, computed as exp(x ln 2).
 inline double exp2(double x) { return exp(x * std::numbers::ln2); }
 
-/// Natural logarithm of a positive finite number, within 1e-15 relative.
+/// Returns the natural logarithm of a positive finite number, with a relative error of 1e-15.
 inline double log(double x) {
   // x = m 2^e with m from sqrt(1/2) to sqrt(2); ln m = 2 artanh(s) by its series.
   int e = 0;
@@ -151,7 +153,8 @@ inline double log(double x) {
   return e * portable::kLn2High + (e * portable::kLn2Low + 2.0 * (s + s * sum));
 }
 
-/// c[0] + c[1] x + c[2] x^2 + ..., even and odd terms separately, which processors do in parallel.
+/// Returns c[0] + c[1] x + c[2] x^2 + ... Sums even and odd terms separately, because processors
+/// compute the two sums in parallel.
 template <std::size_t N>
 double polynomial(const std::array<double, N>& c, double x) {
   const double square = x * x;
@@ -163,8 +166,8 @@ double polynomial(const std::array<double, N>& c, double x) {
   return even + odd * x;
 }
 
-/// x^p for finite x >= 0 and p > 0, within 1e-15 for results of about 1; 0 and 1 are exact. Faster
-/// than exp(p * log(x)).
+/// Returns x^p for finite x >= 0 and p > 0, within 1e-15 for results of about 1. Results of 0 and 1
+/// are exact. Faster than exp(p * log(x)).
 inline double pow(double x, double p) {
   if (!(x > 0.0)) return x;
   if (p == 2.0) return x * x;

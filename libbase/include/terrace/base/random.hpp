@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-/// Random numbers that are the same everywhere. The engines of the standard library are portable,
-/// its distributions differ between implementations.
+/// Random numbers that are the same on every machine. The engines of the standard library are
+/// portable, but its distributions differ between implementations.
 
 namespace terrace::base {
 
@@ -22,23 +22,23 @@ constexpr std::uint64_t mix64(std::uint64_t x) {
   x = (x ^ (x >> 27)) * 0x94D049BB133111EBu;
   return x ^ (x >> 31);
 }
-/// The generator splitmix64 after the state x: mix64(x + kGoldenGamma).
+/// Returns the output of the generator splitmix64 in state x.
 constexpr std::uint64_t splitmix64(std::uint64_t x) { return mix64(x + kGoldenGamma); }
 
-/// A different seed for each of many runs.
+/// Returns a seed for run number `run`, different for each run.
 constexpr std::uint64_t seed_of_run(std::uint64_t seed, std::uint64_t run) {
   return splitmix64(seed + run * kGoldenGamma);
 }
 
-/// The upper 53 bits as a double in [0, 1).
+/// Returns the upper 53 bits as a double in [0, 1).
 constexpr double unit_interval(std::uint64_t bits) {
   return static_cast<double>(bits >> 11) * 0x1p-53;
 }
 
-/// Uniform in [0, 1).
+/// Returns a uniformly distributed number in [0, 1).
 inline double draw_unit(std::mt19937_64& random) { return unit_interval(random()); }
 
-/// Uniform below `bound`, which must be positive and at most 2^32.
+/// Returns a uniformly distributed integer below `bound`. Requires 0 < bound <= 2^32.
 inline std::uint32_t draw_below(std::size_t bound, std::mt19937_64& random) {
   return static_cast<std::uint32_t>(((random() >> 32) * bound) >> 32);
 }

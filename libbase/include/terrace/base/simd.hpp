@@ -5,7 +5,7 @@
 
 namespace terrace::base {
 
-/// The instruction sets for which inner loops are compiled. All give the same bits.
+/// The instruction sets for which inner loops are compiled. All compute the same bits.
 enum class SimdPath : std::uint8_t {
   automatic,  ///< the best one that the processor supports
   portable,   ///< the baseline of the architecture
@@ -25,7 +25,7 @@ enum class SimdPath : std::uint8_t {
   return path == SimdPath::automatic || path == SimdPath::portable;
 }
 
-/// The best path that this processor supports; never `automatic`.
+/// Returns the best path that this processor supports; never `automatic`.
 [[nodiscard]] inline SimdPath best_simd_path() {
   static const SimdPath best = supports(SimdPath::avx512) ? SimdPath::avx512
                                : supports(SimdPath::avx2) ? SimdPath::avx2

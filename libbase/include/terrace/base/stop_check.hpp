@@ -7,19 +7,21 @@
 
 namespace terrace::base {
 
-/// Called at intervals during long work, by any of its threads, possibly several at once. An
-/// exception that it throws ends the work and reaches the caller. At most a few milliseconds pass
-/// between two calls, and often less than a microsecond, so a check should only read a flag. It
-/// does not change results.
+/// A function that long work calls at intervals, from any of its threads and possibly from several
+/// at once. If it throws, the work ends and the exception reaches the caller. At most a few
+/// milliseconds pass between two calls, often less than a microsecond, so the function should only
+/// read a flag. It does not change results.
 using StopCheck = std::function<void()>;
 
-/// Calls a check once per 65,536 units of work, of about a nanosecond each. One object per thread.
+/// Counts units of work, of about a nanosecond each, and calls a check once per 65,536 units. One
+/// object per thread.
 class StopTicks {
  public:
-  /// Checks nothing.
+  /// Creates ticks without a check, which never throw.
   StopTicks() = default;
   explicit StopTicks(StopCheck check) : check_(std::move(check)) {}
 
+  /// Adds `work` units. Throws whatever the check throws.
   void operator()(std::size_t work = 1) {
     work_ += work;
     if (work_ >= kBetweenChecks) look();

@@ -16,14 +16,14 @@
 
 namespace terrace::base {
 
-/// Threads that wait for short loops and start on them within a microsecond: they spin for some
-/// tens of microseconds before they sleep. The caller never waits for a thread that has not begun,
-/// so on a busy machine only the help is lost. One caller at a time.
+/// Threads for many short loops. They start on a loop within a microsecond, because they spin for
+/// some tens of microseconds before they sleep. The caller never waits for a thread that has not
+/// begun, so on a busy machine the loop is slower but never stuck. One caller at a time.
 class ThreadTeam {
  public:
-  /// threads: includes the caller's; 0 counts as 1. The others are started by the first loop, as
-  /// many as the system grants.
-  explicit ThreadTeam(unsigned threads) : wanted_(std::max(1u, threads)) {}
+  /// threads: number of threads, including the caller's; 0 counts as 1. The first loop starts the
+  /// others, or as many as the system grants.
+  explicit ThreadTeam(unsigned threads) : thread_count_(std::max(1u, threads)) {}
   ~ThreadTeam() {
     stop_ = true;
     state_.fetch_add(2 * kStep);
@@ -33,13 +33,14 @@ class ThreadTeam {
   ThreadTeam(const ThreadTeam&) = delete;
   ThreadTeam& operator=(const ThreadTeam&) = delete;
 
-  /// Upper bound of the thread numbers that tasks get.
-  [[nodiscard]] unsigned threads() const { return wanted_; }
+  /// Returns the number of threads. Tasks get smaller thread numbers.
+  [[nodiscard]] unsigned threads() const { return thread_count_; }
 
   /// Calls task(0) ... task(count - 1), each once, on any threads, and returns when all are done.
-  /// Calls begin in ascending order. A task may also take the number of its thread, below
-  /// threads(), where the caller's is 0: calls with the same number do not overlap. If calls throw,
-  /// no more begin, and the exception of the smallest number is rethrown when all have ended.
+  /// Calls begin in ascending order. A task may also be called as task(i, thread), where `thread`
+  /// is the number of the calling thread; the caller's is 0. Calls with the same thread number do
+  /// not overlap. After an exception no more calls begin. When all have ended, the exception of the
+  /// smallest i is rethrown.
   template <class Task>
   void run(std::size_t count, Task&& task) {
     if (count > 1 && !started_) start();
@@ -69,8 +70,8 @@ class ThreadTeam {
   void start() {
     started_ = true;
     try {
-      threads_.reserve(wanted_);
-      for (unsigned i = 1; i < wanted_; ++i) threads_.emplace_back([this, i] { help(i); });
+      threads_.reserve(thread_count_);
+      for (unsigned i = 1; i < thread_count_; ++i) threads_.emplace_back([this, i] { help(i); });
     } catch (const std::system_error&) {
       // The system grants no more threads. The existing ones do the same work.
     } catch (const std::bad_alloc&) {
@@ -83,13 +84,13 @@ class ThreadTeam {
     task_ = task;
     call_ = call;
     next_.store(0, std::memory_order_relaxed);
-    state_.fetch_add(kStep);  // no thread is working, so this is odd and ends in 0
+    state_.fetch_add(kStep);  // the turn becomes odd; no other thread is working
     state_.notify_all();
     work(0);
     std::uint64_t state = state_.fetch_add(kStep) + kStep;
-    for (int looks = 0; (state & (kStep - 1)) != 0; state = state_.load()) {
-      if (looks < kLooks) {
-        ++looks;
+    for (int spins = 0; (state & (kStep - 1)) != 0; state = state_.load()) {
+      if (spins < kSpins) {
+        ++spins;
         pause();
       } else {
         state_.wait(state);
@@ -117,20 +118,20 @@ class ThreadTeam {
   }
 
   void help(unsigned thread) {
-    std::uint64_t done = 0;  // the turn of the last loop that this thread took part in
-    int looks = 0;
+    std::uint64_t last_turn = 0;  // the last loop that this thread worked on
+    int spins = 0;
     for (;;) {
       std::uint64_t state = state_.load();
       if (stop_) return;
       const std::uint64_t turn = state / kStep;
-      if (turn % 2 == 1 && turn != done) {
+      if (turn % 2 == 1 && turn != last_turn) {
         if (!state_.compare_exchange_weak(state, state + 1)) continue;
         work(thread);
         if ((state_.fetch_sub(1) & (kStep - 1)) == 1) state_.notify_all();
-        done = turn;
-        looks = 0;
-      } else if (looks < kLooks) {
-        ++looks;
+        last_turn = turn;
+        spins = 0;
+      } else if (spins < kSpins) {
+        ++spins;
         pause();
       } else {
         state_.wait(state);
@@ -147,13 +148,13 @@ class ThreadTeam {
 #endif
   }
 
-  // Some tens of microseconds.
-  static constexpr int kLooks = 4000;
+  // Number of spins before a thread sleeps: some tens of microseconds.
+  static constexpr int kSpins = 4000;
   // The upper half of the state counts turns: odd while a loop runs. The lower half is the number
   // of threads working on it, not counting the caller's.
   static constexpr std::uint64_t kStep = std::uint64_t{1} << 32;
 
-  const unsigned wanted_;
+  const unsigned thread_count_;
   bool started_ = false;
   std::atomic<std::uint64_t> state_ = 0;
   std::atomic<bool> stop_ = false;
@@ -163,7 +164,7 @@ class ThreadTeam {
   Call call_ = nullptr;
   std::mutex failure_mutex_;
   std::exception_ptr failure_;
-  std::size_t failed_ = 0;
+  std::size_t failed_ = 0;  // the number of the call that threw failure_
   std::vector<std::thread> threads_;
 };
 

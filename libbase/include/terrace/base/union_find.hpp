@@ -17,7 +17,7 @@ class UnionFind {
     std::iota(parent_.begin(), parent_.end(), 0u);
   }
 
-  /// The smallest member of the set that contains x.
+  /// Returns the smallest member of the set that contains x.
   [[nodiscard]] std::uint32_t find(std::uint32_t x) {
     while (parent_[x] != x) {
       parent_[x] = parent_[parent_[x]];  // path halving
@@ -25,7 +25,7 @@ class UnionFind {
     }
     return x;
   }
-  /// Joins the sets of x and y. Returns false if they were one already.
+  /// Joins the sets of x and y. Returns false if they already were the same set.
   bool unite(std::uint32_t x, std::uint32_t y) {
     x = find(x);
     y = find(y);
@@ -35,11 +35,12 @@ class UnionFind {
     --sets_;
     return true;
   }
+  /// Returns the number of sets.
   [[nodiscard]] std::size_t sets() const { return sets_; }
 
-  /// Makes flat() valid for x. Call it for all members in ascending order.
+  /// Makes flat() valid for x. Must be called for all members in ascending order.
   void flatten(std::uint32_t x) { parent_[x] = parent_[parent_[x]]; }
-  /// find() for flattened members. Safe to call from several threads at once.
+  /// Returns find(x) for a flattened member. Several threads may call it at once.
   [[nodiscard]] std::uint32_t flat(std::uint32_t x) const { return parent_[x]; }
 
  private:

@@ -15,21 +15,22 @@
 
 namespace terrace::base {
 
-/// Jobs that threads do ahead of their owner, who takes them back in the order in which it gave
-/// them. The owner bounds memory: it gives only as many jobs as may wait, and may give a job that
-/// it took again, with its buffers. Only one thread, the owner, may call the members.
-template <class Job>
+/// Runs tasks on background threads and returns them in the order in which they were given.
+///
+/// Only one thread, the owner, may call the members. The owner limits memory by limiting size(). To
+/// reuse the buffers of a task, it gives the same object again.
+template <class Task>
 class WorkAhead {
  public:
-  using Work = std::function<void(Job&)>;
+  using Work = std::function<void(Task&)>;
 
-  /// make_work: called once on each thread, before its first job. The function that it returns does
-  /// the jobs of that thread, and may own objects for that thread alone, such as a decoder.
-  /// threads: started with the first job, as many as the system grants; with none, take() does the
-  /// job.
+  /// Each thread calls make_work() before its first task and applies the function that it returns
+  /// to all its tasks. That function may own objects of the thread, such as a decoder. The first
+  /// give() starts `threads` threads, or as many as the system grants. Without threads, take() does
+  /// the work.
   WorkAhead(unsigned threads, std::function<Work()> make_work)
-      : wanted_(threads), make_work_(std::move(make_work)) {}
-  /// Drops the jobs that are not begun, and waits for the others.
+      : requested_threads_(threads), make_work_(std::move(make_work)) {}
+  /// Drops the tasks that no thread has begun, and waits for the others.
   ~WorkAhead() {
     {
       const std::lock_guard lock(mutex_);
@@ -41,48 +42,49 @@ class WorkAhead {
   WorkAhead(const WorkAhead&) = delete;
   WorkAhead& operator=(const WorkAhead&) = delete;
 
-  /// The number of jobs that were given and not taken.
-  [[nodiscard]] std::size_t size() const { return given_ - taken_; }
-  /// The number of running threads: 0 before the first job.
+  /// Returns the number of tasks that were given and not taken.
+  [[nodiscard]] std::size_t size() const { return size_; }
+  /// Returns the number of running threads; 0 before the first task.
   [[nodiscard]] std::size_t threads() const { return threads_.size(); }
 
-  /// Never waits.
-  void give(Job job) {
-    if (given_ == 0) start();
+  /// Appends a task. Never waits.
+  void give(Task task) {
+    if (!started_) start();
     {
       const std::lock_guard lock(mutex_);
-      entries_.push_back({.job = std::move(job)});
+      entries_.push_back({.task = std::move(task)});
     }
-    ++given_;
+    ++size_;
     begin_.notify_one();
   }
 
-  /// Waits for the oldest job and returns it. There must be one. Rethrows what its work threw; the
-  /// job is then gone.
-  Job take() {
-    if (threads_.empty()) do_oldest();
+  /// Waits for the oldest task and returns it. Requires size() > 0. If the work on the task threw,
+  /// removes the task and rethrows the exception.
+  Task take() {
+    if (threads_.empty()) run_oldest();
     std::unique_lock lock(mutex_);
-    done_.wait(lock, [this] { return entries_.front().done; });
+    completed_.wait(lock, [this] { return entries_.front().complete; });
     Entry entry = std::move(entries_.front());
     entries_.pop_front();
     --begun_;
     lock.unlock();
-    ++taken_;
+    --size_;
     if (entry.error) std::rethrow_exception(entry.error);
-    return std::move(entry.job);
+    return std::move(entry.task);
   }
 
  private:
   struct Entry {
-    Job job;
+    Task task;
     std::exception_ptr error{};
-    bool done = false;
+    bool complete = false;
   };
 
   void start() {
+    started_ = true;
     try {
-      threads_.reserve(wanted_);
-      for (unsigned i = 0; i < wanted_; ++i) threads_.emplace_back([this] { run(); });
+      threads_.reserve(requested_threads_);
+      for (unsigned i = 0; i < requested_threads_; ++i) threads_.emplace_back([this] { run(); });
     } catch (const std::system_error&) {
       // The system grants no more threads. The existing ones, or take(), do the same work.
     } catch (const std::bad_alloc&) {
@@ -90,19 +92,19 @@ class WorkAhead {
     }
   }
 
-  /// Does the job with `work`, which is made on the first call.
-  void do_job(Work& work, Entry& entry) const {
+  /// Applies `work` to the entry's task. Creates `work` on the first call.
+  void run_task(Work& work, Entry& entry) const {
     try {
       if (!work) work = make_work_();
-      work(entry.job);
+      work(entry.task);
     } catch (...) {
       entry.error = std::current_exception();
     }
   }
 
-  void do_oldest() {
-    do_job(own_work_, entries_.front());
-    entries_.front().done = true;
+  void run_oldest() {
+    run_task(owner_work_, entries_.front());
+    entries_.front().complete = true;
     ++begun_;
   }
 
@@ -112,28 +114,30 @@ class WorkAhead {
     for (;;) {
       begin_.wait(lock, [this] { return stop_ || begun_ < entries_.size(); });
       if (stop_) return;
-      // Stays where it is until it is taken, which is after it is done.
+      // The reference stays valid: take() removes an entry only when it is complete.
       Entry& entry = entries_[begun_++];
       lock.unlock();
-      do_job(work, entry);
+      run_task(work, entry);
       lock.lock();
-      entry.done = true;
-      done_.notify_one();
+      entry.complete = true;
+      completed_.notify_one();
     }
   }
 
-  const unsigned wanted_;
+  const unsigned requested_threads_;
   const std::function<Work()> make_work_;
-  Work own_work_;                      ///< without threads
-  std::size_t given_ = 0, taken_ = 0;  ///< used only by the owner
+  Work owner_work_;  ///< the owner's work if there are no threads
+  // Only the owner uses these two.
+  std::size_t size_ = 0;
+  bool started_ = false;
 
   std::mutex mutex_;
-  std::condition_variable begin_, done_;
-  std::deque<Entry> entries_;  ///< the oldest first
-  std::size_t begun_ = 0;      ///< how many of them, from the oldest on
+  std::condition_variable begin_, completed_;
+  std::deque<Entry> entries_;  ///< oldest first
+  std::size_t begun_ = 0;      ///< number of entries, from the oldest on, that a thread has begun
   bool stop_ = false;
 
-  std::vector<std::thread> threads_;  ///< last, because they use the members above
+  std::vector<std::thread> threads_;  ///< last, because the threads use the members above
 };
 
 }  // namespace terrace::base

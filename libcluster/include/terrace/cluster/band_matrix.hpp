@@ -12,13 +12,13 @@
 #define TERRACE_CLUSTER_HOST_DEVICE
 #endif
 
-/// The band-shaped half of a symmetric n x n matrix without its diagonal. Row i holds the floor(n /
-/// 2) entries (i, i+1), (i, i+2), .. with columns modulo n. All rows have the same length, so equal
-/// shares of rows are equal shares of work. For odd n each pair occurs once. For even n the n / 2
-/// pairs {i, i + n/2} occur twice, in row i and in row i + n/2.
+/// The band-shaped half of a symmetric n x n matrix without its diagonal. Row i holds the n / 2
+/// entries (rounded down) (i, i+1), (i, i+2), ... with columns modulo n. All rows have the same
+/// length, so equal shares of rows are equal shares of work. For odd n each pair occurs once. For
+/// even n the n / 2 pairs {i, i + n/2} occur twice, in row i and in row i + n/2. The functions on
+/// places compile as CUDA code for host and device.
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 7.6.2. Equation 7.10 as
-/// printed does not invert 7.9; band_place() does. The functions on places compile as CUDA code for
-/// host and device.
+/// printed does not invert 7.9, so band_place() corrects it.
 
 namespace terrace::cluster {
 
@@ -27,7 +27,7 @@ struct BandPlace {
   std::uint64_t row, column;
 };
 
-/// Number of entries per row.
+/// Returns the number of entries per row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_width(std::uint64_t n) {
   return n / 2;
 }
@@ -40,15 +40,15 @@ TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_partner(std::uin
   return j < n ? j : j - n;
 }
 
-/// Returns the place of the pair {i, j}, with i != j and both below n. If it occurs twice, the one
-/// in row i.
+/// Returns the place of the pair {i, j}. If it occurs twice, returns the place in row i. Requires
+/// i != j, i < n and j < n.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr BandPlace band_place(std::uint64_t n, std::uint64_t i,
                                                                   std::uint64_t j) {
-  const std::uint64_t ahead = j > i ? j - i : j + n - i;  // (j - i) mod n
-  return ahead > n / 2 ? BandPlace{j, n - ahead - 1} : BandPlace{i, ahead - 1};
+  const std::uint64_t offset = j > i ? j - i : j + n - i;  // (j - i) mod n
+  return offset > n / 2 ? BandPlace{j, n - offset - 1} : BandPlace{i, offset - 1};
 }
 
-/// Returns the index of that entry, counted row by row.
+/// Returns the index of the entry at band_place(n, i, j), counted row by row.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_entry(std::uint64_t n,
                                                                       std::uint64_t i,
                                                                       std::uint64_t j) {
@@ -72,9 +72,10 @@ class BandMatrix {
 
   [[nodiscard]] std::size_t size() const { return n_; }
   [[nodiscard]] std::size_t width() const { return n_ / 2; }
-  /// Returns the width() entries (i, i + 1), (i, i + 2), .. with columns modulo n.
+  /// Returns the width() entries (i, i + 1), (i, i + 2), ... with columns modulo n.
   [[nodiscard]] T* row(std::size_t i) { return data_.get() + i * width(); }
   [[nodiscard]] const T* row(std::size_t i) const { return data_.get() + i * width(); }
+  /// Returns the entry of a pair. Requires i != j.
   [[nodiscard]] T at(std::size_t i, std::size_t j) const {
     assert(i < n_ && j < n_ && i != j);
     return data_[band_entry(n_, i, j)];

@@ -29,24 +29,22 @@ struct BlockOptions {
   double facility_cost = 1.0;  ///< positive; multiplied by the diagonal of the bounding box
   Effort effort = Effort::standard;
   std::uint64_t seed = 1;  ///< only Effort::full tries random candidates
-  /// Called only during large blocks. After it has thrown, the clusterer can be used for the next
+  /// Called only during large blocks. If it throws, the clusterer can still be used for the next
   /// block.
   base::StopCheck check_stop = {};
 };
 
-/// A clustering. Facilities are in the order of their cluster numbers, which follows a
-/// space-filling curve, so clusters with close numbers are close to each other. assignment[i] is
-/// the cluster number of point i. The facility of a cluster is assigned to itself.
+/// A clustering. Clusters are numbered along a space-filling curve, so clusters with close numbers
+/// are close to each other. The facility of a cluster is assigned to itself.
 ///
-/// Every point is assigned to the nearest facility (a weight multiplies all its distances alike),
-/// as computed in single precision in the unit of the block's bounding box. So another facility may
-/// be nearer by at most a millionth of the diagonal. On ties, duplicates included, the lowest
-/// number wins.
+/// Every point is assigned to the nearest facility, as computed in single precision in the unit of
+/// the block's bounding box. So another facility may be nearer by at most a millionth of the
+/// diagonal. On ties, including duplicate points, the lowest cluster number wins.
 struct BlockClustering {
-  std::vector<std::uint32_t> facilities;
-  std::vector<std::uint32_t> assignment;
-  double facility_cost = 0.0;    ///< the absolute facility cost, in the unit of the points
-  double connection_cost = 0.0;  ///< sum of weighted distances, in double precision
+  std::vector<std::uint32_t> facilities;  ///< per cluster: the point that is its facility
+  std::vector<std::uint32_t> assignment;  ///< per point: its cluster
+  double facility_cost = 0.0;             ///< the absolute facility cost, in the unit of the points
+  double connection_cost = 0.0;           ///< sum of weighted distances, in double precision
 
   [[nodiscard]] double cost() const {
     return static_cast<double>(facilities.size()) * facility_cost + connection_cost;
@@ -57,9 +55,9 @@ struct BlockClustering {
 using base::best_simd_path;
 using base::SimdPath;
 
-/// Clusters blocks one after another and keeps its memory in between. Use one object per thread.
-/// The result depends only on the points, their order, the weights and the options, but not on the
-/// machine, threads, or previous blocks.
+/// Clusters blocks one after another and reuses its memory. Use one object per thread. The result
+/// depends only on the points, their order, the weights and the options. It does not depend on the
+/// machine, the number of threads, or previous blocks.
 class BlockClusterer {
  public:
   /// Throws: std::invalid_argument if `path` is not available on this machine.
@@ -68,16 +66,18 @@ class BlockClusterer {
   BlockClusterer(BlockClusterer&&) noexcept;
   BlockClusterer& operator=(BlockClusterer&&) noexcept;
 
-  /// points: n positions in one Cartesian frame, finite, of any offset and scale. Duplicates and
-  /// degenerate blocks are allowed (if all points are equal there is one facility).
-  /// weights: n positive finite numbers, or empty for 1 each. They multiply distances.
-  /// Requires: n < 2^24. n = 0 gives an empty result.
+  /// Clusters n points.
+  /// points: positions in one Cartesian frame, finite, of any offset and scale. Duplicates and
+  /// degenerate blocks are allowed; if all points are equal there is one facility.
+  /// weights: n positive finite numbers, which multiply distances, or empty for 1 each.
+  /// Requires: n < 2^24. Without points the result is empty.
   ///
-  /// Blocks of fewer than 2500 points always get Effort::full, because a reduced search is up to 30
-  /// % worse there (thesis table 7.5). Costs are infinite if they overflow a double; the clustering
-  /// is correct even then.
-  /// Cost: for blocks of 10 000 points at standard effort and with AVX-512, 0.05 to 0.1 us per
-  /// point; O(n k) for large n. About 140 bytes of memory per point, kept for the next block.
+  /// Blocks of fewer than 2500 points always get Effort::full, because a reduced search is up to
+  /// 30 % worse there (thesis table 7.5). Costs that overflow a double are infinite, but the
+  /// clustering is correct even then.
+  /// Cost: 0.05 to 0.1 us per point for blocks of 10 000 points at standard effort with AVX-512,
+  /// and O(n k) for large n. Needs about 140 bytes of memory per point, which it keeps for the next
+  /// block.
   void run(std::span<const Point3> points, std::span<const double> weights,
            const BlockOptions& options, BlockClustering& result);
 

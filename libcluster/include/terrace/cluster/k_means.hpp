@@ -44,30 +44,31 @@ struct KMeansResult {
   bool converged = false;      ///< false: max_iterations ended the run
 };
 
-/// points: n positions, finite, any offset and scale; 2D data has z = 0. n < 2^32.
+/// Clusters n points.
+/// points: positions, finite, of any offset and scale; 2D data has z = 0. n < 2^32.
 /// weights: n positive finite numbers, or empty for 1 each. A weight below 2^-500 times the
 /// greatest counts as 2^-500 times the greatest.
 ///
 /// Seeds come from greedy k-means++, which tries 2 + 0.7 log2(k) points per centre and takes the
-/// best. A cluster that loses all its points gets the point that costs most (weight times squared
-/// distance; the lowest index on ties) from a cluster of at least two. Empty clusters are served in
-/// order of their numbers. Points at their centre (within 2^-36 of the bounding box's longest side)
-/// are not taken. So with fewer than k distinct points the surplus clusters stay empty, with their
-/// centres at some point.
+/// best. Clusters that lose all their points get new ones, in the order of their numbers. Each gets
+/// the point with the highest cost (weight times squared distance; the lowest index on ties) of all
+/// clusters with at least two points. Points at their centre, within 2^-36 of the bounding box's
+/// longest side, do not move. So with fewer than k distinct points the surplus clusters stay empty,
+/// and their centres are at some point of the input.
 ///
 /// The result depends on points, their order, weights and options, but not on threads. Assignments
 /// equal those of plain Lloyd from the same centres. The centres are equal up to rounding, because
 /// the sums of boxes are reused.
 /// Throws: std::invalid_argument if a point or weight is out of range (the message gives its
 /// index), k is 0 or above n, restarts is 0, or tolerance is negative or NaN.
-/// Cost: O(n log n) once, then per iteration at worst O(n) along the borders of clusters and O(k)
-/// boxes inside them. 100 000 points in the plane with k = 100 take less than a millisecond per
-/// iteration. About 80 bytes of memory per point.
+/// Cost: O(n log n) for the tree, then O(n) per iteration in the worst case. Only points near the
+/// borders of clusters are examined singly. 100 000 points in the plane with k = 100 take less than
+/// a millisecond per iteration. Needs about 80 bytes of memory per point.
 [[nodiscard]] KMeansResult k_means(std::span<const Point3> points, std::span<const double> weights,
                                    const KMeansOptions& options);
 
-/// As k_means(), from the given centres: at least one and at most n, finite. options.clusters, seed
-/// and restarts are ignored.
+/// Clusters as k_means() does, from the caller's centres: at least one and at most n, finite.
+/// Ignores options.clusters, seed and restarts.
 [[nodiscard]] KMeansResult k_means_from(std::span<const Point3> centres,
                                         std::span<const Point3> points,
                                         std::span<const double> weights,

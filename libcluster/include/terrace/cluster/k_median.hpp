@@ -31,21 +31,21 @@ struct KMedianOptions {
   base::StopCheck check_stop = {};
 };
 
-/// Ignores the opening costs of the problem; they are 0 in the solution. The solution lists exactly
-/// k facilities, some without clients if necessary. No exchange of one of them for another improves
-/// it by more than rounding. If no facility cost gives exactly k, the closest number is brought to
-/// k greedily: the facility that saves most opens, or the one that costs least to close closes.
-/// Cost: O(facilities * clients) per round of exchanges, some rounds per restart.
-/// Throws: std::invalid_argument as check() does, if k is 0 or above the number of facilities, or
-/// if restarts is 0.
+/// Returns a solution with exactly k facilities, some without clients if necessary. Ignores the
+/// opening costs of the problem; in the solution they are 0. No exchange of one facility for
+/// another improves the solution by more than rounding. If no facility cost of the search gives
+/// exactly k facilities, the result with the closest number is corrected greedily: facilities that
+/// save most are opened, or facilities that cost least to close are closed. Cost: O(facilities *
+/// clients) per round of exchanges, some rounds per restart. Throws: std::invalid_argument as
+/// check() does, if k is 0 or above the number of facilities, or if restarts is 0.
 [[nodiscard]] FacilitySolution k_median(const FacilityMatrix& problem, std::size_t k,
                                         const KMedianOptions& options = {});
 
-/// As above for points. Ignores facility_cost. Clients farther than outlier_price diagonals from
-/// all facilities are left out and pay that price. Distances are computed as needed, in O(points)
-/// memory. A round of exchanges takes points^2 of them, which is seconds for 20,000 points. For
-/// large sets the binary search considers a random sample of at least 4 k places. A facility always
-/// serves itself.
+/// Solves the same problem for points. Ignores facility_cost. Clients farther than outlier_price
+/// diagonals from all facilities are left out and pay that price. A facility always serves itself.
+/// Distances are computed as needed, in O(points) memory. A round of exchanges computes points^2
+/// distances, which takes seconds for 20,000 points. For large sets the binary search considers a
+/// random sample of at least 4 k positions.
 /// Throws: as above, and for a custom distance that is negative or NaN.
 [[nodiscard]] FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
                                         const KMedianOptions& options = {.restarts = 1,

@@ -35,20 +35,19 @@ struct Minkowski {
   double p = 2.0;  ///< positive; may be infinite
 };
 
-/// M (client - facility)|, where M maps an ellipsoid onto the unit sphere, so each of its radii has
-/// length 1. A metric (symmetric, with triangle inequality) in ground units divided by the units of
+/// The length of M (client - facility), where M maps an ellipsoid onto the unit sphere. It is
+/// symmetric and obeys the triangle inequality. Its unit is that of the points divided by that of
 /// the semi-axes.
 class Elliptical {
  public:
-  /// The ellipse with semi-axis `a` along the direction `angle_degrees`, counter-clockwise from +x,
-  /// and `b` across it (both in the unit of the points), axis-parallel in z with `c` along it. So
-  /// M12 is (1/a - 1/b) sin cos. Equation 4.5 of the thesis as printed has the opposite sign, which
-  /// belongs to a clockwise angle.
-  /// Throws: std::invalid_argument for a semi-axis that is not positive and finite or whose
-  /// reciprocal is infinite, or an angle that is not finite.
+  /// Creates an ellipsoid with a vertical axis. Semi-axis `a` points along `angle_degrees`,
+  /// counter-clockwise from +x, `b` is horizontal and perpendicular to it, and `c` is vertical, all
+  /// in the unit of the points. M12 is (1/a - 1/b) sin cos. Equation 4.5 of the thesis as printed
+  /// has the opposite sign, which belongs to a clockwise angle. Throws: std::invalid_argument for a
+  /// semi-axis that is not positive and finite or whose reciprocal is infinite, or an angle that is
+  /// not finite.
   Elliptical(double a, double b, double angle_degrees, double c = 1.0);
-  /// The ellipsoid whose semi-axis i points along row i of `axes`, which must be three orthonormal
-  /// vectors.
+  /// Creates an ellipsoid whose semi-axis i points along row i of `axes`, an orthonormal matrix.
   /// Throws: std::invalid_argument as above, and if the rows are not orthonormal to 1e-9.
   Elliptical(const Point3& semi_axes, const LinearMap& axes);
 
@@ -56,7 +55,7 @@ class Elliptical {
   /// identity.
   [[nodiscard]] const LinearMap& map() const { return map_; }
   /// Returns the reciprocal of the longest semi-axis. For every vector v, |M v| is at least this
-  /// times v|.
+  /// number times |v|.
   [[nodiscard]] double least_scale() const { return least_scale_; }
 
  private:
@@ -88,15 +87,15 @@ class EllipticalField {
   [[nodiscard]] const LinearMap& operator()(const Point3& position) const;
   /// Returns Elliptical::least_scale() at that position, or 1 outside all regions.
   [[nodiscard]] double least_scale(const Point3& position) const;
-  /// Returns the map that applies in all of `box`, or nullopt if there are several. With one map,
-  /// distances within the box are symmetric and obey the triangle inequality, and a linear map of
-  /// the points makes them Euclidean. With a frame, a uniform box may be missed if the border of a
-  /// region passes close by.
+  /// Returns the map that applies in all of `box`, or nullopt if there are several. If there is
+  /// only one, distances within the box are symmetric and obey the triangle inequality, and the map
+  /// makes them Euclidean. With a frame, the result may be nullopt for a uniform box near the
+  /// border of a region.
   [[nodiscard]] std::optional<LinearMap> uniform_in(const Box3& box) const;
   [[nodiscard]] const std::vector<Region>& regions() const { return regions_; }
 
  private:
-  [[nodiscard]] Point3 framed(const Point3& position) const;
+  [[nodiscard]] Point3 to_frame(const Point3& position) const;
   [[nodiscard]] const Region* find(const Point3& position) const;
   std::vector<Region> regions_;
   std::optional<Frame> frame_;
@@ -113,13 +112,15 @@ struct CustomMetric {
 using Metric =
     std::variant<Euclidean, SquaredEuclidean, Minkowski, Elliptical, EllipticalField, CustomMetric>;
 
-/// Properties of a metric on which a strategy may rely.
+/// Returns whether distance(a, b) always equals distance(b, a).
 [[nodiscard]] bool is_symmetric(const Metric& metric);
+/// Returns whether distance(a, c) never exceeds distance(a, b) + distance(b, c).
 [[nodiscard]] bool obeys_triangle_inequality(const Metric& metric);
 /// Returns the map that makes all distances between points of `box` Euclidean, or nullopt if there
 /// is none.
 [[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Box3& box);
-/// Returns the points as mapped by the linear_map() of their bounding box, or nullopt without one.
+/// Returns the points, mapped by the linear_map() of their bounding box. Returns nullopt if there
+/// is no such map.
 [[nodiscard]] std::optional<std::vector<Point3>> linear_points(const Metric& metric,
                                                                std::span<const Point3> points);
 
@@ -131,17 +132,17 @@ using Metric =
 /// function.
 void check(const Metric& metric);
 
+/// Returns the distance from a facility to a client.
 [[nodiscard]] double distance(const Metric& metric, const Point3& facility, const Point3& client);
 
-/// Returns the length of the diagonal of a box in the metric, or in the Euclidean metric for a
-/// field. If the four diagonals differ, returns the longest. The facility cost is a multiple of it.
-/// 0 for an empty box.
+/// Returns the length of the longest diagonal of a box in the metric, or in the Euclidean metric
+/// for a field; 0 for an empty box. Facility costs are multiples of it.
 [[nodiscard]] double diagonal(const Metric& metric, const Box3& box);
 
-/// Columns of attributes in addition to the positions (colour, intensity, curvature). Each has a
-/// weight: the number of ground units that one unit of the attribute is worth. Channels are further
-/// axes of the distance: under the root for Euclidean and elliptical distances, in the sum of
-/// squares or of p-th powers for the others. Symmetry and the triangle inequality are preserved.
+/// Attributes of points (colour, intensity, curvature) that become further axes of the distance.
+/// The weight of a channel is the number of ground units that one unit of the attribute is worth.
+/// Euclidean and elliptical distances add the squares of channels under the root, the other metrics
+/// add squares or p-th powers to their sum. Symmetry and the triangle inequality are preserved.
 struct Channels {
   std::span<const double> values;   ///< points x weights.size(), row by row; finite
   std::span<const double> weights;  ///< one per channel; finite and not negative

@@ -48,8 +48,9 @@ class DualAscent {
   const ClientOrder* order_;
   const MatrixRows* costs_;
   std::vector<double> duals_;
-  std::vector<double> slack_;         // opening cost minus payments, by facility
-  std::vector<std::uint32_t> reach_;  // per client: number of facilities that cost at most its dual
+  std::vector<double> slack_;  // opening cost minus payments, by facility
+  std::vector<std::uint32_t>
+      reached_;  // per client: number of facilities that cost at most its dual
   std::vector<std::uint32_t> all_;
   std::vector<char> tight_;    // by facility: its slack is used up
   std::vector<char> support_;  // by facility: in a small tight set that reaches every client
@@ -60,7 +61,7 @@ DualAscent::DualAscent(const ClientOrder& order, const MatrixRows& costs)
       costs_(&costs),
       duals_(order.clients()),
       slack_(costs.opening().begin(), costs.opening().end()),
-      reach_(order.clients(), 0),
+      reached_(order.clients(), 0),
       all_(order.clients()),
       tight_(order.facilities(), 0),
       support_(order.facilities(), 0) {
@@ -68,7 +69,7 @@ DualAscent::DualAscent(const ClientOrder& order, const MatrixRows& costs)
   const auto m = static_cast<std::uint32_t>(order.facilities());
   for (std::uint32_t i = 0; i < duals_.size(); ++i) {
     duals_[i] = order.cost(i)[0];
-    while (reach_[i] < m && order.cost(i)[reach_[i]] <= duals_[i]) ++reach_[i];
+    while (reached_[i] < m && order.cost(i)[reached_[i]] <= duals_[i]) ++reached_[i];
   }
 }
 
@@ -76,15 +77,15 @@ bool DualAscent::raise_one(std::uint32_t client) {
   const auto m = static_cast<std::uint32_t>(order_->facilities());
   const double* const costs = order_->cost(client);
   const std::uint32_t* const facilities = order_->facility(client);
-  std::uint32_t& reach = reach_[client];
+  std::uint32_t& reach = reached_[client];
   double room = reach < m ? costs[reach] - duals_[client] : std::numeric_limits<double>::infinity();
-  const double to_next = room;
+  const double next_step = room;
   for (std::uint32_t r = 0; r < reach && room > 0.0; ++r) {
     room = std::min(room, slack_[facilities[r]]);
   }
   if (!(room > 0.0)) return false;
   for (std::uint32_t r = 0; r < reach; ++r) slack_[facilities[r]] -= room;
-  if (room == to_next) {
+  if (room == next_step) {
     duals_[client] = costs[reach];
     while (reach < m && costs[reach] <= duals_[client]) ++reach;
     return true;
@@ -97,7 +98,7 @@ bool DualAscent::raise_one(std::uint32_t client) {
 void DualAscent::lower_one(std::uint32_t client) {
   const double* const costs = order_->cost(client);
   const std::uint32_t* const facilities = order_->facility(client);
-  std::uint32_t& reach = reach_[client];
+  std::uint32_t& reach = reached_[client];
   // Facilities that cost exactly the dual are not paid, so they drop out of reach.
   std::uint32_t paid = reach;
   while (paid > 0 && costs[paid - 1] >= duals_[client]) --paid;
@@ -128,7 +129,7 @@ void DualAscent::find_support() {
       const std::uint32_t* const facilities = order_->facility(i);
       std::uint32_t count = 0, cheapest = 0;
       bool served = false;
-      for (std::uint32_t r = 0; r < reach_[i] && !served; ++r) {
+      for (std::uint32_t r = 0; r < reached_[i] && !served; ++r) {
         const std::uint32_t j = facilities[r];
         served = support_[j] != 0;
         if (tight_[j] && count++ == 0) cheapest = j;
@@ -142,7 +143,7 @@ std::uint32_t DualAscent::payments(std::uint32_t client, std::uint32_t (&two)[2]
   const double* const costs = order_->cost(client);
   const std::uint32_t* const facilities = order_->facility(client);
   std::uint32_t count = 0;
-  for (std::uint32_t r = 0; r < reach_[client] && costs[r] < duals_[client]; ++r) {
+  for (std::uint32_t r = 0; r < reached_[client] && costs[r] < duals_[client]; ++r) {
     if (!support_[facilities[r]]) continue;
     if (count < 2) two[count] = facilities[r];
     ++count;
@@ -163,16 +164,16 @@ bool DualAscent::adjust() {
     for (std::uint32_t other = 0; other < duals_.size(); ++other) {
       const std::uint32_t* const facilities = order_->facility(other);
       std::uint32_t count = 0;
-      bool one_of_two = false;
-      for (std::uint32_t r = 0; r < reach_[other] && count < 2; ++r) {
+      bool shares_facility = false;
+      for (std::uint32_t r = 0; r < reached_[other] && count < 2; ++r) {
         if (!tight_[facilities[r]]) continue;
         ++count;
-        one_of_two |= facilities[r] == two[0] || facilities[r] == two[1];
+        shares_facility |= facilities[r] == two[0] || facilities[r] == two[1];
       }
-      if (count == 1 && one_of_two && other != i) freed.push_back(other);
+      if (count == 1 && shares_facility && other != i) freed.push_back(other);
     }
     if (freed.empty()) continue;
-    State kept{duals_, slack_, reach_};
+    State backup{duals_, slack_, reached_};
     const double sum = total();
     lower_one(i);
     raise(freed);
@@ -180,9 +181,9 @@ bool DualAscent::adjust() {
     raise(freed);
     raise(all_);
     if (total() < sum) {
-      duals_.swap(kept.duals);
-      slack_.swap(kept.slack);
-      reach_.swap(kept.reach);
+      duals_.swap(backup.duals);
+      slack_.swap(backup.slack);
+      reached_.swap(backup.reach);
     } else {
       find_support();
     }

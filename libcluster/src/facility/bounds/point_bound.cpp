@@ -24,17 +24,17 @@
 namespace terrace::cluster {
 namespace {
 
-/// L(v) of points, where all facilities cost the same and only nearby clients pay for a facility:
-/// those closer to it than their payment per weight. A leaf of facilities searches together for the
+/// L(v) of points. All facilities cost the same, and a client pays for a facility only if it is
+/// closer than the client's payment per weight. The facilities of a leaf search together for the
 /// leaves that contain such clients.
 ///
-/// The variables are u * sqrt(w), where u = v / w is the payment per weight. With v as the
-/// variables light clients would hardly move, with u heavy ones.
+/// The variables are u * sqrt(w), where u = v / w is the payment per weight. If the variables were
+/// v, light clients would hardly move; if they were u, heavy clients would not.
 template <class Space>
 class PointDual final : public DualFunction {
  public:
-  /// Space and weights are in the order of the tree's leaves. `price` is the most that a client of
-  /// weight 1 pays; it may be infinite.
+  /// Space and weights must be in the order of the tree's leaves. `price` is an upper bound of what
+  /// a client of weight 1 pays, and may be infinite.
   PointDual(const ClientTree& tree, const Space& space, std::span<const double> weights,
             double facility_cost, double price, const LowerBoundOptions& options)
       : tree_(&tree),
@@ -67,14 +67,14 @@ class PointDual final : public DualFunction {
     std::atomic<std::size_t> most{0};
     base::parallel_for((leaves_.size() + kBlock - 1) / kBlock, threads_, [&](std::size_t block) {
       Work work;
-      std::size_t most_here = 0;
+      std::size_t block_max = 0;
       const std::size_t end = std::min(leaves_.size(), (block + 1) * kBlock);
       for (std::size_t k = block * kBlock; k < end; ++k) {
         if (*check_stop_) (*check_stop_)();
-        most_here = std::max(most_here, visit(leaves_[k], work));
+        block_max = std::max(block_max, visit(leaves_[k], work));
       }
       std::size_t seen = most.load();
-      while (seen < most_here && !most.compare_exchange_weak(seen, most_here)) {
+      while (seen < block_max && !most.compare_exchange_weak(seen, block_max)) {
       }
     });
     DualSum sum(most);
@@ -143,7 +143,7 @@ class PointDual final : public DualFunction {
     while (!work.stack.empty()) {
       const std::uint32_t n = work.stack.back();
       work.stack.pop_back();
-      const bool near = is_near(leaf, n);
+      const bool near = may_pay(leaf, n);
       if (!near) continue;
       if (nodes[n].child_count == 0) work.leaves.push_back(n);
       for (std::uint32_t c = 0; c < nodes[n].child_count; ++c) {
@@ -155,52 +155,53 @@ class PointDual final : public DualFunction {
     return most;
   }
 
-  // Returns whether some facility of the leaf may be closer to the node's box than a payment there.
-  [[nodiscard]] bool is_near(std::uint32_t leaf, std::uint32_t node) const {
-    const ClientTree::Node& from = tree_->nodes()[leaf];
+  // Returns whether a client of the node may pay for a facility of the leaf: whether the distance
+  // of their boxes is below a payment in the node.
+  [[nodiscard]] bool may_pay(std::uint32_t leaf, std::uint32_t node) const {
+    const ClientTree::Node& facilities = tree_->nodes()[leaf];
     const Box3& box = tree_->nodes()[node].box;
     if constexpr (std::is_same_v<Space, FieldSpace>) {
-      for (std::uint32_t j = from.first; j < from.first + from.count; ++j) {
+      for (std::uint32_t j = facilities.first; j < facilities.first + facilities.count; ++j) {
         if (space_->box_distance(j, box) < longest_[node]) return true;
       }
       return false;
     } else {
       // The distance of two boxes is the distance of any point of the first from the second,
       // enlarged by the extent of the first around that point.
-      const Point3& p = space_->points()[from.first];
+      const Point3& p = space_->points()[facilities.first];
       Box3 grown = box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        grown.min[axis] -= from.box.max[axis] - p[axis];
-        grown.max[axis] += p[axis] - from.box.min[axis];
+        grown.min[axis] -= facilities.box.max[axis] - p[axis];
+        grown.max[axis] += p[axis] - facilities.box.min[axis];
       }
-      return space_->box_distance(from.first, grown) < longest_[node];
+      return space_->box_distance(facilities.first, grown) < longest_[node];
     }
   }
 
   // Returns the number of clients examined.
   std::size_t add_up(std::uint32_t facility, Work& work) {
-    auto from = distances_.from(facility);
+    auto row = distances_.row(facility);
     std::size_t looked = 0;
     work.near.clear();
     for (const std::uint32_t n : work.leaves) {
       const ClientTree::Node& node = tree_->nodes()[n];
       if (!(space_->box_distance(facility, node.box) < longest_[n])) continue;
-      from.add(node.first, node.count, payment_.data(), weights_.data());
+      row.add(node.first, node.count, payment_.data(), weights_.data());
       work.near.push_back(n);
       looked += node.count;
     }
-    paid_[facility] = from.sum();
+    paid_[facility] = row.sum();
     if (paid_[facility] > facility_cost_) count_payers(facility, work);
     return looked;
   }
 
   // Few facilities are worth opening, so their distances are simply recomputed.
   void count_payers(std::uint32_t facility, const Work& work) {
-    const auto from = space_->from(facility);
+    const auto row = space_->row(facility);
     for (const std::uint32_t n : work.near) {
       const ClientTree::Node& node = tree_->nodes()[n];
       for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-        if (payment_[i] > from(i)) count_[i].fetch_add(1, std::memory_order_relaxed);
+        if (payment_[i] > row(i)) count_[i].fetch_add(1, std::memory_order_relaxed);
       }
     }
   }
@@ -241,7 +242,7 @@ void check_start(const FacilitySolution& start, std::size_t count, double outlie
   }
 }
 
-// The start with its own numbering, its distances, and derived values.
+// The solution from which the bound starts, with its distances.
 struct Start {
   std::vector<std::uint32_t> facility;  // per client
   std::vector<double> distance;         // per client, at most the price
@@ -257,7 +258,7 @@ struct Start {
       const std::uint32_t c = start.assignment[order[k]];
       if (c == kOutlier) continue;
       facility[k] = place[start.facilities[c]];
-      distance[k] = std::min(distance[k], space.from(facility[k])(k));
+      distance[k] = std::min(distance[k], space.row(facility[k])(k));
     }
     cost = frame.facility_cost * static_cast<double>(start.facilities.size());
     for (std::size_t k = 0; k < order.size(); ++k) cost += frame.weights[k] * distance[k];
@@ -331,8 +332,8 @@ double ascend_from(const Start& start, const Space& space, const SearchFrame& fr
   }
 }
 
-LowerBound to_bound(double value, const std::vector<double>& duals,
-                    const std::vector<std::uint32_t>& order, int exponent) {
+LowerBound make_bound(double value, const std::vector<double>& duals,
+                      const std::vector<std::uint32_t>& order, int exponent) {
   LowerBound bound;
   bound.lower_bound = std::ldexp(std::max(0.0, value), exponent);
   bound.duals.resize(duals.size());
@@ -361,11 +362,11 @@ LowerBound lower_bound(const FacilityPoints& problem, const FacilitySolution& st
   }
   const double rounding = rounding_of_frame(problem, frame);
   std::vector<double> duals;
-  const double value = with_space(problem, frame, original, [&](const auto& space) {
+  const double value = visit_space(problem, frame, original, [&](const auto& space) {
     const Start first(space, start, order, frame);
     return ascend_from(first, space, frame, tree ? &*tree : nullptr, options, duals);
   });
-  return to_bound(value - rounding, duals, order, frame.cost_exponent);
+  return make_bound(value - rounding, duals, order, frame.cost_exponent);
 }
 
 LowerBound lower_bound(const FacilityEntities& problem, const FacilitySolution& start,
@@ -379,7 +380,7 @@ LowerBound lower_bound(const FacilityEntities& problem, const FacilitySolution& 
   const Start first(space, start, order, frame);
   std::vector<double> duals;
   const double value = ascend_from(first, space, frame, nullptr, options, duals);
-  return to_bound(value, duals, order, frame.cost_exponent);
+  return make_bound(value, duals, order, frame.cost_exponent);
 }
 
 }  // namespace terrace::cluster

@@ -47,8 +47,8 @@ CostMatrix cost_matrix(const FacilityPoints& problem, std::uint64_t memory_limit
                        const base::StopCheck& check_stop) {
   check_memory(problem.points.size(), memory_limit, "points");
   SearchFrame frame = make_frame(problem);
-  return with_space(problem, frame, problem.points,
-                    [&](const auto& space) { return fill(space, frame, check_stop); });
+  return visit_space(problem, frame, problem.points,
+                     [&](const auto& space) { return fill(space, frame, check_stop); });
 }
 
 CostMatrix cost_matrix(const FacilityEntities& problem, std::uint64_t memory_limit,

@@ -41,11 +41,11 @@ const double* MatrixRows::row(std::size_t facility, std::vector<double>& /*scrat
   return connection_.data() + facility * clients();
 }
 
-void MatrixRows::gather(std::size_t facility, std::span<const std::uint32_t> which,
+void MatrixRows::gather(std::size_t facility, std::span<const std::uint32_t> indices,
                         double* out) const {
   check_stop();
   const double* const costs = connection_.data() + facility * clients();
-  for (std::size_t k = 0; k < which.size(); ++k) out[k] = costs[which[k]];
+  for (std::size_t k = 0; k < indices.size(); ++k) out[k] = costs[indices[k]];
 }
 
 double MatrixRows::unscaled(double cost) const {

@@ -27,7 +27,7 @@ class Stars {
   explicit Stars(const MatrixRows& costs)
       : costs_(&costs),
         opening_(costs.opening().begin(), costs.opening().end()),
-        left_(costs.facilities(), static_cast<std::uint32_t>(costs.clients())),
+        waiting_count_(costs.facilities(), static_cast<std::uint32_t>(costs.clients())),
         connected_(costs.clients(), 0),
         duals_(costs.clients(), 0.0) {
     const std::size_t m = costs.facilities(), n = costs.clients();
@@ -57,7 +57,7 @@ class Stars {
     for (std::size_t waiting = connected_.size(); waiting > 0;) {
       const auto [price, j] = queue_.top();
       queue_.pop();
-      if (left_[j] == 0) continue;
+      if (waiting_count_[j] == 0) continue;
       const Star star = cheapest(j);
       if (star.price > price) {
         if (star.clients > 0) queue_.push({star.price, j});
@@ -98,14 +98,14 @@ class Stars {
   Star cheapest(std::uint32_t j) {
     costs_->check_stop();
     std::uint32_t* const order = row_order(j);
-    std::uint32_t kept = 0;
-    for (std::uint32_t k = 0; k < left_[j]; ++k) {
-      if (!connected_[order[k]]) order[kept++] = order[k];
+    std::uint32_t waiting = 0;
+    for (std::uint32_t k = 0; k < waiting_count_[j]; ++k) {
+      if (!connected_[order[k]]) order[waiting++] = order[k];
     }
-    left_[j] = kept;
+    waiting_count_[j] = waiting;
     Star star;
     double sum = opening_[j];
-    for (std::uint32_t k = 0; k < kept; ++k) {
+    for (std::uint32_t k = 0; k < waiting; ++k) {
       const double cost = costs_->cost(j, order[k]);
       if (cost > star.price) break;  // the mean can only grow from here on
       sum += cost;
@@ -122,8 +122,8 @@ class Stars {
 
   const MatrixRows* costs_;
   std::vector<double> opening_;
-  std::vector<std::uint32_t> order_;  // per facility: waiting clients, nearest first
-  std::vector<std::uint32_t> left_;   // per facility: number of waiting clients
+  std::vector<std::uint32_t> order_;          // per facility: waiting clients, nearest first
+  std::vector<std::uint32_t> waiting_count_;  // per facility: number of waiting clients
   std::vector<char> connected_;
   std::vector<double> duals_;
   std::vector<std::uint32_t> open_;

@@ -27,14 +27,14 @@ Length length_of(const FacilityOptions& options) {
   return {options.restarts.value_or(length.restarts), options.steps.value_or(length.perturbations)};
 }
 
-struct Found {
+struct Solution {
   double cost = 0.0;
   std::vector<std::uint32_t> open;
 };
 
 // Perturbed solutions that end up worse are discarded: the search continues from the best one.
-Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_t perturbations,
-             std::uint32_t run, Clock::time_point start) {
+Solution search(const MatrixRows& costs, const FacilityOptions& options, std::size_t perturbations,
+                std::uint32_t run, Clock::time_point start) {
   std::mt19937_64 random(base::seed_of_run(options.seed, run));
   MatrixSearch work(costs, costs.opening());
   const std::uint32_t seed_facility = base::draw_below(costs.facilities(), random);
@@ -52,11 +52,11 @@ Found search(const MatrixRows& costs, const FacilityOptions& options, std::size_
       work = best;
     }
   }
-  Found found{best.cost(), {}};
+  Solution solution{best.cost(), {}};
   const auto open = best.state().facilities();
-  found.open.assign(open.begin(), open.end());
-  std::sort(found.open.begin(), found.open.end());
-  return found;
+  solution.open.assign(open.begin(), open.end());
+  std::sort(solution.open.begin(), solution.open.end());
+  return solution;
 }
 
 }  // namespace
@@ -71,13 +71,14 @@ FacilitySolution interchange(const FacilityMatrix& problem, const FacilityOption
   }
   const auto start = Clock::now();
   const MatrixRows costs(problem, options.check_stop);
-  std::vector<Found> found(length.restarts);
+  std::vector<Solution> solutions(length.restarts);
   base::parallel_for(length.restarts, options.threads, [&](std::size_t run) {
-    found[run] =
+    solutions[run] =
         search(costs, options, length.perturbations, static_cast<std::uint32_t>(run), start);
   });
-  const auto best = std::min_element(
-      found.begin(), found.end(), [](const Found& a, const Found& b) { return a.cost < b.cost; });
+  const auto best =
+      std::min_element(solutions.begin(), solutions.end(),
+                       [](const Solution& a, const Solution& b) { return a.cost < b.cost; });
   return solution_of(problem, best->open, options.check_stop);
 }
 

@@ -20,7 +20,7 @@ class Growth {
   Growth(const MatrixRows& costs, const ClientOrder& order)
       : costs_(&costs),
         order_(&order),
-        reach_(order.clients(), 0),
+        reached_(order.clients(), 0),
         connected_(order.clients(), 0),
         duals_(order.clients(), 0.0),
         offers_(costs.facilities()),
@@ -89,7 +89,7 @@ class Growth {
   }
 
   std::size_t reach(std::uint32_t i, double time) {
-    const std::uint32_t r = reach_[i]++;
+    const std::uint32_t r = reached_[i]++;
     const std::uint32_t j = order_->facility(i)[r];
     if (opened_[j]) {
       connect(i, time);
@@ -99,7 +99,7 @@ class Growth {
     ++o.growing;
     o.costs += order_->cost(i)[r];
     announce(j);
-    if (reach_[i] < order_->facilities()) reaches_.push({order_->cost(i)[reach_[i]], i});
+    if (reached_[i] < order_->facilities()) reaches_.push({order_->cost(i)[reached_[i]], i});
     return 0;
   }
 
@@ -118,7 +118,7 @@ class Growth {
 
   [[nodiscard]] bool has_reached(std::uint32_t i, std::uint32_t j) const {
     const double c = costs_->cost(j, i);
-    const std::uint32_t next = reach_[i];
+    const std::uint32_t next = reached_[i];
     if (next == order_->facilities()) return true;
     const double next_cost = order_->cost(i)[next];
     return c < next_cost || (c == next_cost && j < order_->facility(i)[next]);
@@ -126,8 +126,8 @@ class Growth {
 
   void connect(std::uint32_t i, double time) {
     connected_[i] = 1;
-    duals_[i] = std::max(time, order_->cost(i)[reach_[i] == 0 ? 0 : reach_[i] - 1]);
-    for (std::uint32_t r = 0; r < reach_[i]; ++r) {
+    duals_[i] = std::max(time, order_->cost(i)[reached_[i] == 0 ? 0 : reached_[i] - 1]);
+    for (std::uint32_t r = 0; r < reached_[i]; ++r) {
       const std::uint32_t j = order_->facility(i)[r];
       Offers& o = offers_[j];
       if (opened_[j]) continue;
@@ -141,7 +141,7 @@ class Growth {
 
   const MatrixRows* costs_;
   const ClientOrder* order_;
-  std::vector<std::uint32_t> reach_;  // per client: number of facilities its offer has reached
+  std::vector<std::uint32_t> reached_;  // per client: number of facilities its offer has reached
   std::vector<char> connected_;
   std::vector<double> duals_;
   std::vector<Offers> offers_;

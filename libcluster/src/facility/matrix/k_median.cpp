@@ -26,8 +26,8 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kLeastExchangeGain = 1e-12;  // fraction of the cost; smaller gains are rounding
-constexpr std::size_t kTogether = 32;         // number of exchanges evaluated on the same solution
+constexpr double kMinExchangeGain = 1e-12;  // fraction of the cost; smaller gains are rounding
+constexpr std::size_t kBatch = 32;          // number of exchanges evaluated on the same solution
 // A batch with at least this many costs is worth a thread.
 constexpr std::size_t kWorthThreads = 200000;
 
@@ -40,7 +40,7 @@ class MedianSearch {
   void reset(std::span<const std::uint32_t> open);
   /// Opens those of `candidates` that save most, or closes those that cost least to close, until k
   /// are open. Requires: enough candidates.
-  void bring_to(std::size_t k, std::span<const std::uint32_t> candidates);
+  void open_exactly(std::size_t k, std::span<const std::uint32_t> candidates);
   /// Exchanges facilities until none helps.
   void descend(std::mt19937_64& random);
   /// Replaces `count` random facilities by random others.
@@ -71,9 +71,9 @@ class MedianSearch {
 
 MedianSearch::MedianSearch(const CostRows& costs, unsigned threads)
     : costs_(&costs),
-      threads_(kTogether * costs.clients() >= kWorthThreads ? threads : 1),
+      threads_(kBatch * costs.clients() >= kWorthThreads ? threads : 1),
       state_(costs),
-      work_(kTogether) {
+      work_(kBatch) {
   order_.resize(costs.facilities());
   std::iota(order_.begin(), order_.end(), 0u);
 }
@@ -110,7 +110,7 @@ void MedianSearch::close_least() {
                                  }));
 }
 
-void MedianSearch::bring_to(std::size_t k, std::span<const std::uint32_t> candidates) {
+void MedianSearch::open_exactly(std::size_t k, std::span<const std::uint32_t> candidates) {
   while (state_.facilities().size() > k) close_least();
   if (state_.facilities().size() == k) return;
   // Gains only decrease as other facilities open, so an old gain is an upper bound.
@@ -153,22 +153,22 @@ MedianSearch::Exchange MedianSearch::judge(std::uint32_t candidate, Work& work) 
   }
   Exchange best{-1.0, NearestOpen::kNone};
   for (const std::uint32_t j : state_.facilities()) {
-    const double spared = gain - work.closing[j];
-    if (best.leaving == NearestOpen::kNone || spared > best.gain) best = {spared, j};
+    const double saving = gain - work.closing[j];
+    if (best.leaving == NearestOpen::kNone || saving > best.gain) best = {saving, j};
   }
   return best;
 }
 
 void MedianSearch::descend(std::mt19937_64& random) {
   base::shuffle(order_, random);
-  std::vector<Exchange> exchanges(kTogether);
+  std::vector<Exchange> exchanges(kBatch);
   std::vector<std::uint32_t> batch;
   // Ends when every candidate has been rejected since the last exchange.
   std::size_t refused = 0;
   for (std::size_t at = 0; refused < order_.size();) {
     batch.clear();
     std::size_t looked = 0;
-    while (batch.size() < kTogether && refused + looked < order_.size()) {
+    while (batch.size() < kBatch && refused + looked < order_.size()) {
       const std::uint32_t candidate = order_[(at + looked++) % order_.size()];
       if (!state_.is_open(candidate)) batch.push_back(candidate);
     }
@@ -178,7 +178,7 @@ void MedianSearch::descend(std::mt19937_64& random) {
     for (std::size_t b = 1; b < batch.size(); ++b) {
       if (exchanges[b].gain > exchanges[best].gain) best = b;
     }
-    if (!batch.empty() && exchanges[best].gain > kLeastExchangeGain * cost()) {
+    if (!batch.empty() && exchanges[best].gain > kMinExchangeGain * cost()) {
       state_.open(batch[best]);
       state_.close(exchanges[best].leaving);
       refused = 0;  // the batch is repeated, because others in it may still be good
@@ -241,11 +241,11 @@ std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
   }
   MedianSearch first(costs, options.threads);
   first.reset(search_for_cost(costs, k, candidates, random));
-  first.bring_to(k, candidates);
+  first.open_exactly(k, candidates);
   const std::vector<std::uint32_t> start = first.open();
 
   std::vector<double> cost(options.restarts);
-  std::vector<std::vector<std::uint32_t>> found(options.restarts);
+  std::vector<std::vector<std::uint32_t>> solutions(options.restarts);
   base::parallel_for(options.restarts, options.threads, [&](std::size_t run) {
     std::mt19937_64 draws(base::seed_of_run(options.seed, run + 1));
     MedianSearch search(costs, options.restarts > 1 ? 1 : options.threads);
@@ -253,9 +253,10 @@ std::vector<std::uint32_t> find_medians(const CostRows& costs, std::size_t k,
     if (run > 0) search.replace(std::max<std::size_t>(1, k / 2), draws);
     search.descend(draws);
     cost[run] = search.cost();
-    found[run] = search.open();
+    solutions[run] = search.open();
   });
-  return found[static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin())];
+  return solutions[static_cast<std::size_t>(std::min_element(cost.begin(), cost.end()) -
+                                            cost.begin())];
 }
 
 void check_count(std::size_t k, std::size_t facilities, const KMedianOptions& options) {
@@ -334,7 +335,7 @@ FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
   check_count(k, problem.points.size(), options);
   SearchFrame frame = make_frame(problem);
   const double rounding = rounding_of_frame(problem, frame);
-  return with_space(problem, frame, problem.points, [&](const auto& space) {
+  return visit_space(problem, frame, problem.points, [&](const auto& space) {
     const PointRows costs(space, frame.weights, frame.outlier_price, options.check_stop);
     FacilitySolution solution;
     solution.facilities = find_medians(costs, k, options);
@@ -342,7 +343,7 @@ FacilitySolution k_median(const FacilityPoints& problem, std::size_t k,
     solution.assignment = connections.nearest;
     for (std::uint32_t c = 0; c < k; ++c) solution.assignment[solution.facilities[c]] = c;
     for (std::uint32_t i = 0; i < problem.points.size(); ++i) {
-      const double d = space.from(solution.facilities[solution.assignment[i]])(i);
+      const double d = space.row(solution.facilities[solution.assignment[i]])(i);
       if (d > frame.outlier_price) {
         solution.assignment[i] = kOutlier;
         solution.outlier_cost += frame.weights[i] * frame.outlier_price;

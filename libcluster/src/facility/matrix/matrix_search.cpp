@@ -42,11 +42,11 @@ double MatrixSearch::gain(std::uint32_t candidate) {
   const double* const first = state_.first_cost().data();
   const double* const second = state_.second_cost().data();
   const std::uint32_t* const facility = state_.first().data();
-  double spared = -opening_[candidate];
+  double saving = -opening_[candidate];
   for (std::size_t i = 0, n = costs_->clients(); i < n; ++i) {
     const double c = costs[i];
     const double now = std::min(c, first[i]);
-    spared += first[i] - now;
+    saving += first[i] - now;
     auto& closing = closing_[facility[i]];
     closing[0] += std::min(c, second[i]) - now;
     closing[1] += c - now;
@@ -71,7 +71,7 @@ double MatrixSearch::gain(std::uint32_t candidate) {
   } else if (one != NearestOpen::kNone) {
     closings_.push_back(one);
   }
-  return spared + std::max(all, best_one);
+  return saving + std::max(all, best_one);
 }
 
 void MatrixSearch::open(std::uint32_t candidate) {

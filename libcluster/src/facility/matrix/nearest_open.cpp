@@ -57,7 +57,7 @@ void NearestOpen::close(std::uint32_t facility) {
   open_.pop_back();
   position_[facility] = kNone;
 
-  lost_.clear();
+  orphans_.clear();
   for (std::uint32_t i = 0; i < first_.size(); ++i) {
     if (first_[i] == facility) {
       first_[i] = second_[i];
@@ -67,13 +67,13 @@ void NearestOpen::close(std::uint32_t facility) {
     }
     second_[i] = kNone;
     second_cost_[i] = kInfinity;
-    lost_.push_back(i);
+    orphans_.push_back(i);
   }
-  gathered_.resize(lost_.size());
+  gathered_.resize(orphans_.size());
   for (const std::uint32_t j : open_) {
-    costs_->gather(j, lost_, gathered_.data());
-    for (std::size_t k = 0; k < lost_.size(); ++k) {
-      const std::uint32_t i = lost_[k];
+    costs_->gather(j, orphans_, gathered_.data());
+    for (std::size_t k = 0; k < orphans_.size(); ++k) {
+      const std::uint32_t i = orphans_[k];
       if (gathered_[k] < second_cost_[i] && first_[i] != j) {
         second_[i] = j;
         second_cost_[i] = gathered_[k];

@@ -42,7 +42,7 @@ class NearestOpen {
   std::vector<std::uint32_t> first_, second_;
   std::vector<double> first_cost_, second_cost_;
   std::vector<double> scratch_, gathered_;
-  std::vector<std::uint32_t> lost_;
+  std::vector<std::uint32_t> orphans_;
 };
 
 }  // namespace terrace::cluster

@@ -22,27 +22,27 @@ template <class Space>
 class FastDistances {
  public:
   explicit FastDistances(const Space& space) : space_(&space) {}
-  [[nodiscard]] auto from(std::uint32_t facility) const { return From(*this, facility); }
+  [[nodiscard]] auto row(std::uint32_t facility) const { return Row(*this, facility); }
 
-  class From {
+  class Row {
    public:
-    From(const FastDistances& all, std::uint32_t facility) : from_(all.space_->from(facility)) {}
+    Row(const FastDistances& all, std::uint32_t facility) : row_(all.space_->row(facility)) {}
     /// Writes the distances of the first `count` clients.
     void fill(std::uint32_t count, double* out) const {
-      for (std::uint32_t i = 0; i < count; ++i) out[i] = from_(i);
+      for (std::uint32_t i = 0; i < count; ++i) out[i] = row_(i);
     }
     /// Adds the payments of `count` clients, starting at `first`.
     void add(std::uint32_t first, std::uint32_t count, const double* payments,
              const double* weights) {
       for (std::uint32_t k = 0; k < count; ++k) {
         const std::uint32_t i = first + k;
-        half_[k & 1] += weights[i] * std::max(0.0, payments[i] - from_(i));
+        half_[k & 1] += weights[i] * std::max(0.0, payments[i] - row_(i));
       }
     }
     [[nodiscard]] double sum() const { return half_[0] + half_[1]; }
 
    private:
-    typename Space::From from_;
+    typename Space::Row row_;
     double half_[2] = {0.0, 0.0};
   };
 
@@ -60,11 +60,11 @@ class FastDistances<NormSpace<EuclideanNorm, false>> {
       for (const Point3& p : space.points()) axes_[axis].push_back(p[axis]);
     }
   }
-  [[nodiscard]] auto from(std::uint32_t facility) const { return From(*this, facility); }
+  [[nodiscard]] auto row(std::uint32_t facility) const { return Row(*this, facility); }
 
-  class From {
+  class Row {
    public:
-    From(const FastDistances& all, std::uint32_t facility)
+    Row(const FastDistances& all, std::uint32_t facility)
         : x_(all.axes_[0].data()),
           y_(all.axes_[1].data()),
           z_(all.axes_[2].data()),

@@ -12,7 +12,7 @@
 #include "facility/points/fast_distances.hpp"
 #include "facility/points/search_frame.hpp"
 #include "facility/points/search_space.hpp"
-#include "facility/points/with_space.hpp"
+#include "facility/points/space_choice.hpp"
 
 namespace terrace::cluster {
 
@@ -37,18 +37,18 @@ class PointRows final : public CostRows {
     check_stop();
     const auto count = static_cast<std::uint32_t>(clients());
     scratch.resize(count);
-    distances_.from(static_cast<std::uint32_t>(facility)).fill(count, scratch.data());
+    distances_.row(static_cast<std::uint32_t>(facility)).fill(count, scratch.data());
     for (std::uint32_t i = 0; i < count; ++i) {
       scratch[i] = weights_[i] * std::min(scratch[i], price_);
     }
     return scratch.data();
   }
-  void gather(std::size_t facility, std::span<const std::uint32_t> which,
+  void gather(std::size_t facility, std::span<const std::uint32_t> clients,
               double* out) const override {
     check_stop();
-    const auto from = space_->from(static_cast<std::uint32_t>(facility));
-    for (std::size_t k = 0; k < which.size(); ++k) {
-      out[k] = weights_[which[k]] * std::min(from(which[k]), price_);
+    const auto row = space_->row(static_cast<std::uint32_t>(facility));
+    for (std::size_t k = 0; k < clients.size(); ++k) {
+      out[k] = weights_[clients[k]] * std::min(row(clients[k]), price_);
     }
   }
 

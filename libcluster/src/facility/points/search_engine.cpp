@@ -28,7 +28,7 @@ SearchEngine::SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsign
       state_(frame),
       team_(base::threads_for(std::numeric_limits<std::size_t>::max(), threads)),
       check_stop_(std::move(check_stop)),
-      verdicts_(1) {}
+      moves_(1) {}
 
 void SearchEngine::replace(std::vector<std::uint32_t> facility, std::vector<double> distance) {
   state_.assign(std::move(facility), std::move(distance));
@@ -74,14 +74,14 @@ void SearchEngine::start(const FacilitySolution& solution) {
 
 double SearchEngine::gain(std::uint32_t candidate) {
   assert(candidate < state_.size());
-  judge(candidate, true, verdicts_[0]);
-  return state_.unscaled(verdicts_[0].gain);
+  evaluate(candidate, true, moves_[0]);
+  return state_.unscaled(moves_[0].gain);
 }
 
 void SearchEngine::open(std::uint32_t candidate) {
   assert(candidate < state_.size());
-  judge(candidate, true, verdicts_[0]);
-  apply(verdicts_[0]);
+  evaluate(candidate, true, moves_[0]);
+  apply(moves_[0]);
 }
 
 bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std::size_t batch,
@@ -89,45 +89,45 @@ bool SearchEngine::improve(std::size_t candidates, std::mt19937_64& random, std:
   assert(batch > 0);
   // Reports often enough that even a long search can be stopped soon.
   const std::size_t step = std::clamp<std::size_t>(candidates / 256, 1, 1000);
-  std::size_t done = 0, next_report = 0;
-  while (done < candidates) {
-    if (progress && done >= next_report) {
-      if (!progress(done, candidates)) return false;
-      next_report = done + step;
+  std::size_t tried = 0, next_report = 0;
+  while (tried < candidates) {
+    if (progress && tried >= next_report) {
+      if (!progress(tried, candidates)) return false;
+      next_report = tried + step;
     }
     if (check_stop_) check_stop_();
-    const std::size_t now = std::min(batch, candidates - done);
-    if (verdicts_.size() < now) verdicts_.resize(now);
-    for (std::size_t k = 0; k < now; ++k) {
-      verdicts_[k].candidate = base::draw_below(state_.size(), random);
+    const std::size_t batch_size = std::min(batch, candidates - tried);
+    if (moves_.size() < batch_size) moves_.resize(batch_size);
+    for (std::size_t k = 0; k < batch_size; ++k) {
+      moves_[k].candidate = base::draw_below(state_.size(), random);
     }
-    if (now == 1) {
-      judge(verdicts_[0].candidate, true, verdicts_[0]);
+    if (batch_size == 1) {
+      evaluate(moves_[0].candidate, true, moves_[0]);
     } else {
-      team_.run(now, [this](std::size_t k) {
+      team_.run(batch_size, [this](std::size_t k) {
         if (check_stop_) check_stop_();
-        judge(verdicts_[k].candidate, false, verdicts_[k]);
+        evaluate(moves_[k].candidate, false, moves_[k]);
       });
     }
     std::size_t positive = 0;
-    const Verdict* best = nullptr;
-    for (std::size_t k = 0; k < now; ++k) {
-      const Verdict& verdict = verdicts_[k];
-      statistics_.inspected += verdict.inspected;
-      if (!(verdict.gain > 0.0)) continue;
+    const Move* best = nullptr;
+    for (std::size_t k = 0; k < batch_size; ++k) {
+      const Move& move = moves_[k];
+      statistics_.inspected += move.inspected;
+      if (!(move.gain > 0.0)) continue;
       ++positive;
-      if (!best || verdict.gain > best->gain) best = &verdict;
+      if (!best || move.gain > best->gain) best = &move;
     }
-    statistics_.candidates += now;
-    statistics_.vertices += now * (state_.size() + state_.open().size());
+    statistics_.candidates += batch_size;
+    statistics_.vertices += batch_size * (state_.size() + state_.open().size());
     statistics_.positive += positive;
-    done += now - (positive > 1 ? positive - 1 : 0);
+    tried += batch_size - (positive > 1 ? positive - 1 : 0);
     if (best) {
       apply(*best);
       ++statistics_.opened;
     }
   }
-  return !progress || progress(done, candidates);
+  return !progress || progress(tried, candidates);
 }
 
 }  // namespace terrace::cluster

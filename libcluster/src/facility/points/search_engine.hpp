@@ -15,23 +15,24 @@
 
 namespace terrace::cluster {
 
-/// The local search, step by step, for any distances. SpaceSearch implements the part that depends
-/// on the distances. Initially client 0 is the only open facility. Costs and gains are in the unit
-/// of the problem.
+/// The local search, one step at a time. SpaceSearch implements the part that depends on the kind
+/// of distances. Initially client 0 is the only open facility. Costs and gains are in the unit of
+/// the problem.
 ///
 /// Invariant: cost() before open(p) minus cost() after it equals gain(p), whatever its sign, up to
 /// rounding.
 class SearchEngine {
  public:
-  /// strategy: one of local search, not automatic. threads: 0 means one per core. check_stop:
-  /// every operation of O(clients) or more throws whatever it throws.
+  /// strategy: one of local search, not automatic.
+  /// threads: 0 means one per core.
+  /// check_stop: called by every operation of O(clients) or more, which throws whatever it throws.
   SearchEngine(SearchFrame& frame, FacilityStrategy strategy, unsigned threads,
                base::StopCheck check_stop);
   virtual ~SearchEngine() = default;
 
-  /// Makes Meyerson's initial solution (4.2.3). In random order, each client opens a facility with
+  /// Starts from Meyerson's solution (4.2.3). In random order, each client opens a facility with
   /// probability w d / fc, where d is the distance to the nearest facility so far. Otherwise it
-  /// joins that facility, or is left out if that is cheaper. Takes O(clients * facilities).
+  /// joins that facility, or becomes an outlier if that is cheaper. Takes O(clients * facilities).
   virtual void start(std::mt19937_64& random) = 0;
   /// Starts from a solution. Throws: std::invalid_argument if it is not a solution of the problem.
   void start(const FacilitySolution& solution);
@@ -64,9 +65,10 @@ class SearchEngine {
   [[nodiscard]] const SearchStatistics& statistics() const { return statistics_; }
 
  protected:
-  /// Fills in `verdict`. parallel: whether the engine's threads may be used.
-  virtual void judge(std::uint32_t candidate, bool parallel, Verdict& verdict) = 0;
-  virtual void apply(const Verdict& verdict) = 0;
+  /// Fills in `move`, the effect of opening the candidate. parallel: whether to use the engine's
+  /// threads.
+  virtual void evaluate(std::uint32_t candidate, bool parallel, Move& move) = 0;
+  virtual void apply(const Move& move) = 0;
   [[nodiscard]] virtual double distance(std::uint32_t facility, std::uint32_t client) const = 0;
   virtual void connections_replaced() = 0;
   void replace(std::vector<std::uint32_t> facility, std::vector<double> distance);
@@ -78,7 +80,7 @@ class SearchEngine {
 
  private:
   SearchStatistics statistics_;
-  std::vector<Verdict> verdicts_;  // of a batch
+  std::vector<Move> moves_;  // of a batch
 };
 
 }  // namespace terrace::cluster

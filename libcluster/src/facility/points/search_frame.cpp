@@ -78,8 +78,8 @@ struct Channel {
 };
 
 // Combines the positions' diagonal and the channels, as the metric measures the box.
-double whole_diagonal(const Metric& metric, const Point3& extent, double positions,
-                      const std::vector<double>& ranges) {
+double combined_diagonal(const Metric& metric, const Point3& extent, double positions,
+                         const std::vector<double>& ranges) {
   const std::vector<double> origin(ranges.size(), 0.0);
   const auto length = [&](auto norm) {
     return norm(extent[0], extent[1], extent[2], ranges.data(), origin.data(), ranges.size());
@@ -134,11 +134,11 @@ SearchFrame make_frame(const FacilityPoints& problem) {
       for (double& m : map) m = std::ldexp(m, -map_exponent);
       for (Point3& p : frame.points) p = mapped(map, p);
       // Along the longest semi-axis the points may have become tiny.
-      const Scaling again(frame.points);
-      frame.points = scaled(frame.points, again);
-      const int change = map_exponent + again.exponent;
+      const Scaling rescaling(frame.points);
+      frame.points = scaled(frame.points, rescaling);
+      const int change = map_exponent + rescaling.exponent;
       positions = std::holds_alternative<Elliptical>(problem.metric)
-                      ? std::ldexp(mapped_diagonal(map, extent), -again.exponent)
+                      ? std::ldexp(mapped_diagonal(map, extent), -rescaling.exponent)
                       : std::ldexp(positions, -change);
       exponent += change;
     }
@@ -169,14 +169,14 @@ SearchFrame make_frame(const FacilityPoints& problem) {
     }
   }
 
-  const double whole = whole_diagonal(problem.metric, extent, positions, ranges);
+  const double full_diagonal = combined_diagonal(problem.metric, extent, positions, ranges);
   frame.weights.assign(problem.weights.begin(), problem.weights.end());
   if (frame.weights.empty()) frame.weights.assign(count, 1.0);
   const bool squared = std::holds_alternative<SquaredEuclidean>(problem.metric);
   // If all points are equal there are no outliers, so infinity times zero must not matter.
-  const double price =
-      whole > 0.0 ? problem.outlier_price * whole : std::numeric_limits<double>::infinity();
-  set_costs(frame, problem.facility_cost * whole, price, squared ? 2 * greatest : greatest);
+  const double price = full_diagonal > 0.0 ? problem.outlier_price * full_diagonal
+                                           : std::numeric_limits<double>::infinity();
+  set_costs(frame, problem.facility_cost * full_diagonal, price, squared ? 2 * greatest : greatest);
   return frame;
 }
 

@@ -18,16 +18,17 @@
 
 /// Distances as the search engine uses them. There is one class per kind of metric, so that they
 /// are inlined. Each class has
-///     From from(f)            measures distances from facility f: double operator()(client).
-///                             order(client) sorts like the distance; from_order() converts it
-///                             back.
+///     Row row(f)              distances from facility f: double operator()(client).
+///                             order(client) sorts like the distance, and from_order() converts
+///                             it to the distance.
 ///     box_distance(f, box)    lower bound of the computed distance from f to clients in the box
 ///                             (if kHasBoxes)
-///     kHasBoxes, has_triangles()   whether cells in space and clusters as cells may be used
+///     kHasBoxes               whether box_distance() exists, as strategies with trees require
+///     has_triangles()         whether distances are symmetric and obey the triangle inequality
 
 namespace terrace::cluster {
 
-/// Allows for rounding: a bound that rules out a nearer client is first reduced by this factor.
+/// Factor that reduces computed lower bounds of distances, to allow for rounding.
 inline constexpr double kBelieved = 1.0 - 1e-9;
 
 /// Returns the components of the shortest vector from a point to a box.
@@ -52,7 +53,7 @@ class NormSpace {
         norm_(norm),
         triangles_(triangles) {}
 
-  struct From {
+  struct Row {
     const NormSpace& space;
     Point3 origin;
     const double* channels;
@@ -78,7 +79,7 @@ class NormSpace {
   [[nodiscard]] static double from_order(double order) {
     return !kChannels && std::is_same_v<Norm, EuclideanNorm> ? std::sqrt(order) : order;
   }
-  [[nodiscard]] From from(std::uint32_t facility) const {
+  [[nodiscard]] Row row(std::uint32_t facility) const {
     return {*this, points_[facility], channels_of(facility)};
   }
   [[nodiscard]] double box_distance(std::uint32_t facility, const Box3& box) const {
@@ -120,7 +121,7 @@ class FieldSpace {
 
   FieldSpace(FieldSpace&&) = default;  // not copyable, because places_ points into field_
 
-  struct From {
+  struct Row {
     const FieldSpace& space;
     Point3 origin;
     const LinearMap& map;
@@ -137,7 +138,7 @@ class FieldSpace {
     [[nodiscard]] double order(std::uint32_t client) const { return (*this)(client); }
   };
   [[nodiscard]] static double from_order(double order) { return order; }
-  [[nodiscard]] From from(std::uint32_t facility) const {
+  [[nodiscard]] Row row(std::uint32_t facility) const {
     return {*this, points_[facility], *places_[facility].map, channels_of(facility)};
   }
   [[nodiscard]] double box_distance(std::uint32_t facility, const Box3& box) const {
@@ -174,7 +175,7 @@ class IndexSpace {
   IndexSpace(Function distance, bool triangles)
       : distance_(std::move(distance)), triangles_(triangles) {}
 
-  struct From {
+  struct Row {
     const IndexSpace& space;
     std::uint32_t facility;
     double operator()(std::uint32_t client) const {
@@ -188,7 +189,7 @@ class IndexSpace {
     [[nodiscard]] double order(std::uint32_t client) const { return (*this)(client); }
   };
   [[nodiscard]] static double from_order(double order) { return order; }
-  [[nodiscard]] From from(std::uint32_t facility) const { return {*this, facility}; }
+  [[nodiscard]] Row row(std::uint32_t facility) const { return {*this, facility}; }
   [[nodiscard]] bool has_triangles() const { return triangles_; }
 
  private:

@@ -22,24 +22,24 @@ double SearchState::cost() const {
   return cost;
 }
 
-void SearchState::sum(Verdict& verdict) const {
-  double gain = is_open(verdict.candidate) ? 0.0 : -facility_cost_;
-  auto taken = verdict.taken.begin();
-  const auto add_taken = [&](std::uint32_t facility) {
-    double spared = 0.0;
-    for (; taken != verdict.taken.end() && taken->facility() == facility; ++taken) {
-      spared += taken->spared;
+void SearchState::sum(Move& move) const {
+  double gain = is_open(move.candidate) ? 0.0 : -facility_cost_;
+  auto term = move.reassigned.begin();
+  const auto add_terms_of = [&](std::uint32_t facility) {
+    double saving = 0.0;
+    for (; term != move.reassigned.end() && term->facility() == facility; ++term) {
+      saving += term->saving;
     }
-    gain += spared;
+    gain += saving;
   };
-  for (const Verdict::Closed& closed : verdict.closed) {
-    while (taken != verdict.taken.end() && taken->facility() <= closed.facility) {
-      add_taken(taken->facility());
+  for (const Move::Closing& closing : move.closings) {
+    while (term != move.reassigned.end() && term->facility() <= closing.facility) {
+      add_terms_of(term->facility());
     }
-    gain += closed.spared;
+    gain += closing.saving;
   }
-  while (taken != verdict.taken.end()) add_taken(taken->facility());
-  verdict.gain = gain;
+  while (term != move.reassigned.end()) add_terms_of(term->facility());
+  move.gain = gain;
 }
 
 void SearchState::assign(std::vector<std::uint32_t> facility, std::vector<double> distance) {
@@ -88,7 +88,7 @@ void SearchState::close_facility(std::uint32_t facility) {
   slot_[facility] = kClosed;
 }
 
-void SearchState::keep_own(std::uint32_t facility) {
+void SearchState::remove_lost_clients(std::uint32_t facility) {
   Cluster& cluster = clusters_[slot_[facility]];
   std::erase_if(cluster.clients, [&](std::uint32_t i) { return facility_[i] != facility; });
   sum_up(cluster);

@@ -19,37 +19,36 @@ struct Cluster {
   double longest = 0.0;  ///< the longest connection, unweighted
 };
 
-/// The effect of opening a candidate. Terms are sorted by facility, then client, so sums have the
-/// same order whatever strategy found the terms.
-struct Verdict {
-  struct Taken {
+/// A move of the local search: the effect of opening a candidate. Terms are sorted by facility,
+/// then client, so the gain is the same to the last bit whichever strategy found the terms.
+struct Move {
+  struct Reassignment {
     std::uint64_t key;  ///< current facility * 2^32 + client; kOutlier sorts last
-    double spared;
+    double saving;
     [[nodiscard]] std::uint32_t facility() const { return static_cast<std::uint32_t>(key >> 32); }
     [[nodiscard]] std::uint32_t client() const { return static_cast<std::uint32_t>(key); }
   };
-  struct Closed {
+  struct Closing {
     std::uint32_t facility;
-    double spared;
+    double saving;
   };
   std::uint32_t candidate = 0;
   double gain = 0.0;
-  std::vector<Taken> taken;
-  std::vector<Closed> closed;
+  std::vector<Reassignment> reassigned;
+  std::vector<Closing> closings;
   std::uint64_t inspected = 0;
   std::vector<double> losses;        ///< working memory
   std::vector<std::uint32_t> stack;  ///< working memory
 
   void clear() {
-    taken.clear();
-    closed.clear();
+    reassigned.clear();
+    closings.clear();
     inspected = 0;
   }
 };
 
-/// A solution that is being improved, for any distances. A client that is left out has no facility
-/// and a distance equal to the price. No client pays more than the price, and each facility is its
-/// own client.
+/// The current solution of a local search. An outlier has no facility, and its distance is the
+/// outlier price. No client pays more than the price, and each facility is its own client.
 class SearchState {
  public:
   explicit SearchState(SearchFrame& frame);
@@ -73,16 +72,16 @@ class SearchState {
   [[nodiscard]] double cost() const;
   [[nodiscard]] double unscaled(double cost) const;
 
-  /// Adds up a verdict's terms in their order.
-  void sum(Verdict& verdict) const;
+  /// Sets move.gain to the sum of its terms, in their order.
+  void sum(Move& move) const;
 
   /// Sets a new solution: the facility of each client, or kOutlier, and its distance.
   void assign(std::vector<std::uint32_t> facility, std::vector<double> distance);
 
-  /// Applies a verdict. moved_distance(client) is the distance from the candidate. Sets `changed`
-  /// to the clients whose connection changed.
+  /// Makes the move. distance_to_candidate(client) is the client's distance from the candidate.
+  /// Sets `changed` to the clients whose connection changed.
   template <class Distance>
-  void apply(const Verdict& verdict, const Distance& moved_distance,
+  void apply(const Move& move, const Distance& distance_to_candidate,
              std::vector<std::uint32_t>& changed);
 
   [[nodiscard]] FacilitySolution solution() const;
@@ -93,7 +92,7 @@ class SearchState {
   void connect(std::uint32_t client, std::uint32_t facility, double distance);
   void open_facility(std::uint32_t facility);
   void close_facility(std::uint32_t facility);
-  void keep_own(std::uint32_t facility);
+  void remove_lost_clients(std::uint32_t facility);
   void sum_up(Cluster& cluster) const;
 
   std::vector<double> weight_, distance_;
@@ -107,52 +106,53 @@ class SearchState {
 };
 
 template <class Distance>
-void SearchState::apply(const Verdict& verdict, const Distance& moved_distance,
+void SearchState::apply(const Move& move, const Distance& distance_to_candidate,
                         std::vector<std::uint32_t>& changed) {
-  const std::uint32_t candidate = verdict.candidate;
+  const std::uint32_t candidate = move.candidate;
   changed.clear();
   const std::uint32_t former = facility_[candidate];
   open_facility(candidate);
   connect(candidate, candidate, 0.0);
   changed.push_back(candidate);
-  for (const Verdict::Taken& taken : verdict.taken) {
-    if (taken.client() == candidate) continue;
-    connect(taken.client(), candidate, moved_distance(taken.client()));
-    changed.push_back(taken.client());
+  for (const Move::Reassignment& term : move.reassigned) {
+    if (term.client() == candidate) continue;
+    connect(term.client(), candidate, distance_to_candidate(term.client()));
+    changed.push_back(term.client());
   }
-  bool left_out = false;
-  for (const Verdict::Closed& closed : verdict.closed) {
-    for (const std::uint32_t client : clusters_[slot_[closed.facility]].clients) {
-      if (facility_[client] != closed.facility) continue;  // the candidate has already taken it
-      const double d = moved_distance(client);
+  bool has_new_outliers = false;
+  for (const Move::Closing& closing : move.closings) {
+    for (const std::uint32_t client : clusters_[slot_[closing.facility]].clients) {
+      if (facility_[client] != closing.facility) continue;  // now a client of the candidate
+      const double d = distance_to_candidate(client);
       if (d <= outlier_price_) {
         connect(client, candidate, d);
       } else {
         connect(client, kOutlier, outlier_price_);
         outliers_.push_back(client);
-        left_out = true;
+        has_new_outliers = true;
       }
       changed.push_back(client);
     }
-    close_facility(closed.facility);
+    close_facility(closing.facility);
   }
-  // Updates the lists of facilities that lost clients, each once: `taken` is sorted by facility.
+  // Updates the lists of facilities that lost clients, each once: `reassigned` is sorted by
+  // facility.
   std::uint32_t last = candidate;
-  bool outliers_taken = former == kOutlier;
-  for (const Verdict::Taken& taken : verdict.taken) {
-    const std::uint32_t loser = taken.facility();
+  bool outliers_changed = former == kOutlier;
+  for (const Move::Reassignment& term : move.reassigned) {
+    const std::uint32_t loser = term.facility();
     if (loser == kOutlier) {
-      outliers_taken = true;
+      outliers_changed = true;
     } else if (loser != last && is_open(loser)) {
-      keep_own(loser);
+      remove_lost_clients(loser);
       last = loser;
     }
   }
-  if (former != kOutlier && former != candidate && is_open(former)) keep_own(former);
-  if (outliers_taken) {
+  if (former != kOutlier && former != candidate && is_open(former)) remove_lost_clients(former);
+  if (outliers_changed) {
     std::erase_if(outliers_, [&](std::uint32_t i) { return facility_[i] != kOutlier; });
   }
-  if (left_out) std::sort(outliers_.begin(), outliers_.end());
+  if (has_new_outliers) std::sort(outliers_.begin(), outliers_.end());
   Cluster& own = clusters_[slot_[candidate]];
   for (const std::uint32_t client : changed) {
     if (facility_[client] == candidate) own.clients.push_back(client);

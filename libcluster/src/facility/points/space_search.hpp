@@ -17,6 +17,7 @@
 #include "facility/points/client_tree.hpp"
 #include "facility/points/search_engine.hpp"
 #include "facility/points/search_space.hpp"
+#include "facility/points/search_state.hpp"
 
 namespace terrace::cluster {
 
@@ -36,9 +37,9 @@ class SpaceSearch final : public SearchEngine {
     }
     std::vector<std::uint32_t> facility(state_.size(), 0);
     std::vector<double> distances(state_.size());
-    const auto from = space_.from(0);
+    const auto row = space_.row(0);
     for (std::uint32_t i = 0; i < state_.size(); ++i) {
-      distances[i] = i == 0 ? 0.0 : from(i);
+      distances[i] = i == 0 ? 0.0 : row(i);
       if (distances[i] > state_.outlier_price()) {
         distances[i] = state_.outlier_price();
         facility[i] = kOutlier;
@@ -64,7 +65,7 @@ class SpaceSearch final : public SearchEngine {
       std::uint32_t nearest = kOutlier;
       double least = std::numeric_limits<double>::infinity();
       for (const std::uint32_t j : open) {
-        const double d = space_.from(j).order(i);
+        const double d = space_.row(j).order(i);
         if (d < least) {
           least = d;
           nearest = j;
@@ -107,7 +108,7 @@ class SpaceSearch final : public SearchEngine {
   }
 
  private:
-  using From = typename Space::From;
+  using Row = typename Space::Row;
 
   [[nodiscard]] auto points() const { return space_.points(); }
 
@@ -117,9 +118,9 @@ class SpaceSearch final : public SearchEngine {
     base::StopTicks ticks(check_stop_);
     for (const std::uint32_t j : state_.open()) {
       ticks(2 * state_.size());
-      const From from = space_.from(j);
+      const Row row = space_.row(j);
       for (std::uint32_t i = 0; i < state_.size(); ++i) {
-        const double d = from(i);
+        const double d = row(i);
         if (d < distances[i]) {
           distances[i] = d;
           facility[i] = j;
@@ -129,121 +130,121 @@ class SpaceSearch final : public SearchEngine {
   }
 
   [[nodiscard]] double distance(std::uint32_t facility, std::uint32_t client) const override {
-    return space_.from(facility)(client);
+    return space_.row(facility)(client);
   }
 
   void connections_replaced() override {
     if (tree_) tree_->set(state_.distances());
   }
 
-  void apply(const Verdict& verdict) override {
-    state_.apply(verdict, space_.from(verdict.candidate), changed_);
+  void apply(const Move& move) override {
+    state_.apply(move, space_.row(move.candidate), changed_);
     if (tree_) tree_->update(changed_, state_.distances());
   }
 
-  void judge(std::uint32_t candidate, bool parallel, Verdict& verdict) override;
+  void evaluate(std::uint32_t candidate, bool parallel, Move& move) override;
 
-  // Computes parts of a gain. Each function appends to a verdict.
-  void scan_all(std::uint32_t candidate, const From& from, Verdict& verdict);
-  void scan_tree(std::uint32_t candidate, const From& from, Verdict& verdict) const;
-  void scan_outliers(const From& from, Verdict& verdict) const;
-  void scan_facilities(std::uint32_t candidate, const From& from, std::size_t begin,
-                       std::size_t end, Verdict& verdict) const;
-  void inspect(std::uint32_t facility, const From& from, bool takes, Verdict& verdict) const;
-  void take(std::uint32_t client, double d, Verdict& verdict) const {
+  // Each of these functions appends some terms to a move.
+  void scan_all(std::uint32_t candidate, const Row& row, Move& move);
+  void scan_tree(std::uint32_t candidate, const Row& row, Move& move) const;
+  void scan_outliers(const Row& row, Move& move) const;
+  void scan_facilities(std::uint32_t candidate, const Row& row, std::size_t begin, std::size_t end,
+                       Move& move) const;
+  void inspect(std::uint32_t facility, const Row& row, bool reassigns, Move& move) const;
+  void add_reassignment(std::uint32_t client, double d, Move& move) const {
     const std::uint64_t facility = state_.facility(client);
-    verdict.taken.push_back(
+    move.reassigned.push_back(
         {facility << 32 | client, state_.weight(client) * (state_.distance(client) - d)});
   }
-  // Returns the loss of a client that the candidate does not take when its facility closes.
+  // Returns the loss of a client whose facility closes and which the candidate does not attract.
   [[nodiscard]] double loss(std::uint32_t client, double d) const {
     return state_.weight(client) * (std::min(d, state_.outlier_price()) - state_.distance(client));
   }
 
   Space space_;
   std::optional<ClientTree> tree_;
-  std::vector<std::uint32_t> changed_;  // clients changed by the last verdict
-  std::vector<Verdict> parts_;          // parts of a gain, by piece of work
+  std::vector<std::uint32_t> changed_;  // clients changed by the last move
+  std::vector<Move> parts_;             // parts of a move, for the threads
 };
 
 // The gain under each strategy.
 
 template <class Space>
-void SpaceSearch<Space>::judge(std::uint32_t candidate, bool parallel, Verdict& verdict) {
-  verdict.clear();
-  verdict.candidate = candidate;
-  const From from = space_.from(candidate);
+void SpaceSearch<Space>::evaluate(std::uint32_t candidate, bool parallel, Move& move) {
+  move.clear();
+  move.candidate = candidate;
+  const Row row = space_.row(candidate);
   const std::size_t open = state_.open().size();
-  const bool by_threads = parallel && team_.threads() > 1 && open > 1;
-  if (!by_threads) {
+  const bool use_threads = parallel && team_.threads() > 1 && open > 1;
+  if (!use_threads) {
     if (strategy_ == FacilityStrategy::full_scan) {
-      scan_all(candidate, from, verdict);
+      scan_all(candidate, row, move);
     } else {
       if (tree_) {
-        scan_tree(candidate, from, verdict);
+        scan_tree(candidate, row, move);
       } else {
-        scan_outliers(from, verdict);
+        scan_outliers(row, move);
       }
-      scan_facilities(candidate, from, 0, open, verdict);
+      scan_facilities(candidate, row, 0, open, move);
     }
   } else {
-    // There are a few pieces per thread, because clusters differ in size. The last piece is the
-    // client tree or the outliers.
-    const std::size_t pieces = std::min<std::size_t>(open, 4 * team_.threads());
-    parts_.resize(pieces + 1);
-    team_.run(pieces + 1, [&](std::size_t piece) {
-      Verdict& part = parts_[piece == 0 ? pieces : piece - 1];
+    // There are a few parts per thread, because clusters differ in size. The last part is the tree
+    // of clients or the outliers.
+    const std::size_t part_count = std::min<std::size_t>(open, 4 * team_.threads());
+    parts_.resize(part_count + 1);
+    team_.run(part_count + 1, [&](std::size_t part_number) {
+      Move& part = parts_[part_number == 0 ? part_count : part_number - 1];
       part.clear();
-      if (piece > 0) {
-        scan_facilities(candidate, from, (piece - 1) * open / pieces, piece * open / pieces, part);
+      if (part_number > 0) {
+        scan_facilities(candidate, row, (part_number - 1) * open / part_count,
+                        part_number * open / part_count, part);
       } else if (tree_) {
-        scan_tree(candidate, from, part);
+        scan_tree(candidate, row, part);
       } else {
-        scan_outliers(from, part);
+        scan_outliers(row, part);
       }
     });
-    for (const Verdict& part : parts_) {
-      verdict.taken.insert(verdict.taken.end(), part.taken.begin(), part.taken.end());
-      verdict.closed.insert(verdict.closed.end(), part.closed.begin(), part.closed.end());
-      verdict.inspected += part.inspected;
+    for (const Move& part : parts_) {
+      move.reassigned.insert(move.reassigned.end(), part.reassigned.begin(), part.reassigned.end());
+      move.closings.insert(move.closings.end(), part.closings.begin(), part.closings.end());
+      move.inspected += part.inspected;
     }
   }
-  const auto by_key = [](const Verdict::Taken& a, const Verdict::Taken& b) {
+  const auto by_key = [](const Move::Reassignment& a, const Move::Reassignment& b) {
     return a.key < b.key;
   };
-  if (!std::is_sorted(verdict.taken.begin(), verdict.taken.end(), by_key)) {
-    std::sort(verdict.taken.begin(), verdict.taken.end(), by_key);
+  if (!std::is_sorted(move.reassigned.begin(), move.reassigned.end(), by_key)) {
+    std::sort(move.reassigned.begin(), move.reassigned.end(), by_key);
   }
-  state_.sum(verdict);
+  state_.sum(move);
 }
 
 // Examines every client, as in the literature. The reference for the other strategies.
 template <class Space>
-void SpaceSearch<Space>::scan_all(std::uint32_t candidate, const From& from, Verdict& verdict) {
-  std::vector<double>& losses = verdict.losses;
+void SpaceSearch<Space>::scan_all(std::uint32_t candidate, const Row& row, Move& move) {
+  std::vector<double>& losses = move.losses;
   losses.assign(state_.slot_count(), 0.0);
   for (std::uint32_t i = 0; i < state_.size(); ++i) {
-    const double d = from(i);
+    const double d = row(i);
     if (d < state_.distance(i)) {
-      take(i, d, verdict);
+      add_reassignment(i, d, move);
     } else if (state_.facility(i) != kOutlier) {
       losses[state_.slot(state_.facility(i))] += loss(i, d);
     }
   }
   for (const std::uint32_t j : state_.open()) {
-    const double spared = state_.facility_cost() - losses[state_.slot(j)];
-    if (spared > 0.0 && j != candidate) verdict.closed.push_back({j, spared});
+    const double saving = state_.facility_cost() - losses[state_.slot(j)];
+    if (saving > 0.0 && j != candidate) move.closings.push_back({j, saving});
   }
-  verdict.inspected += state_.size();
+  move.inspected += state_.size();
 }
 
 // Examines clients that may be nearer to the candidate than to their facility.
 template <class Space>
-void SpaceSearch<Space>::scan_tree(std::uint32_t candidate, const From& from,
-                                   Verdict& verdict) const {
+void SpaceSearch<Space>::scan_tree(std::uint32_t candidate, const Row& row, Move& move) const {
   if constexpr (Space::kHasBoxes) {
     const std::vector<ClientTree::Node>& nodes = tree_->nodes();
-    std::vector<std::uint32_t>& stack = verdict.stack;  // nodes to visit
+    std::vector<std::uint32_t>& stack = move.stack;  // nodes to visit
     stack.assign(1, 0);
     while (!stack.empty()) {
       const ClientTree::Node& node = nodes[stack.back()];
@@ -253,75 +254,74 @@ void SpaceSearch<Space>::scan_tree(std::uint32_t candidate, const From& from,
       if (node.child_count > 0) continue;
       for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
         const std::uint32_t i = tree_->order()[k];
-        const double d = from(i);
-        if (d < state_.distance(i)) take(i, d, verdict);
+        const double d = row(i);
+        if (d < state_.distance(i)) add_reassignment(i, d, move);
       }
-      verdict.inspected += node.count;
+      move.inspected += node.count;
     }
   }
 }
 
 template <class Space>
-void SpaceSearch<Space>::scan_outliers(const From& from, Verdict& verdict) const {
+void SpaceSearch<Space>::scan_outliers(const Row& row, Move& move) const {
   for (const std::uint32_t i : state_.outliers()) {
-    const double d = from(i);
-    if (d < state_.distance(i)) take(i, d, verdict);
+    const double d = row(i);
+    if (d < state_.distance(i)) add_reassignment(i, d, move);
   }
-  verdict.inspected += state_.outliers().size();
+  move.inspected += state_.outliers().size();
 }
 
-// Examines facilities from the begin-th open one on: their clients, if they are cells, and their
-// closure.
+// Examines the open facilities from number `begin` to `end`: their clients, unless the tree
+// contains them, and whether they close.
 template <class Space>
-void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const From& from,
-                                         std::size_t begin, std::size_t end,
-                                         Verdict& verdict) const {
+void SpaceSearch<Space>::scan_facilities(std::uint32_t candidate, const Row& row, std::size_t begin,
+                                         std::size_t end, Move& move) const {
   const bool triangles = space_.has_triangles();
   for (std::size_t k = begin; k < end; ++k) {
     const std::uint32_t j = state_.open()[k];
     if (j == candidate) continue;
-    bool takes = !tree_;
-    bool closes = true;
+    bool reassigns = !tree_;
+    bool may_close = true;
     if (triangles && strategy_ != FacilityStrategy::full_scan) {
       const Cluster& cluster = state_.cluster(j);
-      const double d = kBelieved * from(j);
-      ++verdict.inspected;
+      const double d = kBelieved * row(j);
+      ++move.inspected;
       // By the triangle inequality, if a client of j is nearer to the candidate than to j, the
       // candidate is within twice the longest connection of j.
-      takes = takes && d < 2.0 * cluster.longest;
-      // And every client i loses at least d - 2 d(i, j), or price - d(i, j).
-      closes = cluster.weight * std::min(d, kBelieved * state_.outlier_price()) <
-               state_.facility_cost() + 2.0 * cluster.cost;
+      reassigns = reassigns && d < 2.0 * cluster.longest;
+      // Likewise, if j closes, every client i loses at least d - 2 d(i, j), or price - d(i, j).
+      may_close = cluster.weight * std::min(d, kBelieved * state_.outlier_price()) <
+                  state_.facility_cost() + 2.0 * cluster.cost;
     }
-    if (takes) {
-      inspect(j, from, true, verdict);
-    } else if (closes) {
-      inspect(j, from, false, verdict);
+    if (reassigns) {
+      inspect(j, row, true, move);
+    } else if (may_close) {
+      inspect(j, row, false, move);
     }
   }
 }
 
-// Examines the clients of one facility: all if the candidate may take some, otherwise until they
-// pay for the facility.
+// Examines the clients of a facility. If the candidate may attract some, examines all of them,
+// otherwise only until their losses reach the facility cost.
 template <class Space>
-void SpaceSearch<Space>::inspect(std::uint32_t facility, const From& from, bool takes,
-                                 Verdict& verdict) const {
+void SpaceSearch<Space>::inspect(std::uint32_t facility, const Row& row, bool reassigns,
+                                 Move& move) const {
   const Cluster& cluster = state_.cluster(facility);
   double losses = 0.0;
   std::size_t inspected = 0;
   for (const std::uint32_t i : cluster.clients) {
-    const double d = from(i);
+    const double d = row(i);
     ++inspected;
     if (d < state_.distance(i)) {
-      if (takes) take(i, d, verdict);
+      if (reassigns) add_reassignment(i, d, move);
     } else {
       losses += loss(i, d);
-      if (!takes && losses >= state_.facility_cost()) break;
+      if (!reassigns && losses >= state_.facility_cost()) break;
     }
   }
-  verdict.inspected += inspected;
-  const double spared = state_.facility_cost() - losses;
-  if (spared > 0.0) verdict.closed.push_back({facility, spared});
+  move.inspected += inspected;
+  const double saving = state_.facility_cost() - losses;
+  if (saving > 0.0) move.closings.push_back({facility, saving});
 }
 
 }  // namespace terrace::cluster

@@ -8,6 +8,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include <terrace/base/ordered_work.hpp>
 #include <terrace/base/portable_math.hpp>

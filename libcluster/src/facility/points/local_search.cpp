@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 
 #include <algorithm>
 #include <random>
@@ -10,34 +10,34 @@
 #include <terrace/base/stop_check.hpp>
 
 #include "facility/points/search_frame.hpp"
+#include "facility/points/space_choice.hpp"
 #include "facility/points/space_search.hpp"
-#include "facility/points/with_space.hpp"
 
 namespace terrace::cluster {
 namespace {
 
 void check_strategy(FacilityStrategy strategy, bool has_boxes, bool has_triangles,
                     const std::string& what) {
-  const std::string asked = std::string("the strategy \"") + name_of(strategy) + "\" ";
+  const std::string prefix = std::string("the strategy \"") + name_of(strategy) + "\" ";
   switch (strategy) {
     case FacilityStrategy::quadtree:
     case FacilityStrategy::octree:
     case FacilityStrategy::kd_tree:
       if (has_boxes) return;
-      throw std::invalid_argument(asked +
+      throw std::invalid_argument(prefix +
                                   "needs bounds on distances to boxes, which do not exist for " +
                                   what + ": use automatic or full_scan");
     case FacilityStrategy::facilities:
       if (has_triangles) return;
       throw std::invalid_argument(
-          asked + "needs distances that are symmetric and obey the triangle inequality, and " +
+          prefix + "needs distances that are symmetric and obey the triangle inequality, and " +
           what + " does not (or does not declare it): use automatic" +
           (has_boxes ? ", kd_tree" : "") + " or full_scan");
     case FacilityStrategy::automatic:
     case FacilityStrategy::full_scan:
       return;
     default:
-      throw std::invalid_argument(asked + "is not a local search on " + what +
+      throw std::invalid_argument(prefix + "is not a local search on " + what +
                                   ": use automatic or full_scan");
   }
 }
@@ -71,10 +71,10 @@ std::unique_ptr<SearchEngine> make_search(const FacilityPoints& problem, Facilit
                                           unsigned threads, const base::StopCheck& check_stop) {
   SearchFrame frame = make_frame(problem);
   const std::string what = "the metric \"" + name_of(problem.metric) + "\"";
-  return with_space(problem, frame, problem.points,
-                    [&](auto space) -> std::unique_ptr<SearchEngine> {
-                      return make(frame, std::move(space), strategy, threads, check_stop, what);
-                    });
+  return visit_space(problem, frame, problem.points,
+                     [&](auto space) -> std::unique_ptr<SearchEngine> {
+                       return make(frame, std::move(space), strategy, threads, check_stop, what);
+                     });
 }
 
 std::unique_ptr<SearchEngine> make_search(const FacilityEntities& problem,

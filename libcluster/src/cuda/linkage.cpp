@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "terrace/cluster/linkage.hpp"
+
 #include <stdexcept>
 
 #include "linkage/points.hpp"
-#include "terrace/cluster/linkage.hpp"
 
 #ifdef TERRACE_CLUSTER_CUDA
-#include "cuda/cuda_rounds.hpp"
 #include "cuda/device_dendrogram.hpp"
+#include "cuda/rounds.hpp"
 #endif
 
 namespace terrace::cluster {

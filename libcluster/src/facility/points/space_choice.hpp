@@ -15,32 +15,33 @@
 
 namespace terrace::cluster {
 
-/// Returns the distances of a problem of entities.
+/// Returns the space of a problem of entities.
 inline IndexSpace space_of(const FacilityEntities& problem) {
   return {problem.distance, problem.symmetric && problem.triangle_inequality};
 }
 
-/// Calls visit(space) with the distances of the problem between the points of its frame, which are
-/// moved out of it. `original` holds the points in the order of the frame. `visit` owns the space,
-/// which refers to nothing outside it.
+/// Calls visit(space) with the space of search_space.hpp that fits the metric of the problem.
+/// Returns what `visit` returns. The space is over the points of `frame`, which are moved out of
+/// it, and depends on no other object. `original` holds the unscaled points in the order of the
+/// frame.
 template <class Visit>
-auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<const Point3> original,
-                const Visit& visit) {
+auto visit_space(const FacilityPoints& problem, SearchFrame& frame,
+                 std::span<const Point3> original, const Visit& visit) {
   using Result = decltype(visit(NormSpace<EuclideanNorm, false>(frame, {}, true)));
   if (linear_map(problem.metric, base::box_of(original))) {
     if (frame.channel_count == 0) return visit(NormSpace<EuclideanNorm, false>(frame, {}, true));
     return visit(NormSpace<EuclideanNorm, true>(frame, {}, true));
   }
-  const auto with_norm = [&](auto norm, bool triangles) -> Result {
+  const auto visit_norm = [&](auto norm, bool triangles) -> Result {
     return visit(NormSpace<decltype(norm), true>(frame, norm, triangles));
   };
   return std::visit(
       [&](const auto& metric) -> Result {
         using M = std::decay_t<decltype(metric)>;
         if constexpr (std::is_same_v<M, Minkowski>) {
-          if (std::isinf(metric.p)) return with_norm(MaximumNorm{}, true);
-          if (metric.p == 1.0) return with_norm(CityBlockNorm{}, true);
-          return with_norm(PowerNorm{metric.p}, metric.p >= 1.0);
+          if (std::isinf(metric.p)) return visit_norm(MaximumNorm{}, true);
+          if (metric.p == 1.0) return visit_norm(CityBlockNorm{}, true);
+          return visit_norm(PowerNorm{metric.p}, metric.p >= 1.0);
         } else if constexpr (std::is_same_v<M, EllipticalField>) {
           return visit(FieldSpace(frame, original, metric));
         } else if constexpr (std::is_same_v<M, CustomMetric>) {
@@ -57,7 +58,7 @@ auto with_space(const FacilityPoints& problem, SearchFrame& frame, std::span<con
           return visit(
               IndexSpace(std::move(distance), metric.symmetric && metric.triangle_inequality));
         } else {
-          return with_norm(SquaredNorm{}, false);
+          return visit_norm(SquaredNorm{}, false);
         }
       },
       problem.metric);

@@ -27,12 +27,12 @@
 namespace terrace::cluster {
 namespace {
 
-// Points nearer to their centre than this (in the unit of the box, squared) count as being at it,
-// because a mean of many points is rounded.
+// Squared distance below which a point counts as being at its centre, in the unit of the bounding
+// box. Not zero, because the mean of many points is rounded.
 constexpr double kAtCentre2 = 0x1p-72;
-// Limit for the caller's centres in the same unit. Beyond it squares would overflow.
+// Limit of the caller's coordinates in the same unit. Beyond it squares would overflow.
 constexpr double kFarthest = 0x1p+400;
-constexpr double kLeastWeight = 0x1p-500;
+constexpr double kMinWeight = 0x1p-500;
 
 void check_points(std::span<const Point3> points, const char* what) {
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -80,7 +80,7 @@ struct ScaledWeights {
     std::frexp(*std::max_element(weights.begin(), weights.end()), &exponent);
     values.reserve(weights.size());
     for (const double w : weights) {
-      values.push_back(std::max(std::ldexp(w, -exponent), kLeastWeight));
+      values.push_back(std::max(std::ldexp(w, -exponent), kMinWeight));
     }
   }
 };
@@ -92,8 +92,8 @@ double squared_distance_bound(const Point3& p, const Box3& box) {
   return box.squared_distance(p) * (1 - 1e-14);
 }
 
-/// The costs of all points for the seeds so far, summed over the boxes of the tree. Draws further
-/// seeds from them.
+/// Draws seeds. Keeps the cost of every point for the seeds so far, and the sums of these costs
+/// over the nodes of the tree.
 class CentreSeeder {
  public:
   CentreSeeder(const KMeansTree& tree, const base::StopCheck& check_stop)
@@ -109,59 +109,65 @@ class CentreSeeder {
     }
   }
 
-  /// Returns the sum of costs that remains with the seeds so far.
+  /// Returns the sum of the costs of all points.
   [[nodiscard]] double total() const { return states_.back().front().sum; }
 
-  /// Returns a position drawn with probability proportional to its cost. Requires: total() > 0.
+  /// Draws a position with probability proportional to its cost, or to its weight for the first
+  /// seed. Requires: total() > 0.
   [[nodiscard]] std::size_t draw(bool first, std::mt19937_64& random) const {
-    double at = base::draw_unit(random) * total();
+    double target = base::draw_unit(random) * total();
     std::size_t node = 0;
     for (std::size_t level = states_.size() - 1; level-- > 0;) {
-      node = pick_part(node * kFan, std::min((node + 1) * kFan, states_[level].size()), at,
+      node = find_part(node * kFan, std::min((node + 1) * kFan, states_[level].size()), target,
                        [&](std::size_t k) { return states_[level][k].sum; });
     }
-    return pick_part(node * KMeansTree::kBlock,
-                     std::min((node + 1) * KMeansTree::kBlock, tree_.count), at,
-                     [&](std::size_t place) { return first ? tree_.w[place] : cost(place); });
+    return find_part(
+        node * KMeansTree::kBlock, std::min((node + 1) * KMeansTree::kBlock, tree_.count), target,
+        [&](std::size_t position) { return first ? tree_.w[position] : cost(position); });
   }
 
-  /// Returns by how much a seed there would lower total().
+  /// Returns by how much a seed at this point would lower total().
   [[nodiscard]] double gain(const Point3& seed) { return gain(seed, states_.size() - 1, 0); }
 
+  /// Adds a seed.
   void add(const Point3& seed) { add(seed, states_.size() - 1, 0); }
 
  private:
   struct State {
-    double most;  // the largest squared distance of a point below
-    double sum;   // sum of weight times squared distance
+    double largest;  // the largest squared distance of a point to its nearest seed
+    double sum;      // sum of weight times squared distance
   };
 
-  [[nodiscard]] double cost(std::size_t place) const { return tree_.w[place] * cost_[place]; }
+  [[nodiscard]] double cost(std::size_t position) const {
+    return tree_.w[position] * cost_[position];
+  }
 
-  /// Returns the part of [first, end) in which `at` falls, never an empty part.
+  /// Lays the sizes of the parts [first, end) end to end. Returns the part that contains `target`
+  /// and subtracts the sizes before it. Never returns an empty part.
   template <class Size>
-  static std::size_t pick_part(std::size_t first, std::size_t end, double& at, const Size& size) {
+  static std::size_t find_part(std::size_t first, std::size_t end, double& target,
+                               const Size& size) {
     std::size_t last = first;
     for (std::size_t k = first; k < end; ++k) {
       const double s = size(k);
       if (s <= 0) continue;
       last = k;
-      if (at < s) break;
-      at -= s;
+      if (target < s) break;
+      target -= s;
     }
     return last;
   }
 
   [[nodiscard]] double gain(const Point3& seed, std::size_t level, std::size_t node) {
     ticks_(KMeansTree::kBlock);
-    if (squared_distance_bound(seed, tree_.levels[level][node].box) >= states_[level][node].most)
+    if (squared_distance_bound(seed, tree_.levels[level][node].box) >= states_[level][node].largest)
       return 0.0;
     double sum = 0;
     if (level == 0) {
-      for (std::size_t place = node * KMeansTree::kBlock; place < (node + 1) * KMeansTree::kBlock;
-           ++place) {
-        const double d = squared(tree_.point(place), seed);
-        sum += tree_.w[place] * std::max(cost_[place] - d, 0.0);
+      for (std::size_t position = node * KMeansTree::kBlock;
+           position < (node + 1) * KMeansTree::kBlock; ++position) {
+        const double d = squared(tree_.point(position), seed);
+        sum += tree_.w[position] * std::max(cost_[position] - d, 0.0);
       }
     } else {
       const std::size_t end = std::min((node + 1) * kFan, states_[level - 1].size());
@@ -173,20 +179,20 @@ class CentreSeeder {
   void add(const Point3& seed, std::size_t level, std::size_t node) {
     ticks_(KMeansTree::kBlock);
     State& state = states_[level][node];
-    if (squared_distance_bound(seed, tree_.levels[level][node].box) >= state.most) return;
+    if (squared_distance_bound(seed, tree_.levels[level][node].box) >= state.largest) return;
     state = {0, 0};
     if (level == 0) {
-      for (std::size_t place = node * KMeansTree::kBlock; place < (node + 1) * KMeansTree::kBlock;
-           ++place) {
-        cost_[place] = std::min(cost_[place], squared(tree_.point(place), seed));
-        state.most = std::max(state.most, cost_[place]);
-        state.sum += cost(place);
+      for (std::size_t position = node * KMeansTree::kBlock;
+           position < (node + 1) * KMeansTree::kBlock; ++position) {
+        cost_[position] = std::min(cost_[position], squared(tree_.point(position), seed));
+        state.largest = std::max(state.largest, cost_[position]);
+        state.sum += cost(position);
       }
     } else {
       const std::size_t end = std::min((node + 1) * kFan, states_[level - 1].size());
       for (std::size_t k = node * kFan; k < end; ++k) {
         add(seed, level - 1, k);
-        state.most = std::max(state.most, states_[level - 1][k].most);
+        state.largest = std::max(state.largest, states_[level - 1][k].largest);
         state.sum += states_[level - 1][k].sum;
       }
     }
@@ -198,10 +204,9 @@ class CentreSeeder {
   std::vector<std::vector<State>> states_;
 };
 
-/// Returns positions of k seeds by greedy k-means++. Each seed is drawn several times, with
-/// probability proportional to weight times squared distance to the nearest seed so far, and the
-/// draw that leaves the least sum of these costs is taken. Boxes that a new seed cannot improve are
-/// skipped.
+/// Returns k seeds by greedy k-means++. For each seed it draws several candidates, with probability
+/// proportional to weight times squared distance to the nearest seed so far, and takes the one that
+/// leaves the least sum of these costs. It skips boxes that a new seed cannot improve.
 std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
                                   std::mt19937_64& random, const base::StopCheck& check_stop) {
   CentreSeeder seeder(tree, check_stop);
@@ -216,12 +221,12 @@ std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
       break;
     }
     Point3 best{};
-    double most = -1;
+    double largest = -1;
     for (std::size_t k = 0; k < draws; ++k) {
       const Point3 seed = tree.point(seeder.draw(false, random));
       const double gain = seeder.gain(seed);
-      if (gain > most) {
-        most = gain;
+      if (gain > largest) {
+        largest = gain;
         best = seed;
       }
     }
@@ -231,7 +236,7 @@ std::vector<Point3> k_means_seeds(const KMeansTree& tree, std::size_t clusters,
   return seeds;
 }
 
-/// One run of Lloyd's iteration. Everything is in scaled units.
+/// One run of Lloyd's iteration, in scaled units.
 struct Run {
   Run(const KMeansTree& the_tree, base::ThreadTeam& team, std::vector<Point3> start,
       const base::StopCheck& check_stop)
@@ -240,81 +245,81 @@ struct Run {
         centres(std::move(start)) {}
 
   void iterate(const KMeansOptions& options, double diagonal) {
-    const double still2 = options.tolerance * diagonal * options.tolerance * diagonal;
+    const double tolerance2 = options.tolerance * diagonal * options.tolerance * diagonal;
     bool assigned = false;  // whether the points are assigned to the current centres
     while (iterations < options.max_iterations && !converged) {
       const bool changed = filter.assign(centres);
       ++iterations;
-      const bool moved = fill_empty();
-      if (!changed && !moved) {
+      const bool filled = fill_empty();
+      if (!changed && !filled) {
         converged = assigned = true;
         break;
       }
-      double most = 0;
+      double largest = 0;
       for (std::size_t c = 0; c < centres.size(); ++c) {
         const KMeansFilter::Sum& sum = filter.sums()[c];
         if (sum.weight == 0) continue;
         const Point3 mean{sum.sum[0] / sum.weight, sum.sum[1] / sum.weight,
                           sum.sum[2] / sum.weight};
-        most = std::max(most, squared(mean, centres[c]));
+        largest = std::max(largest, squared(mean, centres[c]));
         centres[c] = mean;
       }
-      converged = options.tolerance > 0 && most <= still2;
+      converged = options.tolerance > 0 && largest <= tolerance2;
     }
     if (!assigned) filter.assign(centres);
     sse = 0;
-    for (std::size_t place = 0; place < tree.count; ++place) sse += cost(place);
+    for (std::size_t position = 0; position < tree.count; ++position) sse += cost(position);
   }
 
-  /// Gives each empty cluster a point, as described in k_means.hpp. Returns whether there was a
-  /// point to give.
+  /// Moves a point to each empty cluster, as k_means.hpp describes. Returns whether any point
+  /// moved.
   bool fill_empty() {
     const std::span<KMeansFilter::Sum> sums = filter.sums();
     const auto is_empty = [](const KMeansFilter::Sum& sum) { return sum.weight == 0; };
     if (std::none_of(sums.begin(), sums.end(), is_empty)) return false;
     std::vector<std::size_t> size(centres.size(), 0);
     std::vector<std::size_t> order;
-    for (std::size_t place = 0; place < tree.count; ++place) {
-      ++size[filter.cluster(place)];
-      if (squared(tree.point(place), centres[filter.cluster(place)]) > kAtCentre2) {
-        order.push_back(place);
+    for (std::size_t position = 0; position < tree.count; ++position) {
+      ++size[filter.cluster(position)];
+      if (squared(tree.point(position), centres[filter.cluster(position)]) > kAtCentre2) {
+        order.push_back(position);
       }
     }
     const auto costs_less = [&](std::size_t a, std::size_t b) {
-      const double of_a = cost(a);
-      const double of_b = cost(b);
-      return of_a < of_b || (of_a == of_b && tree.original[a] > tree.original[b]);
+      const double cost_a = cost(a);
+      const double cost_b = cost(b);
+      return cost_a < cost_b || (cost_a == cost_b && tree.original[a] > tree.original[b]);
     };
     std::make_heap(order.begin(), order.end(), costs_less);
-    std::vector<std::pair<std::size_t, std::uint32_t>> moves;
+    std::vector<std::pair<std::size_t, std::uint32_t>> reassigned;
     for (std::uint32_t c = 0; c < centres.size(); ++c) {
       if (!is_empty(sums[c])) continue;
       while (!order.empty()) {
         std::pop_heap(order.begin(), order.end(), costs_less);
-        const std::size_t place = order.back();
+        const std::size_t position = order.back();
         order.pop_back();
-        if (size[filter.cluster(place)] < 2) continue;
-        --size[filter.cluster(place)];
-        moves.emplace_back(place, c);
+        if (size[filter.cluster(position)] < 2) continue;
+        --size[filter.cluster(position)];
+        reassigned.emplace_back(position, c);
         break;
       }
     }
-    if (moves.empty()) return false;
-    for (const auto& [place, c] : moves) filter.move_point(place, c);
-    // Sums are recomputed, because subtracting a heavy point would leave rounding errors of its
+    if (reassigned.empty()) return false;
+    for (const auto& [position, c] : reassigned) filter.move_point(position, c);
+    // Recomputes the sums, because subtracting a heavy point would leave rounding errors of its
     // size.
     std::fill(sums.begin(), sums.end(), KMeansFilter::Sum{});
-    for (std::size_t place = 0; place < tree.count; ++place) {
-      KMeansFilter::Sum& sum = sums[filter.cluster(place)];
-      const Point3 p = tree.point(place);
-      for (unsigned axis = 0; axis < 3; ++axis) sum.sum[axis] += tree.w[place] * p[axis];
-      sum.weight += tree.w[place];
+    for (std::size_t position = 0; position < tree.count; ++position) {
+      KMeansFilter::Sum& sum = sums[filter.cluster(position)];
+      const Point3 p = tree.point(position);
+      for (unsigned axis = 0; axis < 3; ++axis) sum.sum[axis] += tree.w[position] * p[axis];
+      sum.weight += tree.w[position];
     }
     return true;
   }
 
-  [[nodiscard]] double cost(std::size_t place) const {
-    return tree.w[place] * squared(tree.point(place), centres[filter.cluster(place)]);
+  [[nodiscard]] double cost(std::size_t position) const {
+    return tree.w[position] * squared(tree.point(position), centres[filter.cluster(position)]);
   }
 
   const KMeansTree& tree;
@@ -342,8 +347,8 @@ KMeansResult result_of(const Run& run, const Scaling& scaling, int weight_expone
   result.centres.reserve(run.centres.size());
   for (const Point3& c : run.centres) result.centres.push_back(unscaled(c, scaling));
   result.assignment.resize(run.tree.count);
-  for (std::size_t place = 0; place < run.tree.count; ++place) {
-    result.assignment[run.tree.original[place]] = run.filter.cluster(place);
+  for (std::size_t position = 0; position < run.tree.count; ++position) {
+    result.assignment[run.tree.original[position]] = run.filter.cluster(position);
   }
   result.sse = std::ldexp(run.sse, 2 * scaling.exponent + weight_exponent);
   result.iterations = run.iterations;

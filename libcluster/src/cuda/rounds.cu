@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
 
-#include "cuda/cuda_device.cuh"
-#include "cuda/cuda_rounds.hpp"
+#include "cuda/device.cuh"
+#include "cuda/rounds.hpp"
 #include "cuda/device_complete.hpp"
 #include "cuda/device_single.hpp"
 

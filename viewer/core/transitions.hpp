@@ -13,84 +13,87 @@
 
 namespace terrace::viewer {
 
-/// Removed triangles that are still drawn while their vertices slide onto their replacements, which
-/// stay hidden until then. Triangles that are exchanged together form a group.
+/// Removed triangles that are still drawn while their vertices slide onto their replacements, and
+/// the replacements, which are hidden until then. Triangles that replace each other form a group.
 ///
-/// Removed triangles are copied to spare slots before those of the model: slot s of the model is
-/// drawn at kVertices + s and kTriangles + s. Waiting items are in plain lists, which each step
-/// scans completely, at some tens of nanoseconds per triangle.
+/// Removed triangles are copied to spare slots before those of the model. Slot s of the model is
+/// drawn at kVertices + s and kTriangles + s. Each step scans the lists of removed and hidden
+/// triangles completely, in some tens of nanoseconds per triangle.
 template <class Vertex>
-class Waiting {
+class Transitions {
  public:
   static constexpr std::uint32_t kVertices = 1u << 14, kTriangles = 1u << 15;
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
 
-  Waiting(Blocks<Vertex>& vertices, Blocks<SceneTriangle>& triangles)
+  Transitions(Blocks<Vertex>& vertices, Blocks<SceneTriangle>& triangles)
       : vertices_(vertices), triangles_(triangles) {}
 
-  [[nodiscard]] bool empty() const { return hidden_.empty() && kept_.empty(); }
+  [[nodiscard]] bool empty() const { return hidden_.empty() && triangles_drawn_.empty(); }
   [[nodiscard]] std::size_t vertex_room() const { return kVertices - anchors_.size(); }
-  [[nodiscard]] std::size_t triangle_room() const { return kTriangles - kept_.size(); }
+  [[nodiscard]] std::size_t triangle_room() const { return kTriangles - triangles_drawn_.size(); }
 
   // ---- Groups, by numbers that are valid until sweep()
 
+  /// Creates a group that lasts from `begin` to `end`, in seconds. Returns its number.
   [[nodiscard]] std::uint32_t open(double begin, double end) {
     groups_.push_back({begin, end, static_cast<std::uint32_t>(groups_.size()), false});
-    return groups_.back().into;
+    return groups_.back().parent;
   }
+  /// Merges two groups.
   void join(std::uint32_t a, std::uint32_t b) {
     Group &one = groups_[a = root(a)], &other = groups_[b = root(b)];
     one.begin = std::min(one.begin, other.begin);
     one.end = std::max(one.end, other.end);
-    other.into = a;
+    other.parent = a;
   }
   [[nodiscard]] double begin(std::uint32_t group) { return groups_[root(group)].begin; }
   /// Ends a group at the next sweep().
-  void end(std::uint32_t group) { groups_[root(group)].over = any_over_ = true; }
+  void end(std::uint32_t group) { groups_[root(group)].ended = any_ended_ = true; }
+  /// Ends the groups whose time is over at the next sweep().
   void end_until(double time) {
     for (std::uint32_t g = 0; g < groups_.size(); ++g) {
-      if (groups_[g].into == g && groups_[g].end <= time) end(g);
+      if (groups_[g].parent == g && groups_[g].end <= time) end(g);
     }
   }
   /// Shows the hidden triangles of groups that have ended. Returns false if none has.
   bool sweep() {
-    if (!any_over_) return false;
-    any_over_ = false;
+    if (!any_ended_) return false;
+    any_ended_ = false;
     std::vector<std::uint32_t> number(groups_.size(), kNone);
-    std::vector<Group> left;
+    std::vector<Group> remaining;
     const auto stays = [&](std::uint32_t& group) {
       const std::uint32_t g = root(group);
-      if (groups_[g].over) return false;
+      if (groups_[g].ended) return false;
       if (number[g] == kNone) {
-        number[g] = static_cast<std::uint32_t>(left.size());
-        left.push_back(groups_[g]);
-        left.back().into = number[g];
+        number[g] = static_cast<std::uint32_t>(remaining.size());
+        remaining.push_back(groups_[g]);
+        remaining.back().parent = number[g];
       }
       group = number[g];
       return true;
     };
     std::size_t count = 0;
-    for (Kept kept : kept_) {
-      if (stays(kept.group)) {
-        kept_[count++] = kept;
+    for (Removed item : triangles_drawn_) {
+      if (stays(item.group)) {
+        triangles_drawn_[count++] = item;
       } else {
-        triangles_.change(kept.slot) = {};
-        free_triangles_.put(kept.slot);
+        triangles_.change(item.slot) = {};
+        free_triangles_.put(item.slot);
       }
     }
-    kept_.resize(count);
+    triangles_drawn_.resize(count);
     count = 0;
     for (std::size_t i = 0; i < anchors_.size(); ++i) {
-      Kept kept = kept_vertices_[i];
-      if (stays(kept.group)) {
+      Removed item = vertices_drawn_[i];
+      if (stays(item.group)) {
         anchors_[count] = anchors_[i];
-        kept_vertices_[count++] = kept;
+        vertices_drawn_[count++] = item;
       } else {
-        free_vertices_.put(kept.slot);
+        free_vertices_.put(item.slot);
       }
     }
     anchors_.resize(count);
-    kept_vertices_.resize(count);
+    vertices_drawn_.resize(count);
     count = 0;
     for (Hidden hidden : hidden_) {
       if (hidden.slot == kNone) continue;
@@ -103,11 +106,11 @@ class Waiting {
       }
     }
     hidden_.resize(count);
-    groups_ = std::move(left);
+    groups_ = std::move(remaining);
     return true;
   }
 
-  // ---- What waits
+  // ---- Removed and hidden triangles
 
   /// Returns the group that hides a triangle, or kNone.
   [[nodiscard]] std::uint32_t hiding(std::uint32_t triangle) const {
@@ -129,31 +132,33 @@ class Waiting {
     const std::uint32_t slot = free_vertices_.take();
     vertices_.change(slot) = vertex;
     anchors_.push_back(anchor);
-    kept_vertices_.push_back({slot, group});
+    vertices_drawn_.push_back({slot, group});
     return slot;
   }
   /// Keeps drawing a removed triangle. Requires room.
   void keep(std::uint32_t group, const SceneTriangle& corners) {
     const std::uint32_t slot = free_triangles_.take();
     triangles_.change(slot) = corners;
-    kept_.push_back({slot, group});
+    triangles_drawn_.push_back({slot, group});
   }
   /// Calls visit(slot, group) for each removed triangle that is still drawn.
   template <class Visit>
-  void for_kept(const Visit& visit) {
-    for (const Kept& kept : kept_) visit(kept.slot, kept.group);
+  void for_each_triangle(const Visit& visit) {
+    for (const Removed& item : triangles_drawn_) visit(item.slot, item.group);
   }
   /// The targets of the removed vertices that are still drawn; slot_of_anchor() gives their slots.
   [[nodiscard]] std::vector<tri::Anchor>& anchors() { return anchors_; }
-  [[nodiscard]] std::uint32_t slot_of_anchor(std::size_t i) const { return kept_vertices_[i].slot; }
+  [[nodiscard]] std::uint32_t slot_of_anchor(std::size_t i) const {
+    return vertices_drawn_[i].slot;
+  }
 
  private:
   struct Group {
     double begin = 0.0, end = 0.0;
-    std::uint32_t into = 0;  ///< itself, or a group that it has joined
-    bool over = false;
+    std::uint32_t parent = 0;  ///< itself, or a group into which it was merged
+    bool ended = false;
   };
-  struct Kept {
+  struct Removed {
     std::uint32_t slot, group;
   };
   struct Hidden {
@@ -161,13 +166,13 @@ class Waiting {
     SceneTriangle corners;
   };
   std::uint32_t root(std::uint32_t group) {
-    while (groups_[group].into != group) {
-      group = groups_[group].into = groups_[groups_[group].into].into;
+    while (groups_[group].parent != group) {
+      group = groups_[group].parent = groups_[groups_[group].parent].parent;
     }
     return group;
   }
-  /// Free slots in the order in which they became free. Items that wait together are then close
-  /// together, so that few blocks change.
+  /// Free slots in the order in which they became free. So triangles that are removed together get
+  /// slots close to each other, and few blocks change.
   class FreeSlots {
    public:
     explicit FreeSlots(std::uint32_t count) : ring_(count) {
@@ -184,12 +189,13 @@ class Waiting {
   Blocks<Vertex>& vertices_;
   Blocks<SceneTriangle>& triangles_;
   std::vector<Group> groups_;
-  std::vector<Kept> kept_, kept_vertices_;  ///< kept triangles; kept vertices, parallel to anchors_
+  std::vector<Removed> triangles_drawn_,
+      vertices_drawn_;  ///< the vertices are parallel to anchors_
   std::vector<tri::Anchor> anchors_;
   std::vector<Hidden> hidden_;
   std::vector<std::uint32_t> index_;  ///< index in hidden_, by drawn slot of a triangle
   FreeSlots free_vertices_{kVertices}, free_triangles_{kTriangles};
-  bool any_over_ = false;
+  bool any_ended_ = false;
 };
 
 }  // namespace terrace::viewer

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hierarchy/metric_block.hpp"
+#include "hierarchy/block_clusterers.hpp"
 
 #include <algorithm>
 #include <cassert>
@@ -14,8 +14,10 @@
 #include <terrace/base/box.hpp>
 
 #include "block/linear_block.hpp"
+#include "facility/corner_distance.hpp"
 #include "facility/points/search_frame.hpp"
 #include "ground.hpp"
+#include "scaling.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -23,99 +25,99 @@ namespace {
 // Each round removes outliers from the block. Nearly all blocks need only two.
 constexpr int kRounds = 16;
 
-// Drops the points that the clustering leaves out. Returns false if there were none.
+// Removes the outliers of the clustering from the points. Returns false if there are none.
 bool drop_outliers(const BlockClustering& clustering, std::size_t channel_count,
                    std::vector<Point3>& points, std::vector<double>& channels,
                    std::vector<std::uint32_t>& numbers) {
-  std::size_t kept = 0;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (clustering.assignment[i] == kOutlier) continue;
-    points[kept] = points[i];
-    numbers[kept] = numbers[i];
+    points[count] = points[i];
+    numbers[count] = numbers[i];
     std::copy_n(channels.begin() + static_cast<std::ptrdiff_t>(i * channel_count), channel_count,
-                channels.begin() + static_cast<std::ptrdiff_t>(kept * channel_count));
-    ++kept;
+                channels.begin() + static_cast<std::ptrdiff_t>(count * channel_count));
+    ++count;
   }
-  const bool dropped = kept < points.size();
-  points.resize(kept);
-  numbers.resize(kept);
-  channels.resize(kept * channel_count);
+  const bool dropped = count < points.size();
+  points.resize(count);
+  numbers.resize(count);
+  channels.resize(count * channel_count);
   return dropped;
 }
 
 }  // namespace
 
-void leave_out(const FacilityPoints& problem, BlockClustering& clustering) {
+void assign_outliers(const FacilityPoints& problem, BlockClustering& clustering) {
   if (std::isinf(problem.outlier_price)) return;
   const SearchFrame frame = make_frame(problem);
   const double weight = frame.weights.front();  // all weights are equal
   const double price = frame.outlier_price;
   const double facility_cost = frame.facility_cost / weight;
   const std::vector<std::uint32_t>& facilities = clustering.facilities;
-  const auto between = [&](std::size_t i, std::size_t cluster) {
+  const auto distance_to = [&](std::size_t i, std::size_t cluster) {
     return std::sqrt(
         squared_length(difference(frame.points[i], frame.points[facilities[cluster]])));
   };
 
   std::vector<std::uint32_t> sizes(facilities.size(), 0);
-  std::vector<double> spent(facilities.size(), facility_cost);
+  std::vector<double> cluster_cost(facilities.size(), facility_cost);
   for (std::size_t i = 0; i < frame.points.size(); ++i) {
     const std::uint32_t c = clustering.assignment[i];
-    const double d = between(i, c);
+    const double d = distance_to(i, c);
     ++sizes[c];
-    spent[c] += std::min(d, price);
+    cluster_cost[c] += std::min(d, price);
     if (d > price) clustering.assignment[i] = kOutlier;
   }
 
-  // Clusters that cost more than leaving out all their members, smallest first.
-  std::vector<std::uint32_t> doubtful;
-  std::vector<char> listed(facilities.size(), 0);
+  // Clusters that cost more than making all their members outliers, smallest first.
+  std::vector<std::uint32_t> candidates;
+  std::vector<char> is_candidate(facilities.size(), 0);
   for (std::uint32_t c = 0; c < facilities.size(); ++c) {
-    if (!(sizes[c] * price < spent[c])) continue;
-    doubtful.push_back(c);
-    listed[c] = 1;
+    if (!(sizes[c] * price < cluster_cost[c])) continue;
+    candidates.push_back(c);
+    is_candidate[c] = 1;
   }
-  if (doubtful.empty()) return;
-  std::stable_sort(doubtful.begin(), doubtful.end(),
+  if (candidates.empty()) return;
+  std::stable_sort(candidates.begin(), candidates.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return sizes[a] < sizes[b]; });
-  std::vector<std::vector<std::uint32_t>> members(facilities.size());  // of listed clusters
+  std::vector<std::vector<std::uint32_t>> members(facilities.size());  // of the candidates
   for (std::uint32_t i = 0; i < frame.points.size(); ++i) {
     const std::uint32_t c = clustering.assignment[i];
-    if (c != kOutlier && listed[c]) members[c].push_back(i);
+    if (c != kOutlier && is_candidate[c]) members[c].push_back(i);
   }
 
-  struct Elsewhere {
+  struct Alternative {
     std::uint32_t cluster;
     double cost;
   };
-  std::vector<Elsewhere> moves;
+  std::vector<Alternative> moves;
   std::vector<char> closed(facilities.size(), 0);
-  std::size_t open = facilities.size();
-  for (const std::uint32_t c : doubtful) {
-    if (open == 1) break;
+  std::size_t open_count = facilities.size();
+  for (const std::uint32_t c : candidates) {
+    if (open_count == 1) break;
     moves.clear();
-    double without = static_cast<double>(sizes[c] - members[c].size()) * price;
-    bool leaves = false;
+    double dissolved_cost = static_cast<double>(sizes[c] - members[c].size()) * price;
+    bool has_outlier = false;
     for (const std::uint32_t i : members[c]) {
-      Elsewhere best{kOutlier, price};
+      Alternative best{kOutlier, price};
       for (std::uint32_t other = 0; other < facilities.size(); ++other) {
         if (other == c || closed[other]) continue;
-        if (const double d = between(i, other); d < best.cost) best = {other, d};
+        if (const double d = distance_to(i, other); d < best.cost) best = {other, d};
       }
       moves.push_back(best);
-      without += best.cost;
-      leaves = leaves || best.cluster == kOutlier;
+      dissolved_cost += best.cost;
+      has_outlier = has_outlier || best.cluster == kOutlier;
     }
-    if (!leaves || !(without < spent[c])) continue;
+    if (!has_outlier || !(dissolved_cost < cluster_cost[c])) continue;
     closed[c] = 1;
-    --open;
+    --open_count;
     for (std::size_t k = 0; k < moves.size(); ++k) {
-      const auto [to, cost] = moves[k];
-      clustering.assignment[members[c][k]] = to;
-      if (to == kOutlier) continue;
-      ++sizes[to];
-      spent[to] += cost;
-      if (listed[to]) members[to].push_back(members[c][k]);
+      const auto [target, cost] = moves[k];
+      clustering.assignment[members[c][k]] = target;
+      if (target == kOutlier) continue;
+      ++sizes[target];
+      cluster_cost[target] += cost;
+      if (is_candidate[target]) members[target].push_back(members[c][k]);
     }
   }
 }
@@ -133,11 +135,11 @@ void MetricBlockClusterer::run(const FacilityPoints& problem, const FacilityOpti
   std::iota(numbers_.begin(), numbers_.end(), 0u);
   for (int round = 1; round < kRounds; ++round) {
     if (!drop_outliers(result, problem.channels.size(), points_, channels_, numbers_)) break;
-    FacilityPoints rest = problem;
-    rest.points = points_;
-    rest.channels.values = channels_;
-    if (round + 1 == kRounds) rest.outlier_price = std::numeric_limits<double>::infinity();
-    run_once(rest, options, result);
+    FacilityPoints remainder = problem;
+    remainder.points = points_;
+    remainder.channels.values = channels_;
+    if (round + 1 == kRounds) remainder.outlier_price = std::numeric_limits<double>::infinity();
+    run_once(remainder, options, result);
   }
   if (numbers_.size() == count) return;
 
@@ -154,12 +156,46 @@ void MetricBlockClusterer::run_once(const FacilityPoints& problem, const Facilit
   if (automatic && problem.channels.size() == 0 &&
       linear_map(problem.metric, base::box_of(problem.points))) {
     run_linear(clusterer_, problem, {.effort = options.effort, .seed = options.seed}, result);
-    leave_out(problem, result);
+    assign_outliers(problem, result);
     return;
   }
   FacilityOptions search = options;
   search.assign_nearest = true;
   if (automatic && problem.points.size() < kFullSearchBelow) {
+    search.effort = std::max(options.effort, Effort::fine);
+  }
+  FacilitySolution solution = solve(problem, search);
+  result.facilities = std::move(solution.facilities);
+  result.assignment = std::move(solution.assignment);
+  result.facility_cost = result.connection_cost = 0.0;
+}
+
+void EntityBlockClusterer::run(std::span<const Point3> corners, std::size_t count, bool ordered,
+                               std::span<const double> weights, double facility_cost,
+                               const FacilityOptions& options, BlockClustering& result) {
+  assert(count > 1 && corners.size() % count == 0);
+  const Scaling scaling(corners);
+  scaled_.resize(corners.size());
+  std::transform(corners.begin(), corners.end(), scaled_.begin(),
+                 [&](const Point3& p) { return scaling.scaled(p); });
+
+  FacilityEntities problem;
+  problem.count = corners.size() / count;
+  problem.distance = [this, count, ordered](std::uint32_t facility, std::uint32_t client) {
+    const Point3* const a = scaled_.data() + facility * count;
+    const Point3* const b = scaled_.data() + client * count;
+    return corner_distance(count, ordered, [a, b](std::size_t i, std::size_t j) {
+      return squared_length(difference(a[i], b[j]));
+    });
+  };
+  problem.symmetric = problem.triangle_inequality = true;
+  problem.weights = weights;
+  // If all entities are equal any cost works, but it must be positive.
+  problem.facility_cost =
+      std::clamp(facility_cost * scaling.diagonal, std::numeric_limits<double>::min(), 0x1p1000);
+  FacilityOptions search = options;
+  search.assign_nearest = true;
+  if (options.strategy == FacilityStrategy::automatic && problem.count < kFullSearchBelow) {
     search.effort = std::max(options.effort, Effort::fine);
   }
   FacilitySolution solution = solve(problem, search);

@@ -18,7 +18,7 @@
 #include "block/engine.hpp"
 #include "block/linear_block.hpp"
 #include "block/state.hpp"
-#include "facility/points/make_search.hpp"
+#include "facility/points/local_search.hpp"
 #include "scaling.hpp"
 
 namespace terrace::cluster {
@@ -34,20 +34,21 @@ EngineFunction engine_of(SimdPath path) {
   return run_engine_portable;
 }
 
-/// Drops facilities at the same place as one of lower number, because they have no clients.
+/// Drops facilities without clients. There is one wherever two facilities have equal positions,
+/// because all clients choose the one with the lower number.
 void drop_empty_facilities(BlockState& state) {
-  std::uint32_t* const number = state.near;
-  std::fill_n(number, state.facility_count, 0u);
-  for (std::uint32_t i = 0; i < state.count; ++i) number[state.nearest[i]] = 1;
-  std::uint32_t kept = 0;
+  std::uint32_t* const new_number = state.nearby;
+  std::fill_n(new_number, state.facility_count, 0u);
+  for (std::uint32_t i = 0; i < state.count; ++i) new_number[state.nearest[i]] = 1;
+  std::uint32_t count = 0;
   for (std::uint32_t j = 0; j < state.facility_count; ++j) {
-    const bool serves = number[j] != 0;
-    number[j] = kept;
-    if (serves) state.facility[kept++] = state.facility[j];
+    const bool has_clients = new_number[j] != 0;
+    new_number[j] = count;
+    if (has_clients) state.facility[count++] = state.facility[j];
   }
-  if (kept == state.facility_count) return;
-  state.facility_count = kept;
-  for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = number[state.nearest[i]];
+  if (count == state.facility_count) return;
+  state.facility_count = count;
+  for (std::uint32_t i = 0; i < state.count; ++i) state.nearest[i] = new_number[state.nearest[i]];
 }
 
 double mean_of(std::span<const double> weights) {
@@ -66,16 +67,16 @@ SearchPlan plan_of(const BlockOptions& options, std::size_t count) {
   switch (effort) {
     case Effort::fast:
       plan.candidates = 1.5f;
-      plan.most_spacing = 32;
+      plan.max_spacing = 32;
       break;
     case Effort::standard:
       plan.candidates = 3.0f;
-      plan.most_spacing = 32;
+      plan.max_spacing = 32;
       plan.polish = 2;
       break;
     case Effort::fine:
       plan.candidates = 4.0f;
-      plan.most_spacing = 16;
+      plan.max_spacing = 16;
       plan.sweeps = 3;
       plan.polish = 3;
       break;
@@ -94,12 +95,12 @@ double distance(const Point3& a, const Point3& b) {
   return std::sqrt(x * x + y * y + z * z);
 }
 
-/// The last step of clustering a block, in double precision. Adds up the cost, and opens facilities
-/// at points that single precision cannot distinguish from their facility although they pay more
-/// than a facility costs (close pairs of great weight).
+/// The last step of clustering a block, in double precision. It adds up the cost. It also opens
+/// facilities at points that pay more than a facility costs although single precision cannot
+/// distinguish them from their facility. Such points are close to it and have great weights.
 class ExactFinish {
  public:
-  /// Changes facilities and assignment of `clustering` if necessary. facility_cost is scaled.
+  /// Adds facilities to `clustering` and reassigns points if necessary. facility_cost is scaled.
   /// Returns the scaled connection cost. Throws whatever the stop check throws.
   double run(std::span<const Point3> points, std::span<const double> weights,
              const Scaling& scaling, double facility_cost, const base::StopCheck& check_stop,
@@ -107,8 +108,8 @@ class ExactFinish {
 
  private:
   struct Costs {
-    double sum = 0.0, greatest = 0.0;
-    std::uint32_t where = 0;  ///< the point with the greatest cost
+    double sum = 0.0, largest = 0.0;
+    std::uint32_t costliest = 0;  ///< the point with the largest cost
   };
   [[nodiscard]] Costs costs(std::span<const Point3> points, std::span<const double> weights,
                             const Scaling& scaling, const BlockClustering& clustering) const;
@@ -124,9 +125,9 @@ ExactFinish::Costs ExactFinish::costs(std::span<const Point3> points,
     double c = distance(scaling.scaled(points[i]), facilities_[clustering.assignment[i]]);
     if (!weights.empty()) c *= weights[i];
     costs.sum += c;
-    if (c > costs.greatest) {
-      costs.greatest = c;
-      costs.where = static_cast<std::uint32_t>(i);
+    if (c > costs.largest) {
+      costs.largest = c;
+      costs.costliest = static_cast<std::uint32_t>(i);
     }
   }
   return costs;
@@ -139,23 +140,23 @@ double ExactFinish::run(std::span<const Point3> points, std::span<const double> 
   for (const std::uint32_t f : clustering.facilities) {
     facilities_.push_back(scaling.scaled(points[f]));
   }
-  Costs present = costs(points, weights, scaling, clustering);
-  while (present.greatest > facility_cost) {
+  Costs current = costs(points, weights, scaling, clustering);
+  while (current.largest > facility_cost) {
     if (check_stop) check_stop();
     // The new cluster follows the one that it splits, which keeps neighbours together.
-    const std::uint32_t number = clustering.assignment[present.where] + 1;
-    const Point3 place = scaling.scaled(points[present.where]);
-    facilities_.insert(facilities_.begin() + number, place);
-    clustering.facilities.insert(clustering.facilities.begin() + number, present.where);
+    const std::uint32_t number = clustering.assignment[current.costliest] + 1;
+    const Point3 position = scaling.scaled(points[current.costliest]);
+    facilities_.insert(facilities_.begin() + number, position);
+    clustering.facilities.insert(clustering.facilities.begin() + number, current.costliest);
     for (std::size_t i = 0; i < points.size(); ++i) {
       std::uint32_t& a = clustering.assignment[i];
       if (a >= number) ++a;
       const Point3 p = scaling.scaled(points[i]);
-      if (distance(p, place) < distance(p, facilities_[a])) a = number;
+      if (distance(p, position) < distance(p, facilities_[a])) a = number;
     }
-    present = costs(points, weights, scaling, clustering);
+    current = costs(points, weights, scaling, clustering);
   }
-  return present.sum;
+  return current.sum;
 }
 
 }  // namespace
