@@ -165,7 +165,7 @@ TEST(AtomicFile, ReportsAFileSizeLimitAndLeavesNothing) {
       for (int i = 0; i < 100; ++i) file.write(std::string(10000, 'x'));
       file.commit();
     } catch (const Error& error) {
-      code = error.parts().cause.find("File too large") != std::string::npos ? 0 : 2;
+      code = error.parts().cause.text().find("File too large") != std::string::npos ? 0 : 2;
     }
     _exit(code);
   }

@@ -13,8 +13,8 @@ TEST(Error, NamesFilePlaceCauseAndRemedyInThisOrder) {
   EXPECT_STREQ(error.what(), "a.xyz: line 12: is not a point; correct it");
   EXPECT_EQ(error.parts().file, "a.xyz");
   EXPECT_EQ(error.parts().where, "line 12");
-  EXPECT_EQ(error.parts().cause, "is not a point");
-  EXPECT_EQ(error.parts().remedy, "correct it");
+  EXPECT_EQ(error.parts().cause.text(), "is not a point");
+  EXPECT_EQ(error.parts().remedy.text(), "correct it");
 }
 
 TEST(Error, LeavesOutPartsThatAreNotGiven) {
@@ -40,6 +40,24 @@ TEST(Error, KeepsTheNumberOfAFailedSystemCall) {
 
 TEST(Error, IsOneLineWhateverItsPartsContain) {
   EXPECT_STREQ(Error("a\nb", "c\r\nd").what(), "a b: c  d");
+}
+
+TEST(Error, CarriesNamesOfParametersAsData) {
+  const Error error = Error("`level`", message("has no {level} {}", 3)).remedy("{level}");
+  EXPECT_STREQ(error.what(), "`level`: has no `level` 3; {level}");
+  EXPECT_EQ(error.message().text([](std::string_view name) { return "--" + std::string(name); }),
+            "`level`: has no --level 3; {level}");
+}
+
+TEST(Message, PutsValuesIntoThePattern) {
+  const Message inner = message("{zoom} {}", "{}");
+  EXPECT_EQ(message("{}, {}: {}; {level}", std::string("a"), -5, inner).text(),
+            "a, -5: `zoom` {}; `level`");
+  EXPECT_EQ(message("no fields").text(), "no fields");
+  EXPECT_EQ((inner + " and " + message("{level}")).text(), "`zoom` {} and `level`");
+  EXPECT_TRUE(Message("").empty());
+  EXPECT_TRUE(Message().empty());
+  EXPECT_FALSE(message("{level}").empty());
 }
 
 }  // namespace

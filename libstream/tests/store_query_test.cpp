@@ -429,7 +429,7 @@ TEST(StoreView, CountsOnlyPointsThatMeetTheCondition) {
     static_cast<void>(store.where("sum < -1").bounds());
     FAIL() << "a view without points has bounds";
   } catch (const Error& error) {
-    EXPECT_EQ(error.parts().cause, "no point meets the condition 'sum < -1'");
+    EXPECT_EQ(error.parts().cause.text(), "no point meets the condition 'sum < -1'");
   }
   EXPECT_THROW(static_cast<void>(store.where("sum <")), Error);
   std::stop_source stop;

@@ -242,7 +242,7 @@ TEST(Where, NamesTheFaultAndItsPosition) {
       ADD_FAILURE() << text;
     } catch (const Error& error) {
       EXPECT_EQ(error.parts().where, where) << text;
-      EXPECT_NE(error.parts().cause.find(cause), std::string::npos) << error.what();
+      EXPECT_NE(error.parts().cause.text().find(cause), std::string::npos) << error.what();
     }
   }
 }

@@ -21,8 +21,9 @@ class JsonOfFile : public ::testing::Test {
     try {
       static_cast<void>(json_of_file(path_, std::uint64_t{64} << 10, "convert it"));
     } catch (const stream::Error& error) {
-      EXPECT_EQ(error.parts().remedy, "convert it");
-      return error.parts().where + (error.parts().where.empty() ? "" : ": ") + error.parts().cause;
+      EXPECT_EQ(error.parts().remedy.text(), "convert it");
+      return error.parts().where + (error.parts().where.empty() ? "" : ": ") +
+             error.parts().cause.text();
     }
     return "none";
   }

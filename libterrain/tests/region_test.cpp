@@ -512,8 +512,8 @@ TEST(Region, DescribesFaultsOfRings) {
       ADD_FAILURE() << "accepted";
     } catch (const stream::Error& error) {
       EXPECT_EQ(error.parts().where, test.where);
-      EXPECT_NE(error.parts().cause.find(test.cause), std::string::npos) << error.parts().cause;
-      EXPECT_NE(error.parts().remedy.find("Fix geometries"), std::string::npos);
+      EXPECT_NE(error.parts().cause.text().find(test.cause), std::string::npos) << error.what();
+      EXPECT_NE(error.parts().remedy.text().find("Fix geometries"), std::string::npos);
     }
   }
   const TemporaryFile file(R"({"type":"Polygon","coordinates":[[[0,0],[4,4],[4,0],[0,4],[0,0]]]})");
@@ -535,7 +535,7 @@ TEST(Region, AcceptsRingsThatTouchOnlyAtPoints) {
     try {
       Region::of_polygons({polygon}, 0, 1);
     } catch (const stream::Error& error) {
-      return error.parts().cause;
+      return error.parts().cause.text();
     }
     return "accepted";
   };

@@ -134,7 +134,7 @@ TEST_F(TileLayerFile, FolderWithoutTilesIsNotAnUnfinishedSet) {
       check_tiles({.folder = folder});
       ADD_FAILURE() << "no error for " << folder;
     } catch (const stream::Error& error) {
-      EXPECT_EQ(error.parts().cause, "contains no tile set");
+      EXPECT_EQ(error.parts().cause.text(), "contains no tile set");
     }
   }
 }

@@ -94,7 +94,7 @@ TEST(MeshCoordinates, AreMetresInGlbForAnyUnits) {
 
 TEST(MeshCoordinates, NotesNameTheRemedy) {
   const auto note = [](const char* path, const MeshUnits& units, const stream::Box3& bounds) {
-    return mesh_coordinates(path, {}, units, bounds).note;
+    return mesh_coordinates(path, {}, units, bounds).note.text();
   };
   const stream::Box3 south{{170, -45, 0}, {171, -44, 4000}}, globe{{-180, -90, 0}, {180, 90, 1}};
   EXPECT_NE(note("m.obj", units_of(4326, "degree"), south).find("`to_crs` EPSG:32759 for metres"),

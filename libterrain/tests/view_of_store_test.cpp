@@ -391,7 +391,7 @@ TEST_F(ViewOfStore, EmptyViewIsAnErrorThatNamesTheCondition) {
       one();
       ADD_FAILURE() << "nothing was wrong";
     } catch (const stream::Error& error) {
-      EXPECT_EQ(error.parts().cause, "no point meets the condition 'class == 77'");
+      EXPECT_EQ(error.parts().cause.text(), "no point meets the condition 'class == 77'");
     }
   }
   EXPECT_EQ(wanted_points(view, {}), 0U);

@@ -9,6 +9,7 @@
 #include <pybind11/stl.h>
 
 #include "call.hpp"
+#include "names.hpp"
 
 namespace terrace::python {
 namespace {
@@ -105,7 +106,7 @@ std::vector<std::array<double, 3>> points3_of(const Array<double>& input) {
   return {rows.begin(), rows.end()};
 }
 
-void log_note(const std::string& line) {
+void log_note(const stream::Message& line) {
   py::module_::import("terrace._call").attr("notes").attr("info")("%s", message_of(line));
 }
 

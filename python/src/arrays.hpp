@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <pybind11/numpy.h>
+#include <terrace/stream/message.hpp>
 #include <terrace/stream/schema.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/terrain/crs.hpp>
@@ -108,7 +109,7 @@ py::array to_records(std::vector<std::byte>&& bytes, const py::dtype& type);
 /// (for messages).
 std::optional<terrain::Region> region_of(const py::object& value);
 /// Writes a line to the package's log.
-void log_note(const std::string& line);
+void log_note(const stream::Message& line);
 /// Converts a region to the CRS of the data and logs assumptions.
 terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion);
 /// Converts a region from the package to the CRS of a store.

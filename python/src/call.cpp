@@ -7,6 +7,8 @@
 #include <string>
 #include <thread>
 
+#include "names.hpp"
+
 namespace terrace::python {
 namespace {
 
@@ -76,7 +78,7 @@ Call::Call(const py::tuple& settings) : progress_(settings[0]), note_(settings[1
     };
   }
   if (!note_.is_none()) {
-    context_.note = [this](const std::string& line) {
+    context_.note = [this](const stream::Message& line) {
       call_python([&] { note_(message_of(line)); });
     };
   }

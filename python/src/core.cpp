@@ -28,17 +28,17 @@ void translate(std::exception_ptr thrown) {
   } catch (const stream::Error& error) {
     if (error.parts().error_number != 0) {
       const py::tuple arguments =
-          py::make_tuple(error.parts().error_number, message_of(error.what()));
+          py::make_tuple(error.parts().error_number, message_of(error.message()));
       PyErr_SetObject(PyExc_OSError, arguments.ptr());
     } else {
-      PyErr_SetObject(error_type.ptr(), message_of(error.what()).ptr());
+      PyErr_SetObject(error_type.ptr(), message_of(error.message()).ptr());
     }
   } catch (const tri::HierarchyError& error) {
-    PyErr_SetObject(error_type.ptr(), message_of(error.what()).ptr());
+    PyErr_SetObject(error_type.ptr(), text_of(error.what()).ptr());
   } catch (const terrain::UsageError& error) {
-    PyErr_SetObject(PyExc_ValueError, message_of(error.what()).ptr());
+    PyErr_SetObject(PyExc_ValueError, message_of(error.message()).ptr());
   } catch (const std::filesystem::filesystem_error& error) {
-    const py::tuple arguments = py::make_tuple(error.code().value(), message_of(error.what()));
+    const py::tuple arguments = py::make_tuple(error.code().value(), text_of(error.what()));
     PyErr_SetObject(PyExc_OSError, arguments.ptr());
   } catch (const py::cast_error&) {
     PyErr_SetString(PyExc_TypeError, "an argument has a type that cannot be used here");
@@ -53,8 +53,6 @@ py::str text_of(std::string_view text) {
   return py::reinterpret_steal<py::str>(
       PyUnicode_DecodeUTF8(text.data(), static_cast<py::ssize_t>(text.size()), "surrogateescape"));
 }
-
-py::str message_of(std::string text) { return text_of(with_module_parameters(std::move(text))); }
 
 PYBIND11_MODULE(_core, module) {
   module.doc() = "The compiled half of terrace; use the package terrace.";

@@ -15,8 +15,6 @@ namespace py = pybind11;
 
 /// Decodes text like os.fsdecode(), because it may contain file names that are not UTF-8.
 py::str text_of(std::string_view text);
-/// Returns a message from the libraries with the module's names of parameters.
-py::str message_of(std::string text);
 
 void bind_names(py::module_& module);
 void bind_build(py::module_& module);

@@ -161,7 +161,7 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
       });
   py::dict result;
   result["units"] = to_python(terrain::MeshUnits(store, options.places));
-  result["note"] = outcome.coordinates.note;
+  result["note"] = message_of(outcome.coordinates.note);
   result["triangles"] = outcome.triangles;
   result["max_error"] = outcome.max_error;
   result["rms_error"] = outcome.rms_error;
@@ -202,9 +202,9 @@ void bind_mesh(py::module_& module) {
         }
       }
     }
-    return released([&](const std::stop_token& stop) {
+    return message_of(released([&](const std::stop_token& stop) {
       return terrain::write_mesh(path, mesh, {.replace = replace, .stop = stop}, units).note;
-    });
+    }));
   });
   module.def("units",
              [](const OpenStore& open) { return to_python(terrain::MeshUnits(open.get())); });

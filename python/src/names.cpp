@@ -150,15 +150,15 @@ const auto& tables() {
 
 /// Parameters that have different names in the libraries (first) and in the module.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParameters{{
-    {"`channel`", "`channels`"},
-    {"`format`", "`input_format`"},
-    {"`memory_bytes`", "`memory`"},
-    {"`output_format`", "`format`"},
-    {"`own_crs`", "`lonlat=False`"},
-    {"`region_crs`", "`crs`"},
-    {"`shift`", "`datum_shift`"},
-    {"`to_crs`", "`crs`"},
-    {"`zoom`", "`zooms`"},
+    {"channel", "channels"},
+    {"format", "input_format"},
+    {"memory_bytes", "memory"},
+    {"output_format", "format"},
+    {"own_crs", "lonlat=False"},
+    {"region_crs", "crs"},
+    {"shift", "datum_shift"},
+    {"to_crs", "crs"},
+    {"zoom", "zooms"},
 }};
 
 }  // namespace
@@ -207,14 +207,12 @@ template void take_named(const py::dict&, const char*, terrain::HeightReference&
 template void take_named(const py::dict&, const char*, tri::TinQuality&);
 template void take_named(const py::dict&, const char*, tri::PointDuplicates&);
 
-std::string with_module_parameters(std::string message) {
-  for (const auto& [library, module] : kParameters) {
-    for (std::size_t at = 0; (at = message.find(library, at)) != std::string::npos;
-         at += module.size()) {
-      message.replace(at, library.size(), module);
-    }
-  }
-  return message;
+py::str message_of(const stream::Message& message) {
+  return text_of(message.text([](std::string_view name) {
+    const auto* const parameter = std::find_if(kParameters.begin(), kParameters.end(),
+                                               [&](const auto& row) { return row.first == name; });
+    return '`' + std::string(parameter == kParameters.end() ? name : parameter->second) + '`';
+  }));
 }
 
 void bind_names(py::module_& module) {

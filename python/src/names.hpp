@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include <terrace/stream/message.hpp>
+
 #include "core.hpp"
 
 /// The names that Python has for enumerators and parameters of the libraries.
@@ -24,6 +26,6 @@ template <class Enum>
 void take_named(const py::dict& options, const char* option, Enum& value);
 
 /// Returns a message of the libraries with the module's names of parameters.
-std::string with_module_parameters(std::string message);
+py::str message_of(const stream::Message& message);
 
 }  // namespace terrace::python

@@ -60,7 +60,7 @@ class PointReader {
       }
     }
     if (!some) {
-      if (const std::string note = voids_->note(); !ended_ && !note.empty()) log_note(note);
+      if (const stream::Message note = voids_->note(); !ended_ && !note.empty()) log_note(note);
       ended_ = true;
       return py::none();
     }
@@ -122,7 +122,7 @@ py::tuple write_points(const py::object& source, const py::dict& arguments, cons
       report(false);
     }
     writer->finish();
-    if (const std::string note = voids.note(); !note.empty()) context.say(note);
+    if (const stream::Message note = voids.note(); !note.empty()) context.say(note);
     report(true);
     points = writer->points();
     nodata = from->progress().nodata;

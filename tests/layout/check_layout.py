@@ -69,7 +69,6 @@ SHORT_FILES = {
     'tools/src/pch/command.hpp': 'the precompiled header',
     'tools/src/scan/criterion.hpp': 'options that a fuzz target parses too',
     'tools/src/serve/viewer_files.hpp': 'the interface of a generated source',
-    'tools/src/tables/dendrogram_file.hpp': 'one file format',
     'tools/src/tables/label_file.hpp': 'one file format',
 }
 ENGINE = 'a step of the engine'
@@ -172,7 +171,7 @@ RESTRICTED = [
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'glpk\.h', [RESEARCH]),
     (r'CLI/', ['tools']),
-    (r'fmt/', ['libstream/src', 'tools/src']),
+    (r'fmt/', ['libstream/src', 'libterrain/src', 'tools/src']),
     (r'pybind11/|Python\.h', ['python']),
     (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'libterrain/fuzz', 'tools', 'tests'] + IN_STREAM),
     (r'gtest/|gmock/', TESTS + ['tools', 'viewer/tests']),
@@ -181,7 +180,7 @@ RESTRICTED = [
 
 # These folders build texts with {fmt}, except in the sources that the Makefile of the browser's core also compiles, which
 # have only the standard library, and in headers, which every source would pay for.
-FORMATTED = ['libstream/src', 'tools/src']
+FORMATTED = ['libstream/src', 'libterrain/src', 'tools/src']
 CORE_MAKEFILE = 'viewer/core/Makefile'
 
 # Functions of the C library whose last bit differs from release to release and from processor to
@@ -321,11 +320,12 @@ def check_inexact(root):
 
 
 def core_sources(root):
-    """The sources of libstream that also compile to WebAssembly."""
+    """The sources of libstream and libterrain that also compile to WebAssembly."""
     if not os.path.isfile(os.path.join(root, CORE_MAKEFILE)):
         return set()
-    listed = re.search(r'^STREAM := (.*)$', read(root, CORE_MAKEFILE).replace('\\\n', ' '), re.MULTILINE)
-    return {f'libstream/src/{name}.cpp' for name in listed.group(1).split()}
+    makefile = read(root, CORE_MAKEFILE).replace('\\\n', ' ')
+    listed = {library: re.search(rf'^{library.upper()} := (.*)$', makefile, re.MULTILINE) for library in ('stream', 'terrain')}
+    return {f'lib{library}/src/{name}.cpp' for library, names in listed.items() if names for name in names.group(1).split()}
 
 
 def check_texts(root):
@@ -359,15 +359,20 @@ def check_command(root):
         for path in files_below(root, folder):
             if not path.endswith(('.cpp', '.hpp', '.h', '.cu')):
                 continue
-            for number, line in enumerate(read(root, path).split('\n'), 1):
+            source = read(root, path)
+            for number, line in enumerate(source.split('\n'), 1):
                 if re.search(r'\bsigaction\b|\bstd::signal\b', line):
                     yield f'{path}:{number}: handles signals of the process, which only tools may'
                 for text in strings_of(line):
                     if re.search(r'--[a-z]', text):
-                        yield f'{path}:{number}: names an option of the command; name the parameter, in backquotes'
-                    for name in re.findall(r'`([a-z_]+)`', text) if below(path, 'libterrain') else []:
-                        if name not in known:
-                            yield f'{path}:{number}: names the parameter `{name}`, which {table} does not know'
+                        yield f'{path}:{number}: names an option of the command; name the parameter with message()'
+                    for name in re.findall(r'`([a-z_]+)`', text):
+                        yield f'{path}:{number}: names `{name}` in a text; name the parameter with message("{{{name}}}")'
+            for pattern in re.finditer(r'\bmessage\(\s*((?:"(?:[^"\\]|\\.)*"\s*)+)', source):
+                number = source.count('\n', 0, pattern.start()) + 1
+                for name in re.findall(r'\{([^{}]+)\}', re.sub(r'"\s*"', '', pattern.group(1))):
+                    if name not in known:
+                        yield f'{path}:{number}: names the parameter {name}, which {table} does not know'
 
 
 def check_meson(root):

@@ -188,12 +188,12 @@ TEST_F(PointMesh, RejectsSamplesOfAPositionThatDifferByMoreThanTheBound) {
       write_bounded_mesh(store, options(1.0, window), common(2));
       FAIL();
     } catch (const stream::Error& error) {
-      EXPECT_NE(
-          error.parts().cause.find("3 places have several samples with heights that differ by "
-                                   "up to 12.5 m"),
-          std::string::npos)
+      EXPECT_NE(error.parts().cause.text().find(
+                    "3 places have several samples with heights that differ by "
+                    "up to 12.5 m"),
+                std::string::npos)
           << error.what();
-      EXPECT_NE(error.parts().remedy.find("`duplicates`"), std::string::npos);
+      EXPECT_NE(error.parts().remedy.text().find("`duplicates`"), std::string::npos);
     }
     EXPECT_LE(write_bounded_mesh(store, options(12.5, window), common()).max_error, 12.5);
   }

@@ -88,7 +88,7 @@ TEST_F(MatchingResultFile, RejectsMalformedPairs) {
   EXPECT_EQ(fault(std::string(kPairs) + "0,1,1\n1,2,1\n", 4).where, "line 3");
   EXPECT_EQ(fault(std::string(kPairs) + "0,1,1\n2,3,1\n", 3).where, "line 3");
   EXPECT_EQ(fault(std::string(kPairs) + "0,1,1\n", 0).where, "line 2");
-  EXPECT_NE(fault(std::string(kPairs) + "0,9,1\n", 5).cause.find("there are 5 points"),
+  EXPECT_NE(fault(std::string(kPairs) + "0,9,1\n", 5).cause.text().find("there are 5 points"),
             std::string::npos);
 }
 
@@ -99,16 +99,16 @@ TEST_F(MatchingResultFile, RejectsMalformedTrees) {
                           "2,3,nan,2,1", "2,3,1,2,0", "2,3,1,2,-1", "2,3,1,2,99999999999"}) {
     EXPECT_EQ(fault(first + row + "\n", 4).where, "line 3") << row;
   }
-  EXPECT_NE(fault(first + "2,5,1,2,1\n", 4).cause.find("before"), std::string::npos);
+  EXPECT_NE(fault(first + "2,5,1,2,1\n", 4).cause.text().find("before"), std::string::npos);
   // A tree has exactly one row fewer than points.
-  EXPECT_NE(fault(first + "2,3,1,2,1\n", 4).cause.find("has 2 rows"), std::string::npos);
+  EXPECT_NE(fault(first + "2,3,1,2,1\n", 4).cause.text().find("has 2 rows"), std::string::npos);
   EXPECT_EQ(fault(first + "2,3,1,3,2\n", 2).where, "line 3");
 }
 
 TEST_F(MatchingResultFile, RejectsEndlessLines) {
   const auto parts = fault(kPairs + std::string(100000, '1'), 4);
   EXPECT_EQ(parts.where, "line 2");
-  EXPECT_NE(parts.cause.find("longer"), std::string::npos);
+  EXPECT_NE(parts.cause.text().find("longer"), std::string::npos);
 }
 
 TEST_F(MatchingResultFile, PlacesNodesAtTheMeanOfTheirPoints) {

@@ -6,20 +6,20 @@
 namespace terrace::tools {
 namespace {
 
-TEST(OptionNames, ReplacesParametersByOptions) {
-  EXPECT_EQ(with_option_names("raise `memory_bytes`, lower `block_points`"),
+using stream::message;
+
+TEST(OptionNames, ShowsParametersAsOptions) {
+  EXPECT_EQ(option_text(message("raise {memory_bytes}, lower {block_points}")),
             "raise --memory, lower --block");
-  EXPECT_EQ(with_option_names("`max_edge` is for points"), "--max-edge is for points");
-  EXPECT_EQ(with_option_names("give `replace`"), "give --force");
+  EXPECT_EQ(option_text(message("{max_edge} is for points")), "--max-edge is for points");
+  EXPECT_EQ(option_text(message("give {replace}")), "give --force");
 }
 
-TEST(OptionNames, KeepsOtherText) {
-  for (const char* text : {"", "a", "`", "``", "`level", "level`", "`terrace info` shows",
-                           "a file named `x", "`levels`", "``level", "` level`"}) {
-    EXPECT_EQ(with_option_names(text), text);
+TEST(OptionNames, KeepsTextThatLooksLikeAParameter) {
+  for (const char* text : {"", "a", "`level`", "{level}", "`terrace info` shows", "a{}b"}) {
+    EXPECT_EQ(option_text(text), text);
+    EXPECT_EQ(option_text(message("{}: {level}", text)), text + std::string(": --level"));
   }
-  EXPECT_EQ(with_option_names("`terrace info`: `level`"), "`terrace info`: --level");
-  EXPECT_EQ(with_option_names("a`b`level`c"), "a`b--levelc");
 }
 
 }  // namespace

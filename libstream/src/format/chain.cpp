@@ -55,13 +55,13 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreem
   }
   if (first.attributes != other.attributes) {
     throw refused(difference(first, other))
-        .remedy("`keep` only what all files have, or read the files separately");
+        .remedy(message("{keep} only what all files have, or read the files separately"));
   }
   if (!crs.agrees(other.crs)) {
     throw refused("its coordinate reference system differs from that of " + first.files.front())
-        .remedy(
-            "if both mean the same system, name it (`crs` of build); otherwise convert one of the "
-            "files, or read them separately");
+        .remedy(message(
+            "if both mean the same system, name it ({crs} of build); otherwise convert one of the "
+            "files, or read them separately"));
   }
 }
 

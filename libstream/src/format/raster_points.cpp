@@ -22,7 +22,7 @@ class WithCells final : public Raster {
     info_ = raster_->info();
     if (info_.world != kPlainWorld) {
       throw Error(info_.files.front(), "is georeferenced, which sets its cell size")
-          .remedy("leave `cell` out");
+          .remedy(message("leave {cell} out"));
     }
     std::erase(info_.comments, kNoGeoreferencing);
     for (double& number : info_.world.xy) number *= cell;

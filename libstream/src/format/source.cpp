@@ -114,7 +114,7 @@ struct HeadScope {
 struct Requirement {
   bool Format::*capability;
   bool (*is_set)(const SourceOptions& options);
-  std::string_view option;   ///< in the terms of SourceOptions
+  std::string_view option;   ///< a pattern of Message, with the name in SourceOptions
   std::string_view lack;     ///< follows the name of a format without the capability
   std::string_view example;  ///< of what has the capability
 };
@@ -122,19 +122,19 @@ struct Requirement {
 constexpr std::array<Requirement, 6> kRequirements{{
     {&Format::height_colours,
      [](const SourceOptions& o) { return o.heights_of_colour != HeightsOfColour::none; },
-     "heights_of_colour", "does not encode heights as colours", "an image"},
+     "{heights_of_colour}", "does not encode heights as colours", "an image"},
     {&Format::octree, [](const SourceOptions& o) { return o.selection.resolution > 0; },
-     "resolution", "has no octree", "a COPC file or EPT"},
+     "{resolution}", "has no octree", "a COPC file or EPT"},
     {&Format::triangles, [](const SourceOptions& o) { return o.entities == Entities::triangles; },
-     "entities", "has no triangles", "a mesh"},
+     "{entities}", "has no triangles", "a mesh"},
     {&Format::lines,
      [](const SourceOptions& o) {
        return o.entities == Entities::segments || o.entities == Entities::polylines;
      },
-     "entities", "has no lines", "a file of lines"},
-    {&Format::raster, [](const SourceOptions& o) { return o.cell > 0; }, "cell",
+     "{entities}", "has no lines", "a file of lines"},
+    {&Format::raster, [](const SourceOptions& o) { return o.cell > 0; }, "{cell}",
      "is not a raster format", "a raster"},
-    {&Format::raster, [](const SourceOptions& o) { return o.band != 1; }, "band", "has no bands",
+    {&Format::raster, [](const SourceOptions& o) { return o.band != 1; }, "{band}", "has no bands",
      "a raster"},
 }};
 
@@ -144,8 +144,9 @@ void check_capabilities(const Format& format, const std::string& file,
   for (const Requirement& requirement : kRequirements) {
     if (format.*requirement.capability || !requirement.is_set(options)) continue;
     throw Error(shown_name(file), fmt::format("{} {}", format.name, requirement.lack))
-        .remedy(fmt::format("name {} ({}), or leave `{}` out", requirement.example,
-                            names_of_formats(requirement.capability), requirement.option));
+        .remedy(message("name {} ({}), or leave {} out", requirement.example,
+                        names_of_formats(requirement.capability),
+                        Message::format(requirement.option, {})));
   }
 }
 
@@ -157,7 +158,7 @@ const Format& common_format(std::span<const std::string> files, const SourceOpti
     if (&other == &format) continue;
     throw Error(shown_name(file), fmt::format("is {}, but {} is {}", other.name,
                                               shown_name(files.front()), format.name))
-        .remedy("name files of one format, or select files of a folder by `format`");
+        .remedy(message("name files of one format, or select files of a folder by {format}"));
   }
   return format;
 }

@@ -7,25 +7,24 @@
 namespace terrace::stream {
 namespace {
 
-std::string one_line(const Error::Parts& parts) {
-  std::string line = parts.file;
-  for (const std::string* part : {&parts.where, &parts.cause}) {
-    if (part->empty()) continue;
+Message line_of(const Error::Parts& parts) {
+  Message line = parts.file;
+  for (const Message& part : {Message(parts.where), parts.cause}) {
+    if (part.empty()) continue;
     if (!line.empty()) line += ": ";
-    line += *part;
+    line += part;
   }
   if (!parts.remedy.empty()) line += "; " + parts.remedy;
-  for (char& c : line) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
-  return line;
+  return std::move(line).on_one_line();
 }
 
 }  // namespace
 
-Error::Error(std::string file, std::string cause)
+Error::Error(std::string file, Message cause)
     : Error({.file = std::move(file), .cause = std::move(cause)}) {}
-Error::Error(Parts parts) : std::runtime_error(one_line(parts)), parts_(std::move(parts)) {}
+Error::Error(Parts parts) : std::runtime_error(line_of(parts).text()), parts_(std::move(parts)) {}
+
+Message Error::message() const { return line_of(parts_); }
 
 Error Error::at(std::string where) && {
   parts_.where = std::move(where);
@@ -40,7 +39,7 @@ Error Error::at_line(std::uint64_t number) && {
   return std::move(*this).at("line " + std::to_string(number));
 }
 
-Error Error::remedy(std::string remedy) && {
+Error Error::remedy(Message remedy) && {
   parts_.remedy = std::move(remedy);
   return Error(std::move(parts_));
 }
@@ -52,8 +51,7 @@ Error Error::error_number(int number) && {
 
 ClosedPipe::ClosedPipe() : Error("standard output", "the program that reads it has ended") {}
 
-Error system_error(std::string file, const std::string& action, int error_number,
-                   std::string remedy) {
+Error system_error(std::string file, const std::string& action, int error_number, Message remedy) {
   return Error(std::move(file), action + ": " + std::generic_category().message(error_number))
       .remedy(std::move(remedy))
       .error_number(error_number);

@@ -108,7 +108,7 @@ void check_count(const SourceInfo& info, const CellWindow& crop) {
   if (cells_of(crop) <= kMostReadableCells) return;
   throw Error(info.files.front(), fmt::format("has {} x {} cells, more than the limit of 2^48",
                                               crop.columns, crop.rows))
-      .remedy("select a part (`region`, gdal_translate -srcwin), or correct its size");
+      .remedy(message("select a part ({region}, gdal_translate -srcwin), or correct its size"));
 }
 
 class RasterSource final : public PointSource {

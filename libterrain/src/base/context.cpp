@@ -19,7 +19,7 @@ void Context::check_stop() const {
   if (stop.stop_requested()) throw stream::Stopped();
 }
 
-void Context::say(const std::string& line) const {
+void Context::say(const stream::Message& line) const {
   if (note) note(line);
 }
 

@@ -11,6 +11,8 @@
 #include <system_error>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -51,21 +53,22 @@ class StoppableText {
 std::string place_of(std::string_view text, std::size_t byte) {
   const std::string_view before = text.substr(0, byte);
   const std::size_t line_begin = before.rfind('\n') + 1;  // 0 if there is none
-  return "line " + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) +
-         ", column " + std::to_string(before.size() - line_begin + 1);
+  return fmt::format("line {}, column {}", 1 + std::count(before.begin(), before.end(), '\n'),
+                     before.size() - line_begin + 1);
 }
 
 }  // namespace
 
 std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
-                                           const std::string& remedy, const std::stop_token& stop) {
+                                           const stream::Message& remedy,
+                                           const std::stop_token& stop) {
   // An ifstream opens a folder, then throws at the first read.
   std::error_code ignored;
   if (std::filesystem::is_directory(name, ignored)) return std::nullopt;
   std::ifstream file(name, std::ios::binary);
   if (!file) return std::nullopt;
-  const auto fail = [&](const std::string& where, const std::string& cause) {
-    throw stream::Error({.file = name, .where = where, .cause = cause, .remedy = remedy});
+  const auto fault = [&](std::string cause) {
+    return stream::Error(name, std::move(cause)).remedy(remedy);
   };
   std::string text;
   std::vector<char> piece(std::size_t{1} << 16);
@@ -74,12 +77,13 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
     file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
     text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
     if (text.size() > most_bytes) {
-      fail({}, "is larger than the " + readable_bytes(most_bytes) + " that such a file may have");
+      throw fault(fmt::format("is larger than the {} that such a file may have",
+                              readable_bytes(most_bytes)));
     }
     // Recognises binary files early, before reading them to the end.
     const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
     if (first != std::string::npos && text[first] != '{' && text[first] != '[') {
-      fail({}, "is not JSON");
+      throw fault("is not JSON");
     }
   }
   if (file.bad()) return std::nullopt;
@@ -88,16 +92,19 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
                                  StoppableText(text.data() + text.size(), stop));
   } catch (const nlohmann::json::parse_error& error) {
     const std::size_t byte = std::min(error.byte == 0 ? 0 : error.byte - 1, text.size());
-    fail(place_of(text, byte), byte == text.size() ? "the JSON is cut off" : "is not JSON");
+    throw fault(byte == text.size() ? "the JSON is cut off" : "is not JSON")
+        .at(place_of(text, byte));
   } catch (const nlohmann::json::out_of_range&) {
-    fail({}, "has a number that is too large");
+    throw fault("has a number that is too large");
   }
   return std::nullopt;
 }
 
 std::string convert_to_geojson(const std::string& name) {
-  return "give GeoJSON; 'ogr2ogr -f GeoJSON -lco RFC7946=YES out.geojson " + name +
-         "' converts what GDAL can read";
+  return fmt::format(
+      "give GeoJSON; 'ogr2ogr -f GeoJSON -lco RFC7946=YES out.geojson {}' converts what GDAL can "
+      "read",
+      name);
 }
 
 }  // namespace terrace::terrain

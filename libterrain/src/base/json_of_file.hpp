@@ -8,6 +8,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "terrace/stream/message.hpp"
+
 namespace terrace::terrain {
 
 /// Size limit of a file of polygons or lines: about 6 million corners.
@@ -17,7 +19,7 @@ inline constexpr std::uint64_t kMostGeoJsonBytes = std::uint64_t{128} << 20;
 /// ten times the file. Throws: stream::Error with this remedy if the file is larger than most_bytes
 /// or is not JSON, in which case it names the place; stream::Stopped.
 std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
-                                           const std::string& remedy,
+                                           const stream::Message& remedy,
                                            const std::stop_token& stop = {});
 
 /// A remedy for files that should be GeoJSON but are not.

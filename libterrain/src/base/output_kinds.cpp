@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -72,11 +74,11 @@ struct NameOfFile {
   }
 };
 
-[[noreturn]] void refuse(const OutputKind& kind, const std::string& path,
-                         const std::string& cause) {
+UsageError refused(const OutputKind& kind, const std::string& path, const stream::Message& cause) {
   const std::string endings = endings_of(kind);
-  throw UsageError(path + ": " + cause + "; " +
-                   (endings.empty() ? "name a folder" : "name a file that ends in " + endings));
+  return UsageError(
+      stream::message("{}: {}; {}", path, cause,
+                      endings.empty() ? "name a folder" : "name a file that ends in " + endings));
 }
 
 }  // namespace
@@ -95,7 +97,7 @@ std::string endings_of(const OutputKind& kind) {
 std::string_view format_of_output(const OutputKind& kind, const std::string& path,
                                   const std::string& format) {
   const auto& [name, ending] = NameOfFile(path);
-  const std::string cannot = std::string(kind.what) + " cannot be written as " + ending;
+  const std::string cannot = fmt::format("{} cannot be written as {}", kind.what, ending);
   const bool streams = path == "-";
   if (streams && !kind.streams) {
     throw UsageError(std::string(kind.what) + " cannot go to standard output; name a " +
@@ -107,24 +109,25 @@ std::string_view format_of_output(const OutputKind& kind, const std::string& pat
       names.push_back(row.name);
       if (row.name != format) continue;
       if (!streams && !has_ending(name, row.endings) && is_known(name)) {
-        refuse(kind, path,
-               "`output_format` " + format + " does not write files that end in " + ending);
+        throw refused(kind, path,
+                      stream::message("{output_format} {} does not write files that end in {}",
+                                      format, ending));
       }
       return row.name;
     }
-    throw UsageError("`output_format` '" + format + "': " + std::string(kind.what) + " can be " +
-                     listed(names, "or"));
+    throw UsageError(stream::message("{output_format} '{}': {} can be {}", format, kind.what,
+                                     listed(names, "or")));
   }
   if (streams) return kind.formats.front().name;
   for (const OutputFormat& row : kind.formats) {
     if (has_ending(name, row.endings)) return row.name;
   }
   if (kind.names == OutputKind::Names::free) {
-    if (is_known(name)) refuse(kind, path, cannot);
+    if (is_known(name)) throw refused(kind, path, cannot);
   } else if (!ending.empty()) {
-    refuse(kind, path, cannot);
+    throw refused(kind, path, cannot);
   } else if (kind.formats.size() > 1) {
-    refuse(kind, path, "has no ending to choose its format by");
+    throw refused(kind, path, "has no ending to choose its format by");
   }
   return kind.formats.front().name;
 }
@@ -135,7 +138,7 @@ void check_input_name(const OutputKind& kind, const std::string& path) {
     if (has_ending(file.name, row.endings)) return;
   }
   if (is_known(file.name)) {
-    refuse(kind, path, std::string(kind.what) + " cannot be read from " + file.ending);
+    throw refused(kind, path, fmt::format("{} cannot be read from {}", kind.what, file.ending));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <terrace/tri/predicates.hpp>
 
@@ -19,33 +20,32 @@
 namespace terrace::terrain {
 namespace {
 
-[[noreturn]] void fail(const std::string& file, const std::string& cause) {
-  throw stream::Error({.file = file,
-                       .cause = cause,
-                       .remedy = "give a GeoJSON file with polygons, or minx,miny,maxx,maxy"});
+stream::Error fault(const std::string& file, std::string cause) {
+  return stream::Error(file, std::move(cause))
+      .remedy("give a GeoJSON file with polygons, or minx,miny,maxx,maxy");
 }
 
 std::vector<Point2> ring_of(const nlohmann::json& json, const std::string& file) {
   std::vector<Point2> ring;
-  if (!json.is_array()) fail(file, "a polygon's ring is not a list of positions");
+  if (!json.is_array()) throw fault(file, "a polygon's ring is not a list of positions");
   for (const nlohmann::json& position : json) {
     if (!position.is_array() || position.size() < 2 || !position[0].is_number() ||
         !position[1].is_number()) {
-      fail(file, "a position is not a pair of numbers");
+      throw fault(file, "a position is not a pair of numbers");
     }
     ring.push_back({position[0].get<double>(), position[1].get<double>()});
     if (!std::isfinite(ring.back()[0]) || !std::isfinite(ring.back()[1])) {
-      fail(file, "a position is not finite");
+      throw fault(file, "a position is not finite");
     }
   }
   if (ring.size() > 1 && ring.front() == ring.back()) ring.pop_back();
-  if (ring.size() < 3) fail(file, "a polygon's ring has fewer than three corners");
+  if (ring.size() < 3) throw fault(file, "a polygon's ring has fewer than three corners");
   return ring;
 }
 
 Polygon polygon_of(const nlohmann::json& rings, const std::string& file) {
   Polygon polygon;
-  if (!rings.is_array() || rings.empty()) fail(file, "a polygon has no ring");
+  if (!rings.is_array() || rings.empty()) throw fault(file, "a polygon has no ring");
   for (const nlohmann::json& ring : rings) polygon.push_back(ring_of(ring, file));
   return polygon;
 }
@@ -55,21 +55,20 @@ Polygon polygon_of(const nlohmann::json& rings, const std::string& file) {
 void collect_polygons(const nlohmann::json& json, const std::string& file, int depth,
                       std::vector<Polygon>& polygons) {
   if (!json.is_object() || !json.contains("type") || !json["type"].is_string() || depth > 8) {
-    fail(file, "not a GeoJSON object");
+    throw fault(file, "not a GeoJSON object");
   }
   if (depth > 0 && json.contains("crs") && !json["crs"].is_null()) {
-    throw stream::Error({.file = file,
-                         .cause = "an object within it has its own crs",
-                         .remedy = "write one crs for all, as the first member of the file, or "
-                                   "give `region_crs`"});
+    throw stream::Error(file, "an object within it has its own crs")
+        .remedy(stream::message("write one crs for all, as the first member of the file, or "
+                                "give {region_crs}"));
   }
   const std::string type = json["type"].get<std::string>();
   const auto member = [&](const char* name) -> const nlohmann::json& {
-    if (!json.contains(name)) fail(file, type + " without '" + name + "'");
+    if (!json.contains(name)) throw fault(file, fmt::format("{} without '{}'", type, name));
     return json[name];
   };
   const auto each = [&](const nlohmann::json& list) {
-    if (!list.is_array()) fail(file, type + " without a list");
+    if (!list.is_array()) throw fault(file, type + " without a list");
     for (const nlohmann::json& part : list) collect_polygons(part, file, depth + 1, polygons);
   };
   if (type == "FeatureCollection") {
@@ -82,21 +81,21 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
     if (!geometry.is_null()) collect_polygons(geometry, file, depth + 1, polygons);
   } else if (type == "MultiPolygon") {
     const nlohmann::json& parts = member("coordinates");
-    if (!parts.is_array()) fail(file, "MultiPolygon without a list");
+    if (!parts.is_array()) throw fault(file, "MultiPolygon without a list");
     for (const nlohmann::json& part : parts) polygons.push_back(polygon_of(part, file));
   } else if (type == "Polygon") {
     polygons.push_back(polygon_of(member("coordinates"), file));
   } else {
-    fail(file, "a region cannot be a " + type);
+    throw fault(file, "a region cannot be a " + type);
   }
 }
 
 Region read_geojson(const std::string& name, const std::stop_token& stop) {
   const auto json = json_of_file(name, kMostGeoJsonBytes, convert_to_geojson(name), stop);
-  if (!json) fail(name, "neither a box nor a file that can be read");
+  if (!json) throw fault(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
   collect_polygons(*json, name, 0, polygons);
-  if (polygons.empty()) fail(name, "contains no polygon");
+  if (polygons.empty()) throw fault(name, "contains no polygon");
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   return Region::of_polygons(std::move(polygons), -kInfinity, kInfinity, name, stop)
       .in_crs(crs_of_geojson(*json, name));
@@ -117,10 +116,9 @@ std::optional<PlacesCrs> crs_of_geojson(const nlohmann::json& object, const std:
   const nlohmann::json::json_pointer name("/properties/name");
   if (!crs.is_object() || !crs.contains(name) || !crs.at(name).is_string() ||
       crs.at(name).get_ref<const std::string&>().empty()) {
-    throw stream::Error({.file = file,
-                         .cause = "its crs does not name a CRS",
-                         .remedy = "write {\"type\": \"name\", \"properties\": {\"name\": "
-                                   "\"EPSG:n\"}}, or give `region_crs`"});
+    throw stream::Error(file, "its crs does not name a CRS")
+        .remedy(stream::message("write {}, or give {region_crs}",
+                                R"({"type": "name", "properties": {"name": "EPSG:n"}})"));
   }
   return PlacesCrs{.name = crs.at(name).get<std::string>(), .file = file};
 }
@@ -128,7 +126,7 @@ std::optional<PlacesCrs> crs_of_geojson(const nlohmann::json& object, const std:
 std::string geojson_crs_member(const stream::Crs& crs) {
   if (crs.epsg == 4326) return {};
   const std::string name =
-      crs.epsg != 0 ? "urn:ogc:def:crs:EPSG::" + std::to_string(crs.epsg) : crs.wkt;
+      crs.epsg != 0 ? fmt::format("urn:ogc:def:crs:EPSG::{}", crs.epsg) : crs.wkt;
   if (name.empty()) return "\"crs\":null,";
   return R"("crs":{"type":"name","properties":{"name":)" + nlohmann::json(name).dump() + "}},";
 }

@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
 #include <geos_c.h>
 
 #include "base/polygon_check.hpp"
@@ -35,7 +36,7 @@ class Geos {
   using Geometry = Owned<GEOSGeometry>;
 
   Geos() : context_(GEOS_init_r()) {
-    if (context_ == nullptr) fail();
+    if (context_ == nullptr) throw fault();
     GEOSContext_setErrorMessageHandler_r(
         context_, [](const char* message, void* to) { *static_cast<std::string*>(to) = message; },
         &said_);
@@ -47,12 +48,12 @@ class Geos {
   [[nodiscard]] GEOSContextHandle_t context() const { return context_; }
   template <class T>
   [[nodiscard]] Owned<T> own(T* made) const {
-    if (made == nullptr) fail();
+    if (made == nullptr) throw fault();
     return Owned<T>(made, Destroy{context_});
   }
   /// Converts the answer of a predicate.
   [[nodiscard]] bool is_true(char answer) const {
-    if (answer != 0 && answer != 1) fail();
+    if (answer != 0 && answer != 1) throw fault();
     return answer == 1;
   }
 
@@ -65,7 +66,7 @@ class Geos {
     closed.push_back(corners.front());
     GEOSCoordSequence* places = GEOSCoordSeq_copyFromBuffer_r(
         context_, closed.front().data(), static_cast<unsigned>(closed.size()), 0, 0);
-    if (places == nullptr) fail();
+    if (places == nullptr) throw fault();
     return own(GEOSGeom_createLinearRing_r(context_, places));  // takes ownership even if it fails
   }
   [[nodiscard]] Geometry polygon(std::span<const Point2> corners) const {
@@ -82,11 +83,10 @@ class Geos {
   }
 
  private:
-  [[noreturn]] void fail() const {
-    throw stream::Error({.file = {},
-                         .where = "region",
-                         .cause = "GEOS failed: " + (said_.empty() ? "out of memory" : said_),
-                         .remedy = "simplify the polygons, or give a box"});
+  [[nodiscard]] stream::Error fault() const {
+    return stream::Error("", "GEOS failed: " + (said_.empty() ? "out of memory" : said_))
+        .at("region")
+        .remedy("simplify the polygons, or give a box");
   }
 
   GEOSContextHandle_t context_;
@@ -96,26 +96,28 @@ class Geos {
 void require_valid(const std::vector<Polygon>& polygons, const std::string& file,
                    const std::stop_token& stop) {
   std::string where;
-  const auto refuse = [&](const std::string& cause) {
-    throw stream::Error({.file = file,
-                         .where = where,
-                         .cause = cause,
-                         .remedy = "repair the polygons, for example by \"Fix geometries\" of QGIS "
-                                   "or ST_MakeValid of PostGIS"});
+  const auto refused = [&](std::string cause) {
+    return stream::Error(file, std::move(cause))
+        .at(where)
+        .remedy(
+            "repair the polygons, for example by \"Fix geometries\" of QGIS "
+            "or ST_MakeValid of PostGIS");
   };
-  if (polygons.empty()) refuse("the region contains no polygon");
+  if (polygons.empty()) throw refused("the region contains no polygon");
   for (std::size_t i = 0; i < polygons.size(); ++i) {
-    const std::string polygon = "polygon " + std::to_string(i + 1);
+    const std::string polygon = fmt::format("polygon {}", i + 1);
     where = polygon;
-    if (polygons[i].empty()) refuse("a polygon has no ring");
+    if (polygons[i].empty()) throw refused("a polygon has no ring");
     const auto at_ring = [&](std::size_t ring) {
-      where = polygon + ", " + (ring == 0 ? "outer ring" : "hole " + std::to_string(ring));
+      where = ring == 0 ? polygon + ", outer ring" : fmt::format("{}, hole {}", polygon, ring);
     };
     for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
       at_ring(ring);
-      if (polygons[i][ring].size() < 3) refuse("a ring has fewer than three corners");
+      if (polygons[i][ring].size() < 3) throw refused("a ring has fewer than three corners");
       for (const Point2& p : polygons[i][ring]) {
-        if (!std::isfinite(p[0]) || !std::isfinite(p[1])) refuse("a coordinate is not finite");
+        if (!std::isfinite(p[0]) || !std::isfinite(p[1])) {
+          throw refused("a coordinate is not finite");
+        }
       }
     }
     const std::optional<std::string> fault = fault_of(polygons[i], stop);
@@ -123,10 +125,10 @@ void require_valid(const std::vector<Polygon>& polygons, const std::string& file
     for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
       at_ring(ring);
       const auto own = fault_of({polygons[i][ring]}, stop);
-      if (own) refuse("the ring is not valid: " + *own);
+      if (own) throw refused("the ring is not valid: " + *own);
     }
     where = polygon;
-    refuse("its rings do not form a valid polygon: " + *fault);
+    throw refused("its rings do not form a valid polygon: " + *fault);
   }
 }
 

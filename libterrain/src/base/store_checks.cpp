@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/store_checks.hpp"
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/stored_entities.hpp"
@@ -12,10 +13,9 @@ namespace terrace::terrain {
 void need_points(const stream::Store& store, const std::string& what) {
   const stream::Entities entities = entities_of(store.schema());
   if (entities == stream::Entities::points) return;
-  throw stream::Error({.file = store.path().string(),
-                       .cause = "holds " + std::string(stream::name_of(entities)) + ", and " +
-                                what + " needs points",
-                       .remedy = "build a store of the vertices: leave `entities` out"});
+  throw stream::Error(store.path().string(),
+                      fmt::format("holds {}, and {} needs points", stream::name_of(entities), what))
+      .remedy(stream::message("build a store of the vertices: leave {entities} out"));
 }
 
 bool is_geocentric(const stream::Crs& recorded) {
@@ -27,27 +27,28 @@ void need_terrain(const stream::Store& store, const std::string& what) {
   need_points(store, what);
   const stream::Crs& crs = store.schema().crs;
   if (!is_geocentric(crs)) return;
-  throw stream::Error({.file = store.path().string(),
-                       .cause = "has the geocentric CRS \"" + crs.name +
-                                "\", in which z is not a height, and " + what + " needs heights",
-                       .remedy = "convert the points to a projected CRS and build a store of "
-                                 "them, or make a surface of the scan"});
+  throw stream::Error(store.path().string(), "has the geocentric CRS \"" + crs.name +
+                                                 "\", in which z is not a height, and " + what +
+                                                 " needs heights")
+      .remedy(
+          "convert the points to a projected CRS and build a store of "
+          "them, or make a surface of the scan");
 }
 
 void need_level(const stream::Store& store, unsigned level) {
   if (level <= store.top()) return;
-  throw UsageError("the store has no level " + std::to_string(level) + ": its top is level " +
-                   std::to_string(store.top()));
+  throw UsageError(
+      fmt::format("the store has no level {}: its top is level {}", level, store.top()));
 }
 
 void need_all_points(const stream::Store& store, unsigned level, std::uint64_t points) {
   const std::uint64_t expected = store.levels()[level].points;
   if (points == expected) return;
-  throw stream::Error({.file = store.path().string(),
-                       .where = "level " + std::to_string(level),
-                       .cause = "the clusters have " + counted(points, "point") +
-                                " instead of the " + std::to_string(expected) + " in the manifest",
-                       .remedy = "restore the files or rebuild the store"});
+  throw stream::Error(store.path().string(),
+                      fmt::format("the clusters have {} instead of the {} in the manifest",
+                                  counted(points, "point"), expected))
+      .at(fmt::format("level {}", level))
+      .remedy("restore the files or rebuild the store");
 }
 
 std::string extent_text(const stream::Store& store) {
@@ -62,11 +63,11 @@ std::string extent_text(const stream::Store& store) {
 
 void throw_none_inside(const stream::Store& store, const std::string& what) {
   throw stream::Error(
-      {.file = store.path().string(),
-       .cause = "no " + what + " is in the region; the points have " + extent_text(store),
-       .remedy =
-           "give a `region` that contains some of them: boxes are in their CRS or in `region_crs`, "
-           "GeoJSON is in the CRS that it names, by default longitude and latitude"});
+      store.path().string(),
+      fmt::format("no {} is in the region; the points have {}", what, extent_text(store)))
+      .remedy(stream::message(
+          "give a {region} that contains some of them: boxes are in their CRS or in {region_crs}, "
+          "GeoJSON is in the CRS that it names, by default longitude and latitude"));
 }
 
 }  // namespace terrace::terrain

@@ -5,6 +5,7 @@
 #include <cassert>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/unit_words.hpp>
 
@@ -36,7 +37,7 @@ CornerReader::CornerReader(const stream::Schema& schema, stream::Entities entiti
                                                                        : stream::kPolylineVertices;
   for (std::size_t corner = 2; corner <= corners; ++corner) {
     for (const char* const axis : {"x", "y", "z"}) {
-      others_.push_back(column(schema, axis + std::to_string(corner)));
+      others_.push_back(column(schema, fmt::format("{}{}", axis, corner)));
     }
   }
   if (entities == stream::Entities::polylines) vertices_ = column(schema, "vertices");
@@ -48,9 +49,8 @@ CornerReader::Column CornerReader::column(const stream::Schema& schema,
       std::find_if(schema.attributes.begin(), schema.attributes.end(),
                    [&](const stream::Channel& channel) { return channel.name == name; });
   if (found == schema.attributes.end()) {
-    throw stream::Error({.file = file_,
-                         .cause = "the column \"" + name + "\" of the corners is missing",
-                         .remedy = "keep all columns: leave `keep` and `drop` out"});
+    throw stream::Error(file_, fmt::format("the column \"{}\" of the corners is missing", name))
+        .remedy(stream::message("keep all columns: leave {keep} and {drop} out"));
   }
   return {found->type,
           schema.attribute_offset(static_cast<std::size_t>(found - schema.attributes.begin()))};
@@ -66,10 +66,9 @@ std::size_t CornerReader::operator()(std::span<const std::byte> record,
   if (vertices_) {
     const double vertices = value(*vertices_);
     if (!(vertices >= 2 && vertices <= static_cast<double>(count))) {
-      throw stream::Error({.file = file_,
-                           .cause = "an entity of " + plain_number(vertices) + ' ' +
-                                    stream::noun_for(vertices == 1, "vertex"),
-                           .remedy = "the store is damaged; build it again"});
+      throw stream::Error(file_, "an entity of " + plain_number(vertices) + ' ' +
+                                     stream::noun_for(vertices == 1, "vertex"))
+          .remedy("the store is damaged; build it again");
     }
     count = static_cast<std::size_t>(vertices);
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include <fmt/core.h>
 #include <terrace/stream/unit_words.hpp>
 
 #include "terrace/terrain/error.hpp"
@@ -98,17 +99,17 @@ ImageSize parse_size(std::string_view text) {
   throw UsageError("'" + std::string(text) + "' is not a size; write WIDTHxHEIGHT, like 1600x1200");
 }
 
-double parse_number(std::string_view text, std::string_view what) {
+double parse_number(std::string_view text, const stream::Message& what) {
   double value = 0;
   std::string_view rest;
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
   if (!leading_number(text, value, rest) || !rest.empty()) {
-    throw UsageError("'" + std::string(text) + "' is not a number in " + std::string(what));
+    throw UsageError(stream::message("'{}' is not a number in {}", text, what));
   }
   return value;
 }
 
-std::vector<double> parse_numbers(std::string_view text, std::string_view what) {
+std::vector<double> parse_numbers(std::string_view text, const stream::Message& what) {
   std::vector<double> numbers;
   for (std::size_t start = 0; start <= text.size();) {
     const std::size_t comma = std::min(text.find(',', start), text.size());
@@ -119,7 +120,7 @@ std::vector<double> parse_numbers(std::string_view text, std::string_view what) 
 }
 
 std::string with_commas(std::uint64_t value) {
-  const std::string digits = std::to_string(value);
+  const std::string digits = fmt::format("{}", value);
   std::string text;
   for (std::size_t i = 0; i < digits.size(); ++i) {
     if (i > 0 && (digits.size() - i) % 3 == 0) text += ',';

@@ -8,6 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "terrace/stream/message.hpp"
+
 namespace terrace::terrain {
 
 /// Parses all of `text` as a number with std::from_chars(); nullopt if it is not one.
@@ -35,10 +37,10 @@ struct ImageSize {
 ImageSize parse_size(std::string_view text);
 
 /// Parses all of `text` as a finite number. Throws: UsageError naming `what`.
-double parse_number(std::string_view text, std::string_view what);
+double parse_number(std::string_view text, const stream::Message& what);
 
 /// Parses comma-separated finite numbers. Throws: UsageError naming `what`.
-std::vector<double> parse_numbers(std::string_view text, std::string_view what);
+std::vector<double> parse_numbers(std::string_view text, const stream::Message& what);
 
 /// Formats a number with thousands separators: "12,345,678".
 std::string with_commas(std::uint64_t value);

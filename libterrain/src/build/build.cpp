@@ -15,6 +15,7 @@
 #include <variant>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/error.hpp>
@@ -50,7 +51,8 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
                               const BuildRequest& request) {
   const std::string& vertical = request.vertical;
   if (!vertical.empty() && vertical != "ellipsoidal" && vertical != "orthometric") {
-    throw UsageError("`vertical` is ellipsoidal or orthometric, not '" + vertical + "'");
+    throw UsageError(
+        stream::message("{vertical} is ellipsoidal or orthometric, not '{}'", vertical));
   }
   stream::StoreSchema schema{info};
   add_outlier_mark(request, schema.attributes);
@@ -67,11 +69,11 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
     }
   }
   schema.format = info.format;
-  schema.parameters = {{"block", std::to_string(request.block_points)},
+  schema.parameters = {{"block", fmt::format("{}", request.block_points)},
                        {"facility_cost", number_text(request.facility_cost)},
                        {"effort", name_of(request.effort)},
                        {"z_weight", number_text(request.z_weight)},
-                       {"seed", std::to_string(request.seed)}};
+                       {"seed", fmt::format("{}", request.seed)}};
   if (request.metric.kind != MetricChoice::Kind::euclidean) {
     schema.parameters.emplace_back("metric", request.metric.canonical());
   }
@@ -163,14 +165,13 @@ void check_cells(const stream::SourceInfo& info) {
     }
   }
   if (apart) return;
-  throw stream::Error(
-      {.file = info.files.empty() ? std::string() : info.files.front(),
-       .cause = std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
-                " cannot be distinguished: steps of " + plain_number(base::hypot(m[0], m[3])) +
-                " x " + plain_number(base::hypot(m[1], m[4])) + " from " + plain_number(m[2]) +
-                ", " + plain_number(m[5]),
-       .remedy =
-           info.grid ? "correct the size of its cells" : "correct the scale of its coordinates"});
+  throw stream::Error(info.files.empty() ? std::string() : info.files.front(),
+                      std::string("the places of its ") + (info.grid ? "cells" : "coordinates") +
+                          " cannot be distinguished: steps of " +
+                          plain_number(base::hypot(m[0], m[3])) + " x " +
+                          plain_number(base::hypot(m[1], m[4])) + " from " + plain_number(m[2]) +
+                          ", " + plain_number(m[5]))
+      .remedy(info.grid ? "correct the size of its cells" : "correct the scale of its coordinates");
 }
 
 /// Limits a source to its first points.
@@ -223,24 +224,23 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
                                   const stream::Progress& read) {
   const stream::Selection& selection = request.selection;
   const bool selected = !selection.where.empty() || selection.region;
-  std::string cause, remedy;
+  std::string cause;
+  stream::Message remedy;
   if (selected && (read.excluded > 0 || read.nodata == 0)) {
     // Parts outside the region are neither read nor counted.
-    cause = "none of its " +
-            (read.excluded > 0 ? std::to_string(read.excluded) + ' ' : std::string()) +
-            "points is selected";
-    remedy = "give another `where` or `region`";
+    cause = read.excluded > 0 ? fmt::format("none of its {} points is selected", read.excluded)
+                              : "none of its points is selected";
+    remedy = stream::message("give another {where} or {region}");
   } else {
-    cause = "there is not one point" + std::string(info.grid ? " with data" : "") + " in it";
+    cause = fmt::format("there is not one point{} in it", info.grid ? " with data" : "");
     if (read.nodata > 0) {
-      cause += " (" + std::to_string(read.nodata) +
-               (info.grid ? " cells, all nodata)" : " points, all without a coordinate)");
+      cause += fmt::format(" ({} {})", read.nodata,
+                           info.grid ? "cells, all nodata" : "points, all without a coordinate");
     }
     remedy = info.grid ? "check the file and its nodata value" : "check the file";
   }
-  throw stream::Error({.file = info.files.empty() ? std::string() : info.files.front(),
-                       .cause = cause,
-                       .remedy = remedy});
+  throw stream::Error(info.files.empty() ? std::string() : info.files.front(), cause)
+      .remedy(remedy);
 }
 
 /// Returns how to join the points across the antimeridian if they must be joined and the input can
@@ -259,11 +259,10 @@ std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request
   if (!request.open &&
       std::any_of(request.inputs.begin(), request.inputs.end(),
                   [](const std::string& name) { return stream::reads_once(name); })) {
-    throw stream::Error(
-        {.file = request.inputs.front(),
-         .cause = "its points " + joint->what +
-                  ", which is known only at the end, and the input can be read only once",
-         .remedy = "name a file, or count longitudes from 0 to 360 or continue them beyond 180"});
+    throw stream::Error(request.inputs.front(),
+                        "its points " + joint->what +
+                            ", which is known only at the end, and the input can be read only once")
+        .remedy("name a file, or count longitudes from 0 to 360 or continue them beyond 180");
   }
   return joint;
 }
@@ -375,17 +374,18 @@ unsigned Build::threads_for(std::size_t payload_bytes) const {
     if (needed(threads) <= memory_bytes_) return threads;
   }
   const auto in_mebibytes = [](std::uint64_t bytes) {
-    return std::to_string((bytes >> 20) + 1) + "M";
+    return fmt::format("{}M", (bytes >> 20) + 1);
   };
   throw stream::Error(
-      {.file = request_.store.string(),
-       .cause = "`memory_bytes` " + std::to_string(memory_bytes_ >> 20) +
-                "M is not enough: the build needs " + in_mebibytes(needed(1)) + ", " +
-                in_mebibytes(source_bytes) + " of it to read the input",
-       .remedy = source_bytes > kSourceMemory && info_.grid
-                     ? "raise `memory_bytes`, lower `block_points`, or rewrite large strips and "
-                       "tiles as small tiles: gdal_translate -co TILED=YES"
-                     : "raise `memory_bytes`, or lower `block_points`"});
+      request_.store.string(),
+      stream::message(
+          "{memory_bytes} {}M is not enough: the build needs {}, {} of it to read the input",
+          memory_bytes_ >> 20, in_mebibytes(needed(1)), in_mebibytes(source_bytes)))
+      .remedy(source_bytes > kSourceMemory && info_.grid
+                  ? stream::message(
+                        "raise {memory_bytes}, lower {block_points}, or rewrite large strips and "
+                        "tiles as small tiles: gdal_translate -co TILED=YES")
+                  : stream::message("raise {memory_bytes}, or lower {block_points}"));
 }
 
 bool Build::next(cluster::HierarchyBuilder& builder, stream::PointBlock& block) {
@@ -442,7 +442,7 @@ BuildOutcome Build::outcome_of(const stream::Progress& read, const cluster::Hier
 }
 
 void Build::tell(const BuildOutcome& outcome, const UndeclaredVoids& voids) const {
-  const auto say = [this](const std::string& note) {
+  const auto say = [this](const stream::Message& note) {
     if (!note.empty()) context_.say(note);
   };
   if (outcome.empty_values > 0) {

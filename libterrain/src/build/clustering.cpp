@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/source.hpp>
 
@@ -55,10 +56,9 @@ AttributeAxis axis_of(const std::string& name, const BuildRequest& request,
     if (attribute.name == name) return {attribute, schema.attribute_offset(i)};
     known += (known.empty() ? "" : ", ") + attribute.name;
   }
-  throw stream::Error({.file = input_name(request),
-                       .cause = "its points have no attribute \"" + name + "\"",
-                       .remedy = known.empty() ? "they have no attributes: leave out `channel`"
-                                               : "`channel` takes one of these: " + known});
+  throw stream::Error(input_name(request), fmt::format("its points have no attribute \"{}\"", name))
+      .remedy(known.empty() ? stream::message("they have no attributes: leave out {channel}")
+                            : stream::message("{channel} takes one of these: {}", known));
 }
 
 void set_channels(const BuildRequest& request, const stream::Schema& schema,
@@ -76,10 +76,9 @@ void set_channels(const BuildRequest& request, const stream::Schema& schema,
       values[i] = stream::to_double(channel.type, record.data() + axes[i].offset) * channel.scale +
                   channel.offset;
       if (std::isfinite(values[i])) continue;
-      throw stream::Error({.file = file,
-                           .cause = "\"" + channel.name + "\" of a point is not finite",
-                           .remedy = "leave such points out with `where`, or the "
-                                     "attribute out of `channel`"});
+      throw stream::Error(file, fmt::format("\"{}\" of a point is not finite", channel.name))
+          .remedy(stream::message("leave such points out with {where}, or the "
+                                  "attribute out of {channel}"));
     }
   };
 }
@@ -112,19 +111,21 @@ void spread_along(std::span<const stream::Point3> vertices, std::span<stream::Po
 void set_corners(const BuildRequest& request, const stream::Schema& schema,
                  cluster::HierarchyOptions& options) {
   if (request.entities == stream::Entities::points) return;
-  const std::string entities = "`entities` " + std::string(stream::name_of(request.entities));
+  const std::string_view entities = stream::name_of(request.entities);
   if (request.metric.kind != MetricChoice::Kind::euclidean || !request.channels.empty() ||
       std::isfinite(request.outlier_price)) {
-    throw UsageError(entities +
-                     " are clustered by Euclidean distances: without `metric`, `channel` and "
-                     "`outlier_price`");
+    throw UsageError(
+        stream::message("{entities} {} are clustered by Euclidean distances: without {metric}, "
+                        "{channel} and {outlier_price}",
+                        entities));
   }
   using cluster::FacilityStrategy;
   if (request.strategy != FacilityStrategy::automatic &&
       request.strategy != FacilityStrategy::full_scan &&
       request.strategy != FacilityStrategy::facilities) {
-    throw UsageError(entities + " do not support the " + cluster::name_of(request.strategy) +
-                     " search: choose automatic, full scan or facilities");
+    throw UsageError(stream::message(
+        "{entities} {} do not support the {} search: choose automatic, full scan or facilities",
+        entities, cluster::name_of(request.strategy)));
   }
   const CornerReader read(schema, request.entities, input_name(request));
   options.corners.count = read.most();
@@ -147,11 +148,11 @@ void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>&
   if (std::isinf(request.outlier_price)) return;
   const auto same = [](const stream::Channel& channel) { return channel.name == kOutlierName; };
   if (std::any_of(attributes.begin(), attributes.end(), same)) {
-    throw stream::Error({.file = input_name(request),
-                         .cause = std::string("its points already have an attribute \"") +
-                                  kOutlierName +
-                                  "\", the name that `outlier_price` marks outliers with",
-                         .remedy = std::string("leave it out: `drop` ") + kOutlierName});
+    throw stream::Error(input_name(request),
+                        stream::message("its points already have an attribute \"{}\", the name "
+                                        "that {outlier_price} marks outliers with",
+                                        kOutlierName))
+        .remedy(stream::message("leave it out: {drop} {}", kOutlierName));
   }
   attributes.push_back({kOutlierName, stream::ScalarType::u8});
 }

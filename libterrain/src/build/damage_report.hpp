@@ -32,7 +32,7 @@ class DamageReport {
     return [this](const stream::Error& damage, std::uint64_t points) {
       const stream::Error::Parts& parts = damage.parts();
       std::string line = parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
-                         parts.cause + " (" + counted(points, "point") + " left out)";
+                         parts.cause.text() + " (" + counted(points, "point") + " left out)";
       const std::lock_guard lock(mutex_);
       // With several files, each is opened twice: to check that they agree, and to read it.
       if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;

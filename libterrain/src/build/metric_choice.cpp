@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <terrace/base/portable_math.hpp>
 
@@ -24,21 +25,22 @@ struct Place {
   const std::string& file;
   std::size_t region;
 
-  [[noreturn]] void fail(const std::string& cause) const {
-    throw stream::Error({.file = file,
-                         .where = "region " + std::to_string(region),
-                         .cause = cause,
-                         .remedy = "a region is {\"box\": [minx, miny, maxx, maxy], \"semi_axes\": "
-                                   "[a, b], \"angle\": degrees}"});
+  [[nodiscard]] stream::Error fault(std::string cause) const {
+    return stream::Error(file, std::move(cause))
+        .at(fmt::format("region {}", region))
+        .remedy(
+            "a region is {\"box\": [minx, miny, maxx, maxy], \"semi_axes\": "
+            "[a, b], \"angle\": degrees}");
   }
 };
 
 std::vector<double> numbers(const nlohmann::json& json, const char* name, const Place& place) {
-  if (!json.is_array()) place.fail(std::string("\"") + name + "\" is not a list of numbers");
+  if (!json.is_array()) throw place.fault(fmt::format("\"{}\" is not a list of numbers", name));
   std::vector<double> values;
   for (const nlohmann::json& value : json) {
-    if (!value.is_number())
-      place.fail(std::string("\"") + name + "\" has an entry that is not a number");
+    if (!value.is_number()) {
+      throw place.fault(fmt::format("\"{}\" has an entry that is not a number", name));
+    }
     values.push_back(value.get<double>());
   }
   return values;
@@ -52,29 +54,29 @@ stream::Box3 box_of(const nlohmann::json& json, const Place& place) {
   } else if (v.size() == 6) {
     box = {{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
   } else {
-    place.fail("\"box\" has " + counted(v.size(), "number") + ", not 4 or 6");
+    throw place.fault(fmt::format("\"box\" has {}, not 4 or 6", counted(v.size(), "number")));
   }
-  if (box.empty()) place.fail("\"box\" is empty: a minimum exceeds its maximum");
+  if (box.empty()) throw place.fault("\"box\" is empty: a minimum exceeds its maximum");
   return box;
 }
 
 cluster::LinearMap axes_of(const nlohmann::json& region, const Place& place) {
   if (region.contains("rotation")) {
-    if (region.contains("angle")) place.fail("has both \"angle\" and \"rotation\"");
+    if (region.contains("angle")) throw place.fault("has both \"angle\" and \"rotation\"");
     const nlohmann::json& rows = region["rotation"];
     if (!rows.is_array() || rows.size() != 3)
-      place.fail("\"rotation\" is not a list of three rows");
+      throw place.fault("\"rotation\" is not a list of three rows");
     cluster::LinearMap axes{};
     for (std::size_t i = 0; i < 3; ++i) {
       const std::vector<double> row = numbers(rows[i], "rotation", place);
-      if (row.size() != 3) place.fail("each row of \"rotation\" needs three numbers");
+      if (row.size() != 3) throw place.fault("each row of \"rotation\" needs three numbers");
       for (std::size_t k = 0; k < 3; ++k) axes[3 * i + k] = row[k];
     }
     return axes;
   }
   double angle = 0.0;
   if (region.contains("angle")) {
-    if (!region["angle"].is_number()) place.fail("\"angle\" is not a number of degrees");
+    if (!region["angle"].is_number()) throw place.fault("\"angle\" is not a number of degrees");
     angle = region["angle"].get<double>();
   }
   // Not the library's own constructor from an angle: its sine may differ in the last bit between
@@ -84,29 +86,30 @@ cluster::LinearMap axes_of(const nlohmann::json& region, const Place& place) {
 }
 
 MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
-  if (!json.is_object()) place.fail("is not an object");
+  if (!json.is_object()) throw place.fault("is not an object");
   for (const auto& [name, value] : json.items()) {
     if (name != "box" && name != "semi_axes" && name != "angle" && name != "rotation") {
-      place.fail("\"" + name + "\" is not a member of a region");
+      throw place.fault(fmt::format("\"{}\" is not a member of a region", name));
     }
   }
-  if (!json.contains("semi_axes")) place.fail("has no \"semi_axes\"");
+  if (!json.contains("semi_axes")) throw place.fault("has no \"semi_axes\"");
   const std::vector<double> lengths = numbers(json["semi_axes"], "semi_axes", place);
   if (lengths.size() != 2 && lengths.size() != 3) {
-    place.fail("\"semi_axes\" has " + counted(lengths.size(), "number") + ", not 2 or 3");
+    throw place.fault(
+        fmt::format("\"semi_axes\" has {}, not 2 or 3", counted(lengths.size(), "number")));
   }
   std::optional<stream::Box3> box;
   if (json.contains("box")) box = box_of(json["box"], place);
   for (const double length : lengths) {
     // Distances are divided by this length.
-    if (length > 0 && std::isinf(1.0 / length)) place.fail("\"semi_axes\" are too small");
+    if (length > 0 && std::isinf(1.0 / length)) throw place.fault("\"semi_axes\" are too small");
   }
   try {
     return {box,
             cluster::Elliptical({lengths[0], lengths[1], lengths.size() > 2 ? lengths[2] : 1.0},
                                 axes_of(json, place))};
   } catch (const std::invalid_argument& error) {
-    place.fail(error.what());
+    throw place.fault(error.what());
   }
 }
 
@@ -117,15 +120,13 @@ std::vector<MetricChoice::Region> read_regions(const std::string& file) {
       "degrees}]}";
   const std::optional<nlohmann::json> found = json_of_file(file, kMostBytes, shape);
   if (!found) {
-    throw stream::Error({.file = file,
-                         .cause = "cannot be read",
-                         .remedy = "`metric` elliptical:FILE names a JSON file of regions"});
+    throw stream::Error(file, "cannot be read")
+        .remedy(stream::message("{metric} elliptical:FILE names a JSON file of regions"));
   }
   const nlohmann::json& json = *found;
   if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
       json["regions"].empty()) {
-    throw stream::Error(
-        {.file = file, .cause = "is not a JSON object with a list \"regions\"", .remedy = shape});
+    throw stream::Error(file, "is not a JSON object with a list \"regions\"").remedy(shape);
   }
   std::vector<MetricChoice::Region> regions;
   for (const nlohmann::json& region : json["regions"]) {
@@ -147,15 +148,17 @@ MetricChoice MetricChoice::parse(const std::string& text) {
     choice.kind = Kind::squared;
   } else if (name == "minkowski" && !rest.empty()) {
     choice.kind = Kind::minkowski;
-    choice.p =
-        rest == "inf" ? kUnbounded : parse_number(rest, "the exponent of `metric` minkowski");
-    if (!(choice.p > 0.0)) throw UsageError("`metric` minkowski:P needs a positive P, or inf");
+    choice.p = rest == "inf"
+                   ? kUnbounded
+                   : parse_number(rest, stream::message("the exponent of {metric} minkowski"));
+    if (!(choice.p > 0.0))
+      throw UsageError(stream::message("{metric} minkowski:P needs a positive P, or inf"));
   } else if (name == "elliptical" && !rest.empty()) {
     choice.kind = Kind::elliptical;
     choice.regions = read_regions(rest);
   } else {
-    throw UsageError("`metric` " + text +
-                     ": the metrics are euclidean, squared, minkowski:P and elliptical:FILE");
+    throw UsageError(stream::message(
+        "{metric} {}: the metrics are euclidean, squared, minkowski:P and elliptical:FILE", text));
   }
   return choice;
 }

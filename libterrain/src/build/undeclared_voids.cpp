@@ -49,26 +49,26 @@ void UndeclaredVoids::add(const stream::PointBlock& block) {
   for (std::size_t i = 0; i < kUsual; ++i) seen_.usual[i] += seen.usual[i];
 }
 
-std::string UndeclaredVoids::note_of(std::uint64_t count, double stored,
-                                     const std::string& heights) const {
+stream::Message UndeclaredVoids::note_of(std::uint64_t count, double stored,
+                                         const std::string& heights) const {
   const std::string value = number_text(stored);
-  std::string remedy;
+  stream::Message remedy;
   if (!info_.grid) {
     const std::string limit = std::abs(stored) > kMost ? (stored > 0 ? "1e30" : "-1e30") : value;
-    remedy = std::string("leave them out: `where` 'z ") + (stored > 0 ? "< " : "> ") + limit + "'";
+    remedy = stream::message("leave them out: {where} 'z {} {}'", stored > 0 ? "<" : ">", limit);
   } else if (info_.format == "ascii-grid" || info_.format == "binary-grid") {
     remedy = "declare the value in the header: NODATA_value " + value;
   } else {
     remedy = "declare the value: gdal_edit.py -a_nodata " + value + " FILE";
   }
   const bool one = count == 1;
-  return (info_.files.size() == 1 ? info_.files.front() + ": " : std::string()) +
-         counted(count, info_.grid ? "cell" : "point") + (one ? " has " : " have ") + heights +
-         ", and " + (one ? "is" : "are") + " kept; if " + (one ? "that means" : "these mean") +
-         " no data, " + remedy;
+  return stream::message("{}{} {} {}, and {} kept; if {} no data, {}",
+                         info_.files.size() == 1 ? info_.files.front() + ": " : "",
+                         counted(count, info_.grid ? "cell" : "point"), one ? "has" : "have",
+                         heights, one ? "is" : "are", one ? "that means" : "these mean", remedy);
 }
 
-std::string UndeclaredVoids::note() const {
+stream::Message UndeclaredVoids::note() const {
   if (seen_.beyond > 0) {
     return note_of(seen_.beyond, seen_.value,
                    "heights beyond 1e30, such as " + number_text(seen_.value));

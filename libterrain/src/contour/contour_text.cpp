@@ -8,6 +8,7 @@
 #include <span>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/file_marks.hpp"
@@ -80,7 +81,7 @@ ContourText::ContourText(const stream::Store& store, const ContourRequest& reque
           "\"features\":[";
   if (!request.own_crs) {
     const stream::Box3 box = world_box(store.schema(), store.bounds());
-    geography_.emplace(system_of(store, ", or ask for `own_crs`"), box);
+    geography_.emplace(system_of(store, stream::message(", or ask for {own_crs}")), box);
     Point2 middle{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
     (*geography_)({&middle, 1});
     middle_ = middle[0];
@@ -115,12 +116,11 @@ void ContourText::append(std::string& text, const ContourLine& line,
   for (std::size_t i = 0; geography_ && i < places.size(); ++i) {
     if (std::isfinite(places[i][0]) && std::isfinite(places[i][1])) continue;
     const Point2 at = ground_.world(line.points[reverse_ ? places.size() - 1 - i : i]);
-    throw stream::Error({.file = file_,
-                         .cause = plain_number(at[0]) + ',' + plain_number(at[1]) +
-                                  " has no longitude and latitude in " +
-                                  geography_->system().title(),
-                         .remedy = "build the store with the right `crs`, or leave the "
-                                   "place out with `region`"});
+    throw stream::Error(
+        file_, fmt::format("{},{} has no longitude and latitude in {}", plain_number(at[0]),
+                           plain_number(at[1]), geography_->system().title()))
+        .remedy(stream::message("build the store with the right {crs}, or leave the "
+                                "place out with {region}"));
   }
   text +=
       "{\"type\":\"Feature\",\"properties\":{\"elev\":" + number_text(levels_.height(line.level)) +

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/available_memory.hpp"
@@ -26,9 +27,8 @@ constexpr double kMostLevels = 1e15;
 /// Drawing more levels than this would practically never end.
 constexpr double kMostLevelsDrawn = 1e7;
 
-stream::Error failure(const stream::Store& store, const std::string& cause,
-                      const std::string& remedy) {
-  return stream::Error({.file = store.path().string(), .cause = cause, .remedy = remedy});
+stream::Error fault(const stream::Store& store, stream::Message cause) {
+  return {store.path().string(), std::move(cause)};
 }
 
 /// Throws: stream::Error if the interval is too small for the heights.
@@ -37,8 +37,9 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
   const auto level = [&](double raw) { return (raw * z.scale + z.offset) / request.interval; };
   const stream::Box3& bounds = store.bounds();
   if (std::max(std::abs(level(bounds.min[2])), std::abs(level(bounds.max[2]))) > kMostLevels) {
-    throw failure(store, "heights have too many levels of " + plain_number(request.interval),
-                  "give a larger `interval`");
+    throw fault(store,
+                fmt::format("heights have too many levels of {}", plain_number(request.interval)))
+        .remedy(stream::message("give a larger {interval}"));
   }
   double low = bounds.min[2], high = bounds.max[2];
   if (request.region) {
@@ -51,39 +52,43 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
   }
   const double levels = std::abs(level(high) - level(low));
   if (levels <= kMostLevelsDrawn) return;
-  throw failure(store,
-                "between the lowest and the highest point there are " +
-                    counted(static_cast<std::uint64_t>(levels), "level") + " of " +
-                    plain_number(request.interval) + ", more than " +
-                    with_commas(static_cast<std::uint64_t>(kMostLevelsDrawn)),
-                "give a larger `interval`");
+  throw fault(
+      store,
+      fmt::format("between the lowest and the highest point there are {} of {}, more than {}",
+                  counted(static_cast<std::uint64_t>(levels), "level"),
+                  plain_number(request.interval),
+                  with_commas(static_cast<std::uint64_t>(kMostLevelsDrawn))))
+      .remedy(stream::message("give a larger {interval}"));
 }
 
 /// Returns why there are no lines although the store has points.
-std::string reason_for_none(const stream::Store& store, const ContourRequest& request) {
+stream::Message reason_for_none(const stream::Store& store, const ContourRequest& request) {
   const std::string interval = plain_number(request.interval);
   const stream::Channel& z = store.schema().coordinates[2];
   const auto height = [&](double raw) { return raw * z.scale + z.offset; };
   const auto [low, high] =
       std::minmax({height(store.bounds().min[2]), height(store.bounds().max[2])});
   if ((std::floor(low / request.interval) + 1.0) * request.interval >= high) {
-    return "no multiple of `interval` " + interval + " is between the heights, " +
-           readable_number(low, 10) + " to " + readable_number(high, 10);
+    return stream::message("no multiple of {interval} {} is between the heights, {} to {}",
+                           interval, readable_number(low, 10), readable_number(high, 10));
   }
   if (request.max_edge) {
-    return "no triangle with sides of up to " + plain_number(*request.max_edge) +
-           " m crosses a multiple of `interval` " + interval;
+    return stream::message(
+        "no triangle with sides of up to {} m crosses a multiple of {interval} {}",
+        plain_number(*request.max_edge), interval);
   }
   if (request.region) {
-    return "inside the region no multiple of `interval` " + interval + " is crossed";
+    return stream::message("inside the region no multiple of {interval} {} is crossed", interval);
   }
   if (store.schema().grid && request.level == 0) {
-    return "no square of four neighbouring samples with data crosses a multiple of `interval` " +
-           interval;
+    return stream::message(
+        "no square of four neighbouring samples with data crosses a multiple of {interval} {}",
+        interval);
   }
   if (request.level == 0) return "the points are on one line, so they span no triangles";
-  return "no triangle of the points of level " + std::to_string(request.level) +
-         " crosses a multiple of `interval` " + interval;
+  return stream::message(
+      "no triangle of the points of level {} crosses a multiple of {interval} {}", request.level,
+      interval);
 }
 
 }  // namespace
@@ -129,17 +134,19 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
       .threads = std::max(1U, context.threads),
       .memory_bytes = memory,
       .emit = [&](ContourLine&& line) { text.add(std::move(line)); },
-      .limit = {.points = memory / 3 / kContourBytesPerPoint,
-                .exceeded =
-                    [&] {
-                      throw failure(
-                          store,
-                          "unfinished contour lines have more than " +
-                              counted(memory / 3 / kContourBytesPerPoint, "point") +
-                              ", too many for `memory_bytes`",
-                          "raise `memory_bytes` or `interval`, or choose a smaller `region`");
-                    },
-                .stop = context.stop},
+      .limit =
+          {.points = memory / 3 / kContourBytesPerPoint,
+           .exceeded =
+               [&] {
+                 throw fault(
+                     store,
+                     stream::message(
+                         "unfinished contour lines have more than {}, too many for {memory_bytes}",
+                         counted(memory / 3 / kContourBytesPerPoint, "point")))
+                     .remedy(stream::message(
+                         "raise {memory_bytes} or {interval}, or choose a smaller {region}"));
+               },
+           .stop = context.stop},
       .progress = [&](double share) { report.update(text.outcome().lines, share); },
   };
   if (store.schema().grid && request.level == 0) {
@@ -149,7 +156,8 @@ ContourOutcome write_contours(const stream::Store& given, const ContourRequest& 
   }
   text.finish();
   if (text.outcome().lines == 0) {
-    context.say("there are no lines: " + (store.points() == 0 ? "the store has no points"
+    context.say(stream::message("there are no lines: {}", store.points() == 0
+                                                              ? "the store has no points"
                                                               : reason_for_none(store, request)));
   }
   return text.outcome();

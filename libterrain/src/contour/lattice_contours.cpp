@@ -44,9 +44,9 @@ void draw_lattice_contours(const ContourParts& parts) {
   const stream::Store& store = parts.store;
   const ContourRequest& request = parts.request;
   if (request.max_edge) {
-    throw UsageError(
-        "`max_edge` is for irregular points and coarser levels: rasters mark missing data "
-        "explicitly");
+    throw UsageError(stream::message(
+        "{max_edge} is for irregular points and coarser levels: rasters mark missing data "
+        "explicitly"));
   }
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);

@@ -20,6 +20,7 @@
 #include "contour/part_lines.hpp"
 #include "surface/point_window.hpp"
 #include "surface/window_tree.hpp"
+#include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -94,12 +95,12 @@ class PointContours {
     const std::uint64_t least = std::min(
         kBytesPerWindow, parts_.store.levels()[request_.level].points * kBytesPerPointAlone);
     if (memory < least) {
-      throw stream::Error({.file = parts_.store.path().string(),
-                           .cause = "contours of its points need " +
-                                    readable_bytes(kProcessBytes + 2 * least) +
-                                    " of memory, `memory_bytes` allows " +
-                                    readable_bytes(kProcessBytes + parts_.memory_bytes),
-                           .remedy = "raise `memory_bytes`, or choose a coarser `level`"});
+      throw stream::Error(
+          parts_.store.path().string(),
+          stream::message("contours of its points need {} of memory, {memory_bytes} allows {}",
+                          readable_bytes(kProcessBytes + 2 * least),
+                          readable_bytes(kProcessBytes + parts_.memory_bytes)))
+          .remedy(stream::message("raise {memory_bytes}, or choose a coarser {level}"));
     }
     const auto threads = static_cast<unsigned>(
         std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, parts_.threads));

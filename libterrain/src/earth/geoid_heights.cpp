@@ -7,6 +7,7 @@
 #include <system_error>
 
 #include <GeographicLib/Geoid.hpp>
+#include <fmt/core.h>
 
 #include "earth/crs/crs_definition.hpp"
 #include "earth/crs/operation_choice.hpp"
@@ -19,19 +20,19 @@
 namespace terrace::terrain {
 
 GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
-  const auto fail = [&file](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = file, .cause = cause, .remedy = remedy});
-  };
   const std::filesystem::path path(file);
-  const char* const fetch = "give a grid of GeographicLib's, like egm2008-5.pgm";
-  if (path.extension() != ".pgm") fail("is not named like a geoid grid (.pgm)", fetch);
+  const auto fault = [&file](std::string cause) {
+    return stream::Error(file, std::move(cause))
+        .remedy("give a grid of GeographicLib's, like egm2008-5.pgm");
+  };
+  if (path.extension() != ".pgm") throw fault("is not named like a geoid grid (.pgm)");
   std::error_code error;
   const std::uintmax_t bytes = std::filesystem::file_size(path, error);
-  if (error) fail("cannot be read: " + error.message(), fetch);
+  if (error) throw fault("cannot be read: " + error.message());
   if (bytes > memory_bytes) {
-    fail("takes " + std::to_string((bytes >> 20) + 1) + "M of memory, " +
-             std::to_string(memory_bytes >> 20) + "M of `memory_bytes` are left",
-         "raise `memory_bytes` or use a coarser grid");
+    throw stream::Error(file, stream::message("takes {}M of memory, {}M of {memory_bytes} are left",
+                                              (bytes >> 20) + 1, memory_bytes >> 20))
+        .remedy(stream::message("raise {memory_bytes} or use a coarser grid"));
   }
   try {
     const std::filesystem::path folder =
@@ -40,7 +41,7 @@ GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
     geoid_ = std::make_unique<const GeographicLib::Geoid>(path.stem().string(), folder.string(),
                                                           kCubic, kForThreads);
   } catch (const std::exception& damage) {
-    fail(std::string("is not a geoid grid: ") + damage.what(), fetch);
+    throw fault(fmt::format("is not a geoid grid: {}", damage.what()));
   }
 }
 
@@ -56,22 +57,24 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::StoreSchema& schema, Height
   const bool ignored = vertical == HeightReference::ignore;
   const bool orthometric = vertical == HeightReference::orthometric;
   if ((ignored || vertical == HeightReference::ellipsoidal) && !geoid.empty()) {
-    throw UsageError("`vertical` " + std::string(ignored ? "ignore" : "ellipsoidal") +
-                     " takes heights as they are, `geoid` converts them: give one of the two");
+    throw UsageError(stream::message(
+        "{vertical} {} takes heights as they are, {geoid} converts them: give one of the two",
+        ignored ? "ignore" : "ellipsoidal"));
   }
   const std::string& recorded = schema.vertical;
   if (recorded == "ellipsoidal" && (!geoid.empty() || orthometric)) {
-    throw UsageError("the store's heights are already ellipsoidal: leave " +
-                     std::string(geoid.empty() ? "`vertical` orthometric" : "`geoid`") +
-                     " out, or build the store with `vertical` orthometric if they are not");
+    throw UsageError(stream::message(
+        "the store's heights are already ellipsoidal: leave {} out, or build the store with "
+        "{vertical} orthometric if they are not",
+        geoid.empty() ? stream::message("{vertical} orthometric") : stream::message("{geoid}")));
   }
   if (recorded != "ellipsoidal" && vertical == HeightReference::recorded && geoid.empty()) {
-    throw UsageError((recorded.empty()
-                          ? std::string("the store does not say what its heights refer to")
-                          : "the store's heights are " + recorded) +
-                     ", and globes want heights above the ellipsoid: give `vertical` orthometric "
-                     "(by the store's vertical CRS, or EGM96), `geoid` FILE (a GeographicLib "
-                     "geoid grid), `vertical` ellipsoidal if they are that, or `vertical` ignore");
+    throw UsageError(stream::message(
+        "{}, and globes want heights above the ellipsoid: give {vertical} orthometric (by the "
+        "store's vertical CRS, or EGM96), {geoid} FILE (a GeographicLib geoid grid), {vertical} "
+        "ellipsoidal if they are that, or {vertical} ignore",
+        recorded.empty() ? "the store does not say what its heights refer to"
+                         : "the store's heights are " + recorded));
   }
   // The same unit as all other verbs, with the same assumption.
   const Ground ground(schema);
@@ -120,19 +123,17 @@ void EllipsoidalHeights::find_operation(const stream::StoreSchema& schema,
     choice = choose_operation(source.get(), target.get(), area);
     if (choice.found) operation_.emplace(choice.pipeline);
   } catch (const CrsError& error) {
-    throw stream::Error(
-        {.file = {}, .where = "heights", .cause = error.what(), .remedy = error.remedy()});
+    throw stream::Error("", error.what()).at("heights").remedy(error.remedy());
   }
   if (!operation_) {
-    throw stream::Error(
-        {.file = {},
-         .where = "heights",
-         .cause = "no operation leads from " + name + " to the ellipsoid" +
-                  (choice.better.empty() ? "" : ": " + choice.better),
-         .remedy = choice.better.empty()
-                       ? "give `geoid` FILE (a GeographicLib geoid grid)"
-                       : "install that grid where PROJ finds it, or give `geoid` FILE (a "
-                         "GeographicLib geoid grid)"});
+    throw stream::Error("", "no operation leads from " + name + " to the ellipsoid" +
+                                (choice.better.empty() ? "" : ": " + choice.better))
+        .at("heights")
+        .remedy(
+            choice.better.empty()
+                ? stream::message("give {geoid} FILE (a GeographicLib geoid grid)")
+                : stream::message("install that grid where PROJ finds it, or give {geoid} FILE (a "
+                                  "GeographicLib geoid grid)"));
   }
   add_note(name + " to the ellipsoid by " + quoted_with_accuracy(choice.name, choice.accuracy) +
            (choice.better.empty() ? "" : " (" + choice.better + ")"));

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
@@ -15,12 +16,10 @@
 namespace terrace::terrain {
 namespace {
 
-[[noreturn]] void fail_beyond_pole(const std::string& file, const std::string& where,
-                                   double latitude, const std::string& remedy) {
-  throw stream::Error({.file = file,
-                       .where = where,
-                       .cause = "the latitude " + plain_number(latitude) + " is beyond a pole",
-                       .remedy = remedy});
+stream::Error beyond_pole(const std::string& file, const std::string& where, double latitude) {
+  return stream::Error(file,
+                       fmt::format("the latitude {} is beyond a pole", plain_number(latitude)))
+      .at(where);
 }
 
 std::string place_text(double x, double y) { return plain_number(x) + ' ' + plain_number(y); }
@@ -34,8 +33,8 @@ void check_latitudes(std::span<const Point2> places, double most, const std::str
     const double latitude = y * degrees;
     if (!(std::abs(latitude) > 90 + beyond) || !std::isfinite(latitude)) continue;
     if (!std::isnan(latitude_on_earth(latitude))) continue;
-    fail_beyond_pole(file, where.empty() ? "place " + place_text(x, y) : where, latitude,
-                     "places are longitude, latitude: exchange them if they are swapped");
+    throw beyond_pole(file, where.empty() ? "place " + place_text(x, y) : where, latitude)
+        .remedy("places are longitude, latitude: exchange them if they are swapped");
   }
 }
 
@@ -74,9 +73,10 @@ void LatitudeCheck::operator()(std::span<const stream::Point3> stored) const {
     const double y = m[3] * p[0] + m[4] * p[1] + m[5];
     if (!std::isnan(latitude_on_earth(y * degrees_))) continue;
     const double x = m[0] * p[0] + m[1] * p[1] + m[2];
-    fail_beyond_pole(file_, "point " + place_text(x, y), y * degrees_,
-                     "x is the longitude and y the latitude: exchange them if they are swapped, or "
-                     "name the right `crs`");
+    throw beyond_pole(file_, "point " + place_text(x, y), y * degrees_)
+        .remedy(stream::message(
+            "x is the longitude and y the latitude: exchange them if they are swapped, or "
+            "name the right {crs}"));
   }
 }
 

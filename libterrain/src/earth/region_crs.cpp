@@ -18,11 +18,10 @@
 namespace terrace::terrain {
 namespace {
 
-[[noreturn]] void fail(const CoordinateSystem& to, const std::string& cause) {
-  throw stream::Error({.file = {},
-                       .where = "region",
-                       .cause = cause + " " + to.title(),
-                       .remedy = "give a smaller region, or one in the CRS of the data"});
+stream::Error fault(const CoordinateSystem& to, const std::string& cause) {
+  return stream::Error("", cause + " " + to.title())
+      .at("region")
+      .remedy("give a smaller region, or one in the CRS of the data");
 }
 
 class Outline {
@@ -42,7 +41,7 @@ class Outline {
     }
     // Around a pole, the outline ends a full turn away from its start.
     if (turn_ != 0 && std::abs(start[0] - first[0]) > 0.5 * turn_) {
-      fail(to_, "the region contains a pole, so its outline is not a polygon in");
+      throw fault(to_, "the region contains a pole, so its outline is not a polygon in");
     }
     return result;
   }
@@ -51,7 +50,7 @@ class Outline {
   [[nodiscard]] Point2 moved(Point2 place) const {
     change_.reverse({&place, 1});
     if (!std::isfinite(place[0]) || !std::isfinite(place[1])) {
-      fail(to_, "the region's outline leaves the area of");
+      throw fault(to_, "the region's outline leaves the area of");
     }
     return place;
   }
@@ -80,7 +79,7 @@ class Outline {
     if (off <= 1e-6 * length) return end;
     if (depth == kMost) {
       // By now the pieces of a smooth curve are straight; only a jump is not.
-      if (off > 0.1 * length) fail(to_, "the region's outline is discontinuous in");
+      if (off > 0.1 * length) throw fault(to_, "the region's outline is discontinuous in");
       return end;
     }
     const Point2 half = add_from(a, middle, start, depth + 1, result);
@@ -142,7 +141,7 @@ Region region_in(const Region& region, const Transformation& change, const strea
     // Sides may coincide, as the meridians of 180 degrees east and west do.
     for (Polygon& part : valid_polygons(polygon)) polygons.push_back(std::move(part));
   }
-  if (polygons.empty()) fail(to, "the region has no area in");
+  if (polygons.empty()) throw fault(to, "the region has no area in");
   const Region there =
       Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
   return with_turns(there, to.turn(), bounds);

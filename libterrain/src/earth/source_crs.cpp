@@ -5,6 +5,8 @@
 #include <utility>
 #include <variant>
 
+#include <fmt/core.h>
+
 #include "earth/crs/crs_definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
@@ -12,11 +14,6 @@
 
 namespace terrace::terrain {
 namespace {
-
-[[noreturn]] void fail(const std::string& file, const std::string& cause,
-                       const std::string& remedy) {
-  throw stream::Error({.file = file, .cause = cause, .remedy = remedy});
-}
 
 /// Returns nullopt for a local system, which it stores in `local`.
 std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std::string& contents,
@@ -29,7 +26,8 @@ std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std:
     local = std::get<LocalCrs>(std::move(system));
     return std::nullopt;
   } catch (const CrsError& error) {
-    fail(file, error.what(), "correct or remove it, or name the system: `crs` EPSG:n");
+    throw stream::Error(file, error.what())
+        .remedy(stream::message("correct or remove it, or name the system: {crs} EPSG:n"));
   }
 }
 
@@ -38,21 +36,22 @@ std::optional<CoordinateSystem> read_sidecar(const std::string& file, const std:
 std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& info,
                                                    std::string& name,
                                                    std::optional<LocalCrs>& local,
-                                                   std::string& note) {
+                                                   stream::Message& note) {
   std::optional<CoordinateSystem> system;
   for (const std::string& file : info.files) {
     const std::string sidecar = stream::prj_beside(file);
     if (sidecar.empty()) continue;
     const std::string contents = contents_of_file(sidecar);
     if (contents.empty()) {
-      note = sidecar + " is empty and says nothing of the CRS";
+      note = fmt::format("{} is empty and says nothing of the CRS", sidecar);
       continue;
     }
     const std::optional<CoordinateSystem> other = read_sidecar(sidecar, contents, local);
     if (!other) continue;
     if (system && !system->same_places(*other)) {
-      fail(sidecar, "its CRS differs from that of " + name,
-           "convert one of the files, or name the CRS of all: `crs` EPSG:n");
+      throw stream::Error(sidecar, fmt::format("its CRS differs from that of {}", name))
+          .remedy(
+              stream::message("convert one of the files, or name the CRS of all: {crs} EPSG:n"));
     }
     if (!system) {
       system = other;
@@ -76,14 +75,14 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
       found.system.emplace(std::get<CrsDefinition>(*own));
     }
   } catch (const ContradictoryCrs& error) {
-    fail(file, error.what(), error.remedy());
+    throw stream::Error(file, error.what()).remedy(error.remedy());
   } catch (const CrsError& error) {
     // Without a unit, even distances are unknown.
     if (!info.crs.geographic && !metres_in_unit(info.crs.horizontal_unit)) {
-      fail(file, error.what(), error.remedy());
+      throw stream::Error(file, error.what()).remedy(error.remedy());
     }
-    found.note = std::string(error.what()) + ": what needs places on the earth will not work (" +
-                 error.remedy() + ")";
+    found.note = stream::message("{}: what needs places on the earth will not work ({})",
+                                 error.what(), error.remedy());
     return found;
   }
   std::string sidecar;
@@ -94,9 +93,9 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
     const std::optional<CoordinateSystem> other =
         system_of_sidecars(info, sidecar, local, found.note);
     if (other && !other->same_places(*found.system)) {
-      fail(file,
-           "its CRS is " + found.system->title() + ", that of " + sidecar + " is " + other->title(),
-           "remove the wrong one, or say which is meant: `crs` EPSG:n");
+      throw stream::Error(file, fmt::format("its CRS is {}, that of {} is {}",
+                                            found.system->title(), sidecar, other->title()))
+          .remedy(stream::message("remove the wrong one, or say which is meant: {crs} EPSG:n"));
     }
   }
   if (!found.system) {
@@ -108,9 +107,10 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
       if (found.crs.horizontal_unit.empty()) found.crs.horizontal_unit = record.horizontal_unit;
       if (found.crs.vertical_unit.empty()) found.crs.vertical_unit = record.vertical_unit;
       if (local->is_geocentric) {
-        found.note = "the CRS \"" + record.name +
-                     "\" is geocentric, with x, y and z from the centre of the earth: z is not a "
-                     "height, and what needs a terrain will not work";
+        found.note = fmt::format(
+            "the CRS \"{}\" is geocentric, with x, y and z from the centre of the earth: z is not "
+            "a height, and what needs a terrain will not work",
+            record.name);
         return found;
       }
     }
@@ -120,7 +120,7 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
         set_vertical_epsg(heights, info.crs.vertical_epsg);
         found.heights = heights.heights;
       } catch (const CrsError& error) {
-        found.note = std::string(error.what()) + " (" + error.remedy() + ")";
+        found.note = stream::message("{} ({})", error.what(), error.remedy());
       }
     }
     return found;
@@ -128,8 +128,9 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
   if (shift) {
     CrsDefinition shifted = found.system->definition();
     if (found.system->counts_as_wgs84()) {
-      fail(file, "its CRS " + found.system->title() + " counts as WGS 84 and takes no shift",
-           "leave `shift` out");
+      throw stream::Error(file, fmt::format("its CRS {} counts as WGS 84 and takes no shift",
+                                            found.system->title()))
+          .remedy(stream::message("leave {shift} out"));
     }
     shifted.shift = shift;
     found.system.emplace(shifted);
@@ -158,10 +159,12 @@ void check_unit_of_columns(const stream::SourceInfo& info, const SourceCrs& foun
     return;
   }
   const std::string crs = found.system ? found.system->title() : '"' + found.crs.name + '"';
-  fail(info.files.empty() ? std::string() : info.files.front(),
-       "x and y are in " + plural_unit(unit) + " by the names of their columns, but the CRS " +
-           crs + " is in " + (of_crs.empty() ? "another unit" : plural_unit(of_crs)),
-       "name the CRS of these numbers with `crs` EPSG:n, or rename the columns");
+  throw stream::Error(
+      info.files.empty() ? std::string() : info.files.front(),
+      fmt::format("x and y are in {} by the names of their columns, but the CRS {} is in {}",
+                  plural_unit(unit), crs, of_crs.empty() ? "another unit" : plural_unit(of_crs)))
+      .remedy(stream::message(
+          "name the CRS of these numbers with {crs} EPSG:n, or rename the columns"));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "terrace/stream/message.hpp"
 #include "terrace/stream/source.hpp"
 #include "terrace/terrain/crs.hpp"
 
@@ -14,7 +15,7 @@ struct SourceCrs {
   stream::Crs crs;  ///< as a store records it
   Heights heights = Heights::unknown;
   std::optional<CoordinateSystem> system;  ///< nullopt: no CRS, or an unknown one
-  std::string note;                        ///< what the user should know; may be empty
+  stream::Message note;                    ///< what the user should know; may be empty
 };
 
 /// Returns the CRS that the source states or, failing that, the file NAME.prj next to it (if there

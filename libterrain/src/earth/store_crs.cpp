@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
@@ -22,7 +24,7 @@
 
 namespace terrace::terrain {
 
-CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise) {
+CoordinateSystem system_of(const stream::Store& store, const stream::Message& otherwise) {
   const std::string file = store.path().string();
   check_latitudes(store);
   std::optional<CoordinateSystem> system = CoordinateSystem::of(store.schema().crs, file);
@@ -30,12 +32,11 @@ CoordinateSystem system_of(const stream::Store& store, const std::string& otherw
     // A CRS recorded by name alone is a local (engineering) system.
     const std::string& name = store.schema().crs.name;
     throw stream::Error(
-        {.file = file,
-         .cause = name.empty() ? "has no CRS"
-                  : is_geocentric(store.schema().crs)
-                      ? "has the geocentric CRS \"" + name + "\", which is not converted"
-                      : "has the CRS \"" + name + "\", which has no place on the earth",
-         .remedy = "rebuild it with `crs` EPSG:n" + otherwise});
+        file, name.empty() ? "has no CRS"
+              : is_geocentric(store.schema().crs)
+                  ? fmt::format("has the geocentric CRS \"{}\", which is not converted", name)
+                  : fmt::format("has the CRS \"{}\", which has no place on the earth", name))
+        .remedy(stream::message("rebuild it with {crs} EPSG:n{}", otherwise));
   }
   return system->over(world_box(store.schema(), store.bounds()));
 }
@@ -80,9 +81,9 @@ CoordinateSystem system_named_in(const PlacesCrs& given) {
   } catch (const UsageError&) {
     // Reported below, with the file.
   }
-  throw stream::Error({.file = given.file,
-                       .cause = "its crs \"" + given.name.substr(0, 80) + "\" is not known",
-                       .remedy = "write a known one, like EPSG:n, or give `region_crs`"});
+  throw stream::Error(given.file,
+                      fmt::format("its crs \"{}\" is not known", given.name.substr(0, 80)))
+      .remedy(stream::message("write a known one, like EPSG:n, or give {region_crs}"));
 }
 
 }  // namespace
@@ -118,10 +119,9 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
     if (!named.empty()) throw;
   }
   if (!system && !named.empty()) {
-    throw stream::Error(
-        {.file = source.files.empty() ? std::string() : source.files.front(),
-         .cause = "has no known CRS, so the region cannot be converted to it",
-         .remedy = "leave `region_crs` out and give the region in its coordinates"});
+    throw stream::Error(source.files.empty() ? std::string() : source.files.front(),
+                        "has no known CRS, so the region cannot be converted to it")
+        .remedy(stream::message("leave {region_crs} out and give the region in its coordinates"));
   }
   const bool degrees = source.crs.geographic && source.crs.horizontal_unit == "degree";
   turn_ = system ? system->turn() : degrees ? 360 : 0;
@@ -162,12 +162,11 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
   const std::optional<CoordinateSystem> own = system_ ? system_() : std::nullopt;
   if (!own && given.name.empty()) return std::nullopt;
   if (!own) {
-    throw stream::Error({.file = given.file,
-                         .cause = "its crs is " + system_named_in(given).title() +
-                                  ", and the CRS of the data is not known",
-                         .remedy =
-                             "name the CRS of the data with `crs` EPSG:n when they are read or "
-                             "built, or leave the crs out if it is the same"});
+    throw stream::Error(given.file,
+                        fmt::format("its crs is {}, and the CRS of the data is not known",
+                                    system_named_in(given).title()))
+        .remedy(stream::message("name the CRS of the data with {crs} EPSG:n when they are read or "
+                                "built, or leave the crs out if it is the same"));
   }
   if (given.name.empty()) {
     // Longitudes may be counted to 360, and continue beyond the antimeridian.
@@ -253,10 +252,9 @@ void PlaceConversion::operator()(std::span<stream::Point3> points,
     for (std::size_t i = 0; i < count; ++i) {
       stream::Point3& p = points[first + i];
       if (!std::isfinite(places[i][0]) || !std::isfinite(places[i][1])) {
-        throw stream::Error({.file = {},
-                             .where = "point " + plain_number(p[0]) + " " + plain_number(p[1]),
-                             .cause = "has no image in " + change_->to().title(),
-                             .remedy = "choose another `to_crs` or a smaller `region`"});
+        throw stream::Error("", "has no image in " + change_->to().title())
+            .at(fmt::format("point {} {}", plain_number(p[0]), plain_number(p[1])))
+            .remedy(stream::message("choose another {to_crs} or a smaller {region}"));
       }
       p[0] = places[i][0];
       p[1] = places[i][1];

@@ -10,6 +10,8 @@
 #include <string>
 #include <tuple>
 
+#include <fmt/core.h>
+
 #include "base/file_marks.hpp"
 #include "base/geojson_crs.hpp"
 #include "base/stored_entities.hpp"
@@ -47,9 +49,8 @@ struct LineColumns {
         return store.schema().attribute_offset(i);
       }
     }
-    throw stream::Error({.file = store.path().string(),
-                         .cause = "its lines have no column \"" + std::string(name) + "\"",
-                         .remedy = "keep all columns: leave `keep` and `drop` out"});
+    throw stream::Error(store.path().string(), fmt::format("its lines have no column \"{}\"", name))
+        .remedy(stream::message("keep all columns: leave {keep} and {drop} out"));
   }
 };
 
@@ -116,16 +117,17 @@ void write_geojson(const LineSet& lines, const stream::Crs& crs,
   constexpr std::size_t kAtOnce = std::size_t{1} << 20;
   const bool known = crs != stream::Crs{};
   if (known && crs.epsg == 0) {
-    throw UsageError(
+    throw UsageError(stream::message(
         "GeoJSON names its CRS by an EPSG code, which the CRS of these lines does not have; pass "
-        "`to_crs` EPSG:4326, which needs none");
+        "{to_crs} EPSG:4326, which needs none"));
   }
   std::string text = std::string(kLinesHead) + geojson_crs_member(crs) + "\"features\":[";
   for (std::size_t i = 0; i < lines.lines.size(); ++i) {
     const LineSet::Line& line = lines.lines[i];
     text += i == 0 ? "\n" : ",\n";
-    text += R"({"type":"Feature","properties":{"line":)" + std::to_string(line.number) +
-            R"(},"geometry":{"type":"LineString","coordinates":[)";
+    text += fmt::format(
+        R"({{"type":"Feature","properties":{{"line":{}}},"geometry":{{"type":"LineString","coordinates":[)",
+        line.number);
     for (std::size_t v = line.begin; v < line.end; ++v) {
       text += v == line.begin ? "[" : ",[";
       for (std::size_t axis = 0; axis < line.dimensions; ++axis) {

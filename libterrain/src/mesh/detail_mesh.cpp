@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store_query.hpp>
 #include <terrace/tri/metric.hpp>
@@ -130,12 +131,11 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
   const std::uint64_t needed =
       points * (kBytesPerVertex + more_per_vertex) + (std::uint64_t{32} << 20);
   if (needed <= memory_bytes && points <= kMostVertices) return;
-  throw stream::Error({.file = store.path().string(),
-                       .cause = "a mesh of " + counted(points, "point") + " needs " +
-                                std::to_string((needed >> 20) + 1) +
-                                "M of memory, `memory_bytes` allows " +
-                                std::to_string(memory_bytes >> 20) + "M",
-                       .remedy = "choose a coarser `level` or a smaller `region`"});
+  throw stream::Error(
+      store.path().string(),
+      stream::message("a mesh of {} needs {}M of memory, {memory_bytes} allows {}M",
+                      counted(points, "point"), (needed >> 20) + 1, memory_bytes >> 20))
+      .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
 }
 
 /// Returns the metric in the coordinates of the triangulation.
@@ -146,7 +146,8 @@ tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& stor
   std::vector<tri::MetricField2::Region> regions;
   for (const MetricChoice::Region& region : metric.regions) {
     if (region.box && (m[1] != 0.0 || m[3] != 0.0)) {
-      throw UsageError("`metric`: the boxes of regions need a raster that is not rotated");
+      throw UsageError(
+          stream::message("{metric}: the boxes of regions need a raster that is not rotated"));
     }
     constexpr double kEverywhere = std::numeric_limits<double>::infinity();
     tri::Box3 box{{-kEverywhere, -kEverywhere, -kEverywhere},
@@ -383,17 +384,17 @@ TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
   if (entities_of(store.schema()) == stream::Entities::triangles) {
     if (kind != MetricChoice::Kind::euclidean || options.heights.any()) {
       throw UsageError(
-          "triangles of a store are written as they were read: leave out `metric`, "
-          "smoothing and overlays");
+          stream::message("triangles of a store are written as they were read: leave out {metric}, "
+                          "smoothing and overlays"));
     }
     return detail_triangles(store, detail, context.memory_or(0));
   }
   if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
-    throw UsageError("a mesh has the metric euclidean or elliptical:FILE, not " +
-                     options.metric.text);
+    throw UsageError(fmt::format("a mesh has the metric euclidean or elliptical:FILE, not {}",
+                                 options.metric.text));
   }
   if (detail.cluster && options.heights.any()) {
-    throw UsageError("`cluster` excludes smoothing and overlays");
+    throw UsageError(stream::message("{cluster} excludes smoothing and overlays"));
   }
   const Detail wide = with_margin(store, detail, store.schema());
   check_memory(store, wide, context.memory_or(0),
@@ -464,9 +465,8 @@ stream::Overlay open_height_overlay(const std::string& path, const stream::Store
   const std::string& heights = store.schema().coordinates[2].name;
   if (overlay.channel() != heights) {
     throw stream::Error(
-        {.file = path,
-         .cause = "has values of '" + overlay.channel() + "', not of the heights '" + heights + "'",
-         .remedy = "name an overlay written by terrace mesh"});
+        path, "has values of '" + overlay.channel() + "', not of the heights '" + heights + "'")
+        .remedy("name an overlay written by terrace mesh");
   }
   return overlay;
 }

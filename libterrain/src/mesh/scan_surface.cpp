@@ -31,11 +31,11 @@ void check_surface_memory(const stream::Store& store, const Detail& detail,
   const std::uint64_t points = wanted_points(store, detail);
   const std::uint64_t needed = kSurfaceBytesBeside + points * bytes_per_point;
   if (needed <= memory_bytes) return;
-  throw stream::Error({.file = store.path().string(),
-                       .cause = "a surface of " + counted(points, "point") + " needs " +
-                                readable_bytes(needed) + ", `memory_bytes` allows " +
-                                readable_bytes(memory_bytes),
-                       .remedy = "choose a coarser `level` or a smaller `region`"});
+  throw stream::Error(store.path().string(),
+                      stream::message("a surface of {} needs {}, {memory_bytes} allows {}",
+                                      counted(points, "point"), readable_bytes(needed),
+                                      readable_bytes(memory_bytes)))
+      .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
 }
 
 /// Returns metres about the middle of the positions.

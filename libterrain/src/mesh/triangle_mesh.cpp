@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
+
 #include "base/file_marks.hpp"
 #include "base/units.hpp"
 #include "earth/crs/crs_definition.hpp"
@@ -44,7 +46,7 @@ std::string projection_at(double longitude, double latitude) {
   if (latitude < -80) return "EPSG:5042";
   const double turned = longitude - 360 * std::floor((longitude + 180) / 360);
   const double zone = std::clamp(std::floor((turned + 180) / 6) + 1, 1.0, 60.0);
-  return "EPSG:" + std::to_string((latitude < 0 ? 32700 : 32600) + static_cast<int>(zone));
+  return fmt::format("EPSG:{}", (latitude < 0 ? 32700 : 32600) + static_cast<int>(zone));
 }
 
 /// The facts that mesh_coordinates() and the note are based on.
@@ -94,7 +96,7 @@ struct Coordinates {
   }
   [[nodiscard]] bool as_they_are() const { return !local && metres == stream::Point3{1, 1, 1}; }
   [[nodiscard]] std::string name() const {
-    return crs.epsg != 0 ? "EPSG:" + std::to_string(crs.epsg) : crs.name;
+    return crs.epsg != 0 ? fmt::format("EPSG:{}", crs.epsg) : crs.name;
   }
   [[nodiscard]] std::string horizontal_unit() const {
     if (!crs.horizontal_unit.empty()) return plural_unit(crs.horizontal_unit);
@@ -116,7 +118,7 @@ struct Coordinates {
   double widest_error = 0;  ///< relative error of lengths from west to east
 };
 
-std::string note_in_metres(const Coordinates& here) {
+stream::Message note_in_metres(const Coordinates& here) {
   const std::string name = here.name().empty() ? "" : " of " + here.name();
   const std::string back = "; asset.extras says how to get the coordinates" + name + " back";
   if (!here.local && here.metres[0] == 1) {
@@ -131,20 +133,22 @@ std::string note_in_metres(const Coordinates& here) {
                                   : here.heights_too()) +
            back;
   }
-  std::string note = "in metres, as glTF asks, east and north of " +
-                     readable_number(here.middle[0], 10) + ", " +
-                     readable_number(here.middle[1], 10) + name;
+  stream::Message note =
+      fmt::format("in metres, as glTF asks, east and north of {}, {}{}",
+                  readable_number(here.middle[0], 10), readable_number(here.middle[1], 10), name);
   if (here.widest_error >= 0.001) {
-    note += "; lengths from west to east are exact there and off by up to " +
-            readable_number(100 * here.widest_error, 2) + " % at the border";
+    note += fmt::format(
+        "; lengths from west to east are exact there and off by up to {} % at the border",
+        readable_number(100 * here.widest_error, 2));
     if (here.widest_error >= 0.01) {
-      note += " (a projection, as `to_crs`" + here.projection() + ", is more accurate)";
+      note +=
+          stream::message(" (a projection, as {to_crs}{}, is more accurate)", here.projection());
     }
   }
   return note + here.heights_too() + "; asset.extras says how to get the coordinates back";
 }
 
-std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
+stream::Message note_as_they_are(const Coordinates& here, const MeshUnits& units) {
   const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-3;
   if (!here.known || (!here.local && same)) return {};
   std::string heights = units.height_unit.empty() ? here.crs.vertical_unit : units.height_unit;
@@ -153,12 +157,15 @@ std::string note_as_they_are(const Coordinates& here, const MeshUnits& units) {
                                ? here.horizontal_unit()
                                : "metres of a map that stretches lengths to " +
                                      readable_number(1 / here.metres[0]) + " times";
-  return "x and y are " + what + " and heights " + plural_unit(heights) +
-         ", which most programs read as one unit; " +
-         // A conversion leaves heights as they are.
-         (metres_in_unit(heights) == 1.0 ? "pass `to_crs`" + here.projection() + " for metres, or "
-                                         : std::string()) +
-         "write GLB, which is in metres";
+  // A conversion leaves heights as they are.
+  const stream::Message convert =
+      metres_in_unit(heights) == 1.0
+          ? stream::message("pass {to_crs}{} for metres, or ", here.projection())
+          : "";
+  return stream::message(
+      "x and y are {} and heights {}, which most programs read as one unit; {}write GLB, which is "
+      "in metres",
+      what, plural_unit(heights), convert);
 }
 
 }  // namespace
@@ -187,7 +194,7 @@ MeshCoordinates mesh_coordinates(const std::string& path, const stream::WriterOp
     if (here.local) out.origin = {here.middle[0], here.middle[1], 0};
     out.note = note_in_metres(here);
   }
-  if (!out.note.empty()) out.note = path + ": " + out.note;
+  if (!out.note.empty()) out.note = stream::message("{}: {}", path, out.note);
   return out;
 }
 

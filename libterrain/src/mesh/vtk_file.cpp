@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstring>
 
+#include <fmt/core.h>
+
 #include "base/file_marks.hpp"
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
@@ -30,9 +32,9 @@ void write_vtk(const std::string& path, std::span<const stream::Point3> position
                std::span<const std::array<std::uint32_t, 4>> tetrahedra,
                const stream::WriterOptions& options) {
   stream::AtomicFile file(path, options.replace);
-  std::string bytes = "# vtk DataFile Version 3.0\n" + std::string(kWriterMark) +
-                      "\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS " +
-                      std::to_string(positions.size()) + " double\n";
+  std::string bytes = fmt::format(
+      "# vtk DataFile Version 3.0\n{}\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n",
+      kWriterMark, positions.size());
   const auto flush = [&](std::size_t done) {
     if (done % kVtkPiece != 0) return;
     if (options.stop.stop_requested()) throw stream::Stopped();
@@ -42,19 +44,18 @@ void write_vtk(const std::string& path, std::span<const stream::Point3> position
   for (std::size_t i = 0; i < positions.size(); flush(++i)) {
     for (const double c : positions[i]) append(bytes, c);
   }
-  bytes += "\nCELLS " + std::to_string(tetrahedra.size()) + ' ' +
-           std::to_string(5 * tetrahedra.size()) + '\n';
+  bytes += fmt::format("\nCELLS {} {}\n", tetrahedra.size(), 5 * tetrahedra.size());
   for (std::size_t t = 0; t < tetrahedra.size(); flush(++t)) {
     append(bytes, std::int32_t{4});
     for (const std::uint32_t corner : tetrahedra[t]) {
       append(bytes, static_cast<std::int32_t>(corner));
     }
   }
-  bytes += "\nCELL_TYPES " + std::to_string(tetrahedra.size()) + '\n';
+  bytes += fmt::format("\nCELL_TYPES {}\n", tetrahedra.size());
   constexpr std::int32_t kTetrahedron = 10;
   for (std::size_t t = 0; t < tetrahedra.size(); flush(++t)) append(bytes, kTetrahedron);
-  bytes += "\nPOINT_DATA " + std::to_string(levels.size()) +
-           "\nSCALARS level unsigned_char 1\nLOOKUP_TABLE default\n";
+  bytes += fmt::format("\nPOINT_DATA {}\nSCALARS level unsigned_char 1\nLOOKUP_TABLE default\n",
+                       levels.size());
   for (const std::uint8_t level : levels) bytes += static_cast<char>(level);
   bytes += '\n';
   file.write(bytes);

@@ -31,12 +31,12 @@ void for_each_wanted_entity(
       [&](stream::ClusterId, const stream::ClusterPoints& points, std::size_t i,
           const stream::Point3&) {
         if (visited++ >= most) {
-          throw stream::Error({.file = store.path().string(),
-                               .cause = "the detail wants more than the " + std::to_string(most) +
-                                        " " + std::string(stream::name_of(entities)) +
-                                        " that fit into `memory_bytes` " +
-                                        std::to_string(memory_bytes >> 20) + "M",
-                               .remedy = "choose a coarser `level` or a smaller `region`"});
+          throw stream::Error(
+              store.path().string(),
+              stream::message(
+                  "the detail wants more than the {} {} that fit into {memory_bytes} {}M", most,
+                  stream::name_of(entities), memory_bytes >> 20))
+              .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
         }
         const auto record = std::span(points.payload).subspan(i * record_bytes, record_bytes);
         corners[0] = points.positions[i];

@@ -28,9 +28,9 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
     return make_point_sampler(std::move(cloud), options, context);
   }
   if (options.max_edge) {
-    throw UsageError(
-        "`max_edge` is for irregular points and coarser levels: rasters mark missing data "
-        "explicitly");
+    throw UsageError(stream::message(
+        "{max_edge} is for irregular points and coarser levels: rasters mark missing data "
+        "explicitly"));
   }
   return make_lattice_sampler(store.with_stop(context.stop), options, context);
 }

@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "terrace/stream/axis_names.hpp"
 #include "terrace/stream/error.hpp"
@@ -96,27 +98,24 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
     return static_cast<unsigned char>(c) < ' ' && c != '\t' && c != '\r';
   });
   if (json || binary || text.starts_with('<')) {
-    throw stream::Error({.file = file,
-                         .cause = std::string("is ") +
+    throw stream::Error(file, std::string("is ") +
                                   (json     ? "JSON"
                                    : binary ? "not text"
                                             : "XML") +
-                                  ", not a table of places",
-                         .remedy = "give CSV; 'ogr2ogr -f CSV -lco GEOMETRY=AS_XY out.csv " + file +
-                                   "' converts what GDAL can read"});
+                                  ", not a table of places")
+        .remedy("give CSV; 'ogr2ogr -f CSV -lco GEOMETRY=AS_XY out.csv " + file +
+                "' converts what GDAL can read");
   }
   if (has_decimal_commas(first_line)) {
-    throw stream::Error({.file = file,
-                         .where = "the first line",
-                         .cause = "has numbers with a decimal comma",
-                         .remedy = "write numbers with a decimal point"});
+    throw stream::Error(file, "has numbers with a decimal comma")
+        .at("the first line")
+        .remedy("write numbers with a decimal point");
   }
   if (const std::size_t at = first_line.find_first_of(",;\t"); at != std::string_view::npos) {
     layout.separator = first_line[at];
   } else {
-    throw stream::Error({.file = file,
-                         .cause = "the first line has only one column",
-                         .remedy = "give x and y with a comma, a semicolon or a tab between them"});
+    throw stream::Error(file, "the first line has only one column")
+        .remedy("give x and y with a comma, a semicolon or a tab between them");
   }
   const auto cells_of = [&layout](std::string_view line) {
     std::vector<std::string_view> cells;
@@ -134,11 +133,11 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
       for (char& c : name) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c;
     }
     if (!columns) {
-      throw stream::Error({.file = file,
-                           .where = "the first line",
-                           .cause = "the header names no x and y column",
-                           .remedy = "name the columns x and y, or lon and lat; without a header, "
-                                     "the first two are x and y"});
+      throw stream::Error(file, "the header names no x and y column")
+          .at("the first line")
+          .remedy(
+              "name the columns x and y, or lon and lat; without a header, "
+              "the first two are x and y");
     }
   } else {
     comment.remove_prefix(std::min(comment.find_first_not_of("# "), comment.size()));
@@ -182,10 +181,9 @@ bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most
   }
   if (batch.begins.empty()) {
     if (window.empty()) return false;
-    throw stream::Error({.file = name(),
-                         .where = "line " + std::to_string(line_),
-                         .cause = "is longer than any line of a table",
-                         .remedy = "give a text file with one place a line"});
+    throw stream::Error(name(), "is longer than any line of a table")
+        .at_line(line_)
+        .remedy("give a text file with one place a line");
   }
   batch.text.assign(window.substr(0, end));
   batch.begins.push_back(end);
@@ -207,14 +205,12 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
     if (column != layout.x && column != layout.y) continue;
     const std::optional<double> value = number_in(cell);
     if (!value) {
-      throw stream::Error({.file = file,
-                           .where = "line " + std::to_string(line_number),
-                           .cause = "'" + std::string(cell.substr(0, 40)) + "' is not a coordinate",
-                           .remedy = cell.find(',') != cell.npos
-                                         ? "write numbers with a decimal point"
-                                         : "coordinates are plain numbers, in column " +
-                                               std::to_string(layout.x + 1) + " and column " +
-                                               std::to_string(layout.y + 1)});
+      throw stream::Error(file, fmt::format("'{}' is not a coordinate", cell.substr(0, 40)))
+          .at_line(line_number)
+          .remedy(cell.find(',') != cell.npos
+                      ? "write numbers with a decimal point"
+                      : fmt::format("coordinates are plain numbers, in column {} and column {}",
+                                    layout.x + 1, layout.y + 1));
     }
     place[column == layout.x ? 0 : 1] = *value;
     ++cells;
@@ -225,10 +221,9 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
     ++cells;
   }
   if (cells < 2) {
-    throw stream::Error({.file = file,
-                         .where = "line " + std::to_string(line_number),
-                         .cause = "has fewer columns than the first line",
-                         .remedy = "give x and y in every line"});
+    throw stream::Error(file, "has fewer columns than the first line")
+        .at_line(line_number)
+        .remedy("give x and y in every line");
   }
   return place;
 }

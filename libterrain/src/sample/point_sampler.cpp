@@ -241,11 +241,12 @@ class PointSampler final : public HeightSampler {
         static_cast<double>(kReadBytes) + part.points * static_cast<double>(kBytesPerExpected);
     const std::uint64_t needed =
         2 * std::max(memory_ + (std::uint64_t{1} << 20), static_cast<std::uint64_t>(bytes));
-    throw stream::Error({.file = cloud_.store.path().string(),
-                         .cause = "more than " + counted(room_, "point") +
-                                  " are close together, too many for `memory_bytes`",
-                         .remedy = "give " + std::to_string((needed >> 20) + 1) +
-                                   "M of memory or more, or a coarser `level`"});
+    throw stream::Error(
+        cloud_.store.path().string(),
+        stream::message("more than {} are close together, too many for {memory_bytes}",
+                        counted(room_, "point")))
+        .remedy(stream::message("give {}M of memory or more, or a coarser {level}",
+                                (needed >> 20) + 1));
   }
 
   void answer_along(CloudWorker& worker, const StoredBox& box, Numbers numbers,

@@ -87,9 +87,10 @@ class ProfileRun {
       }
     }
     if (!(rows > kMostRows)) return;
-    throw UsageError(std::string(request_.step ? "`step` is too small" : "the line is too long") +
-                     ": the profile would have more than " +
-                     counted(static_cast<std::uint64_t>(kMostRows), "row"));
+    throw UsageError(stream::message(
+        "{}: the profile would have more than {}",
+        request_.step ? stream::message("{step} is too small") : "the line is too long",
+        counted(static_cast<std::uint64_t>(kMostRows), "row")));
   }
 
   /// Adds a point every `step` metres of the leg.

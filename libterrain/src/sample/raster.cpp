@@ -210,11 +210,12 @@ class RasterRun {
     const std::uint64_t memory = working_memory(context_);
     if (table <= memory / 2) return memory - table;
     throw stream::Error(
-        {.file = request_.output,
-         .cause = "a raster of " + with_commas(grid_.columns) + " x " + with_commas(grid_.rows) +
-                  " cells needs " + readable_bytes(kProcessBytes + 2 * table) +
-                  " of memory, `memory_bytes` allows " + readable_bytes(context_.memory_or(0)),
-         .remedy = "give a larger `cell` or a smaller `region`"});
+        request_.output,
+        stream::message("a raster of {} x {} cells needs {} of memory, {memory_bytes} allows {}",
+                        with_commas(grid_.columns), with_commas(grid_.rows),
+                        readable_bytes(kProcessBytes + 2 * table),
+                        readable_bytes(context_.memory_or(0))))
+        .remedy(stream::message("give a larger {cell} or a smaller {region}"));
   }
 
   [[nodiscard]] bool shaded() const { return request_.value == RasterValue::hillshade; }

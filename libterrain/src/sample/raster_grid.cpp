@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/source.hpp>
@@ -64,9 +65,9 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
     if (std::isfinite(p[0]) && std::isfinite(p[1])) result.include(stream::Point3{p[0], p[1], 0});
   }
   if (result.empty()) {
-    throw stream::Error({.file = store.path().string(),
-                         .cause = "the region has no image in " + change.to().title(),
-                         .remedy = "choose another `to_crs` or a smaller `region`"});
+    throw stream::Error(store.path().string(),
+                        fmt::format("the region has no image in {}", change.to().title()))
+        .remedy(stream::message("choose another {to_crs} or a smaller {region}"));
   }
   return result;
 }
@@ -97,8 +98,9 @@ double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned
 
 std::uint32_t count_of(double cells) {
   if (!(cells <= kMostGridCells)) {
-    throw UsageError("`cell` is too small: a side of the raster would have " +
-                     plain_number(std::ceil(cells)) + " cells");
+    throw UsageError(
+        stream::message("{cell} is too small: a side of the raster would have {} cells",
+                        plain_number(std::ceil(cells))));
   }
   return static_cast<std::uint32_t>(std::max(1.0, cells));
 }
@@ -119,37 +121,40 @@ struct CellRange {
 
 RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
                         const Context& context) {
-  if (request.cell) throw UsageError("`align` gives the cells: leave `cell` out");
+  if (request.cell) throw UsageError(stream::message("{align} gives the cells: leave {cell} out"));
   need_level(store, request.sampler.level);
   stream::SourceOptions options;
   options.stop = context.stop;
   const stream::SourceInfo info =
       stream::open_source(std::span(&request.align, 1), options)->info();
-  const auto refuse = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = request.align, .cause = cause, .remedy = remedy});
-  };
+
   const std::array<double, 6>& m = info.world.xy;
-  if (!info.grid) refuse("is not a raster, and has no grid to align with", "name a raster");
+  if (!info.grid) {
+    throw stream::Error(request.align, "is not a raster, and has no grid to align with")
+        .remedy("name a raster");
+  }
   if (m[1] != 0 || m[3] != 0) {
-    refuse("is rotated, which the output does not support", "align with a raster that is north up");
+    throw stream::Error(request.align, "is rotated, which the output does not support")
+        .remedy("align with a raster that is north up");
   }
   const std::optional<CoordinateSystem> theirs = crs_of_source(info).system;
   const std::optional<CoordinateSystem> own =
       CoordinateSystem::of(store.schema().crs, store.path().string());
   if (theirs && own && !theirs->same_places(*own)) {
     if (request.to && !request.to->to().same_places(*theirs)) {
-      throw UsageError("`align` uses the CRS of " + request.align + ", " + theirs->title() +
-                       ": leave `to_crs` out");
+      throw UsageError(stream::message("{align} uses the CRS of {}, {}: leave {to_crs} out",
+                                       request.align, theirs->title()));
     }
     if (!request.to) {
       request.to.emplace(system_of(store), *theirs);
       if (!request.to->note().empty()) context.say(request.to->note());
     }
   } else if (request.to) {
-    throw UsageError("`align` uses the CRS of " + request.align + ": leave `to_crs` out");
+    throw UsageError(
+        stream::message("{align} uses the CRS of {}: leave {to_crs} out", request.align));
   } else if (theirs.has_value() != own.has_value()) {
-    context.say(request.align + ": its grid is read in the CRS of the store, because " +
-                (theirs ? "that of the store" : "its own") + " is not known");
+    context.say(fmt::format("{}: its grid is read in the CRS of the store, because {} is not known",
+                            request.align, theirs ? "that of the store" : "its own"));
   }
   return {.x = m[2],
           .y = m[5],
@@ -226,10 +231,9 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     }
   }
   if (!(cell > 0) || !std::isfinite(cell)) {
-    throw stream::Error(
-        {.file = store.path().string(),
-         .cause = "all points are at one place or on one line, so no cell size follows",
-         .remedy = "give `cell`"});
+    throw stream::Error(store.path().string(),
+                        "all points are at one place or on one line, so no cell size follows")
+        .remedy(stream::message("give {cell}"));
   }
   grid.step_x = cell;
   grid.step_y = -cell;

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/available_memory.hpp"
@@ -85,7 +86,7 @@ class Answers {
               places_[i] = place_of(batch.line(i), *layout_, file_.name(), batch.first_line + i);
               if (!(std::abs(places_[i][1]) > conversions.most_latitude)) continue;
               check_latitudes({&places_[i], 1}, conversions.most_latitude, file_.name(),
-                              "line " + std::to_string(batch.first_line + i));
+                              fmt::format("line {}", batch.first_line + i));
             }
             const std::span<Point2> here(places_.data() + piece * kLines,
                                          end_of(piece) - piece * kLines);
@@ -138,7 +139,7 @@ class Answers {
     const std::vector<std::string>& names = layout_->names;
     std::string unused = name;
     for (int i = 2; std::find(names.begin(), names.end(), unused) != names.end(); ++i) {
-      unused = name + "_" + std::to_string(i);
+      unused = fmt::format("{}_{}", name, i);
     }
     return unused;
   }

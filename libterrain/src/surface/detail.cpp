@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/base/ordered_work.hpp>
 
 #include "base/store_checks.hpp"
@@ -46,9 +47,9 @@ void note_idle_focuses(const stream::Store& store, const Detail& detail, const C
   const stream::Box3 all = world_box(store.schema(), store.whole().bounds());
   for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
     if (detail.reaches_into(detail.focuses[i].region, all)) continue;
-    const std::string which = detail.focuses.size() > 1 ? " " + std::to_string(i + 1) : "";
-    context.say("`focus`" + which + " is outside the store and adds no points: they have " +
-                extent_text(store.whole()));
+    const std::string which = detail.focuses.size() > 1 ? fmt::format(" {}", i + 1) : "";
+    context.say(stream::message("{focus}{} is outside the store and adds no points: they have {}",
+                                which, extent_text(store.whole())));
   }
 }
 
@@ -74,12 +75,12 @@ class Descent {
         heads_(store.top()) {
     const unsigned level = stream::level_of(first_);
     if (level > store.top() || stream::ordinal_of(first_) >= store.levels()[level].clusters) {
-      throw UsageError("the store has no cluster " + std::to_string(level) + ":" +
-                       std::to_string(stream::ordinal_of(first_)));
+      throw UsageError(
+          fmt::format("the store has no cluster {}:{}", level, stream::ordinal_of(first_)));
     }
     if (level < finest_) {
-      throw UsageError("`cluster`: a cluster of level " + std::to_string(level) +
-                       " has no points of level " + std::to_string(finest_));
+      throw UsageError(stream::message("{cluster}: a cluster of level {} has no points of level {}",
+                                       level, finest_));
     }
   }
 

@@ -26,7 +26,7 @@ Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
   need_level(store, level);
   if (!std::isfinite(near.xy[0]) || !std::isfinite(near.xy[1]) ||
       !std::isfinite(near.z.value_or(0))) {
-    throw UsageError("`near` needs finite coordinates");
+    throw UsageError(stream::message("{near} needs finite coordinates"));
   }
   const stream::StoreSchema& schema = store.schema();
   check_latitudes({&near.xy, 1}, most_latitude(schema.crs), store.path().string());
@@ -55,7 +55,7 @@ std::vector<stream::FoundPoint> nearest_points(stream::StoreQuery& query, const 
 std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query, const NearPlace& place,
                                               double radius, unsigned level) {
   if (!(radius >= 0.0) || !std::isfinite(radius)) {
-    throw UsageError("`radius` must be 0 or more");
+    throw UsageError(stream::message("{radius} must be 0 or more"));
   }
   const Local here = local(query.store(), place, level);
   return query.within(here.place, radius, here.metric, level);

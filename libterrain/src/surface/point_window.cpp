@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
@@ -71,10 +72,11 @@ void PointWindow::check_memory(std::size_t more) const {
                                open_tree_.memory_bytes();
   if (memory_bytes_ == 0 || needed <= memory_bytes_) return;
   throw NoRoom({.file = cloud_.store.path().string(),
-                .cause = "a window of at least " + counted(around + inserted, "point") + " needs " +
-                         std::to_string((needed >> 20) + 1) + "M of memory, " +
-                         std::to_string(memory_bytes_ >> 20) + "M are allowed for it",
-                .remedy = "give more `memory_bytes`, fewer `threads`, or a coarser `level`"});
+                .cause = fmt::format(
+                    "a window of at least {} needs {}M of memory, {}M are allowed for it",
+                    counted(around + inserted, "point"), (needed >> 20) + 1, memory_bytes_ >> 20),
+                .remedy = stream::message(
+                    "give more {memory_bytes}, fewer {threads}, or a coarser {level}")});
 }
 
 void PointWindow::take(const stream::StoreQuery::Node& node) {

@@ -187,11 +187,10 @@ StoreFill::StoreFill(const stream::Store& store) {
         }
       });
   if (std::all_of(weight.begin(), weight.end(), [](double w) { return w == 0.0; })) {
-    throw stream::Error({.file = store.path().string(),
-                         .cause = raster ? "no sample has data, so nothing can be filled"
-                                         : "no point has a height, so there is nothing to tile",
-                         .remedy = raster ? "check the source's nodata value"
-                                          : "check the source's third coordinate"});
+    throw stream::Error(store.path().string(),
+                        raster ? "no sample has data, so nothing can be filled"
+                               : "no point has a height, so there is nothing to tile")
+        .remedy(raster ? "check the source's nodata value" : "check the source's third coordinate");
   }
   grid_.emplace(columns, rows, std::move(sum), std::move(weight));
 }

@@ -177,7 +177,7 @@ std::uint64_t value_of_option(const std::string& name, const std::string& text,
   try {
     return parse(text);
   } catch (const UsageError& error) {
-    throw UsageError(name + ": " + error.what());
+    throw UsageError(stream::message("{}: {}", name, error.message()));
   }
 }
 
@@ -323,6 +323,9 @@ std::string stopped_message(std::string_view verb_name) {
 
 /// Returns the message to show. Those of the standard library are of little use to users.
 std::string message_of(const std::exception& error) {
+  if (const auto* fault = dynamic_cast<const stream::Error*>(&error)) {
+    return option_text(fault->message());
+  }
   if (dynamic_cast<const std::bad_alloc*>(&error) != nullptr) {
     return "out of memory; give a smaller --memory or a smaller input";
   }
@@ -432,10 +435,10 @@ int run_command_line(int argc, const char* const* argv) {
   } catch (const stream::ClosedPipe&) {
     return kDone;
   } catch (const UsageError& error) {
-    print_message(with_option_names(error.what()));
+    print_message(option_text(error.message()));
     return kWrongUsage;
   } catch (const std::invalid_argument& error) {  // a library rejected a parameter
-    print_message(with_option_names(error.what()));
+    print_message(error.what());
     return kWrongUsage;
   } catch (const std::exception& error) {
     // A wait, read or write that Ctrl-C interrupted is not a failure.
@@ -443,7 +446,7 @@ int run_command_line(int argc, const char* const* argv) {
       print_message(stopped_message(argc > 1 ? argv[1] : ""));
       return kInterrupted;
     }
-    print_message(with_option_names(message_of(error)));
+    print_message(message_of(error));
     return kFailed;
   }
 }

@@ -65,7 +65,7 @@ struct CommonOptions {
   /// and at least 64 MiB. From 64 MiB on, the order of a raster's cells does not depend on it.
   [[nodiscard]] std::uint64_t reading_memory(std::uint64_t parts = 1) const;
   /// Prints a message on standard error, unless -q is given.
-  void say(const std::string& line) const;
+  void say(const stream::Message& line) const;
   /// Prints an explanation on standard error, only with -v.
   void explain(const std::string& line) const;
   /// Returns the context for the libraries: progress and notes go to standard error, and Ctrl-C

@@ -44,8 +44,8 @@ std::uint64_t CommonOptions::reading_memory(std::uint64_t parts) const {
   return std::max(kLeast, (memory - std::min(memory, kProgramMemory)) / parts);
 }
 
-void CommonOptions::say(const std::string& line) const {
-  if (!quiet) print_message(with_option_names(line));
+void CommonOptions::say(const stream::Message& line) const {
+  if (!quiet) print_message(option_text(line));
 }
 
 void CommonOptions::explain(const std::string& line) const {
@@ -66,7 +66,7 @@ Context CommonOptions::context() const {
           .memory_bytes = memory_bytes,
           .stop = stop_token(),
           .progress = show,
-          .note = [this](const std::string& line) { say(line); }};
+          .note = [this](const stream::Message& line) { say(line); }};
 }
 
 }  // namespace terrace::tools

@@ -3,14 +3,14 @@
 
 #include <algorithm>
 #include <array>
-#include <cstddef>
+#include <string_view>
 #include <utility>
 
 namespace terrace::tools {
 namespace {
 
-/// Pairs of a parameter and its option. tests/layout checks that every parameter that libterrain
-/// names is listed.
+/// Pairs of a parameter and its option. tests/layout checks that every parameter that the libraries
+/// name in messages is listed.
 constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"align", "--align"},
     {"band", "--band"},
@@ -59,23 +59,12 @@ constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_
 
 }  // namespace
 
-std::string with_option_names(std::string_view message) {
-  std::string text;
-  for (std::size_t begin = message.find('`'); begin != std::string_view::npos;
-       begin = message.find('`')) {
-    text += message.substr(0, begin);
-    message.remove_prefix(begin + 1);
-    const std::string_view name = message.substr(0, message.find('`'));
+std::string option_text(const stream::Message& message) {
+  return message.text([](std::string_view name) {
     const auto* const option = std::find_if(kOptions.begin(), kOptions.end(),
                                             [&](const auto& row) { return row.first == name; });
-    if (option == kOptions.end() || name.size() == message.size()) {
-      text += '`';
-      continue;
-    }
-    text += option->second;
-    message.remove_prefix(name.size() + 1);
-  }
-  return text += message;
+    return std::string(option == kOptions.end() ? name : option->second);
+  });
 }
 
 }  // namespace terrace::tools

@@ -2,12 +2,13 @@
 #pragma once
 
 #include <string>
-#include <string_view>
+
+#include <terrace/stream/message.hpp>
 
 namespace terrace::tools {
 
-/// Returns a libterrain message with parameter names in backquotes (`memory_bytes`) replaced by the
-/// options that set them (--memory). Other text in backquotes stays. O(length).
-std::string with_option_names(std::string_view message);
+/// Returns the text of a library's message with the options that set its parameters (--memory for
+/// memory_bytes).
+std::string option_text(const stream::Message& message);
 
 }  // namespace terrace::tools

@@ -139,8 +139,8 @@ class Maker {
     const std::uint64_t table = stream::geotiff_table_bytes(tiff);
     if (table <= memory_bytes / 4) return tiff;
     throw std::runtime_error(
-        fmt::format("a raster of {} x {} cells needs {} of memory, `memory_bytes` allows {}; give "
-                    "a smaller --size or more --memory",
+        fmt::format("a raster of {} x {} cells needs {} of memory, --memory allows {}; give a "
+                    "smaller --size or more --memory",
                     with_commas(tiff.columns), with_commas(tiff.rows), readable_bytes(4 * table),
                     readable_bytes(memory_bytes)));
   }

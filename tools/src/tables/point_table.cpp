@@ -108,7 +108,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     table.payload.insert(table.payload.end(), block.payload.begin(), block.payload.end());
   });
   table.nodata = source->progress().nodata;
-  if (const std::string note = voids.note(); !note.empty()) common.say(note);
+  if (const stream::Message note = voids.note(); !note.empty()) common.say(note);
   if (table.nodata > 0 && !table.info.grid) {
     common.context().say(counted(table.nodata, "point") +
                          " without a coordinate are left out: point numbers do not count them");

@@ -112,7 +112,7 @@ class ConvertCommand : public Command {
     if (!lost.empty()) common.say(lost);
     tell_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
-    if (const std::string note = voids.note(); !note.empty()) common.say(note);
+    if (const stream::Message note = voids.note(); !note.empty()) common.say(note);
     damage.tell(common.context());
 
     Summary summary;

@@ -197,7 +197,7 @@ Contents stream_through(stream::PointSource& source, const CommonOptions& common
     contents.points += block.size();
     voids.add(block);
   });
-  contents.comment = with_option_names(voids.note());
+  contents.comment = option_text(voids.note());
   contents.nodata = source.progress().nodata;
   contents.empty_values = source.progress().empty_values;
   contents.withheld = source.progress().withheld;
@@ -267,7 +267,7 @@ SourceCrs crs_with_note(const stream::SourceInfo& info) {
   } catch (const stream::Error& error) {
     SourceCrs crs;
     crs.crs = info.crs;
-    crs.note = error.what();
+    crs.note = error.message();
     return crs;
   }
 }
@@ -348,7 +348,7 @@ std::string text_of_files(const stream::SourceInfo& info, const Contents& conten
     text += "withheld:  " + with_commas(contents.withheld) + " of them\n";
   }
   text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
-  if (!crs.note.empty()) text += "note:      " + printable_line(with_option_names(crs.note)) + '\n';
+  if (!crs.note.empty()) text += "note:      " + printable_line(option_text(crs.note)) + '\n';
   if (const std::string vertical = vertical_of(crs); !vertical.empty()) {
     text += "vertical:  " + vertical + '\n';
   }

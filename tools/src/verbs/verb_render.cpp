@@ -178,7 +178,7 @@ PictureInput from_source(const std::string& path, stream::HeightsOfColour colour
       }
     }
   });
-  if (const std::string note = voids.note(); !note.empty()) common.say(note);
+  if (const stream::Message note = voids.note(); !note.empty()) common.say(note);
   if (grid) {
     input.mesh = grid->mesh();
     input.terrain = true;

@@ -223,7 +223,7 @@ OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node,
         name_,
         fmt::format("{} are in one place, more than a node of COPC can have in this memory: {}",
                     counted(count, "point"), most_together_))
-        .remedy("raise `memory_bytes`, leave them out, or write LAZ");
+        .remedy(message("raise {memory_bytes}, leave them out, or write LAZ"));
   }
   NodePoints points = load(node, std::move(bucket));
   sort(points.items, node.depth);

@@ -66,7 +66,7 @@ char GeoJsonItems::at(std::size_t place) {
   if (place >= most_bytes_) {
     throw Error(input_->name(), fmt::format("a feature has more than {} MiB", most_bytes_ >> 20))
         .at_byte(input_->offset())
-        .remedy("raise `memory_bytes`, or split the feature's lines");
+        .remedy(message("raise {memory_bytes}, or split the feature's lines"));
   }
   window_ = input_->fill(std::min(most_bytes_, std::max(place + 1, 2 * window_.size())));
   return place < window_.size() ? window_[place] : '\0';

@@ -236,14 +236,14 @@ std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOpt
   const HeightsOfColour colours = options.heights_of_colour;
   if (!grey && colours == HeightsOfColour::none) {
     throw grid_fault(file, "is a colour picture, not a height map")
-        .remedy(
-            "if its colours encode heights, set `heights_of_colour` to mapbox or terrarium; "
+        .remedy(message(
+            "if its colours encode heights, set {heights_of_colour} to mapbox or terrarium; "
             "otherwise "
-            "look for the GeoTIFF");
+            "look for the GeoTIFF"));
   }
   if (colours != HeightsOfColour::none &&
       (grey || image.bits == 16 || image.colour_type == PNG_COLOR_TYPE_GRAY_ALPHA)) {
-    throw grid_fault(file, "has no 8-bit colours").remedy("leave `heights_of_colour` out");
+    throw grid_fault(file, "has no 8-bit colours").remedy(message("leave {heights_of_colour} out"));
   }
   const ScalarType type = !grey              ? ScalarType::u32
                           : image.bits == 16 ? ScalarType::u16

@@ -377,7 +377,7 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
     throw Error(name,
                 "the record of its coordinate reference system (an EVLR) follows the points, so it "
                 "cannot be read from a pipe")
-        .remedy("name the file, or the system: `crs` EPSG:n");
+        .remedy(message("name the file, or the system: {crs} EPSG:n"));
   }
   return recorded_crs(header, comments);
 }

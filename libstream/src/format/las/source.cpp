@@ -82,8 +82,9 @@ class LasOpener {
     open_nodes();
     if (stream_.info.octree) return;
     if (wanted.resolution > 0) {
-      throw Error(stream_.input->name(), "it has no octree, so `resolution` does not apply")
-          .remedy("name a COPC file, not piped, or EPT, or leave `resolution` out");
+      throw Error(stream_.input->name(),
+                  message("it has no octree, so {resolution} does not apply"))
+          .remedy(message("name a COPC file, not piped, or EPT, or leave {resolution} out"));
     }
     if (header_.compressed) {
       stream_.records = open_laz_records(*stream_.input, file_, header_, options_);
@@ -113,7 +114,8 @@ class LasOpener {
       stream_.info.format = "copc";
     } catch (const Error& error) {
       if (wanted.resolution > 0) throw;
-      stream_.info.comments.push_back("read in the order of the file: " + error.parts().cause);
+      stream_.info.comments.push_back("read in the order of the file: " +
+                                      error.parts().cause.text());
     }
   }
 

@@ -87,7 +87,7 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
     throw Error(
         path, fmt::format("writing LAZ with {} per point needs {}M of memory, more than it may use",
                           counted(vlr.record_length(), "byte"), (2 * chunk >> 20) + 1))
-        .remedy("raise `memory_bytes`");
+        .remedy(message("raise {memory_bytes}"));
   }
   const std::uint64_t most = chunks < 5 ? 1 : (chunks - 3) / 2;
   return static_cast<unsigned>(std::min<std::uint64_t>(options.threads, most));

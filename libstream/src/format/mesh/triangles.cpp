@@ -119,7 +119,7 @@ class TriangleSource final : public PointSource {
     delivered_ += block.size();
     if (delivered_ + nodata_ == 0) {
       throw Error(info_.files.front(), "has no faces, so it has no triangles")
-          .remedy("read it as points: leave `entities` out");
+          .remedy(message("read it as points: leave {entities} out"));
     }
     return !block.empty();
   }

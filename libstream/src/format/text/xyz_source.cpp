@@ -298,10 +298,10 @@ class XyzSource final : public PointSource {
     throw Error(input_.name(), fmt::format("column {}, {}, is an integer that a double cannot hold",
                                            column + 1, in_quotes(field)))
         .at_line(lines_.number())
-        .remedy(
+        .remedy(message(
             "move this line to the top of the first file, which makes the column 64-bit integers "
             "if all its values are integers and none is missing, or "
-            "leave the column out (`drop` of build and convert)");
+            "leave the column out ({drop} of build and convert)"));
   }
 
   /// Reads a line with fields that are empty, in quotes, or text that is not needed.
@@ -350,14 +350,15 @@ class XyzSource final : public PointSource {
         if (!real) {
           return line_fault(fmt::format("{} an integer that fits into {}, as the previous ones do",
                                         cause, name_of(types_[i])))
-              .remedy("correct it, or leave the column out (`drop` of build and convert)");
+              .remedy(message("correct it, or leave the column out ({drop} of build and convert)"));
         }
         return line_fault(cause + " a number that fits into a double")
-            .remedy(field.find(',') != field.npos ? "write numbers with a decimal point"
-                    : coordinate
-                        ? "write numbers, or nothing or NA for missing values"
-                        : "write numbers, or nothing or NA for missing values, or leave the "
-                          "column out (`drop` of build and convert)");
+            .remedy(
+                field.find(',') != field.npos ? "write numbers with a decimal point"
+                : coordinate
+                    ? "write numbers, or nothing or NA for missing values"
+                    : message("write numbers, or nothing or NA for missing values, or leave the "
+                              "column out ({drop} of build and convert)"));
       }
       if (coordinate && std::isinf(value)) {
         return line_fault(fmt::format("{} is {}, but a coordinate must be finite", column, field))

@@ -337,7 +337,7 @@ class Store::ConditionView final : public Store::View {
     if (bounds_.empty()) {
       throw Error(view.path().string(),
                   "no point meets the condition " + in_quotes(condition_.text()))
-          .remedy("give another `where`");
+          .remedy(message("give another {where}"));
     }
     return bounds_;
   }

@@ -5,8 +5,9 @@
 #include <functional>
 #include <optional>
 #include <stop_token>
-#include <string>
 #include <string_view>
+
+#include <terrace/stream/message.hpp>
 
 namespace terrace::terrain {
 
@@ -27,13 +28,13 @@ struct Context {
   /// Called from time to time, by one thread at a time; an exception from it ends the work.
   std::function<void(const Progress&)> progress{};
   /// Receives what the user should know about the result, such as an assumption that was made.
-  std::function<void(const std::string&)> note{};
+  std::function<void(const stream::Message&)> note{};
 
   /// Returns memory_bytes if set. Otherwise returns `standard` bytes, limited to the available
   /// memory; if `standard` is 0, half of the available memory.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
   /// Calls note, if it is set.
-  void say(const std::string& line) const;
+  void say(const stream::Message& line) const;
   /// Throws: stream::Stopped if a stop was requested.
   void check_stop() const;
 };

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <terrace/base/stop_check.hpp>
+#include <terrace/stream/message.hpp>
 #include <terrace/stream/point.hpp>
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/store.hpp>
@@ -167,7 +168,7 @@ class Transformation {
 /// Returns the CRS of a store. Throws: stream::Error if it has none, if it is unknown, or if a
 /// latitude is beyond a pole. otherwise: a remedy to suggest for stores without a CRS, in addition
 /// to naming it when the store is built.
-CoordinateSystem system_of(const stream::Store& store, const std::string& otherwise = {});
+CoordinateSystem system_of(const stream::Store& store, const stream::Message& otherwise = {});
 
 /// Converts from a store's CRS to another, named as for CoordinateSystem::parse(), by the best
 /// operation for the store's area. shift: belongs to the system whose datum does not count as WGS

@@ -9,6 +9,7 @@
 
 #include <terrace/stream/mesh_reader.hpp>
 #include <terrace/stream/mesh_writer.hpp>
+#include <terrace/stream/message.hpp>
 #include <terrace/stream/point.hpp>
 #include <terrace/stream/point_writer.hpp>
 #include <terrace/stream/schema.hpp>
@@ -68,7 +69,7 @@ struct MeshCoordinates {
   stream::Point3 origin{};  ///< origin of the file's scene in the coordinates, if it has a frame
   /// What the user should know about the coordinates in the file, whose name it contains; empty if
   /// there is nothing to report.
-  std::string note{};
+  stream::Message note{};
 };
 
 /// For a mesh within `bounds` in the file that stream::open_mesh_writer() writes.

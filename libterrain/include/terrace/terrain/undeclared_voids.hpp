@@ -7,6 +7,7 @@
 #include <mutex>
 #include <string>
 
+#include <terrace/stream/message.hpp>
 #include <terrace/stream/source.hpp>
 
 namespace terrace::terrain {
@@ -22,7 +23,7 @@ class UndeclaredVoids {
   /// Adds a block with heights in stored coordinates. Thread-safe.
   void add(const stream::PointBlock& block);
   /// Returns the note; empty if no such height was added.
-  [[nodiscard]] std::string note() const;
+  [[nodiscard]] stream::Message note() const;
 
  private:
   static constexpr std::size_t kUsual = 8;
@@ -36,8 +37,8 @@ class UndeclaredVoids {
   [[nodiscard]] double height(double stored) const {
     return stored * info_.coordinates[2].scale + info_.coordinates[2].offset;
   }
-  [[nodiscard]] std::string note_of(std::uint64_t count, double stored,
-                                    const std::string& heights) const;
+  [[nodiscard]] stream::Message note_of(std::uint64_t count, double stored,
+                                        const std::string& heights) const;
 
   const stream::SourceInfo& info_;
   std::mutex mutex_;

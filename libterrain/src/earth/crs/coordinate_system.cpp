@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <GeographicLib/Math.hpp>
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 
 #include "base/units.hpp"
@@ -44,21 +45,20 @@ DatumChange change_between(const CrsDefinition& from, const CrsDefinition& to,
   try {
     return {from, to, area};
   } catch (const CrsError& error) {
-    throw stream::Error(
-        {.file = {}, .where = from.title(), .cause = error.what(), .remedy = error.remedy()});
+    throw stream::Error("", error.what()).at(from.title()).remedy(error.remedy());
   }
 }
 
 [[noreturn]] void fail_without_way(const CoordinateSystem& from, const std::string& to,
                                    const DatumChange& change) {
   throw stream::Error(
-      {.file = {},
-       .cause = "the CRS " + from.title() + " has the datum " + from.definition().datum +
-                ", and no operation leads from it to " + to +
-                (change.better().empty() ? "" : ": " + change.better()),
-       .remedy = std::string(change.better().empty() ? "" : "install that grid, or ") +
-                 "give `shift` dx,dy,dz[,rx,ry,rz,ds] here or when the store is built, or convert "
-                 "the data to a system on WGS 84, ETRS89 or NAD83 first"});
+      "", fmt::format("the CRS {} has the datum {}, and no operation leads from it to {}{}",
+                      from.title(), from.definition().datum, to,
+                      change.better().empty() ? "" : ": " + change.better()))
+      .remedy(
+          stream::message("{}give {shift} dx,dy,dz[,rx,ry,rz,ds] here or when the store is built, "
+                          "or convert the data to a system on WGS 84, ETRS89 or NAD83 first",
+                          change.better().empty() ? "" : "install that grid, or "));
 }
 
 }  // namespace
@@ -97,7 +97,8 @@ auto of_text(const std::string& text, const Function& function) {
   try {
     return function(crs_of_text(text));
   } catch (const CrsError& error) {
-    throw UsageError("'" + text.substr(0, 80) + "': " + error.what() + "; " + error.remedy());
+    throw UsageError(
+        stream::message("'{}': {}; {}", text.substr(0, 80), error.what(), error.remedy()));
   }
 }
 
@@ -134,7 +135,7 @@ std::optional<CoordinateSystem> CoordinateSystem::of(const stream::Crs& crs,
     if (!definition) return std::nullopt;
     return CoordinateSystem(*definition);
   } catch (const CrsError& error) {
-    throw stream::Error({.file = file, .cause = error.what(), .remedy = error.remedy()});
+    throw stream::Error(file, error.what()).remedy(error.remedy());
   }
 }
 
@@ -377,10 +378,10 @@ std::string Transformation::note() const {
 
 std::optional<DatumShift> parse_datum_shift(const std::string& text) {
   if (text.empty()) return std::nullopt;
-  const std::vector<double> numbers = parse_numbers(text, "`shift`");
+  const std::vector<double> numbers = parse_numbers(text, stream::message("{shift}"));
   if (numbers.size() != 3 && numbers.size() != 7) {
-    throw UsageError("`shift` takes three or seven numbers, dx,dy,dz[,rx,ry,rz,ds], not " +
-                     std::to_string(numbers.size()));
+    throw UsageError(stream::message(
+        "{shift} takes three or seven numbers, dx,dy,dz[,rx,ry,rz,ds], not {}", numbers.size()));
   }
   DatumShift shift{};
   std::copy(numbers.begin(), numbers.end(), shift.begin());

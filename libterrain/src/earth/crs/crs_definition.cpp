@@ -11,6 +11,8 @@
 #include <utility>
 #include <variant>
 
+#include <fmt/core.h>
+
 #include "earth/crs/crs_reading.hpp"
 #include "earth/crs/projection_engine.hpp"
 
@@ -46,8 +48,8 @@ std::string bound(const std::string& text, const DatumShift& shift) {
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     // WKT writes the scale as 1 + the difference, because an abridged transformation has no units.
     const double value = i == 6 ? 1 + shift[i] * 1e-6 : shift[i];
-    result += std::string(",PARAMETER[\"") + kNames[i] + "\"," + plain_number(value) +
-              ",ID[\"EPSG\"," + std::to_string(8605 + i) + "]]";
+    result += fmt::format(R"(,PARAMETER["{}",{},ID["EPSG",{}]])", kNames[i], plain_number(value),
+                          8605 + i);
   }
   return result + "]]";
 }
@@ -108,12 +110,13 @@ std::string CrsDefinition::title() const {
 CrsDefinition on_earth(AnyCrs system) {
   if (auto* const definition = std::get_if<CrsDefinition>(&system)) return std::move(*definition);
   const LocalCrs& local = std::get<LocalCrs>(system);
-  const std::string name = "the CRS \"" + local.crs.name + '"';
+  const std::string name = fmt::format("the CRS \"{}\"", local.crs.name);
   if (local.is_geocentric) {
-    throw CrsError(name + " is geocentric, with x, y and z from the centre of the earth",
-                   "convert the points with cs2cs, or name the right CRS: `crs` EPSG:n");
+    throw CrsError(
+        fmt::format("{} is geocentric, with x, y and z from the centre of the earth", name),
+        stream::message("convert the points with cs2cs, or name the right CRS: {crs} EPSG:n"));
   }
-  throw CrsError(name + " is a local one, without a place on the earth",
+  throw CrsError(fmt::format("{} is a local one, without a place on the earth", name),
                  "name a CRS on the earth: EPSG:n");
 }
 

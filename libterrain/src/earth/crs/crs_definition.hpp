@@ -19,13 +19,18 @@ namespace terrace::terrain {
 /// cause.
 class CrsError : public std::runtime_error {
  public:
-  CrsError(const std::string& cause, std::string remedy)
+  CrsError(const std::string& cause, stream::Message remedy)
       : std::runtime_error(cause), remedy_(std::move(remedy)) {}
-  [[nodiscard]] const std::string& remedy() const { return remedy_; }
+  [[nodiscard]] const stream::Message& remedy() const { return remedy_; }
 
  private:
-  std::string remedy_;
+  stream::Message remedy_;
 };
+
+/// Returns the usual remedy for a CRS that cannot be used.
+inline stream::Message remedy_by_code() {
+  return stream::message("name the system by its code: {crs} EPSG:n");
+}
 
 /// PROJ's database was not found, or reading it failed. Then every system looks unknown, which must
 /// not be reported as an unknown system.

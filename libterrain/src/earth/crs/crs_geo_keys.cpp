@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 
 #include "base/units.hpp"
@@ -21,9 +22,7 @@ namespace {
 /// The code that means: defined by the other keys.
 constexpr int kUserDefined = 32767;
 
-[[noreturn]] void fail_geo_keys(const std::string& cause) {
-  throw CrsError(cause, "name the system by its code: `crs` EPSG:n");
-}
+CrsError fault(const std::string& cause) { return {cause, remedy_by_code()}; }
 
 /// The GeoKeys of one file.
 class GeoKeyValues {
@@ -41,7 +40,7 @@ class GeoKeyValues {
     const stream::GeoKey* const found = find(key);
     if (found == nullptr || found->values.empty()) return std::nullopt;
     if (!std::isfinite(found->values.front())) {
-      fail_geo_keys("GeoKey " + std::to_string(key) + " is not finite");
+      throw fault(fmt::format("GeoKey {} is not finite", key));
     }
     return found->values.front();
   }
@@ -49,7 +48,7 @@ class GeoKeyValues {
   [[nodiscard]] int code(int key) const {
     const double value = number(key).value_or(0);
     if (!(value >= 0 && value <= 65535 && value == std::floor(value))) {
-      fail_geo_keys("GeoKey " + std::to_string(key) + " is not a code");
+      throw fault(fmt::format("GeoKey {} is not a code", key));
     }
     return static_cast<int>(value);
   }
@@ -69,18 +68,17 @@ class GeoKeyValues {
     if (unit == 0) return 0;
     if (unit == kUserDefined) {
       if (const auto size = number(key + 1); size && *size > 0) return *size;
-      fail_geo_keys(std::string("its ") + kind + " unit is user-defined and has no size (GeoKey " +
-                    std::to_string(key + 1) + ")");
+      throw fault(
+          fmt::format("its {} unit is user-defined and has no size (GeoKey {})", kind, key + 1));
     }
     double factor = 0;
     const char* category = nullptr;
     const bool known =
-        proj_uom_get_info_from_database(proj_context(), "EPSG", std::to_string(unit).c_str(),
+        proj_uom_get_info_from_database(proj_context(), "EPSG", fmt::format("{}", unit).c_str(),
                                         nullptr, &factor, &category) != 0;
     check_proj_database();
     if (!known || text_of(category) != kind || !(factor > 0)) {
-      fail_geo_keys(std::string("its ") + kind + " unit EPSG:" + std::to_string(unit) +
-                    " is not known");
+      throw fault(fmt::format("its {} unit EPSG:{} is not known", kind, unit));
     }
     return factor;
   }
@@ -183,8 +181,8 @@ std::string part_of(const std::string& citation, std::string_view part) {
 }
 
 ProjObject object_of_code(int code, PJ_CATEGORY category) {
-  ProjObject object(proj_create_from_database(proj_context(), "EPSG", std::to_string(code).c_str(),
-                                              category, 0, nullptr));
+  ProjObject object(proj_create_from_database(
+      proj_context(), "EPSG", fmt::format("{}", code).c_str(), category, 0, nullptr));
   check_proj_database();
   return object;
 }
@@ -200,7 +198,7 @@ ProjObject geographic_of_code(int code) {
 }
 
 ProjObject required(ProjObject object, const std::string& what) {
-  if (object == nullptr) fail_geo_keys(what);
+  if (object == nullptr) throw fault(what);
   return object;
 }
 
@@ -224,7 +222,7 @@ ProjObject base_of(const GeoKeyValues& keys) {
   PJ_CONTEXT* const context = proj_context();
   if (const int code = keys.known_code(2048); code != 0) {
     return required(geographic_of_code(code),
-                    "the geographic CRS EPSG:" + std::to_string(code) + " is not known");
+                    fmt::format("the geographic CRS EPSG:{} is not known", code));
   }
   const std::string citation = keys.text(2049);
   std::string name = part_of(citation, "GCS Name"), datum = part_of(citation, "Datum");
@@ -244,21 +242,19 @@ ProjObject base_of(const GeoKeyValues& keys) {
     } else if (const auto minor = keys.number(2058)) {
       inverse = *minor == major ? 0 : major / (major - *minor);
     } else {
-      fail_geo_keys("its ellipsoid has a size but no shape (GeoKeys 2058, 2059)");
+      throw fault("its ellipsoid has a size but no shape (GeoKeys 2058, 2059)");
     }
   } else if (const int ellipsoid = keys.known_code(2056); ellipsoid != 0) {
-    const ProjObject known =
-        required(object_of_code(ellipsoid, PJ_CATEGORY_ELLIPSOID),
-                 "its ellipsoid EPSG:" + std::to_string(ellipsoid) + " is not known");
+    const ProjObject known = required(object_of_code(ellipsoid, PJ_CATEGORY_ELLIPSOID),
+                                      fmt::format("its ellipsoid EPSG:{} is not known", ellipsoid));
     proj_ellipsoid_get_parameters(context, known.get(), &major, nullptr, nullptr, &inverse);
   } else {
-    fail_geo_keys("its datum is user-defined and has no ellipsoid (GeoKeys 2056 to 2059)");
+    throw fault("its datum is user-defined and has no ellipsoid (GeoKeys 2056 to 2059)");
   }
   double meridian = keys.number(2061).value_or(0);
   if (const int code = keys.known_code(2051); code != 0) {
-    const ProjObject known =
-        required(object_of_code(code, PJ_CATEGORY_PRIME_MERIDIAN),
-                 "its prime meridian EPSG:" + std::to_string(code) + " is not known");
+    const ProjObject known = required(object_of_code(code, PJ_CATEGORY_PRIME_MERIDIAN),
+                                      fmt::format("its prime meridian EPSG:{} is not known", code));
     double unit = base::kRadiansPerDegree;
     proj_prime_meridian_get_parameters(context, known.get(), &meridian, &unit, nullptr);
     if (meridian != 0) meridian *= degrees_of(unit);
@@ -279,11 +275,11 @@ void read_shift(const GeoKeyValues& keys, CrsDefinition& definition) {
   if (shift == nullptr) return;
   DatumShift values{};
   if (shift->values.size() != 3 && shift->values.size() != 7) {
-    fail_geo_keys("GeoKey 2062 is not a shift");
+    throw fault("GeoKey 2062 is not a shift");
   }
   std::copy(shift->values.begin(), shift->values.end(), values.begin());
   for (const double value : values) {
-    if (!std::isfinite(value)) fail_geo_keys("GeoKey 2062 is not finite");
+    if (!std::isfinite(value)) throw fault("GeoKey 2062 is not finite");
   }
   if (definition.base_epsg == 0 || values != DatumShift{}) definition.shift = values;
 }
@@ -312,10 +308,10 @@ ProjObject conversion_by_name(const std::string& name, const GeoKeyValues& keys,
 ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres) {
   if (const int code = keys.known_code(3074); code != 0) {
     return required(object_of_code(code, PJ_CATEGORY_COORDINATE_OPERATION),
-                    "its projection EPSG:" + std::to_string(code) + " is not known");
+                    fmt::format("its projection EPSG:{} is not known", code));
   }
   const int number = keys.code(3075);
-  if (number == 0) fail_geo_keys("its projection has no method (GeoKey 3075)");
+  if (number == 0) throw fault("its projection has no method (GeoKey 3075)");
   const double latitude = value_of(keys, Role::latitude, degrees, metres).value_or(0);
   const bool other =
       (number == 7 && keys.find(3078) != nullptr) || (number == 15 && std::abs(latitude) != 90);
@@ -326,14 +322,13 @@ ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres
     for (const NamedMethod& row : kNamedMethods) {
       if (row.number == number) return conversion_by_name(row.name, keys, degrees, metres);
     }
-    fail_geo_keys("its projection method " + std::to_string(number) +
-                  " (GeoKey 3075) is not known");
+    throw fault(fmt::format("its projection method {} (GeoKey 3075) is not known", number));
   }
   const auto is_role = [&](Role role) { return value_of(keys, role, degrees, metres); };
   std::vector<std::string> codes;
   std::vector<PJ_PARAM_DESCRIPTION> parameters;
   for (const int code : method->parameters) {
-    if (code != 0) codes.push_back(std::to_string(code));
+    if (code != 0) codes.push_back(fmt::format("{}", code));
   }
   for (std::size_t i = 0; i < codes.size(); ++i) {
     const ParameterName& name = *parameter_of_code(method->parameters[i]);
@@ -356,7 +351,7 @@ ProjObject conversion_of(const GeoKeyValues& keys, double degrees, double metres
                       : kind == ParameterKind::length ? PJ_UT_LINEAR
                                                       : PJ_UT_SCALE});
   }
-  const std::string code = std::to_string(method->code);
+  const std::string code = fmt::format("{}", method->code);
   return required(ProjObject(proj_create_conversion(
                       proj_context(), "unnamed", nullptr, nullptr, nullptr, "EPSG", code.c_str(),
                       static_cast<int>(parameters.size()), parameters.data())),
@@ -372,7 +367,7 @@ CrsDefinition definition_of_geo_keys(const stream::Crs& crs) {
   ProjObject whole;
   if (keys.code(1024) != 2) {
     const double metres = keys.metres_per_unit();
-    if (metres == 0) fail_geo_keys("its linear unit is missing (GeoKey 3076)");
+    if (metres == 0) throw fault("its linear unit is missing (GeoKey 3076)");
     const ProjObject conversion = conversion_of(keys, keys.degrees_per_unit(), metres);
     const ProjObject axes(proj_create_cartesian_2D_cs(context, PJ_CART2D_EASTING_NORTHING,
                                                       metres == 1 ? "metre" : "unknown", metres));
@@ -391,26 +386,26 @@ CrsDefinition definition_of_geo_keys(const stream::Crs& crs) {
 
 void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
   const GeoKeyValues keys(crs);
-  const std::string code = "EPSG:" + std::to_string(definition.epsg());
-  const auto contradict = [&code](const std::string& what) {
-    throw ContradictoryCrs("the GeoKeys contradict each other: " + code + " and " + what,
-                           "say which is meant with `crs` EPSG:n");
+  const auto contradiction = [&](const std::string& what) {
+    return ContradictoryCrs(
+        fmt::format("the GeoKeys contradict each other: EPSG:{} and {}", definition.epsg(), what),
+        stream::message("say which is meant with {crs} EPSG:n"));
   };
   const int model = keys.code(1024), projected = keys.known_code(3072);
   if ((model == 1 && definition.geographic) || (model == 2 && !definition.geographic)) {
-    contradict(model == 1 ? "a projected model" : "a geographic model");
+    throw contradiction(model == 1 ? "a projected model" : "a geographic model");
   }
   if (definition.geographic) {
-    if (projected != 0) contradict("the projected CRS EPSG:" + std::to_string(projected));
+    if (projected != 0) throw contradiction(fmt::format("the projected CRS EPSG:{}", projected));
     return;
   }
   const int base = keys.known_code(2048);
   if (base != 0 && definition.base_epsg != 0 && base != definition.base_epsg) {
-    contradict("the geographic CRS EPSG:" + std::to_string(base));
+    throw contradiction(fmt::format("the geographic CRS EPSG:{}", base));
   }
   const double unit = keys.metres_per_unit();
   if (unit != 0 && std::abs(unit / definition.metres_per_unit - 1) > 1e-9) {
-    contradict("the unit of " + std::to_string(unit) + " metres");
+    throw contradiction(fmt::format("the unit of {:f} metres", unit));
   }
   const bool parameters = std::any_of(kRoles.begin(), kRoles.end(), [&keys](const RoleOfKey& row) {
     return keys.number(row.key).has_value();
@@ -442,7 +437,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
                          1e-8 * std::max({1.0, std::abs(given), std::abs(parameter.value)});
     }
     if (known && !good) {
-      contradict("GeoKey " + std::to_string(row.key) + " of " + std::to_string(*value));
+      throw contradiction(fmt::format("GeoKey {} of {:f}", row.key, *value));
     }
   }
 }

@@ -16,8 +16,6 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr char kByCode[] = "name the system by its code: `crs` EPSG:n";
-
 struct Axis {
   std::string direction;
   double unit = 1;  ///< in radians or metres
@@ -36,7 +34,7 @@ std::vector<Axis> axes_of(const PJ* crs) {
     axis.direction = text_of(direction);
     if (!(axis.unit > 0) || !std::isfinite(axis.unit)) {
       throw CrsError("the CRS \"" + text_of(proj_get_name(crs)) + "\" has a unit without a size",
-                     kByCode);
+                     remedy_by_code());
     }
     axes.push_back(axis);
   }
@@ -79,7 +77,7 @@ void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
   if (ellipsoid == nullptr ||
       proj_ellipsoid_get_parameters(context, ellipsoid.get(), &own.semi_major, nullptr, nullptr,
                                     &own.inverse_flattening) == 0) {
-    throw CrsError("the CRS \"" + definition.name + "\" has no ellipsoid", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" has no ellipsoid", remedy_by_code());
   }
   const ProjObject meridian(proj_get_prime_meridian(context, crs));
   double longitude = 0, unit = base::kRadiansPerDegree;
@@ -91,10 +89,11 @@ void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
   if (datum != nullptr) definition.datum = text_of(proj_get_name(datum.get()));
   if (!(own.semi_major > 0 && std::isfinite(own.semi_major) && own.flattening() >= 0 &&
         own.flattening() < 0.5)) {
-    throw CrsError("the CRS \"" + definition.name + "\" has an impossible ellipsoid", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" has an impossible ellipsoid",
+                   remedy_by_code());
   }
   if (!std::isfinite(definition.prime_meridian)) {
-    throw CrsError("the CRS \"" + definition.name + "\" has no prime meridian", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" has no prime meridian", remedy_by_code());
   }
 }
 
@@ -108,7 +107,8 @@ void read_base(const PJ* crs, CrsDefinition& definition) {
   const ProjObject geodetic(proj_crs_get_geodetic_crs(context, crs));
   ProjObject base = geodetic != nullptr ? demoted_to_2d(geodetic.get()) : nullptr;
   if (base == nullptr) {
-    throw CrsError("the CRS \"" + definition.name + "\" has no base geographic CRS", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" has no base geographic CRS",
+                   remedy_by_code());
   }
   definition.base_epsg = epsg_of(base.get());
   if (definition.base_epsg == 0) {
@@ -134,7 +134,9 @@ void read_projected(const PJ* crs, CrsDefinition& definition) {
   PJ_CONTEXT* const context = proj_context();
   definition.geographic = false;
   const std::vector<Axis> axes = axes_of(crs);
-  if (axes.size() < 2) throw CrsError("the CRS \"" + definition.name + "\" has no axes", kByCode);
+  if (axes.size() < 2) {
+    throw CrsError("the CRS \"" + definition.name + "\" has no axes", remedy_by_code());
+  }
   definition.metres_per_unit = metres_of(axes[0].unit);
   const ProjObject conversion(proj_crs_get_coordoperation(context, crs));
   if (conversion == nullptr) return;
@@ -156,12 +158,12 @@ void read_shift(const PJ* bound, CrsDefinition& definition) {
     throw CrsError("the CRS \"" + definition.name +
                        "\" is bound to another by an operation that is not a shift by seven "
                        "parameters",
-                   kByCode);
+                   remedy_by_code());
   }
   for (double& value : shift) {
     if (!std::isfinite(value)) {
       throw CrsError("the CRS \"" + definition.name + "\" has a shift to WGS 84 that is not finite",
-                     kByCode);
+                     remedy_by_code());
     }
     // WKT stores the scale as 1 + the difference; rounding restores the digits lost by that.
     if (std::abs(value) < 1e5) value = std::round(value * 1e9) / 1e9;
@@ -176,7 +178,7 @@ std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition
   const PJ_TYPE type = proj_get_type(crs);
   if (type == PJ_TYPE_BOUND_CRS) {
     const ProjObject source(proj_get_source_crs(context, crs));
-    if (source == nullptr) throw CrsError("the bound CRS has no source", kByCode);
+    if (source == nullptr) throw CrsError("the bound CRS has no source", remedy_by_code());
     auto local = read_horizontal(source.get(), definition);
     if (!local) read_shift(crs, definition);
     return local;
@@ -197,7 +199,7 @@ std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition
   const bool geographic = type == PJ_TYPE_GEOGRAPHIC_2D_CRS || type == PJ_TYPE_GEOGRAPHIC_3D_CRS;
   if (!geographic && type != PJ_TYPE_PROJECTED_CRS) {
     throw CrsError("the CRS \"" + definition.name + "\" is neither geographic nor projected",
-                   kByCode);
+                   remedy_by_code());
   }
   if (geographic && proj_crs_is_derived(context, crs) != 0) {
     throw CrsError("the CRS \"" + definition.name +
@@ -206,7 +208,7 @@ std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition
   }
   const ProjObject plane = demoted_to_2d(crs);
   if (plane == nullptr)
-    throw CrsError("the CRS \"" + definition.name + "\" is incomplete", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" is incomplete", remedy_by_code());
   const std::vector<Axis> axes = axes_of(crs);
   if (axes.size() == 3) {
     definition.heights = Heights::ellipsoidal;
@@ -216,7 +218,8 @@ std::optional<LocalCrs> read_horizontal(const PJ* crs, CrsDefinition& definition
   read_code(crs, definition);
   definition.wkt = wkt_of(plane.get());
   if (definition.wkt.empty()) {
-    throw CrsError("the CRS \"" + definition.name + "\" cannot be written as WKT", kByCode);
+    throw CrsError("the CRS \"" + definition.name + "\" cannot be written as WKT",
+                   remedy_by_code());
   }
   read_base(plane.get(), definition);
   if (!geographic) read_projected(plane.get(), definition);
@@ -284,7 +287,7 @@ void check_code(CrsDefinition& definition) {
   if (!what.empty()) {
     throw ContradictoryCrs("the definition of \"" + definition.name + "\" contradicts its code " +
                                definition.authority + ":" + definition.code + " in " + what,
-                           kByCode);
+                           remedy_by_code());
   }
   take(std::move(known), definition);
 }
@@ -300,11 +303,12 @@ void read_vertical_crs(const PJ* crs, CrsDefinition& definition) {
   const std::string name = text_of(proj_get_name(crs));
   const std::vector<Axis> axes = axes_of(crs);
   if (proj_get_type(crs) != PJ_TYPE_VERTICAL_CRS || axes.empty()) {
-    throw CrsError("the CRS \"" + name + "\" is not a CRS of heights", kByCode);
+    throw CrsError("the CRS \"" + name + "\" is not a CRS of heights", remedy_by_code());
   }
   if (axes[0].direction != "up") {
-    throw CrsError("the vertical CRS \"" + name + "\" measures depths downwards",
-                   "name a CRS of heights, or say what heights refer to with `vertical`");
+    throw CrsError(
+        "the vertical CRS \"" + name + "\" measures depths downwards",
+        stream::message("name a CRS of heights, or say what heights refer to with {vertical}"));
   }
   definition.metres_per_height = metres_of(axes[0].unit);
   if (plain_name(name) == kUnknownHeights) return;
@@ -334,7 +338,7 @@ AnyCrs read_crs(const PJ* crs) {
       vertical(proj_crs_get_sub_crs(context, crs, 1));
   if (horizontal == nullptr || vertical == nullptr) {
     throw CrsError("the compound CRS \"" + text_of(proj_get_name(crs)) + "\" is incomplete",
-                   kByCode);
+                   remedy_by_code());
   }
   if (auto local = read_horizontal(horizontal.get(), definition)) {
     const std::vector<Axis> axes = axes_of(vertical.get());

@@ -12,6 +12,8 @@
 #include <utility>
 #include <variant>
 
+#include <fmt/core.h>
+
 #include "earth/crs/crs_geo_keys.hpp"
 #include "earth/crs/crs_reading.hpp"
 #include "earth/crs/projection_names.hpp"
@@ -35,7 +37,7 @@ int alias_of(int code) {
 /// square of the depth.
 void check_extent(std::string_view text) {
   constexpr int kDeepest = 32, kMostParts = 512;
-  const char* const remedy = "name the system by its code: `crs` EPSG:n";
+  const stream::Message remedy = remedy_by_code();
   if (text.size() > kMostCrsText) {
     throw CrsError("the definition is longer than 64 KiB", remedy);
   }
@@ -234,7 +236,7 @@ CrsDefinition definition_of_arcinfo(const std::string& text) {
     }
   }
   throw CrsError("of ArcInfo's old format only GEOGRAPHIC in DD and UTM in METERS are supported",
-                 "name the system by its code: `crs` EPSG:n");
+                 remedy_by_code());
 }
 
 }  // namespace
@@ -247,7 +249,7 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
   if (code >= kFirstDatum && code < kFirstDatum + static_cast<int>(kOfDatums.size())) {
     code = kOfDatums[static_cast<std::size_t>(code - kFirstDatum)];
   }
-  const ProjObject vertical = proj_crs_of_code("EPSG", std::to_string(code));
+  const ProjObject vertical = proj_crs_of_code("EPSG", fmt::format("{}", code));
   const PJ_TYPE type = vertical == nullptr ? PJ_TYPE_UNKNOWN : proj_get_type(vertical.get());
   // GeoTIFF 1.0 used these codes for heights above ellipsoids; 5030 is WGS 84's. GeoTIFF 1.1 uses
   // the geographic system with heights as third axis, such as 4979.
@@ -261,8 +263,9 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
     return;
   }
   if (type != PJ_TYPE_VERTICAL_CRS) {
-    throw CrsError("the vertical CRS EPSG:" + std::to_string(code) + " is not known",
-                   "name a known one, or say what heights refer to with `vertical`");
+    throw CrsError(
+        fmt::format("the vertical CRS EPSG:{} is not known", code),
+        stream::message("name a known one, or say what heights refer to with {vertical}"));
   }
   forget_heights(definition);
   read_vertical_crs(vertical.get(), definition);
@@ -271,7 +274,7 @@ void set_vertical_epsg(CrsDefinition& definition, int code) {
 void forget_heights(CrsDefinition& definition) {
   if (definition.heights == Heights::ellipsoidal && definition.geographic &&
       !definition.height_wkt.empty() && definition.base_epsg != 0) {
-    definition.code = std::to_string(definition.base_epsg);
+    definition.code = fmt::format("{}", definition.base_epsg);
   }
   definition.heights = Heights::unknown;
   definition.height_wkt.clear();
@@ -281,9 +284,9 @@ void forget_heights(CrsDefinition& definition) {
 }
 
 AnyCrs crs_of_epsg(int code) {
-  const ProjObject crs = proj_crs_of_code("EPSG", std::to_string(alias_of(code)));
+  const ProjObject crs = proj_crs_of_code("EPSG", fmt::format("{}", alias_of(code)));
   if (crs == nullptr) {
-    throw CrsError("the CRS EPSG:" + std::to_string(code) + " is not known",
+    throw CrsError(fmt::format("the CRS EPSG:{} is not known", code),
                    "give another code, or the system's definition as a WKT or PRJ file");
   }
   return read_crs(crs.get());
@@ -299,7 +302,9 @@ std::string contents_of_file(const std::string& name) {
 
 namespace {
 
-constexpr char kCorrect[] = "correct the text, or name the system by its code: `crs` EPSG:n";
+stream::Message remedy_for_text() {
+  return stream::message("correct the text, or name the system by its code: {crs} EPSG:n");
+}
 
 /// Returns nullopt for a text that is not the definition or name of a CRS. Throws: CrsError.
 std::optional<AnyCrs> find_crs(const std::string& text) {
@@ -308,7 +313,7 @@ std::optional<AnyCrs> find_crs(const std::string& text) {
   constexpr std::string_view kInit = "+init=";
   if (plain.starts_with(kInit) && plain.find(' ') == plain.npos) plain.erase(0, kInit.size());
   if (plain == "WGS72") plain = "EPSG:4322";
-  if (plain.empty()) throw CrsError("the definition is empty", kCorrect);
+  if (plain.empty()) throw CrsError("the definition is empty", remedy_for_text());
   check_extent(plain);
   if (is_arcinfo(plain)) return definition_of_arcinfo(plain);
   proj_complaint();
@@ -331,7 +336,8 @@ std::optional<AnyCrs> find_crs(const std::string& text) {
 AnyCrs crs_of_contents(const std::string& text) {
   if (auto system = find_crs(text)) return *std::move(system);
   const std::string why = proj_complaint();
-  throw CrsError("the definition cannot be read" + (why.empty() ? "" : ": " + why), kCorrect);
+  throw CrsError("the definition cannot be read" + (why.empty() ? "" : ": " + why),
+                 remedy_for_text());
 }
 
 AnyCrs crs_of_text(const std::string& text) {
@@ -365,9 +371,9 @@ std::optional<AnyCrs> crs_of_record(const stream::Crs& crs) {
     if (std::holds_alternative<LocalCrs>(system)) return system;
     definition = on_earth(std::move(system));
     if (crs.epsg != 0 && definition.epsg() != 0 && alias_of(crs.epsg) != definition.epsg()) {
-      throw ContradictoryCrs("its CRS is EPSG:" + std::to_string(crs.epsg) + " by code and EPSG:" +
-                                 std::to_string(definition.epsg()) + " by WKT",
-                             "say which is meant with `crs` EPSG:n");
+      throw ContradictoryCrs(
+          fmt::format("its CRS is EPSG:{} by code and EPSG:{} by WKT", crs.epsg, definition.epsg()),
+          stream::message("say which is meant with {crs} EPSG:n"));
     }
   } else if (crs.epsg != 0) {
     AnyCrs system = crs_of_epsg(crs.epsg);
@@ -385,8 +391,8 @@ std::optional<AnyCrs> crs_of_record(const stream::Crs& crs) {
   const auto unit = metres_in_unit(crs.horizontal_unit);
   if (!definition.geographic && unit && std::abs(*unit / definition.metres_per_unit - 1) > 1e-8) {
     throw ContradictoryCrs(
-        "its CRS " + definition.title() + " contradicts its unit, " + crs.horizontal_unit,
-        "say what is meant with `crs` EPSG:n");
+        fmt::format("its CRS {} contradicts its unit, {}", definition.title(), crs.horizontal_unit),
+        stream::message("say what is meant with {crs} EPSG:n"));
   }
   if (const auto height = metres_in_unit(crs.vertical_unit)) {
     definition.metres_per_height = *height;

@@ -63,7 +63,7 @@ class ProjPipeline::Pool {
     if (worker->operation() == nullptr) {
       const std::string why = proj_complaint();
       throw CrsError("PROJ cannot compute '" + definition_ + "'" + (why.empty() ? "" : ": " + why),
-                     "give another CRS with `crs` EPSG:n");
+                     stream::message("give another CRS with {crs} EPSG:n"));
     }
     return worker;
   }

@@ -153,7 +153,7 @@ std::string proj_pipeline_of(const CrsDefinition& definition) {
   const std::string why = proj_complaint();
   throw CrsError("PROJ cannot compute the projection of the CRS " + definition.title() +
                      (why.empty() ? "" : ": " + why),
-                 "give another with `crs` EPSG:n");
+                 stream::message("give another with {crs} EPSG:n"));
 }
 
 std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition) {
@@ -167,7 +167,7 @@ std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition)
     return make_projection(*definition.method, definition.parameters, definition.ellipsoid);
   } catch (const std::invalid_argument& error) {
     throw CrsError("the CRS " + definition.title() + " has no usable projection: " + error.what(),
-                   "give another with `crs` EPSG:n");
+                   stream::message("give another with {crs} EPSG:n"));
   }
 }
 

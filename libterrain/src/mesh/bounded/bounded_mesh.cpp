@@ -20,7 +20,7 @@ namespace {
 
 /// remedy: for a mesh that should have fewer points than its border.
 BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
-                          const BoundedMeshOptions& options, const char* remedy,
+                          const BoundedMeshOptions& options, const stream::Message& remedy,
                           const std::stop_token& stop) {
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;
@@ -43,12 +43,11 @@ BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
     search.run = [&](double bound) { return run(bound, options.max_points); };
     if (!tri::least_error(search)) {
       run(search.range, ~std::uint64_t{0});
-      throw stream::Error(
-          {.file = options.path,
-           .cause = "`max_points` " + std::to_string(options.max_points) +
-                    " is too few: even a flat mesh of this region, with its border, takes " +
-                    std::to_string(result.vertices),
-           .remedy = remedy});
+      throw stream::Error(options.path,
+                          stream::message("{max_points} {} is too few: even a flat mesh of this "
+                                          "region, with its border, takes {}",
+                                          options.max_points, result.vertices))
+          .remedy(remedy);
     }
   }
   if (result.samples == 0 && (options.region || store.condition() != nullptr))
@@ -70,13 +69,15 @@ BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMe
   say_unknown_height_unit(Ground(store.schema()), context);
   const stream::Store source = store.with_stop(context.stop);
   if (store.schema().grid) {
-    const char* const remedy = options.fill == Fill::none
-                                   ? "allow more points, or `fill` cells without data"
-                                   : "allow more points";
+    const stream::Message remedy =
+        options.fill == Fill::none
+            ? stream::message("allow more points, or {fill} cells without data")
+            : "allow more points";
     return mesh_by(RasterMesher(source, options, context), store, options, remedy, context.stop);
   }
   if (options.fill != Fill::none) {
-    throw UsageError("`fill` is for rasters: irregular points have no cells without data");
+    throw UsageError(
+        stream::message("{fill} is for rasters: irregular points have no cells without data"));
   }
   return mesh_by(PointMesher(source, options, context), store, options, "allow more points",
                  context.stop);

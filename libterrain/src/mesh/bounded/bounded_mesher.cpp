@@ -71,10 +71,11 @@ Aim BoundedMesher::aim_within(double bound) const {
   const double sure = bound * (bends() ? 7.0 / 8.0 : 15.0 / 16.0) - moved[2];
   if (options_.max_points > 0) return {std::max(first, 0.0), std::max(sure, 0.0), HUGE_VAL};
   if (!(sure >= 0.0)) {
-    throw stream::Error({.file = options_.path,
-                         .cause = "its format rounds heights by up to " +
-                                  readable_number(moved[2]) + ", too much for this `max_error`",
-                         .remedy = "write PLY, which is exact"});
+    throw stream::Error(
+        options_.path,
+        stream::message("its format rounds heights by up to {}, too much for this {max_error}",
+                        readable_number(moved[2])))
+        .remedy("write PLY, which is exact");
   }
   return {first, sure, bound};
 }
@@ -83,12 +84,11 @@ unsigned BoundedMesher::threads_within_memory(std::uint64_t each, std::uint64_t 
                                               const std::string& purpose) const {
   const std::uint64_t memory = context_.memory_or(0);
   if (memory < shared + each) {
-    throw stream::Error({.file = store_.path().string(),
-                         .cause = "a mesh with a bound needs " +
-                                  std::to_string(((shared + each) >> 20) + 1) + "M of memory" +
-                                  purpose + ", `memory_bytes` allows " +
-                                  std::to_string(memory >> 20) + "M",
-                         .remedy = "allow more"});
+    throw stream::Error(
+        store_.path().string(),
+        stream::message("a mesh with a bound needs {}M of memory{}, {memory_bytes} allows {}M",
+                        ((shared + each) >> 20) + 1, purpose, memory >> 20))
+        .remedy("allow more");
   }
   return static_cast<unsigned>(std::min<std::uint64_t>(
       context_.threads, (memory - shared) / std::max<std::uint64_t>(each, 1)));

@@ -31,10 +31,9 @@ void read_back(stream::AtomicFile& file, std::uint64_t count, const std::stop_to
     piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(kSpoolPiece, count - at)));
     const auto bytes = std::as_writable_bytes(std::span(piece));
     if (file.read_at(at * sizeof(T), bytes) != bytes.size()) {
-      throw stream::Error({.file = file.target().string(),
-                           .where = "byte " + std::to_string(at * sizeof(T)),
-                           .cause = "a temporary file was truncated while in use",
-                           .remedy = "check the disk and run again"});
+      throw stream::Error(file.target().string(), "a temporary file was truncated while in use")
+          .at_byte(at * sizeof(T))
+          .remedy("check the disk and run again");
     }
     take(std::span<const T>(piece));
   }
@@ -54,9 +53,9 @@ MeshSpool::MeshSpool(const std::string& path)
 
 void MeshSpool::add_vertices(std::span<const stream::Point3> positions) {
   if (positions.size() > std::numeric_limits<std::uint32_t>::max() - vertices_) {
-    throw stream::Error({.file = vertex_file_.target().string(),
-                         .cause = "the mesh has more than 4,294,967,295 vertices",
-                         .remedy = "mesh smaller regions, or allow a larger error"});
+    throw stream::Error(vertex_file_.target().string(),
+                        "the mesh has more than 4,294,967,295 vertices")
+        .remedy("mesh smaller regions, or allow a larger error");
   }
   vertex_file_.write(std::as_bytes(positions));
   vertices_ += positions.size();

@@ -316,10 +316,9 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
       got = file_.read_at(std::uint64_t{number} * bytes.size(), bytes);
     }
     if (got != bytes.size()) {
-      throw stream::Error({.file = file_.target().string(),
-                           .where = "byte " + std::to_string(number * bytes.size()),
-                           .cause = "a temporary file was truncated while in use",
-                           .remedy = "check the disk and run again"});
+      throw stream::Error(file_.target().string(), "a temporary file was truncated while in use")
+          .at_byte(number * bytes.size())
+          .remedy("check the disk and run again");
     }
     take(chunk);
   }
@@ -333,9 +332,9 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
   StreamingHull hull;
   const auto add = [&](const stream::Point3& p) {
     if (!(std::abs(p[0]) < kLargest && std::abs(p[1]) < kLargest && std::abs(p[2]) < kLargest)) {
-      throw stream::Error({.file = store.path().string(),
-                           .cause = "a point has a coordinate that is not finite or exceeds 1e100",
-                           .remedy = "leave it out of the store, or of the `region`"});
+      throw stream::Error(store.path().string(),
+                          "a point has a coordinate that is not finite or exceeds 1e100")
+          .remedy(stream::message("leave it out of the store, or of the {region}"));
     }
     if (scan.samples % scan.period == 0) {
       if (scan.some.size() == kMostPlaces) {

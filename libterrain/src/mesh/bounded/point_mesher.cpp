@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/base/ordered_work.hpp>
 #include <terrace/stream/error.hpp>
 
@@ -215,15 +216,16 @@ stream::Error PointMesher::shared_places_error() const {
     }
   }
   return stream::Error(
-      {.file = store_.path().string(),
-       .cause = counted(shared.places, "place", "has", "have") +
-                " several samples with heights that differ by up to " +
-                readable_number(shared.range * metres_vertical()) + " m (at " +
-                plain_number(shared.widest[0]) + ", " + plain_number(shared.widest[1]) + ")",
-       .remedy = options_.duplicates == tri::PointDuplicates::kAll
-                     ? "set `duplicates` to min, max, mean or first to choose one, or allow "
-                       "a larger `max_error`"
-                     : "choose one with `duplicates`"});
+             store_.path().string(),
+             fmt::format("{} several samples with heights that differ by up to {} m (at {}, {})",
+                         counted(shared.places, "place", "has", "have"),
+                         readable_number(shared.range * metres_vertical()),
+                         plain_number(shared.widest[0]), plain_number(shared.widest[1])))
+      .remedy(options_.duplicates == tri::PointDuplicates::kAll
+                  ? stream::message(
+                        "set {duplicates} to min, max, mean or first to choose one, or allow "
+                        "a larger {max_error}")
+                  : stream::message("choose one with {duplicates}"));
 }
 
 BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,

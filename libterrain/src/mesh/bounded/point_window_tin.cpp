@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/predicates.hpp>
 
@@ -208,9 +209,6 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
                           const stream::MeshRounding& rounding, const stream::Store& store,
                           bool may_miss) {
   store.check_stop();
-  const auto fail = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = store.path().string(), .cause = cause, .remedy = remedy});
-  };
   const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
   MeshSamples left;
   const MeshSamples* taken = &samples;
@@ -228,7 +226,7 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
     SharedPlaces shared;
     if (refuse) shared.add(samples);
     if (shared.places > 0) throw SamplesShareAPlace{};
-    fail(error.what(), "check the store's points");
+    throw stream::Error(source, error.what()).remedy("check the store's points");
   }
   const bool all = options.tin.duplicates == tri::PointDuplicates::kAll;
   if (all && tin.duplicate_range > options.tin.max_error) throw SamplesShareAPlace{};
@@ -258,10 +256,13 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
   const bool missed = exact && tin.errors.uncovered > 0 && !out.triangles.empty();
   const bool beyond = errors.largest > options.bound;
   if (missed || (beyond && !may_miss)) {
-    fail(missed ? "the mesh leaves out samples"
-                : "the mesh misses its bound: " + plain_number(errors.largest) + " of " +
-                      plain_number(options.bound),
-         exact ? "this is a fault of terrace, please report it" : "write PLY, which is exact");
+    throw stream::Error(
+        store.path().string(),
+        missed ? "the mesh leaves out samples"
+               : fmt::format("the mesh misses its bound: {} of {}", plain_number(errors.largest),
+                             plain_number(options.bound)))
+        .remedy(exact ? "this is a fault of terrace, please report it"
+                      : "write PLY, which is exact");
   }
   return out;
 }

@@ -110,11 +110,11 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
     : BoundedMesher(store, options, context), whole_(lattice_of(store, options.region)) {
   if (whole_.columns < 2 || whole_.rows < 2) {
     if (options.region) {
-      throw UsageError("`region`: it does not meet the raster of the store");
+      throw UsageError(stream::message("{region}: it does not meet the raster of the store"));
     }
-    throw stream::Error({.file = store.path().string(),
-                         .cause = "the raster is one line of samples, so it has no triangles",
-                         .remedy = "use a profile or its points instead of a mesh"});
+    throw stream::Error(store.path().string(),
+                        "the raster is one line of samples, so it has no triangles")
+        .remedy("use a profile or its points instead of a mesh");
   }
   const bool interpolates = options.fill == Fill::interpolate;
   threads_ =

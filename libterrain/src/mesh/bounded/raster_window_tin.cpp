@@ -8,6 +8,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/point_tin.hpp>
@@ -271,8 +272,8 @@ void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) cons
   options_.places(std::span<stream::Point3>(read));
   for (tri::Point3& p : read) p = rounding_(p);
   if (!turn_back(read, tin.triangles)) {
-    fail(tin, "triangles would be inverted in the other CRS",
-         "write the mesh in the store's CRS, or choose another `to_crs`");
+    throw fault(tin, "triangles would be inverted in the other CRS")
+        .remedy(stream::message("write the mesh in the store's CRS, or choose another {to_crs}"));
   }
   std::vector<stream::Point3> moved;
   moved.reserve(samples.heights.size());
@@ -299,35 +300,31 @@ void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) cons
   if (errors.covered > 0) tin.check.rms_error = errors.rms;
 }
 
-void WindowMesher::fail(const WindowTin& tin, const std::string& cause,
-                        const std::string& remedy) const {
-  throw stream::Error({.file = store_.path().string(),
-                       .where = "window at column " + std::to_string(tin.window.column) + ", row " +
-                                std::to_string(tin.window.row),
-                       .cause = cause,
-                       .remedy = remedy});
+stream::Error WindowMesher::fault(const WindowTin& tin, std::string cause) const {
+  return stream::Error(store_.path().string(), std::move(cause))
+      .at(fmt::format("window at column {}, row {}", tin.window.column, tin.window.row));
 }
 
 void WindowMesher::require_sound(const WindowTin& tin) const {
   const bool exact = rounding_.largest() == stream::Point3{};
   if (options_.places.has_effect() && tin.check.max_error > options_.bound &&
       !(exact && tin.check.max_error <= tin.rounding_of_errors())) {
-    fail(tin,
-         "the mesh misses its bound in the other CRS: " + plain_number(tin.check.max_error) +
-             " of " + plain_number(options_.bound),
-         "allow a larger `max_error`, or write the mesh in the store's CRS");
+    throw fault(tin, fmt::format("the mesh misses its bound in the other CRS: {} of {}",
+                                 plain_number(tin.check.max_error), plain_number(options_.bound)))
+        .remedy(
+            stream::message("allow a larger {max_error}, or write the mesh in the store's CRS"));
   }
   if (tin.check.max_error > options_.bound &&
       !(exact && tin.check.max_error <= tin.rounding_of_errors())) {
     if (exact) {
-      fail(tin,
-           "the mesh misses its bound: " + plain_number(tin.check.max_error) + " of " +
-               plain_number(options_.bound),
-           "this is a fault of terrace, please report it");
+      throw fault(tin, fmt::format("the mesh misses its bound: {} of {}",
+                                   plain_number(tin.check.max_error), plain_number(options_.bound)))
+          .remedy("this is a fault of terrace, please report it");
     }
-    fail(tin,
-         "the numbers of the file's format are too coarse for this bound so far from its origin",
-         "write PLY, which is exact, or a smaller `region`");
+    throw fault(
+        tin,
+        "the numbers of the file's format are too coarse for this bound so far from its origin")
+        .remedy(stream::message("write PLY, which is exact, or a smaller {region}"));
   }
   require_no_holes(tin);
 }
@@ -335,9 +332,9 @@ void WindowMesher::require_sound(const WindowTin& tin) const {
 void WindowMesher::require_no_holes(const WindowTin& tin) const {
   const bool exact = rounding_.largest() == stream::Point3{} || options_.places.has_effect();
   if (tin.check.nodata_covered > 0 || tin.check.uncovered_inner > 0 || tin.check.inverted > 0) {
-    fail(tin, "the mesh covers cells without data, leaves out cells with data, or folds",
-         exact ? "this is a fault of terrace, please report it"
-               : "write PLY, which is exact, or a smaller `region`");
+    throw fault(tin, "the mesh covers cells without data, leaves out cells with data, or folds")
+        .remedy(exact ? "this is a fault of terrace, please report it"
+                      : stream::message("write PLY, which is exact, or a smaller {region}"));
   }
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <terrace/stream/error.hpp>
 #include <terrace/stream/mesh_writer.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
@@ -88,8 +89,7 @@ class WindowMesher {
   template <class T>
   void measure_moved(const Samples<T>& samples, WindowTin& tin) const;
   /// Throws: stream::Error.
-  [[noreturn]] void fail(const WindowTin& tin, const std::string& cause,
-                         const std::string& remedy) const;
+  [[nodiscard]] stream::Error fault(const WindowTin& tin, std::string cause) const;
   /// Throws: stream::Error if a reader of the file would see an error beyond the bound, or a hole.
   void require_sound(const WindowTin& tin) const;
   void require_no_holes(const WindowTin& tin) const;

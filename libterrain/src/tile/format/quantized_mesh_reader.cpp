@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstring>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
@@ -18,17 +19,17 @@ class Reader {
 
   [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
 
-  [[noreturn]] void fail(const std::string& what) const {
-    throw stream::Error({.file = name_,
-                         .where = "byte " + std::to_string(at_),
-                         .cause = what,
-                         .remedy = "the tile is damaged: make it again"});
+  [[nodiscard]] stream::Error fault(std::string cause) const {
+    return stream::Error(name_, std::move(cause))
+        .at_byte(at_)
+        .remedy("the tile is damaged: make it again");
   }
   // Call before allocating memory for the values.
   void need(std::uint64_t count, std::size_t size, const char* what) const {
     if (count > left() / size) {
-      fail(std::to_string(count) + " " + what + " of " + counted(size, "byte") + ", but only " +
-           counted(left(), "byte") + (left() == 1 ? " is" : " are") + " left");
+      throw fault(fmt::format("{} {} of {}, but only {} {} left", count, what,
+                              counted(size, "byte"), counted(left(), "byte"),
+                              left() == 1 ? "is" : "are"));
     }
   }
   template <class T>
@@ -41,7 +42,7 @@ class Reader {
   }
   double finite(const char* what) {
     const auto value = get<double>(what);
-    if (!std::isfinite(value)) fail(std::string(what) + " is not finite");
+    if (!std::isfinite(value)) throw fault(fmt::format("{} is not finite", what));
     return value;
   }
   stream::Point3 point(const char* what) {
@@ -71,7 +72,7 @@ std::vector<std::uint16_t> read_column(Reader& in, std::size_t count, const char
   for (std::uint16_t& out : values) {
     const unsigned code = in.get<std::uint16_t>(what);
     value += static_cast<int>(code >> 1) ^ -static_cast<int>(code & 1);
-    if (value < 0 || value > kTileUnits) in.fail(std::string(what) + " outside 0 to 32767");
+    if (value < 0 || value > kTileUnits) throw in.fault(fmt::format("{} outside 0 to 32767", what));
     out = static_cast<std::uint16_t>(value);
   }
   return values;
@@ -86,10 +87,10 @@ void read_triangles(Reader& in, TileMesh& mesh) {
   for (auto& triangle : mesh.triangles) {
     for (std::uint32_t& vertex : triangle) {
       const auto code = std::uint32_t{in.get<Index>("index")};
-      if (code > highest) in.fail("index before the first vertex");
+      if (code > highest) throw in.fault("index before the first vertex");
       vertex = highest - code;
       if (code == 0) ++highest;
-      if (vertex >= mesh.size()) in.fail("index beyond the last vertex");
+      if (vertex >= mesh.size()) throw in.fault("index beyond the last vertex");
     }
   }
 }
@@ -101,7 +102,7 @@ std::vector<std::uint32_t> read_edge(Reader& in, std::size_t vertices) {
   std::vector<std::uint32_t> list(count);
   for (std::uint32_t& vertex : list) {
     vertex = in.get<Index>("edge vertex");
-    if (vertex >= vertices) in.fail("edge vertex beyond the last vertex");
+    if (vertex >= vertices) throw in.fault("edge vertex beyond the last vertex");
   }
   return list;
 }
@@ -120,17 +121,18 @@ void read_extension(Reader& in, TileMesh& mesh) {
   in.need(length, 1, "bytes of an extension");
   switch (static_cast<TileExtension>(id)) {
     case TileExtension::oct_normals:
-      if (!mesh.normals.empty()) in.fail("duplicate normals");
-      if (length != 2 * mesh.size()) in.fail("normals for another number of vertices");
+      if (!mesh.normals.empty()) throw in.fault("duplicate normals");
+      if (length != 2 * mesh.size()) throw in.fault("normals for another number of vertices");
       for (std::size_t i = 0; i < mesh.size(); ++i) {
         const auto code = in.get<std::array<std::uint8_t, 2>>("normal");
         mesh.normals.push_back(oct_decode(code));
       }
       return;
     case TileExtension::water_mask:
-      if (!mesh.water.empty()) in.fail("duplicate water mask");
-      if (length != 1 && length != kWaterCells)
-        in.fail("a water mask that has neither 1 nor 65536 bytes");
+      if (!mesh.water.empty()) throw in.fault("duplicate water mask");
+      if (length != 1 && length != kWaterCells) {
+        throw in.fault("a water mask that has neither 1 nor 65536 bytes");
+      }
       for (std::size_t i = 0; i < length; ++i) {
         mesh.water.push_back(in.get<std::uint8_t>("water mask"));
       }
@@ -138,7 +140,7 @@ void read_extension(Reader& in, TileMesh& mesh) {
     case TileExtension::metadata: {
       const auto size = in.get<std::uint32_t>("length of the metadata");
       if (length < sizeof(size) || size != length - sizeof(size)) {
-        in.fail("metadata and its extension have different lengths");
+        throw in.fault("metadata and its extension have different lengths");
       }
       const auto text = in.take(size);
       mesh.metadata.assign(reinterpret_cast<const char*>(text.data()), text.size());
@@ -160,7 +162,7 @@ DecodedTile decode_tile(std::span<const std::byte> bytes, const std::string& nam
   mesh.lowest = in.get<float>("lowest height");
   mesh.highest = in.get<float>("highest height");
   if (!std::isfinite(mesh.lowest) || !std::isfinite(mesh.highest) || mesh.lowest > mesh.highest) {
-    in.fail("lowest and highest height are not finite and in order");
+    throw in.fault("lowest and highest height are not finite and in order");
   }
   tile.header.sphere.centre = in.point("centre of the bounding sphere");
   tile.header.sphere.radius = in.finite("radius of the bounding sphere");

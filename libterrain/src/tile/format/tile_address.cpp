@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include <fmt/core.h>
+
 #include "base/units.hpp"
 #include "tile/format/ellipsoid.hpp"
 
@@ -36,8 +38,7 @@ std::optional<std::uint32_t> take_number(std::string_view& text, char end) {
 }  // namespace
 
 std::string tile_path(const TileAddress& tile) {
-  return std::to_string(tile.zoom) + "/" + std::to_string(tile.x) + "/" + std::to_string(tile.y) +
-         ".terrain";
+  return fmt::format("{}/{}/{}.terrain", tile.zoom, tile.x, tile.y);
 }
 
 std::optional<TileAddress> parse_tile_path(const std::string& path) {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <iterator>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <terrace/stream/error.hpp>
 
@@ -30,7 +31,7 @@ TileRange range_from(const Json& json, unsigned zoom) {
                         count_from(json.at("endX")), count_from(json.at("endY"))};
   if (range.x0 > range.x1 || range.y0 > range.y1 || range.x1 >= tile_columns(zoom) ||
       range.y1 >= tile_rows(zoom)) {
-    throw std::runtime_error("a range of available tiles outside zoom " + std::to_string(zoom));
+    throw std::runtime_error(fmt::format("a range of available tiles outside zoom {}", zoom));
   }
   return range;
 }
@@ -145,17 +146,14 @@ TileLayer read_layer(const std::string& path) {
   constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;  // for a fragmented coverage
   const auto json = json_of_file(path, kMostBytes, "make the tiles again");
   if (!json) {
-    throw stream::Error({.file = path,
-                         .cause = "cannot be read",
-                         .remedy = "name the folder of a finished tile set"});
+    throw stream::Error(path, "cannot be read").remedy("name the folder of a finished tile set");
   }
   try {
     return layer_from(*json);
   } catch (const std::exception& error) {
-    throw stream::Error(
-        {.file = path,
-         .cause = std::string("does not describe a supported tile set: ") + error.what(),
-         .remedy = "make the tiles again"});
+    throw stream::Error(path,
+                        std::string("does not describe a supported tile set: ") + error.what())
+        .remedy("make the tiles again");
   }
 }
 

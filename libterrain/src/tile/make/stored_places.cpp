@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 
@@ -201,9 +202,8 @@ void StoredPlaces::find_bounds(const std::string& file, bool is_lattice) {
   }
   if (!(all.min[0] <= all.max[0]) || (is_lattice && !std::isfinite(lattice_spacing()))) {
     throw stream::Error(
-        {.file = file,
-         .cause = "cannot be converted to longitude and latitude with " + crs_.title(),
-         .remedy = "rebuild the store with the right `crs`"});
+        file, fmt::format("cannot be converted to longitude and latitude with {}", crs_.title()))
+        .remedy(stream::message("rebuild the store with the right {crs}"));
   }
   // Between the sampled places, the border of a projected box may bulge by part of a step.
   if (!crs_.is_geographic()) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
@@ -49,10 +50,12 @@ class SourceOf final : public TileSource {
 /// In metres above the ellipsoid; nullopt: heights are interpolated from surrounding heights.
 std::optional<double> flat_height(const stream::Store& store, const TilesRequest& request,
                                   double metres_per_unit) {
-  if (request.fill == Fill::none) throw UsageError("`fill` none: globes have no holes");
+  if (request.fill == Fill::none) {
+    throw UsageError(stream::message("{fill} none: globes have no holes"));
+  }
   if (request.fill == Fill::interpolate) return std::nullopt;
   if (request.flat_height && !(std::abs(*request.flat_height) <= kFarthest)) {
-    throw UsageError("`fill` flat: heights beyond 10,000 km are not on a globe");
+    throw UsageError(stream::message("{fill} flat: heights beyond 10,000 km are not on a globe"));
   }
   const stream::Channel& z = store.schema().coordinates[2];
   const double lowest = (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
@@ -65,11 +68,12 @@ void check_heights(const stream::Store& store, double metres) {
   for (const stream::Point3& end : {store.bounds().min, store.bounds().max}) {
     const double height = (end[2] * z.scale + z.offset) * metres;
     if (std::abs(height) <= kFarthest) continue;
-    throw stream::Error({.file = store.path().string(),
-                         .cause = "has heights of " + plain_number(height) +
-                                  " m: heights beyond 10,000 km are not on a globe",
-                         .remedy = "check the unit and the nodata value of the source, or leave "
-                                   "wrong heights out: `where` 'z < 9000'"});
+    throw stream::Error(
+        store.path().string(),
+        fmt::format("has heights of {} m: heights beyond 10,000 km are not on a globe",
+                    plain_number(height)))
+        .remedy(stream::message("check the unit and the nodata value of the source, or leave "
+                                "wrong heights out: {where} 'z < 9000'"));
   }
 }
 
@@ -78,11 +82,9 @@ void check_heights(const stream::Store& store, double metres) {
 TileResources tile_resources(const Context& context, const std::string& path) {
   const std::uint64_t memory = context.memory_or(0);
   if (memory < kBytesBeside + kBytesPerThread) {
-    throw stream::Error(
-        {.file = path,
-         .cause = "tiles need " + std::to_string((kBytesBeside + kBytesPerThread) >> 20) +
-                  "M of memory, `memory_bytes` allows " + std::to_string(memory >> 20) + "M",
-         .remedy = "allow more"});
+    throw stream::Error(path, stream::message("tiles need {}M of memory, {memory_bytes} allows {}M",
+                                              (kBytesBeside + kBytesPerThread) >> 20, memory >> 20))
+        .remedy("allow more");
   }
   const std::uint64_t threads = (memory - kBytesBeside) / kBytesPerThread;
   return {memory, static_cast<unsigned>(std::min<std::uint64_t>(context.threads, threads))};
@@ -93,9 +95,9 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
                                              const TileResources& resources,
                                              const Context& context) {
   if (request.water && !request.water_height && !given.schema().grid) {
-    throw UsageError(
-        "`water` nodata is for rasters: irregular points have no cells without data; give the "
-        "height of the water");
+    throw UsageError(stream::message(
+        "{water} nodata is for rasters: irregular points have no cells without data; give the "
+        "height of the water"));
   }
   const stream::Store store = given.with_stop(context.stop);
   const CoordinateSystem system = system_of(store);

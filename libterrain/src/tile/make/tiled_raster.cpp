@@ -20,8 +20,8 @@ namespace {
 /// Returns the same store, if it can be tiled.
 const stream::Store& checked(const stream::Store& store) {
   if (store.schema().columns >= 2 && store.schema().rows >= 2) return store;
-  throw stream::Error({.file = store.path().string(),
-                       .cause = "a raster of one line of samples has no surface to tile"});
+  throw stream::Error(store.path().string(),
+                      "a raster of one line of samples has no surface to tile");
 }
 
 /// Number of steps along a box in which a projected raster's places are sampled. Boxes wider than

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <fcntl.h>
+#include <fmt/core.h>
 #include <sys/stat.h>
 #include <terrace/stream/error.hpp>
 #include <unistd.h>
@@ -79,7 +80,7 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
   }
   std::string temporary = target.parent_path().string();
   temporary.append("/.").append(target.filename().string()).append(kTemporaryEnding);
-  temporary.append("-").append(std::to_string(::getpid()));
+  temporary += fmt::format("-{}", ::getpid());
   Descriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC,
                          S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH));
   if (file.number() < 0) throw stream::system_error(path, "cannot be created", errno);
@@ -88,7 +89,7 @@ void write_tile_file(const std::string& path, std::span<const std::byte> bytes) 
     const int cause = errno;
     ::unlink(temporary.c_str());
     throw stream::system_error(path, "cannot be written", cause,
-                               "make room and run again with `resume`");
+                               stream::message("make room and run again with {resume}"));
   }
 }
 

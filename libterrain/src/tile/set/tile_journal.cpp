@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
 
@@ -49,7 +50,7 @@ std::string line_of(const TileAddress& tile, const FinishedTile& finished) {
   for (const std::uint64_t number :
        {std::uint64_t{tile.zoom}, std::uint64_t{tile.x}, std::uint64_t{tile.y}, finished.bytes,
         finished.checksum, finished.inputs}) {
-    line += std::to_string(number) + " ";
+    line += fmt::format("{} ", number);
   }
   return line + number_text(finished.max_error) + " .\n";
 }

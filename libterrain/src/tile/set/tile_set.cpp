@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/core.h>
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/file_lock.hpp>
@@ -42,23 +43,22 @@ std::string source_options_of(const TilesRequest& request) {
   }
   constexpr std::array<const char*, 4> kReferences{"", "ellipsoidal", "orthometric", "ignore"};
   text += std::string("\n") + kReferences.at(static_cast<std::size_t>(request.vertical));
-  if (!request.geoid.empty()) text += "\n" + std::to_string(digest_of_file(request.geoid));
+  if (!request.geoid.empty()) text += fmt::format("\n{}", digest_of_file(request.geoid));
   return text;
 }
 
 /// Identifies the store and the options; a change invalidates a finished set.
 std::string fingerprint_of(const stream::Store& store, const TileSetOptions& options) {
   const TilesRequest& request = options.request;
-  std::string text = "1 ";
-  text +=
-      std::to_string(checksum_of(read_tile_file((store.path() / "manifest.json").string()))) + " ";
-  text += std::to_string(checksum_of(std::as_bytes(std::span(options.source_options))));
+  std::string text =
+      fmt::format("1 {} {}", checksum_of(read_tile_file((store.path() / "manifest.json").string())),
+                  checksum_of(std::as_bytes(std::span(options.source_options))));
   for (const double number :
        {static_cast<double>(request.first_zoom), static_cast<double>(options.last_zoom),
         request.max_error.value_or(0.0)}) {
     text.append(" ").append(number_text(number));
   }
-  text.append(" ").append(std::to_string(static_cast<int>(request.quality)));
+  text += fmt::format(" {}", static_cast<int>(request.quality));
   for (const bool flag : {request.normals, request.water, request.gzip, request.metadata}) {
     text += flag ? " yes" : " no";
   }
@@ -68,10 +68,8 @@ std::string fingerprint_of(const stream::Store& store, const TileSetOptions& opt
 /// Throws: stream::Error if the folder has a finished set with other inputs or options.
 void refuse_another(const std::string& layer_path, const std::string& fingerprint) {
   if (!fs::exists(layer_path) || read_layer(layer_path).fingerprint == fingerprint) return;
-  throw stream::Error(
-      {.file = layer_path,
-       .cause = "is finished, and made from another store or with other options",
-       .remedy = "give `replace` to replace it: tiles that stay the same are kept"});
+  throw stream::Error(layer_path, "is finished, and made from another store or with other options")
+      .remedy(stream::message("give {replace} to replace it: tiles that stay the same are kept"));
 }
 
 /// Whether `folder` contains files but no tile set, finished or not.
@@ -136,34 +134,37 @@ class TileFolder {
 
 TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
     : path_(stream::follow_links(folder).string()) {
-  const auto refuse = [&](const std::string& cause, const std::string& remedy) {
-    throw stream::Error({.file = folder, .cause = cause, .remedy = remedy});
-  };
-  if (fs::exists(path_) && !fs::is_directory(path_)) refuse("is not a folder", "name another one");
+  const auto fault = [&](std::string cause) { return stream::Error(folder, std::move(cause)); };
+  if (fs::exists(path_) && !fs::is_directory(path_)) {
+    throw fault("is not a folder").remedy("name another one");
+  }
   // Nothing is created in a foreign folder, not even the lock.
   if (holds_others(path_)) {
-    refuse("is not empty and contains no tile set", "name another folder, or empty it yourself");
+    throw fault("is not empty and contains no tile set")
+        .remedy("name another folder, or empty it yourself");
   }
   std::error_code error;
   made_ = fs::create_directories(path_, error);
   if (error) throw stream::system_error(folder, "cannot be created", error.value());
   lock_ = stream::FileLock(fs::path(path_) / kLockName);
   if (!lock_.held()) {
-    refuse("another run is writing tiles to it", "wait until it ends, or name another folder");
+    throw fault("another run is writing tiles to it")
+        .remedy("wait until it ends, or name another folder");
   }
   const std::string layer_path = path_ + "/" + kLayerName;
   const std::string journal_path = path_ + "/" + TileJournal::kName;
   if (fs::exists(layer_path)) {
     if (read_layer(layer_path).fingerprint.empty()) {
-      refuse("contains a tile set that terrace did not write", "name another folder");
+      throw fault("contains a tile set that terrace did not write").remedy("name another folder");
     }
     if (!force && !resume) {
-      refuse("already contains a tile set",
-             "give `replace` to replace it (unchanged tiles are kept), or name another folder");
+      throw fault("already contains a tile set")
+          .remedy(stream::message(
+              "give {replace} to replace it (unchanged tiles are kept), or name another folder"));
     }
   } else if (fs::exists(journal_path) && !force && !resume) {
-    refuse("contains an unfinished tile set",
-           "give `resume` to continue, or `replace` to replace it");
+    throw fault("contains an unfinished tile set")
+        .remedy(stream::message("give {resume} to continue, or {replace} to replace it"));
   }
   stream::remove_abandoned(layer_path);
   stream::remove_abandoned(journal_path);
@@ -171,9 +172,8 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
 
 void TileFolder::check_same() const {
   if (lock_.has_name()) return;
-  throw stream::Error({.file = path_,
-                       .cause = "has been moved or replaced by another program in the meantime",
-                       .remedy = "run again, and do not move the folder"});
+  throw stream::Error(path_, "has been moved or replaced by another program in the meantime")
+      .remedy("run again, and do not move the folder");
 }
 
 TileFolder::~TileFolder() {
@@ -193,17 +193,16 @@ unsigned native_zoom(double spacing) {
 void check_request(const TilesRequest& request) {
   for (const unsigned zoom : {request.first_zoom, request.last_zoom.value_or(0)}) {
     if (zoom > kDeepestZoom) {
-      throw UsageError("`zoom` " + std::to_string(zoom) + ": must be from 0 to " +
-                       std::to_string(kDeepestZoom));
+      throw UsageError(stream::message("{zoom} {}: must be from 0 to {}", zoom, kDeepestZoom));
     }
   }
   if (request.max_error && !(*request.max_error > 0.0 && std::isfinite(*request.max_error))) {
-    throw UsageError("`max_error` must be a positive number of metres");
+    throw UsageError(stream::message("{max_error} must be a positive number of metres"));
   }
   if (request.metadata && request.first_zoom > 0) {
-    throw UsageError(
-        "`metadata` lists in each tile the tiles below it, from zoom 0 on: begin with `zoom` 0, or "
-        "leave it out");
+    throw UsageError(stream::message(
+        "{metadata} lists in each tile the tiles below it, from zoom 0 on: begin with {zoom} 0, or "
+        "leave it out"));
   }
 }
 
@@ -228,12 +227,12 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
                                .last_zoom = request.last_zoom.value_or(native),
                                .source_options = source_options_of(request)};
   if (request.first_zoom > options.last_zoom) {
-    throw UsageError("`zoom` " + std::to_string(request.first_zoom) + "-" +
-                     std::to_string(options.last_zoom) + ": give the smaller one first");
+    throw UsageError(stream::message("{zoom} {}-{}: give the smaller one first", request.first_zoom,
+                                     options.last_zoom));
   }
   if (options.last_zoom > native) {
-    context.say("zoom " + std::to_string(native) + " already shows every sample: deeper ones, to " +
-                std::to_string(options.last_zoom) + ", add no detail");
+    context.say(fmt::format("zoom {} already shows every sample: deeper ones, to {}, add no detail",
+                            native, options.last_zoom));
   }
   const std::string layer_path = options.folder + "/" + kLayerName;
   const std::string fingerprint = fingerprint_of(store, options);
@@ -257,8 +256,10 @@ TilesOutcome write_tiles(const stream::Store& store, const TilesRequest& request
   for (const TileZoom& zoom : writer.result.zooms) {
     const double bound = options.max_error(zoom.zoom);
     if (zoom.max_error > bound) {
-      context.say("zoom " + std::to_string(zoom.zoom) + ": " + readable_number(bound) +
-                  " m was requested, which is finer than the 15 bits of a tile's coordinates here");
+      context.say(
+          fmt::format("zoom {}: {} m was requested, which is finer than the 15 bits of a tile's "
+                      "coordinates here",
+                      zoom.zoom, readable_number(bound)));
     }
     layer.max_errors[zoom.zoom] = std::max(zoom.max_error, bound);
   }

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 #include <terrace/stream/atomic_file.hpp>
 #include <terrace/stream/error.hpp>
@@ -274,10 +275,9 @@ void TileSetWriter::write_zooms() {
 
 void TileSetWriter::take_larger_steps(Zoom& zoom) {
   if (zoom.range > 1e7) {
-    throw stream::Error({.file = options_.folder,
-                         .where = "zoom " + std::to_string(zoom.plan.zoom),
-                         .cause = "heights beyond 10,000 km are not on a globe",
-                         .remedy = "check the unit and the nodata value of the source"});
+    throw stream::Error(options_.folder, "heights beyond 10,000 km are not on a globe")
+        .at(fmt::format("zoom {}", zoom.plan.zoom))
+        .remedy("check the unit and the nodata value of the source");
   }
   zoom.range = std::max(1.0, 2.0 * zoom.range);
   zoom.plan =

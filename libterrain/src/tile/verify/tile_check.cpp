@@ -185,7 +185,7 @@ Checked SetCheck::check(const TileAddress& tile, const TileHeights& heights) con
     }
     decoded = unpack_tile(bytes, path_of(tile));
   } catch (const stream::Error& error) {
-    checked.faults.push_back({byte_of(error.parts().where), error.parts().cause});
+    checked.faults.push_back({byte_of(error.parts().where), error.parts().cause.text()});
     return checked;
   }
   checked.decoded = true;
@@ -364,9 +364,8 @@ bool is_tile_folder(const std::string& folder) {
 
 TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context) {
   if (!is_tile_folder(request.folder)) {
-    throw stream::Error({.file = request.folder,
-                         .cause = "contains no tile set",
-                         .remedy = "name the folder that it was written to"});
+    throw stream::Error(request.folder, "contains no tile set")
+        .remedy("name the folder that it was written to");
   }
   const TileResources resources = tile_resources(context, request.folder);
   std::unique_ptr<TileSource> source;
@@ -377,9 +376,8 @@ TileCheckResult check_tiles(const TileCheckRequest& request, const Context& cont
   }
   const std::string layer_path = request.folder + "/layer.json";
   if (!std::filesystem::exists(layer_path)) {
-    throw stream::Error({.file = request.folder,
-                         .cause = "contains an unfinished tile set",
-                         .remedy = "finish it first: make the set again with `resume`"});
+    throw stream::Error(request.folder, "contains an unfinished tile set")
+        .remedy(stream::message("finish it first: make the set again with {resume}"));
   }
   TileLayer layer = read_layer(layer_path);
   TileInventory inventory = take_inventory(request.folder, layer, context);

@@ -7,6 +7,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
@@ -48,8 +49,8 @@ void Inventory::bounds() {
                     b.south <= b.north && b.north <= 90.0;
   if (!good) problem(layer_path_, "bounds that are not a box on the globe");
   if (!layer_.max_errors.empty() && layer_.max_errors.size() != layer_.available.size()) {
-    problem(layer_path_, "errors of " + std::to_string(layer_.max_errors.size()) +
-                             " zooms, tiles of " + std::to_string(layer_.available.size()));
+    problem(layer_path_, fmt::format("errors of {} zooms, tiles of {}", layer_.max_errors.size(),
+                                     layer_.available.size()));
   }
   for (const double error : layer_.max_errors) {
     if (!std::isfinite(error) || error < 0.0)
@@ -85,7 +86,7 @@ void Inventory::files() {
 void Inventory::zoom(unsigned zoom) {
   const std::vector<TileAddress>& there = result.tiles[zoom];
   const std::vector<TileRange>& ranges = layer_.available[zoom];
-  const std::string label = "zoom " + std::to_string(zoom);
+  const std::string label = fmt::format("zoom {}", zoom);
   if (zoom < layer_.first_zoom && !ranges.empty()) {
     problem(layer_path_, label + " has tiles, but is above minzoom");
   }

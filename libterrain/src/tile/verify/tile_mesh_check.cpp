@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include <fmt/core.h>
 #include <nlohmann/json.hpp>
 
 #include "base/units.hpp"
@@ -150,8 +151,8 @@ class MeshCheck {
 /// Returns "triangle 5 ..." or "triangle 5 and 6 more ...".
 std::string first_and_more(std::uint64_t count, const std::string& kind, std::uint64_t first,
                            const std::string& what) {
-  if (count == 1) return kind + " " + std::to_string(first) + " " + what;
-  return kind + " " + std::to_string(first) + " and " + with_commas(count - 1) + " more " + what;
+  if (count == 1) return fmt::format("{} {} {}", kind, first, what);
+  return fmt::format("{} {} and {} more {}", kind, first, with_commas(count - 1), what);
 }
 
 void MeshCheck::triangles() {
@@ -220,14 +221,14 @@ void MeshCheck::cover() {
   }
   if (open > 0) {
     fault(triangle_at(first_open),
-          counted(open, "edge", "inside the tile has", "inside the tile have") +
-              " only one triangle, the first at triangle " + std::to_string(first_open));
+          fmt::format("{} only one triangle, the first at triangle {}",
+                      counted(open, "edge", "inside the tile has", "inside the tile have"),
+                      first_open));
   }
   if (crowded > 0) {
-    fault(triangle_at(first_crowded), counted(crowded, "edge", "has", "have") +
-                                          " two triangles on one side, the first at "
-                                          "triangle " +
-                                          std::to_string(first_crowded));
+    fault(triangle_at(first_crowded),
+          fmt::format("{} two triangles on one side, the first at triangle {}",
+                      counted(crowded, "edge", "has", "have"), first_crowded));
   }
 }
 
