@@ -31,7 +31,8 @@ TYPED_TEST(ScanKernelsTyped, MatchTheDefinitionOnEveryInstructionSet) {
       for (std::size_t j = 0; j < columns; ++j) {
         costs[j] = static_cast<TypeParam>(static_cast<int>(random() % 100) - 20);
         labels[j] = random() % 5 == 0 ? kSettled<Number> : -static_cast<Number>(random() % 50);
-        distance[j] = random() % 3 == 0 ? kUnreachable<Number> : static_cast<Number>(random() % 100);
+        distance[j] =
+            random() % 3 == 0 ? kUnreachable<Number> : static_cast<Number>(random() % 100);
       }
       std::vector<std::int64_t> previous(columns, 3), expected_previous = previous;
       std::vector<Number> expected = distance;

@@ -123,7 +123,7 @@ TEST(TileInputs, DigestDependsOnAllInputs) {
     change(changed);
     seen.push_back(digest_of(tile, plan, changed, hilly));
   };
-  with_inputs([](TileInputs& i) { i.mesh.quality = tri::TinQuality::kFitted; });
+  with_inputs([](TileInputs& i) { i.mesh.quality = tri::TinQuality::fitted; });
   with_inputs([](TileInputs& i) { i.mesh.normals = true; });
   with_inputs([](TileInputs& i) { i.mesh.water = true; });
   with_inputs([](TileInputs& i) { i.gzip = true; });

@@ -219,7 +219,7 @@ TEST(TileMesher, EveryQualityKeepsTheBound) {
     surface.in_rows = in_rows;
     std::vector<std::size_t> triangles;
     for (const auto quality :
-         {tri::TinQuality::kGreedy, tri::TinQuality::kRemoval, tri::TinQuality::kFitted}) {
+         {tri::TinQuality::greedy, tri::TinQuality::removal, tri::TinQuality::fitted}) {
       const MadeTile made = make_tile(tile, plan, surface, {.quality = quality});
       expect_sound(tile, made);
       expect_bound(tile, made, plan, surface);

@@ -163,7 +163,7 @@ TEST_F(ViewOfStore, UsesOnlyItsPointsForHeights) {
                             if (i % 7 == 0) places.push_back({p[0], p[1]});
                           });
     using Method = tri::Interpolation;
-    for (const Method method : {Method::kLinear, Method::kNaturalNeighbour, Method::kNearest}) {
+    for (const Method method : {Method::linear, Method::natural_neighbour, Method::nearest}) {
       SamplerOptions options{.method = method};
       std::vector<GroundPoint> found = sample_places(pair.view, places, options);
       EXPECT_EQ(bits_of(found), bits_of(sample_places(pair.alone, places, options)));

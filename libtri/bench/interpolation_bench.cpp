@@ -143,11 +143,11 @@ void add(Input input, const std::string& name) {
     benchmark::RegisterBenchmark((std::string(what) + "/" + name).c_str(), function, input, method)
         ->Unit(benchmark::kMillisecond);
   };
-  row("natural_neighbour", heights<Coord>, Interpolation::kNaturalNeighbour);
-  row("linear", heights<Coord>, Interpolation::kLinear);
-  row("nearest", heights<Coord>, Interpolation::kNearest);
-  row("gradient_natural", gradients<Coord>, GradientFrom::kNaturalNeighbours);
-  row("gradient_triangles", gradients<Coord>, GradientFrom::kTriangles);
+  row("natural_neighbour", heights<Coord>, Interpolation::natural_neighbour);
+  row("linear", heights<Coord>, Interpolation::linear);
+  row("nearest", heights<Coord>, Interpolation::nearest);
+  row("gradient_natural", gradients<Coord>, GradientFrom::natural_neighbours);
+  row("gradient_triangles", gradients<Coord>, GradientFrom::triangles);
 }
 
 }  // namespace

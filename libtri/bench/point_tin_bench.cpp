@@ -111,7 +111,7 @@ void mesh(benchmark::State& state, double max_error, TinQuality quality) {
 }
 
 void measure(benchmark::State& state, double max_error) {
-  const PointTin tin = make(max_error, TinQuality::kGreedy);
+  const PointTin tin = make(max_error, TinQuality::greedy);
   for (auto _ : state)
     benchmark::DoNotOptimize(
         measure_surface(input().x, input().y, input().z, tin.vertices, tin.triangles));
@@ -154,11 +154,11 @@ void tile(benchmark::State& state, double max_error) {
 constexpr double kOnePercent = 15.5;
 constexpr double kHalf = 0.85;
 #define TIN(name, ...) BENCHMARK_CAPTURE(mesh, name, __VA_ARGS__)->Unit(benchmark::kMillisecond)
-TIN(greedy_one_percent, kOnePercent, TinQuality::kGreedy);
-TIN(removal_one_percent, kOnePercent, TinQuality::kRemoval);
-TIN(fitted_one_percent, kOnePercent, TinQuality::kFitted);
-TIN(greedy_half, kHalf, TinQuality::kGreedy);
-TIN(removal_half, kHalf, TinQuality::kRemoval);
+TIN(greedy_one_percent, kOnePercent, TinQuality::greedy);
+TIN(removal_one_percent, kOnePercent, TinQuality::removal);
+TIN(fitted_one_percent, kOnePercent, TinQuality::fitted);
+TIN(greedy_half, kHalf, TinQuality::greedy);
+TIN(removal_half, kHalf, TinQuality::removal);
 BENCHMARK_CAPTURE(tile, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(tile, tenth_of_it, kOnePercent / 10)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(measure, one_percent, kOnePercent)->Unit(benchmark::kMillisecond);

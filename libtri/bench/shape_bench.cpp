@@ -115,7 +115,7 @@ std::array<double, 2> take_out_and_put_back(Delaunay3<Coord>& triangulation, Sha
   return {follow(), collapse};
 }
 
-enum class Change { kExpand, kCollapse };
+enum class Change { expand, collapse };
 
 template <class Coord>
 void update(benchmark::State& state, const ShapeOptions& options, Change timed) {
@@ -195,9 +195,9 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     ShapeOptions options;
   };
   Method methods[] = {{"poles", {}}, {"flood", {}}, {"no guard", {}}, {"published", {}}};
-  for (Method* flood : {&methods[1], &methods[2]}) flood->options.rule = ShapeRule::kFlood;
+  for (Method* flood : {&methods[1], &methods[2]}) flood->options.rule = ShapeRule::flood;
   methods[2].options.keep_vertices = false;
-  methods[3].options.rule = ShapeRule::kPublished;
+  methods[3].options.rule = ShapeRule::published;
   for (const Method& method : methods) {
     Shape3<Coord> shape(method.options);
     double time = 1e9;
@@ -213,7 +213,7 @@ void scan_rows(const char* name, const Surface& original, const SurfaceMeasures&
     const std::size_t lost = shape.lost_vertices().size(), rescued = shape.rescued_count();
     // This comes last, as labels that follow changes may differ from those from scratch.
     std::array<double, 2> follow{};
-    if (method.options.rule == ShapeRule::kPoles) follow = mean_of_clusters(triangulation, shape);
+    if (method.options.rule == ShapeRule::poles) follow = mean_of_clusters(triangulation, shape);
     print_row(name, label.c_str(), build, time, found, lost, rescued, step, measures, volume,
               follow);
   }
@@ -249,10 +249,10 @@ int main(int argc, char** argv) {
   const char* data = std::getenv("TERRACE_DATA");
   if (data != nullptr && !kSmall) print_table(std::filesystem::path(data) / "scan");
   ShapeOptions flood, no_guard, published, edges;
-  flood.rule = no_guard.rule = edges.rule = ShapeRule::kFlood;
+  flood.rule = no_guard.rule = edges.rule = ShapeRule::flood;
   no_guard.keep_vertices = false;
-  published.rule = ShapeRule::kPublished;
-  edges.criterion = ShapeCriterion::kEdgeLength;
+  published.rule = ShapeRule::published;
+  edges.criterion = ShapeCriterion::edge_length;
   edges.edge_factor = 1.0;
   const auto add = [](const char* name, auto function) {
     benchmark::RegisterBenchmark(name, function)->Unit(benchmark::kMillisecond);
@@ -265,8 +265,8 @@ int main(int argc, char** argv) {
   add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
   add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
   const auto add_update = [&](const std::string& name, const ShapeOptions& options) {
-    for (const Change change : {Change::kExpand, Change::kCollapse}) {
-      const std::string of = change == Change::kExpand ? "/expand" : "/collapse";
+    for (const Change change : {Change::expand, Change::collapse}) {
+      const std::string of = change == Change::expand ? "/expand" : "/collapse";
       for (auto* function : {&update<std::int32_t>, &update<double>}) {
         const bool integers = function == &update<std::int32_t>;
         benchmark::RegisterBenchmark((name + of + (integers ? "/integers" : "/doubles")).c_str(),

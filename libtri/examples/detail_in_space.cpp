@@ -42,7 +42,7 @@ int main() {
 
   // Finds the tetrahedron that contains a point, and the nearest vertex.
   const Location3 location = space.locate({301, 302, 303});
-  correct = correct && location.place != Place3::kOutside && space.alive(location.tetrahedron);
+  correct = correct && location.place != Place3::outside && space.alive(location.tetrahedron);
 
   // Points that already existed stay.
   std::vector<VertexId> added;

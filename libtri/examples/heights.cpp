@@ -28,9 +28,9 @@ int main() {
   // Passes many queries in one call: heights, and slope and aspect.
   const std::vector<tri::Point2> queries{{200, 120.5}, {280.25, 200}, {-50, 0}};
   const auto found =
-      tri::heights_at(terrain, heights, queries, tri::Interpolation::kNaturalNeighbour);
+      tri::heights_at(terrain, heights, queries, tri::Interpolation::natural_neighbour);
   const auto gradients =
-      tri::gradients_at(terrain, heights, queries, tri::GradientFrom::kNaturalNeighbours);
+      tri::gradients_at(terrain, heights, queries, tri::GradientFrom::natural_neighbours);
   for (std::size_t i = 0; i < 2; ++i)
     std::printf("(%g, %g): height %.2f, slope %.1f degrees, facing %.0f degrees\n", queries[i][0],
                 queries[i][1], found[i], tri::slope_degrees(gradients[i]),

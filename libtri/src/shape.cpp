@@ -25,7 +25,7 @@ struct BasicShape3<Triangulation>::Impl {
   template <class Work>
   void with_criterion(const Triangulation& triangulation, const Work& work) const {
     [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
-    if (options.criterion == ShapeCriterion::kGabriel) {
+    if (options.criterion == ShapeCriterion::gabriel) {
       work(shape::Gabriel{});
     } else {
       work(shape::EdgeLength{options.edge_factor});
@@ -54,14 +54,14 @@ void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, uns
                                          const base::StopCheck& check_stop) {
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   shape::State& state = impl_->state;
-  if (impl_->options.rule == ShapeRule::kPoles) {
+  if (impl_->options.rule == ShapeRule::poles) {
     [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
     return shape::restore_by_poles(mesh, state, threads, check_stop);
   }
   state.ticks = base::StopTicks(check_stop);
   const bool keep_vertices = impl_->options.keep_vertices;
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
-    if (impl_->options.rule == ShapeRule::kFlood) {
+    if (impl_->options.rule == ShapeRule::flood) {
       shape::flood(mesh, state, criterion);
       if (keep_vertices) shape::rescue(mesh, state);
     } else {
@@ -74,7 +74,7 @@ void BasicShape3<Triangulation>::restore(const Triangulation& triangulation, uns
 template <class Triangulation>
 void BasicShape3<Triangulation>::update(const Triangulation& triangulation,
                                         const typename Triangulation::Changes& changes) {
-  if (impl_->options.rule != ShapeRule::kFlood) return restore(triangulation);
+  if (impl_->options.rule != ShapeRule::flood) return restore(triangulation);
   const auto& mesh = Delaunay3Access::mesh(triangulation);
   impl_->with_criterion(triangulation, [&](const auto& criterion) {
     shape::update_flood(mesh, impl_->state, criterion, changes);
@@ -86,7 +86,7 @@ template <class Triangulation>
 void BasicShape3<Triangulation>::update_nearby(const Triangulation& triangulation,
                                                const typename Triangulation::Changes& changes) {
   const auto& mesh = Delaunay3Access::mesh(triangulation);
-  if (impl_->options.rule != ShapeRule::kPoles) return update(triangulation, changes);
+  if (impl_->options.rule != ShapeRule::poles) return update(triangulation, changes);
   if (!shape::worth_updating(mesh, impl_->state, changes)) return restore(triangulation);
   [[maybe_unused]] const auto scope = Delaunay3Access::scope(triangulation);
   shape::update_nearby(mesh, impl_->state, changes);

@@ -28,11 +28,11 @@ void check(const SmoothingOptions& options) {
   };
   require(options.strength > 0 && options.strength <= 1,
           "strength " + std::to_string(options.strength) + " is not in 0 < strength <= 1");
-  if (options.method == Smoothing::kBilateral)
+  if (options.method == Smoothing::bilateral)
     require(options.edge_height > 0, "edge_height " + std::to_string(options.edge_height) +
                                          " is not positive; give the smallest height difference "
                                          "to preserve");
-  if (options.method != Smoothing::kTaubin) return;
+  if (options.method != Smoothing::taubin) return;
   require(options.pass_band > 0 && options.pass_band < 1,
           "pass_band " + std::to_string(options.pass_band) + " is not in 0 < pass_band < 1");
   // The roughest component, of eigenvalue 2, must not grow.
@@ -182,11 +182,11 @@ std::vector<HeightChange> smooth(const Delaunay2<Coord>& triangulation, const He
     return complement > 0 ? complement * complement : 0;
   };
   for (unsigned i = 0; i < options.iterations; ++i) {
-    if (options.method == Smoothing::kBilateral) {
+    if (options.method == Smoothing::bilateral) {
       apply_step(rows, options.strength, height, next, similar, ticks);
     } else {
       apply_step(rows, options.strength, height, next, all, ticks);
-      if (options.method == Smoothing::kTaubin)
+      if (options.method == Smoothing::taubin)
         apply_step(rows, second_step(options), height, next, all, ticks);
     }
   }

@@ -256,8 +256,8 @@ TYPED_TEST(Delaunay2Test, RestartedBehavesLikeNew) {
 TYPED_TEST(Delaunay2Test, LocateAndNearestAgreeWithBruteForce) {
   using Point = typename Delaunay2<TypeParam>::Point;
   for (const PointSet kind :
-       {PointSet::kUniform, PointSet::kFewBits, PointSet::kSevenBits, PointSet::kGrid,
-        PointSet::kHorizontal, PointSet::kOffLine, PointSet::kCircle, PointSet::kClusters}) {
+       {PointSet::uniform, PointSet::few_bits, PointSet::seven_bits, PointSet::grid,
+        PointSet::horizontal, PointSet::off_line, PointSet::circle, PointSet::clusters}) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points<TypeParam>(kind, 100, 8);
     Delaunay2<TypeParam> triangulation;
@@ -265,7 +265,7 @@ TYPED_TEST(Delaunay2Test, LocateAndNearestAgreeWithBruteForce) {
     using Kernel =
         typename std::remove_cvref_t<decltype(Delaunay2Access::mesh(triangulation))>::Kernel;
     std::vector<Point> queries = make_points<TypeParam>(kind, 300, 9);
-    for (const PointSet other : {PointSet::kFewBits, PointSet::kGrid})
+    for (const PointSet other : {PointSet::few_bits, PointSet::grid})
       for (const Point& p : make_points<TypeParam>(other, 100, 10)) queries.push_back(p);
     for (const Point& q : queries) {
       bool is_vertex = false;
@@ -279,7 +279,7 @@ TYPED_TEST(Delaunay2Test, LocateAndNearestAgreeWithBruteForce) {
       }
       ASSERT_EQ(triangulation.nearest(q), best);
       const Location location = triangulation.locate(q, best);
-      ASSERT_EQ(location.place == Place::kVertex, is_vertex);
+      ASSERT_EQ(location.place == Place::vertex, is_vertex);
       if (is_vertex) {
         ASSERT_EQ(triangulation.point(location.vertex), q);
         continue;
@@ -297,18 +297,18 @@ TYPED_TEST(Delaunay2Test, LocateAndNearestAgreeWithBruteForce) {
         on_edge = on_edge || least == 0;
       }
       switch (location.place) {
-        case Place::kVertex:
+        case Place::vertex:
           FAIL();
           break;
-        case Place::kInside:
+        case Place::inside:
           ASSERT_TRUE(inside_any && !on_edge);
           for (std::size_t i = 0; i < 3; ++i) ASSERT_GT(side(location.triangle, i), 0);
           break;
-        case Place::kEdge:
+        case Place::edge:
           ASSERT_TRUE(on_edge);
           ASSERT_EQ(side(location.triangle, location.edge), 0);
           break;
-        case Place::kOutside:
+        case Place::outside:
           ASSERT_FALSE(inside_any);
           if (triangulation.triangle_count() == 0) break;
           ASSERT_LT(side(location.triangle, location.edge), 0);
@@ -346,7 +346,7 @@ TYPED_TEST(Delaunay2Test, GridEqualsBuild) {
 }
 
 TYPED_TEST(Delaunay2Test, NeighboursAreCounterClockwise) {
-  const auto points = make_points<TypeParam>(PointSet::kSevenBits, 200, 2);
+  const auto points = make_points<TypeParam>(PointSet::seven_bits, 200, 2);
   Delaunay2<TypeParam> triangulation;
   triangulation.build(points);
   std::vector<VertexId> around;
@@ -472,7 +472,7 @@ TEST(Delaunay2, RefusesBadCoordinatesAndStaysUnchanged) {
 
 TEST(Delaunay2, MemoryPerVertexIsBounded) {
   Delaunay2<std::int32_t> triangulation;
-  const auto points = make_points<std::int32_t>(PointSet::kUniform, 200'000, 1);
+  const auto points = make_points<std::int32_t>(PointSet::uniform, 200'000, 1);
   triangulation.build(points);
   EXPECT_LE(triangulation.memory_bytes(), 66 * points.size());
 }

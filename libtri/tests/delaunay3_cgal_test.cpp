@@ -23,7 +23,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
   for (const PointSet3 kind : kPointSets3) {
     for (const std::size_t count : {4u, 10u, 150u, 2000u}) {
       // Two lines of points have a tetrahedron for each pair of edges.
-      if (kind == PointSet3::kCurves && count > 150) continue;
+      if (kind == PointSet3::curves && count > 150) continue;
       SCOPED_TRACE(name(kind) + " " + std::to_string(count));
       const auto points = make_points3<TypeParam>(kind, count, 31);
       Delaunay3<TypeParam> triangulation;
@@ -36,7 +36,7 @@ TYPED_TEST(Delaunay3CgalTest, SameTetrahedra) {
 
 TYPED_TEST(Delaunay3CgalTest, SameTetrahedraAfterRemoval) {
   for (const PointSet3 kind : kPointSets3) {
-    if (kind == PointSet3::kCurves) continue;
+    if (kind == PointSet3::curves) continue;
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<TypeParam>(kind, 300, 32);
     std::mt19937_64 random(33);
@@ -101,8 +101,8 @@ spatial::Verdict expect_right_verdict(std::array<typename Ours::Point, 5> p, int
       typename Ours::Probe(p[4], lattice).side(vertex(0), vertex(1), vertex(2), vertex(3));
   const bool inside =
       side != 0 ? side > 0 : spatial::inside_perturbed_sphere<Ours>(p[0], p[1], p[2], p[3], p[4]);
-  if (verdict != spatial::Verdict::kOpen) {
-    EXPECT_EQ(verdict == spatial::Verdict::kIn, inside);
+  if (verdict != spatial::Verdict::open) {
+    EXPECT_EQ(verdict == spatial::Verdict::in, inside);
   }
   return verdict;
 }
@@ -127,7 +127,7 @@ void expect_exact_signs(const std::array<std::array<double, 3>, 5>& p, bool deci
     ASSERT_EQ(Ours::in_sphere(p[0], p[1], p[2], p[3], p[4]), side);
     if (is_new(p)) {
       const spatial::Verdict verdict = expect_right_verdict<Ours>(p, turn, side);
-      ASSERT_FALSE(decided && verdict == spatial::Verdict::kOpen);
+      ASSERT_FALSE(decided && verdict == spatial::Verdict::open);
     }
   }
   ASSERT_EQ(Ours::compare_distance(p[0], p[1], p[2]),
@@ -186,7 +186,7 @@ TEST(IntKernel3, SignsAreExact) {
     ASSERT_EQ(Ours::in_sphere(p[0], p[1], p[2], p[3], p[4]), side);
     if (!is_new(p)) continue;
     const spatial::Verdict verdict = expect_right_verdict<Ours>(p, turn, side);
-    ASSERT_FALSE(bound <= 512 && verdict == spatial::Verdict::kOpen);
+    ASSERT_FALSE(bound <= 512 && verdict == spatial::Verdict::open);
   }
 }
 

@@ -39,7 +39,7 @@ TYPED_TEST_SUITE(Delaunay3Test, Coords);
 TYPED_TEST(Delaunay3Test, BuildIsValidAndCompleteForEveryKindOfPoints) {
   for (const PointSet3 kind : kPointSets3) {
     for (const std::size_t count : {0u, 1u, 2u, 3u, 4u, 5u, 9u, 40u, 1000u}) {
-      if (kind == PointSet3::kCurves && count > 100) continue;
+      if (kind == PointSet3::curves && count > 100) continue;
       SCOPED_TRACE(name(kind) + " " + std::to_string(count));
       const auto points = make_points3<TypeParam>(kind, count, 17 + count);
       Delaunay3<TypeParam> triangulation;
@@ -59,8 +59,8 @@ TYPED_TEST(Delaunay3Test, BuildIsValidAndCompleteForEveryKindOfPoints) {
 TYPED_TEST(Delaunay3Test, ResultDoesNotDependOnThreads) {
   // Enough points for passes in parts, with duplicates across their border, large cavities, and
   // ties.
-  for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kFiveBits,
-                               PointSet3::kSlab, PointSet3::kClusters}) {
+  for (const PointSet3 kind : {PointSet3::uniform, PointSet3::grid, PointSet3::five_bits,
+                               PointSet3::slab, PointSet3::clusters}) {
     SCOPED_TRACE(name(kind));
     auto points = make_points3<TypeParam>(kind, 20'000, 6);
     Delaunay3<TypeParam> one;
@@ -182,8 +182,8 @@ TYPED_TEST(Delaunay3Test, RandomOperationsEqualRebuild) {
 }
 
 TYPED_TEST(Delaunay3Test, ReinsertingCompactSetsRestoresAll) {
-  for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kSlab,
-                               PointSet3::kFiveBits, PointSet3::kClusters}) {
+  for (const PointSet3 kind : {PointSet3::uniform, PointSet3::grid, PointSet3::slab,
+                               PointSet3::five_bits, PointSet3::clusters}) {
     for (std::uint64_t seed = 0; seed < 6; ++seed) {
       SCOPED_TRACE(name(kind) + " seed " + std::to_string(seed));
       std::mt19937_64 random(seed);
@@ -256,7 +256,7 @@ TYPED_TEST(Delaunay3Test, FillsCavitiesAndHolesOfAnySize) {
 
 TYPED_TEST(Delaunay3Test, AllInstructionSetsGiveTheSameTetrahedra) {
   for (const PointSet3 kind : kPointSets3) {
-    if (kind == PointSet3::kCurves) continue;
+    if (kind == PointSet3::curves) continue;
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<TypeParam>(kind, 200, 12);
     std::vector<Delaunay3<TypeParam>> triangulations;
@@ -292,7 +292,7 @@ TYPED_TEST(Delaunay3Test, JournalReportsNetChanges) {
     SCOPED_TRACE(name(kind));
     std::mt19937_64 random(9);
     // On the curves there are as many tetrahedra as pairs of points.
-    const auto points = make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 40 : 150, 4);
+    const auto points = make_points3<TypeParam>(kind, kind == PointSet3::curves ? 40 : 150, 4);
     Delaunay3<TypeParam> triangulation;
     // A consumer's state: arrays by slot, kept up to date by changes only.
     std::map<TetrahedronId, Corners> tetrahedra;
@@ -344,10 +344,9 @@ TYPED_TEST(Delaunay3Test, JournalReportsNetChanges) {
 
 TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
   using Point = typename Delaunay3<TypeParam>::Point;
-  for (const PointSet3 kind :
-       {PointSet3::kUniform, PointSet3::kFewBits, PointSet3::kFiveBits, PointSet3::kGrid,
-        PointSet3::kSlab, PointSet3::kLine, PointSet3::kPlane, PointSet3::kOffPlane,
-        PointSet3::kSphere, PointSet3::kClusters}) {
+  for (const PointSet3 kind : {PointSet3::uniform, PointSet3::few_bits, PointSet3::five_bits,
+                               PointSet3::grid, PointSet3::slab, PointSet3::line, PointSet3::plane,
+                               PointSet3::off_plane, PointSet3::sphere, PointSet3::clusters}) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<TypeParam>(kind, 80, 8);
     Delaunay3<TypeParam> triangulation;
@@ -355,7 +354,7 @@ TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
     using Kernel =
         typename std::remove_cvref_t<decltype(Delaunay3Access::mesh(triangulation))>::Kernel;
     std::vector<Point> queries = make_points3<TypeParam>(kind, 150, 9);
-    for (const PointSet3 other : {PointSet3::kFewBits, PointSet3::kGrid})
+    for (const PointSet3 other : {PointSet3::few_bits, PointSet3::grid})
       for (const Point& p : make_points3<TypeParam>(other, 60, 10)) queries.push_back(p);
     for (const Point& q : queries) {
       bool is_vertex = false;
@@ -369,7 +368,7 @@ TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
       }
       ASSERT_EQ(triangulation.nearest(q), best);
       const Location3 location = triangulation.locate(q, best);
-      ASSERT_EQ(location.place == Place3::kVertex, is_vertex);
+      ASSERT_EQ(location.place == Place3::vertex, is_vertex);
       ASSERT_TRUE(triangulation.alive(location.vertex));
       if (is_vertex) {
         ASSERT_EQ(triangulation.point(location.vertex), q);
@@ -390,7 +389,7 @@ TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
         inside_any = true;
         zeros_of_best = static_cast<int>(std::count(sides.begin(), sides.end(), 0));
       }
-      if (location.place == Place3::kOutside) {
+      if (location.place == Place3::outside) {
         ASSERT_FALSE(inside_any);
         if (triangulation.tetrahedron_count() == 0) continue;
         ASSERT_LT(side(location.tetrahedron, location.corner[0]), 0);
@@ -399,9 +398,9 @@ TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
         continue;
       }
       ASSERT_TRUE(inside_any);
-      ASSERT_EQ(zeros_of_best, location.place == Place3::kInside  ? 0
-                               : location.place == Place3::kFacet ? 1
-                                                                  : 2);
+      ASSERT_EQ(zeros_of_best, location.place == Place3::inside  ? 0
+                               : location.place == Place3::facet ? 1
+                                                                 : 2);
       for (std::size_t i = 0; i < 4; ++i) {
         const bool on = (zeros_of_best > 0 && i == location.corner[0]) ||
                         (zeros_of_best > 1 && i == location.corner[1]);
@@ -412,7 +411,7 @@ TYPED_TEST(Delaunay3Test, LocateAndNearestAgreeWithBruteForce) {
 }
 
 TYPED_TEST(Delaunay3Test, NeighboursAgreeWithTetrahedra) {
-  const auto points = make_points3<TypeParam>(PointSet3::kFiveBits, 200, 2);
+  const auto points = make_points3<TypeParam>(PointSet3::five_bits, 200, 2);
   Delaunay3<TypeParam> triangulation;
   triangulation.build(points);
   std::map<VertexId, std::set<VertexId>> joined;
@@ -462,7 +461,7 @@ TEST(Delaunay3, RefusesBadCoordinatesAndStaysUnchanged) {
 
 TEST(Delaunay3, MemoryPerVertexIsBounded) {
   Delaunay3<std::int32_t> triangulation;
-  const auto points = make_points3<std::int32_t>(PointSet3::kUniform, 50'000, 1);
+  const auto points = make_points3<std::int32_t>(PointSet3::uniform, 50'000, 1);
   triangulation.build(points);
   EXPECT_LE(triangulation.memory_bytes(), 262 * points.size());
 }

@@ -33,7 +33,7 @@ TYPED_TEST(DynamicSurfaceOf, FollowsChangesOfAnyPoints) {
     SCOPED_TRACE(name(kind));
     std::mt19937_64 random(6);
     DynamicSurface<Coord> surface;
-    const auto points = make_points3<Coord>(kind, kind == PointSet3::kCurves ? 40 : 250, 6);
+    const auto points = make_points3<Coord>(kind, kind == PointSet3::curves ? 40 : 250, 6);
     Delaunay3<Coord> triangulation;
     triangulation.start_journal();
     Shape3<Coord> shape;

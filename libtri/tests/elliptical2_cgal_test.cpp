@@ -59,7 +59,7 @@ TEST(EllipticalMetric2, MatchesCgalOnMappedPointsForEllipses) {
       SCOPED_TRACE("angle " + std::to_string(angle) + " ratio " + std::to_string(ratio));
       const LinearMap2 map = ellipse_map(ratio, 1, angle);
       EXPECT_EQ(map[1], map[2]);
-      const auto points = make_points<double>(PointSet::kUniform, 3000, 5);
+      const auto points = make_points<double>(PointSet::uniform, 3000, 5);
       Elliptical2 triangulation(map);
       triangulation.build(points);
       ASSERT_TRUE(triangles_of(triangulation) == mapped_triangles(points, map));

@@ -129,8 +129,8 @@ TEST(EllipticalMetric2, PointsWithEqualMappedPositionsStayApart) {
 
 TEST(EllipticalMetric2, NearestIsNearestInTheMetric) {
   const LinearMap2 map = ellipse_map(6, 1, 20);
-  for (const PointSet kind : {PointSet::kUniform, PointSet::kFewBits, PointSet::kGrid,
-                              PointSet::kCircle, PointSet::kHorizontal}) {
+  for (const PointSet kind : {PointSet::uniform, PointSet::few_bits, PointSet::grid,
+                              PointSet::circle, PointSet::horizontal}) {
     SCOPED_TRACE(name(kind));
     Elliptical2 triangulation(map);
     triangulation.build(make_points<double>(kind, 100, 8));

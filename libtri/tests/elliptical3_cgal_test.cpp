@@ -64,7 +64,7 @@ TEST(EllipticalMetric3, MatchesCgalOnMappedPointsForEllipsoids) {
       EXPECT_EQ(map[1], map[3]);
       EXPECT_EQ(map[2], map[6]);
       EXPECT_EQ(map[5], map[7]);
-      const auto points = make_points3<double>(PointSet3::kUniform, 600, 5);
+      const auto points = make_points3<double>(PointSet3::uniform, 600, 5);
       Elliptical3 triangulation(map);
       triangulation.build(points);
       ASSERT_TRUE(tetrahedra_of(triangulation) == mapped_tetrahedra(points, map));
@@ -126,10 +126,10 @@ TEST(EllipticalKernel3, SignsAreExact) {
       // The filter may leave anything undecided.
       const auto verdict = EllipticalKernel::Probe(p[4], {}).side(Corner{c[0], 0}, Corner{c[1], 0},
                                                                   Corner{c[2], 0}, Corner{c[3], 0});
-      if (verdict != spatial::Verdict::kOpen) {
-        ASSERT_EQ(side, verdict == spatial::Verdict::kIn ? 1 : -1);
+      if (verdict != spatial::Verdict::open) {
+        ASSERT_EQ(side, verdict == spatial::Verdict::in ? 1 : -1);
       }
-      decided += verdict != spatial::Verdict::kOpen;
+      decided += verdict != spatial::Verdict::open;
     }
     ASSERT_EQ(EllipticalKernel::compare_distance(p[0], p[1], p[2]),
               static_cast<int>(CGAL::sign(Rational(square(map, exact_difference(p[1], p[0])) -

@@ -59,9 +59,9 @@ TEST(EllipticalMetric3, IntegerPointsAndMapsGiveDelaunay3OfMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1},
         LinearMap3{2, 0, 0, -7, 0.25, 0, 1, 0, 8}, LinearMap3{1, 0, 0, 0, 1, 0, 1, -1, 1}}) {
-    for (const PointSet3 kind : {PointSet3::kFiveBits, PointSet3::kGrid, PointSet3::kSlab,
-                                 PointSet3::kPlane, PointSet3::kOffPlane, PointSet3::kLine,
-                                 PointSet3::kSphere, PointSet3::kCurves, PointSet3::kClusters}) {
+    for (const PointSet3 kind : {PointSet3::five_bits, PointSet3::grid, PointSet3::slab,
+                                 PointSet3::plane, PointSet3::off_plane, PointSet3::line,
+                                 PointSet3::sphere, PointSet3::curves, PointSet3::clusters}) {
       SCOPED_TRACE(name(kind) + " " + std::to_string(m[3]));
       const auto points = make_points3<double>(kind, 400, 4);
       std::vector<Space> mapped;
@@ -143,7 +143,7 @@ TEST(EllipticalMetric3, RandomOperationsEqualRebuild) {
 
 TEST(EllipticalMetric3, ResultDoesNotDependOnThreads) {
   const LinearMap3 map = ellipsoid_map({6, 1, 3}, rotations()[3]);
-  for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kClusters}) {
+  for (const PointSet3 kind : {PointSet3::uniform, PointSet3::grid, PointSet3::clusters}) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<double>(kind, 12'000, 6);
     Elliptical3 one(map), two(map);
@@ -164,8 +164,8 @@ TEST(EllipticalMetric3, ResultDoesNotDependOnThreads) {
 
 TEST(EllipticalMetric3, NearestIsNearestInTheMetric) {
   const LinearMap3 map = ellipsoid_map({6, 1, 2}, rotations()[4]);
-  for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kFewBits, PointSet3::kGrid,
-                               PointSet3::kSphere, PointSet3::kPlane}) {
+  for (const PointSet3 kind : {PointSet3::uniform, PointSet3::few_bits, PointSet3::grid,
+                               PointSet3::sphere, PointSet3::plane}) {
     SCOPED_TRACE(name(kind));
     Elliptical3 triangulation(map);
     triangulation.build(make_points3<double>(kind, 100, 8));

@@ -33,8 +33,8 @@ std::vector<Space> ellipsoid(std::size_t count, const Space& radii) {
 
 std::vector<ShapeOptions> all_options() {
   std::vector<ShapeOptions> result{{}};
-  for (const auto criterion : {ShapeCriterion::kGabriel, ShapeCriterion::kEdgeLength}) {
-    for (const auto rule : {ShapeRule::kFlood, ShapeRule::kPublished}) {
+  for (const auto criterion : {ShapeCriterion::gabriel, ShapeCriterion::edge_length}) {
+    for (const auto rule : {ShapeRule::flood, ShapeRule::published}) {
       for (const bool keep : {true, false}) {
         result.push_back({rule, criterion, 0.7, keep});
       }
@@ -47,8 +47,8 @@ std::vector<ShapeOptions> all_options() {
 TEST(EllipticalShape, IntegerPointsAndMapsGiveTheShapeOfMappedPoints) {
   for (const LinearMap3& m :
        {LinearMap3{4, 0, 0, 0, 1, 0, 0, 0, 0.5}, LinearMap3{1, 0, 0, 3, 1, 0, -2, 5, 1}}) {
-    for (const PointSet3 kind : {PointSet3::kFiveBits, PointSet3::kGrid, PointSet3::kSphere,
-                                 PointSet3::kSlab, PointSet3::kClusters, PointSet3::kPlane}) {
+    for (const PointSet3 kind : {PointSet3::five_bits, PointSet3::grid, PointSet3::sphere,
+                                 PointSet3::slab, PointSet3::clusters, PointSet3::plane}) {
       const auto points = make_points3<double>(kind, 250, 4);
       std::vector<Space> mapped;
       for (const Space& p : points)
@@ -126,7 +126,7 @@ TEST(EllipticalShape, RestoresAnEllipsoidOfStretchedSamples) {
   EXPECT_EQ(measures.euler_characteristic, 2);
   EXPECT_NEAR(measures.volume, 4.0 / 3 * 3.141592653589793 * 40, 1.5);
   // Edge lengths with a factor of 1, which restores uniform samples (see ShapeOptions).
-  options.shape = {ShapeRule::kFlood, ShapeCriterion::kEdgeLength, 1.0, true};
+  options.shape = {ShapeRule::flood, ShapeCriterion::edge_length, 1.0, true};
   EXPECT_EQ(measure(restore_surface(points, options).surface).faces, 3996u);
 
   options.quantise_bits = 20;

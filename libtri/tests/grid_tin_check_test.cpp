@@ -92,7 +92,7 @@ struct CrossingTriangles {
 CrossingTriangles make_crossing_triangles(std::uint32_t columns, std::uint32_t rows,
                                           std::uint64_t seed) {
   CrossingTriangles result{
-      make_window<float>(Relief::kNoise, seed % 2 == 0 ? Gaps::kBlobs : Gaps::kNone, columns, rows,
+      make_window<float>(Relief::noise, seed % 2 == 0 ? Gaps::blobs : Gaps::none, columns, rows,
                          seed),
       {},
       {}};

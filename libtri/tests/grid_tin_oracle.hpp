@@ -19,8 +19,8 @@ namespace terrace::tri::grid_tin_oracle {
 
 using Corners = std::array<std::array<std::int64_t, 2>, 3>;
 
-inline constexpr TinQuality kQualities[] = {TinQuality::kGreedy, TinQuality::kRemoval,
-                                            TinQuality::kFitted};
+inline constexpr TinQuality kQualities[] = {TinQuality::greedy, TinQuality::removal,
+                                            TinQuality::fitted};
 
 inline std::int64_t turn(const std::array<std::int64_t, 2>& a, const std::array<std::int64_t, 2>& b,
                          const std::array<std::int64_t, 2>& c) {

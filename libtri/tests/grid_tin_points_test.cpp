@@ -13,7 +13,7 @@ using namespace terrace::tri;
 using namespace terrace::tri::grid_tin_oracle;
 
 TEST(GridTin, BestOfPoints) {
-  const auto owned = make_window<float>(Relief::kNoise, Gaps::kNone, 40, 40, 8);
+  const auto owned = make_window<float>(Relief::noise, Gaps::none, 40, 40, 8);
   const GridTinOptions options;
   for (const std::size_t count : {4UL, 5UL, 50UL, 400UL, 1600UL, 99999UL}) {
     const GridTin tin = grid_tin_of_points(owned.window(), count, options);
@@ -46,7 +46,7 @@ TEST(GridTin, BestOfPoints) {
 
 TEST(GridTin, BestOfPointsCoversDataOnceThereAreEnough) {
   for (const Gaps gaps : kGapPatterns) {
-    const auto owned = make_window<float>(Relief::kHills, gaps, 40, 33, 8);
+    const auto owned = make_window<float>(Relief::hills, gaps, 40, 33, 8);
     SCOPED_TRACE(static_cast<int>(gaps));
     for (const std::size_t count : {4UL, 30UL, 300UL}) {
       const GridTin tin = grid_tin_of_points(owned.window(), count, {});

@@ -54,10 +54,10 @@ TEST(GridTin, GreedyIsDelaunayOnTheGround) {
     std::int64_t wx, wy;
   };
   for (const Steps& steps : {Steps{1, -1, 1, 1}, Steps{2, -1, 4, 1}, Steps{0.5, -1, 1, 4}}) {
-    for (const Relief relief : {Relief::kHills, Relief::kNoise, Relief::kLake, Relief::kSteps}) {
-      SCOPED_TRACE(describe(relief, Gaps::kNone, 45, 38, 9));
-      const auto owned = make_window<float>(relief, Gaps::kNone, 45, 38, 9);
-      const GridTin tin = make(owned, bound_for(relief), TinQuality::kGreedy, steps.x, steps.y);
+    for (const Relief relief : {Relief::hills, Relief::noise, Relief::lake, Relief::steps}) {
+      SCOPED_TRACE(describe(relief, Gaps::none, 45, 38, 9));
+      const auto owned = make_window<float>(relief, Gaps::none, 45, 38, 9);
+      const GridTin tin = make(owned, bound_for(relief), TinQuality::greedy, steps.x, steps.y);
       for (std::size_t i = 0; i < tin.triangles.size(); ++i) {
         const Corners t = corners_of(tin, i);
         for (const GridVertex& v : tin.vertices)
@@ -69,24 +69,24 @@ TEST(GridTin, GreedyIsDelaunayOnTheGround) {
 
 TEST(GridTin, RemovalAvoidsThinTriangles) {
   for (const double row_step : {-1.0, -0.6, -2.5}) {
-    for (const Relief relief : {Relief::kHills, Relief::kNoise, Relief::kLake, Relief::kFlat}) {
-      for (const Gaps gaps : {Gaps::kNone, Gaps::kBlobs}) {
+    for (const Relief relief : {Relief::hills, Relief::noise, Relief::lake, Relief::flat}) {
+      for (const Gaps gaps : {Gaps::none, Gaps::blobs}) {
         SCOPED_TRACE(describe(relief, gaps, 90, 80, 4));
         const auto owned = make_window<float>(relief, gaps, 90, 80, 4);
         const double bound = bound_for(relief);
-        const GridTin greedy = make(owned, bound, TinQuality::kGreedy, 1, row_step);
+        const GridTin greedy = make(owned, bound, TinQuality::greedy, 1, row_step);
         std::set<Corners> before;
         for (std::size_t i = 0; i < greedy.triangles.size(); ++i)
           before.insert(key_of(corners_of(greedy, i)));
-        const GridTin tin = make(owned, bound, TinQuality::kRemoval, 1, row_step);
+        const GridTin tin = make(owned, bound, TinQuality::removal, 1, row_step);
         for (std::size_t i = 0; i < tin.triangles.size(); ++i) {
           const Corners t = corners_of(tin, i);
           // Steps are rounded to 1 / 1024 of a square.
           if (smallest_angle(t, 1, row_step) < 4.98) {
-            EXPECT_TRUE(gaps != Gaps::kNone || before.count(key_of(t)) == 1);
+            EXPECT_TRUE(gaps != Gaps::none || before.count(key_of(t)) == 1);
           }
         }
-        if (gaps == Gaps::kNone && relief == Relief::kHills) {
+        if (gaps == Gaps::none && relief == Relief::hills) {
           EXPECT_LT(tin.triangles.size(), greedy.triangles.size());
         }
       }
@@ -95,7 +95,7 @@ TEST(GridTin, RemovalAvoidsThinTriangles) {
 }
 
 TEST(GridTin, StillWaterHasFewTriangles) {
-  OwnedWindow<float> owned = make_window<float>(Relief::kNoise, Gaps::kNone, 200, 200, 7);
+  OwnedWindow<float> owned = make_window<float>(Relief::noise, Gaps::none, 200, 200, 7);
   for (std::uint32_t y = 20; y < 180; ++y)
     for (std::uint32_t x = 20; x < 180; ++x) owned.heights[std::size_t{y} * 200 + x] = 0;
   for (const TinQuality quality : kQualities) {
@@ -108,10 +108,10 @@ TEST(GridTin, StillWaterHasFewTriangles) {
 }
 
 TEST(GridTin, OrientationFollowsTheGround) {
-  const auto owned = make_window<float>(Relief::kHills, Gaps::kNone, 20, 20, 3);
+  const auto owned = make_window<float>(Relief::hills, Gaps::none, 20, 20, 3);
   for (const double x : {1.0, -1.0})
     for (const double y : {1.0, -1.0}) {
-      const GridTin tin = make(owned, 5, TinQuality::kRemoval, x, y);
+      const GridTin tin = make(owned, 5, TinQuality::removal, x, y);
       for (std::size_t i = 0; i < tin.triangles.size(); ++i) {
         const Corners t = corners_of(tin, i);
         EXPECT_GT(static_cast<double>(turn(t[0], t[1], t[2])) * x * y, 0);

@@ -28,14 +28,14 @@ void expect_within_bounds(std::uint32_t columns, std::uint32_t rows, std::uint64
       std::size_t before = std::numeric_limits<std::size_t>::max();
       for (const TinQuality quality : kQualities) {
         const GridTin tin = make(owned, bound, quality);
-        const double largest_error = brute_force(owned, tin, gaps != Gaps::kNone);
+        const double largest_error = brute_force(owned, tin, gaps != Gaps::none);
         EXPECT_LE(largest_error, bound);
         EXPECT_NEAR(tin.check.max_error, largest_error, 1e-9 * bound);
         EXPECT_LE(tin.check.max_error, bound);
         EXPECT_EQ(tin.check.uncovered_inner, 0U);
         EXPECT_EQ(tin.check.nodata_covered, 0U);
         EXPECT_EQ(tin.check.inverted, 0U);
-        if (gaps == Gaps::kNone) {
+        if (gaps == Gaps::none) {
           EXPECT_LE(tin.triangles.size(), before);
         }
         before = tin.triangles.size();
@@ -56,8 +56,8 @@ TEST(GridTin, WithinBoundInSmallWindows) {
 }
 
 TEST(GridTin, SingleLinesHaveNoTriangles) {
-  const auto owned = make_window<float>(Relief::kNoise, Gaps::kNone, 1, 50, 5);
-  const GridTin tin = make(owned, 1, TinQuality::kRemoval);
+  const auto owned = make_window<float>(Relief::noise, Gaps::none, 1, 50, 5);
+  const GridTin tin = make(owned, 1, TinQuality::removal);
   EXPECT_TRUE(tin.triangles.empty());
   EXPECT_TRUE(tin.vertices.empty());
   EXPECT_EQ(tin.check.samples, 50U);
@@ -65,9 +65,9 @@ TEST(GridTin, SingleLinesHaveNoTriangles) {
 }
 
 TEST(GridTin, PlanesHaveTwoTriangles) {
-  for (const Relief relief : {Relief::kFlat, Relief::kRamp}) {
+  for (const Relief relief : {Relief::flat, Relief::ramp}) {
     for (const double bound : {0.0, 1e-6, 5.0}) {
-      const auto owned = make_window<float>(relief, Gaps::kNone, 300, 200, 1);
+      const auto owned = make_window<float>(relief, Gaps::none, 300, 200, 1);
       for (const TinQuality quality : kQualities) {
         const GridTin tin = make(owned, bound, quality);
         EXPECT_EQ(tin.triangles.size(), 2U);
@@ -78,7 +78,7 @@ TEST(GridTin, PlanesHaveTwoTriangles) {
 }
 
 TEST(GridTin, ZeroBoundKeepsAllSamplesOffPlanes) {
-  const auto owned = make_window<float>(Relief::kNoise, Gaps::kNone, 40, 30, 1);
+  const auto owned = make_window<float>(Relief::noise, Gaps::none, 40, 30, 1);
   for (const TinQuality quality : kQualities) {
     const GridTin tin = make(owned, 0, quality);
     EXPECT_LE(tin.check.max_error, 1e-9);
@@ -88,11 +88,11 @@ TEST(GridTin, ZeroBoundKeepsAllSamplesOffPlanes) {
 
 TEST(GridTin, SameBytesOnEveryProcessor) {
   for (const Relief relief : kReliefs) {
-    for (const Gaps gaps : {Gaps::kNone, Gaps::kBlobs}) {
+    for (const Gaps gaps : {Gaps::none, Gaps::blobs}) {
       const auto owned = make_window<float>(relief, gaps, 75, 60, 21);
       OwnedWindow<double> wide{75, 60, {}};
       for (const float z : owned.heights) wide.heights.push_back(static_cast<double>(z) * 1.1);
-      for (const TinQuality quality : {TinQuality::kGreedy, TinQuality::kFitted}) {
+      for (const TinQuality quality : {TinQuality::greedy, TinQuality::fitted}) {
         GridTinOptions options;
         options.max_error = bound_for(relief);
         options.quality = quality;
@@ -116,14 +116,14 @@ TEST(GridTin, SameBytesOnEveryProcessor) {
 }
 
 TEST(GridTin, DoublesWithFloatValuesGiveTheSame) {
-  const auto owned = make_window<float>(Relief::kHills, Gaps::kBlobs, 80, 70, 2);
+  const auto owned = make_window<float>(Relief::hills, Gaps::blobs, 80, 70, 2);
   OwnedWindow<double> wide{80, 70, {owned.heights.begin(), owned.heights.end()}};
-  EXPECT_EQ(make(owned, 9, TinQuality::kFitted).vertices,
-            make(wide, 9, TinQuality::kFitted).vertices);
+  EXPECT_EQ(make(owned, 9, TinQuality::fitted).vertices,
+            make(wide, 9, TinQuality::fitted).vertices);
 }
 
 TEST(GridTin, KeepsTheBoundWhereFloatsLackPrecision) {
-  auto owned = make_window<double>(Relief::kHills, Gaps::kNone, 60, 60, 6);
+  auto owned = make_window<double>(Relief::hills, Gaps::none, 60, 60, 6);
   for (double& z : owned.heights) z = z * 1e-3 + 123456.789;
   for (const TinQuality quality : kQualities) {
     const GridTin tin = make(owned, 0.01, quality);
@@ -133,7 +133,7 @@ TEST(GridTin, KeepsTheBoundWhereFloatsLackPrecision) {
 }
 
 TEST(GridTin, RejectsInvalidArguments) {
-  const auto owned = make_window<float>(Relief::kHills, Gaps::kNone, 10, 8, 1);
+  const auto owned = make_window<float>(Relief::hills, Gaps::none, 10, 8, 1);
   const GridSides sides = settle_sides(owned.window(), 1);
   GridTinOptions options;
   options.max_error = 1;

@@ -15,7 +15,7 @@ using namespace terrace::tri::grid_tin_oracle;
 /// Windows of a raster that share sides, each settled with the adjacent lines.
 TEST(GridTin, WindowsFitTogether) {
   for (const Gaps gaps : kGapPatterns) {
-    for (const Relief relief : {Relief::kHills, Relief::kNoise}) {
+    for (const Relief relief : {Relief::hills, Relief::noise}) {
       constexpr std::uint32_t kSize = 61, kHalf = 30;
       SCOPED_TRACE(describe(relief, gaps, kSize, kSize, 11));
       const auto whole = make_window<float>(relief, gaps, kSize, kSize, 11);

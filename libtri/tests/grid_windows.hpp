@@ -18,31 +18,31 @@ namespace terrace::tri {
 inline constexpr double kNoHeight = std::numeric_limits<double>::quiet_NaN();
 
 enum class Relief {
-  kFlat,
-  kRamp,
-  kSteps,
-  kNoise,   ///< independent samples in the range of 16 bits
-  kHills,   ///< smooth, of integers
-  kSpikes,  ///< flat with a few samples far off
-  kLake,    ///< hills with flat water
-  kHuge,    ///< about 1e30
-  kTiny,    ///< about 1e-30
+  flat,
+  ramp,
+  steps,
+  noise,   ///< independent samples in the range of 16 bits
+  hills,   ///< smooth, of integers
+  spikes,  ///< flat with a few samples far off
+  lake,    ///< hills with flat water
+  huge,    ///< about 1e30
+  tiny,    ///< about 1e-30
 };
-inline constexpr Relief kReliefs[] = {Relief::kFlat,  Relief::kRamp,  Relief::kSteps,
-                                      Relief::kNoise, Relief::kHills, Relief::kSpikes,
-                                      Relief::kLake,  Relief::kHuge,  Relief::kTiny};
+inline constexpr Relief kReliefs[] = {Relief::flat,  Relief::ramp,  Relief::steps,
+                                      Relief::noise, Relief::hills, Relief::spikes,
+                                      Relief::lake,  Relief::huge,  Relief::tiny};
 
 enum class Gaps {
-  kNone,
-  kSprinkled,  ///< single samples
-  kHalf,       ///< on one side of a slanted line
-  kBlobs,      ///< round holes
-  kIslands,    ///< round islands
-  kFrame,      ///< along all four sides
-  kMost,       ///< 9 of 10 samples
+  none,
+  sprinkled,  ///< single samples
+  half,       ///< on one side of a slanted line
+  blobs,      ///< round holes
+  islands,    ///< round islands
+  frame,      ///< along all four sides
+  most,       ///< 9 of 10 samples
 };
-inline constexpr Gaps kGapPatterns[] = {Gaps::kNone,    Gaps::kSprinkled, Gaps::kHalf, Gaps::kBlobs,
-                                        Gaps::kIslands, Gaps::kFrame,     Gaps::kMost};
+inline constexpr Gaps kGapPatterns[] = {Gaps::none,    Gaps::sprinkled, Gaps::half, Gaps::blobs,
+                                        Gaps::islands, Gaps::frame,     Gaps::most};
 
 /// A window with its samples.
 template <class T>
@@ -74,31 +74,31 @@ OwnedWindow<T> make_window(Relief relief, Gaps gaps, std::uint32_t columns, std:
           std::floor(200 * (std::sin(a * x + c) * std::cos(b * y) + std::sin(0.11 * (x + y))));
       double z = 0;
       switch (relief) {
-        case Relief::kFlat:
+        case Relief::flat:
           z = 17;
           break;
-        case Relief::kRamp:
+        case Relief::ramp:
           z = 3 * x - 7 * y;
           break;
-        case Relief::kSteps:
+        case Relief::steps:
           z = 50 * std::floor((x + 2 * y) / 9);
           break;
-        case Relief::kNoise:
+        case Relief::noise:
           z = std::floor(65536 * unit()) - 32768;
           break;
-        case Relief::kHills:
+        case Relief::hills:
           z = hills;
           break;
-        case Relief::kSpikes:
+        case Relief::spikes:
           z = unit() < 0.02 ? std::floor(2000 * unit() - 1000) : 5;
           break;
-        case Relief::kLake:
+        case Relief::lake:
           z = std::fmax(hills, 0);
           break;
-        case Relief::kHuge:
+        case Relief::huge:
           z = 1e30 * (unit() - 0.5);
           break;
-        case Relief::kTiny:
+        case Relief::tiny:
           z = 1e-30 * (unit() - 0.5);
           break;
       }
@@ -108,24 +108,24 @@ OwnedWindow<T> make_window(Relief relief, Gaps gaps, std::uint32_t columns, std:
       const double chance = unit();
       bool missing = false;
       switch (gaps) {
-        case Gaps::kNone:
+        case Gaps::none:
           break;
-        case Gaps::kSprinkled:
+        case Gaps::sprinkled:
           missing = chance < 0.02;
           break;
-        case Gaps::kHalf:
+        case Gaps::half:
           missing = y - rows * 0.5 > slope * (x - columns * 0.5);
           break;
-        case Gaps::kBlobs:
+        case Gaps::blobs:
           missing = in_disc;
           break;
-        case Gaps::kIslands:
+        case Gaps::islands:
           missing = !in_disc;
           break;
-        case Gaps::kFrame:
+        case Gaps::frame:
           missing = row < 2 || column < 3 || row + 3 > rows || column + 2 > columns;
           break;
-        case Gaps::kMost:
+        case Gaps::most:
           missing = chance < 0.9;
           break;
       }
@@ -138,11 +138,11 @@ OwnedWindow<T> make_window(Relief relief, Gaps gaps, std::uint32_t columns, std:
 /// An error bound that leaves work to do.
 inline double bound_for(Relief relief) {
   switch (relief) {
-    case Relief::kNoise:
+    case Relief::noise:
       return 9000;
-    case Relief::kHuge:
+    case Relief::huge:
       return 2e29;
-    case Relief::kTiny:
+    case Relief::tiny:
       return 2e-31;
     default:
       return 12;

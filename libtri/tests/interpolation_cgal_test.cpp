@@ -120,7 +120,7 @@ TYPED_TEST(InterpolationCgalTest, SameNaturalNeighbourCoordinates) {
       for (const Point2& query : make_queries(triangulation, 70, count)) {
         SCOPED_TRACE(std::to_string(query[0]) + ", " + std::to_string(query[1]));
         const Weights cgal_weights = weights_of(oracle, query);
-        weights_at(triangulation, query, Interpolation::kNaturalNeighbour, ours);
+        weights_at(triangulation, query, Interpolation::natural_neighbour, ours);
         ASSERT_EQ(ours.empty(), cgal_weights.empty());
         Weights difference = cgal_weights;
         for (const auto& [vertex, weight] : ours)

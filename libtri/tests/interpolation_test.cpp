@@ -19,8 +19,8 @@ namespace terrace::tri {
 namespace {
 
 using planar::DoubleKernel;
-constexpr Interpolation kInterpolations[] = {Interpolation::kNearest, Interpolation::kLinear,
-                                             Interpolation::kNaturalNeighbour};
+constexpr Interpolation kInterpolations[] = {Interpolation::nearest, Interpolation::linear,
+                                             Interpolation::natural_neighbour};
 const double kNan = std::numeric_limits<double>::quiet_NaN();
 
 template <class Coord>
@@ -59,7 +59,7 @@ TYPED_TEST(InterpolationTest, WeightsObeyTheirLaws) {
       for (const Point2& query : make_queries(triangulation, 140, count)) {
         SCOPED_TRACE(std::to_string(query[0]) + ", " + std::to_string(query[1]));
         for (const Interpolation method :
-             {Interpolation::kLinear, Interpolation::kNaturalNeighbour}) {
+             {Interpolation::linear, Interpolation::natural_neighbour}) {
           weights_at(triangulation, query, method, weights);
           ASSERT_EQ(!weights.empty(), this->in_hull(triangulation, query));
           if (weights.empty()) continue;
@@ -79,12 +79,12 @@ TYPED_TEST(InterpolationTest, WeightsObeyTheirLaws) {
           ASSERT_NEAR(sum, 1, 1e-14);
           for (std::size_t k = 0; k < 2; ++k)
             ASSERT_LE(std::abs(mean[k]), 1e-11 * extent[k] + 0x1p-1073);
-          ASSERT_TRUE(method == Interpolation::kNaturalNeighbour || weights.size() <= 3);
+          ASSERT_TRUE(method == Interpolation::natural_neighbour || weights.size() <= 3);
           const Location at = [&]() -> Location {
             if constexpr (std::is_same_v<TypeParam, double>) return triangulation.locate(query);
             return {};
           }();
-          if (at.place == Place::kVertex) {
+          if (at.place == Place::vertex) {
             ASSERT_EQ(weights.size(), 1u);
             ASSERT_EQ(weights[0].vertex, at.vertex);
           }
@@ -96,10 +96,10 @@ TYPED_TEST(InterpolationTest, WeightsObeyTheirLaws) {
 
 TYPED_TEST(InterpolationTest, LinearWeightsAreThoseOfOneTriangle) {
   Delaunay2<TypeParam> triangulation;
-  triangulation.build(make_points<TypeParam>(PointSet::kSevenBits, 200, 1));
+  triangulation.build(make_points<TypeParam>(PointSet::seven_bits, 200, 1));
   std::vector<VertexWeight> weights;
   for (const Point2& query : make_queries(triangulation, 300, 1)) {
-    weights_at(triangulation, query, Interpolation::kLinear, weights);
+    weights_at(triangulation, query, Interpolation::linear, weights);
     if (weights.empty()) continue;
     // The sum and the mean, which are tested above, determine the weights in a triangle.
     std::size_t holders = 0;
@@ -129,7 +129,7 @@ TYPED_TEST(InterpolationTest, NearestIsNearest) {
           if (order < 0 || (order == 0 && triangulation.point(v) < triangulation.point(best)))
             best = v;
         }
-        weights_at(triangulation, query, Interpolation::kNearest, weights);
+        weights_at(triangulation, query, Interpolation::nearest, weights);
         ASSERT_EQ(weights.size(), 1u);
         ASSERT_EQ(weights[0].vertex, best);
         ASSERT_EQ(weights[0].weight, 1);
@@ -157,8 +157,8 @@ TYPED_TEST(InterpolationTest, WeightsDoNotDependOnCocircularDiagonals) {
   for (const Point2& query : make_queries(grid, 700, 5)) {
     const Point2 other{77 - query[0], query[1]};
     if (77 - other[0] != query[0]) continue;  // rounded
-    weights_at(grid, query, Interpolation::kNaturalNeighbour, left);
-    weights_at(mirrored, other, Interpolation::kNaturalNeighbour, right);
+    weights_at(grid, query, Interpolation::natural_neighbour, left);
+    weights_at(mirrored, other, Interpolation::natural_neighbour, right);
     std::map<Point2, double> difference;
     for (const auto& [vertex, weight] : left) {
       const Point2 p = query_at(grid, vertex);
@@ -172,7 +172,7 @@ TYPED_TEST(InterpolationTest, WeightsDoNotDependOnCocircularDiagonals) {
 }
 
 TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
-  for (const PointSet kind : {PointSet::kGrid, PointSet::kSevenBits}) {
+  for (const PointSet kind : {PointSet::grid, PointSet::seven_bits}) {
     SCOPED_TRACE(name(kind));
     Delaunay2<TypeParam> triangulation;
     triangulation.build(make_points<TypeParam>(kind, 400, 1));
@@ -199,7 +199,7 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
       queries.push_back({x + step / 2, 0.5 * x + 13});
     }
     const auto values =
-        heights_at(triangulation, heights, queries, Interpolation::kNaturalNeighbour);
+        heights_at(triangulation, heights, queries, Interpolation::natural_neighbour);
     std::size_t compared = 0;
     const auto compare = [&](std::size_t i, std::size_t k) {
       if (std::isnan(values[i]) || std::isnan(values[k])) return;
@@ -215,7 +215,7 @@ TYPED_TEST(InterpolationTest, NaturalNeighboursAreContinuousAcrossCircles) {
 
 TYPED_TEST(InterpolationTest, ManyQueriesEqualSingleOnesForAnyNumberOfThreads) {
   Delaunay2<TypeParam> triangulation;
-  const auto points = make_points<TypeParam>(PointSet::kUniform, 3000, 4);
+  const auto points = make_points<TypeParam>(PointSet::uniform, 3000, 4);
   triangulation.build(points);
   std::mt19937_64 random(4);
   std::vector<double> heights(triangulation.vertex_slots());
@@ -239,7 +239,7 @@ TYPED_TEST(InterpolationTest, ManyQueriesEqualSingleOnesForAnyNumberOfThreads) {
       }
     }
   }
-  for (const GradientFrom from : {GradientFrom::kTriangles, GradientFrom::kNaturalNeighbours}) {
+  for (const GradientFrom from : {GradientFrom::triangles, GradientFrom::natural_neighbours}) {
     const auto one = gradients_at(triangulation, heights, queries, from, 1);
     const auto four = gradients_at(triangulation, heights, queries, from, 4);
     ASSERT_EQ(std::memcmp(one.data(), four.data(), one.size() * sizeof(Gradient)), 0);
@@ -261,14 +261,14 @@ std::vector<std::array<Coord, 2>> spread_points(std::uint64_t seed) {
 TYPED_TEST(InterpolationTest, GradientsOfPlanesAreExactEverywhere) {
   for (const bool regular : {false, true}) {
     Delaunay2<TypeParam> triangulation;
-    triangulation.build(regular ? make_points<TypeParam>(PointSet::kGrid, 400, 1)
+    triangulation.build(regular ? make_points<TypeParam>(PointSet::grid, 400, 1)
                                 : spread_points<TypeParam>(1));
     const auto plane = [&](VertexId v) {
       const Point2 p = query_at(triangulation, v);
       return 3 + 0.25 * p[0] - 2 * p[1];
     };
     const auto queries = make_queries(triangulation, 1000, 2);
-    for (const GradientFrom from : {GradientFrom::kTriangles, GradientFrom::kNaturalNeighbours}) {
+    for (const GradientFrom from : {GradientFrom::triangles, GradientFrom::natural_neighbours}) {
       const auto gradients = gradients_at(triangulation, plane, queries, from);
       std::size_t inside = 0;
       for (std::size_t i = 0; i < queries.size(); ++i) {
@@ -301,10 +301,10 @@ TYPED_TEST(InterpolationTest, GradientsAreDerivatives) {
   for (const bool natural : {false, true}) {
     const auto gradients =
         gradients_at(triangulation, heights, queries,
-                     natural ? GradientFrom::kNaturalNeighbours : GradientFrom::kTriangles);
+                     natural ? GradientFrom::natural_neighbours : GradientFrom::triangles);
     const auto values =
         heights_at(triangulation, heights, neighbours,
-                   natural ? Interpolation::kNaturalNeighbour : Interpolation::kLinear);
+                   natural ? Interpolation::natural_neighbour : Interpolation::linear);
     for (std::size_t i = 0; i < queries.size(); ++i) {
       const double x = (values[4 * i] - values[4 * i + 1]) / (2 * step);
       const double y = (values[4 * i + 2] - values[4 * i + 3]) / (2 * step);
@@ -323,8 +323,8 @@ TEST(Interpolation, GradientsOnEdgesAndVerticesAreMeans) {
   const auto at = [&](Point2 p, GradientFrom from) {
     return gradients_at(triangulation, height, std::span(&p, 1), from, 1)[0];
   };
-  const GradientFrom triangles = GradientFrom::kTriangles;
-  const GradientFrom natural = GradientFrom::kNaturalNeighbours;
+  const GradientFrom triangles = GradientFrom::triangles;
+  const GradientFrom natural = GradientFrom::natural_neighbours;
   EXPECT_DOUBLE_EQ(at({2, 0.5}, triangles).y, 1);
   EXPECT_DOUBLE_EQ(at({2, 3}, triangles).y, -1.0 / 3);
   // The edge from (0, 0) to the top: gradients (0, 1) and (1 / 2, 0), areas 2 and 4.
@@ -353,7 +353,7 @@ TEST(Interpolation, HandlesManyNeighboursOfOneQuery) {
   Delaunay2<double> triangulation;
   triangulation.build(points);
   std::vector<VertexWeight> weights;
-  weights_at(triangulation, {0, 0}, Interpolation::kNaturalNeighbour, weights);
+  weights_at(triangulation, {0, 0}, Interpolation::natural_neighbour, weights);
   ASSERT_EQ(weights.size(), kCorners);
   for (const auto& [vertex, weight] : weights) ASSERT_NEAR(weight, 1.0 / kCorners, 1e-11);
 }
@@ -372,9 +372,9 @@ TEST(Interpolation, ManyNearlyCocircularNeighboursReproducePlanes) {
   }
   const std::vector<std::array<double, 2>> queries{{1, 2}, {300, -400}};
   const std::vector<double> at =
-      heights_at(triangulation, heights, queries, Interpolation::kNaturalNeighbour, 1);
+      heights_at(triangulation, heights, queries, Interpolation::natural_neighbour, 1);
   const std::vector<Gradient> gradients =
-      gradients_at(triangulation, heights, queries, GradientFrom::kNaturalNeighbours, 1);
+      gradients_at(triangulation, heights, queries, GradientFrom::natural_neighbours, 1);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     EXPECT_NEAR(at[i], 3 + 0.25 * queries[i][0] - 0.5 * queries[i][1], 1e-8);
     EXPECT_NEAR(gradients[i].x, 0.25, 1e-9);
@@ -425,7 +425,7 @@ TEST(Interpolation, HeightsComeFromArraysFunctionsAndModels) {
   const std::vector<Point2> queries{{0.25, 0.5}, {2, 2}, {-1, 0}};
   for (const Interpolation method : kInterpolations) {
     const auto expected = heights_at(triangulation, array, queries, method);
-    EXPECT_EQ(std::isnan(expected[2]), method != Interpolation::kNearest);
+    EXPECT_EQ(std::isnan(expected[2]), method != Interpolation::nearest);
     const auto other = heights_at(triangulation, model, queries, method);
     const auto third = heights_at(
         triangulation, [](VertexId v) { return double{0} + slot(v); }, queries, method);
@@ -442,7 +442,7 @@ TEST(Interpolation, RefusesBadData) {
   std::vector<double> heights(triangulation.vertex_slots(), 1.0);
   const auto message = [&](const std::vector<Point2>& queries) -> std::string {
     try {
-      heights_at(triangulation, heights, queries, Interpolation::kLinear);
+      heights_at(triangulation, heights, queries, Interpolation::linear);
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -455,7 +455,7 @@ TEST(Interpolation, RefusesBadData) {
   heights.pop_back();
   EXPECT_NE(message({{0, 0}}).find("vertex_slots"), std::string::npos);
   std::vector<VertexWeight> weights{{VertexId{1}, 1}};
-  EXPECT_THROW(weights_at(triangulation, {kNan, 0}, Interpolation::kNearest, weights),
+  EXPECT_THROW(weights_at(triangulation, {kNan, 0}, Interpolation::nearest, weights),
                std::invalid_argument);
   const Delaunay2<double> empty;
   for (const Interpolation method : kInterpolations) {
@@ -472,7 +472,7 @@ TEST(Interpolation, ExceptionsOfHeightFunctionsPropagate) {
   triangulation.build_grid(0, 0, 1, 3, 3);
   const auto fails = [](VertexId) -> double { throw std::runtime_error("no height"); };
   const std::vector<Point2> queries(50'000, {0.5, 0.25});
-  EXPECT_THROW(heights_at(triangulation, fails, queries, Interpolation::kLinear, 3),
+  EXPECT_THROW(heights_at(triangulation, fails, queries, Interpolation::linear, 3),
                std::runtime_error);
 }
 

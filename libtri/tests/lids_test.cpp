@@ -142,7 +142,7 @@ TYPED_TEST(Lids, MatchTheDefinition) {
     ASSERT_NO_FATAL_FAILURE(check(dense_patches<Coord>(random)));
     for (const PointSet3 kind : kPointSets3) {
       SCOPED_TRACE(name(kind));
-      if (std::is_same_v<Coord, double> && kind == PointSet3::kTiny) continue;  // areas lose bits
+      if (std::is_same_v<Coord, double> && kind == PointSet3::tiny) continue;  // areas lose bits
       ASSERT_NO_FATAL_FAILURE(check(make_points3<Coord>(kind, 120, seed)));
     }
   }

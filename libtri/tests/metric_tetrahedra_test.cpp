@@ -217,7 +217,7 @@ TYPED_TEST_SUITE(MetricTetrahedraTest, CoordTypes);
 TYPED_TEST(MetricTetrahedraTest, KeepTheGuarantees) {
   for (const PointSet3 kind : kPointSets3) {
     for (const std::size_t count : {1u, 4u, 20u, 200u}) {
-      if (kind == PointSet3::kCurves && count > 20) continue;
+      if (kind == PointSet3::curves && count > 20) continue;
       SCOPED_TRACE(name(kind) + " " + std::to_string(count));
       const auto points = make_points3<TypeParam>(kind, count, 41);
       Delaunay3<TypeParam> triangulation;
@@ -227,7 +227,7 @@ TYPED_TEST(MetricTetrahedraTest, KeepTheGuarantees) {
       const auto before = own_tetrahedra(triangulation);
       const auto after = corners_of_all(triangulation, result.tetrahedra);
       const std::size_t changed = Check(before, after, field).run(result.stuck, kIdentityMap<3>);
-      if (kind == PointSet3::kUniform && count == 200) {
+      if (kind == PointSet3::uniform && count == 200) {
         EXPECT_GT(changed, 100u);
       }
       if (this->HasFailure()) return;
@@ -237,7 +237,7 @@ TYPED_TEST(MetricTetrahedraTest, KeepTheGuarantees) {
 
 TYPED_TEST(MetricTetrahedraTest, DependOnThePointsAlone) {
   for (const PointSet3 kind : kPointSets3) {
-    if (kind == PointSet3::kCurves) continue;
+    if (kind == PointSet3::curves) continue;
     SCOPED_TRACE(name(kind));
     auto points = make_points3<TypeParam>(kind, 200, 42);
     const MetricField3 field = three_spatial_regions(points);
@@ -294,7 +294,7 @@ TYPED_TEST(MetricTetrahedraTest, OfOneMetricEqualTheEllipticalTriangulation) {
 }
 
 TEST(MetricTetrahedra3, AlsoStartFromAnEllipticalTriangulation) {
-  const auto points = make_points3<double>(PointSet3::kFiveBits, 300, 45);
+  const auto points = make_points3<double>(PointSet3::five_bits, 300, 45);
   Elliptical3 triangulation(ellipsoid_map({3, 1, 1}, rotations()[3]));
   triangulation.build(points);
   const MetricField3 field([&](const Space& p) {

@@ -110,7 +110,7 @@ TYPED_TEST(MetricTriangles, KeepTheGuarantees) {
       const std::size_t changed =
           check(triangles_of(triangulation),
                 corners_of_all(triangulation, metric_triangles(triangulation, field)), field);
-      if (kind == PointSet::kUniform && count == 800) {
+      if (kind == PointSet::uniform && count == 800) {
         EXPECT_GT(changed, 300u);
       }
       if (this->HasFailure()) return;
@@ -187,7 +187,7 @@ TYPED_TEST(MetricTriangles, OfOneMetricEqualTheEllipticalTriangulation) {
 }
 
 TEST(MetricTriangles2, AlsoStartFromAnEllipticalTriangulation) {
-  const auto points = make_points<double>(PointSet::kSevenBits, 700, 45);
+  const auto points = make_points<double>(PointSet::seven_bits, 700, 45);
   Elliptical2 triangulation(ellipse_map(3, 1, 80));
   triangulation.build(points);
   const MetricField2 field([&](const PlanePoint& p) {
@@ -203,7 +203,7 @@ TEST(MetricTriangles2, WindowsDependOnPointsAndWindowAlone) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
-    auto points = make_points<double>(PointSet::kSevenBits, 600, 46 + seed);
+    auto points = make_points<double>(PointSet::seven_bits, 600, 46 + seed);
     const MetricField2 field = three_regions(points);
     const double x = static_cast<double>(random() % 100), y = static_cast<double>(random() % 100);
     const Box3 window = box2(x, y, x + 40, y + 25);

@@ -184,9 +184,9 @@ TEST(PointRows, KeepTheErrorOnALattice) {
           const PointTin tin = point_tin(grid.rows(), frame, options);
           check_framed_mesh(tin, frame);
           check_errors(Places(grid), grid.z, tin, error);
-          if (quality != TinQuality::kFitted)
+          if (quality != TinQuality::fitted)
             check_lattice(Places(grid), grid.z, tin, *options.lattice);
-          if (quality == TinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
+          if (quality == TinQuality::greedy && tin.vertices.size() < 800) check_delaunay(tin);
         }
       }
     }
@@ -242,8 +242,8 @@ TEST(PointRows, TurnedAndBentGridsKeepTheError) {
               point_tin(SampleGrid{shape.columns, places.x, places.y, grid.z}, frame, options);
           check_framed_mesh(tin, frame);
           check_errors(places, grid.z, tin, error);
-          if (quality != TinQuality::kFitted) check_lattice(places, grid.z, tin, *options.lattice);
-          if (quality == TinQuality::kGreedy && tin.vertices.size() < 800) check_delaunay(tin);
+          if (quality != TinQuality::fitted) check_lattice(places, grid.z, tin, *options.lattice);
+          if (quality == TinQuality::greedy && tin.vertices.size() < 800) check_delaunay(tin);
         }
       }
     }
@@ -259,17 +259,17 @@ TEST(PointRows, HaveAsFewTrianglesAsPointTins) {
     y.push_back(grid.y[i / grid.x.size()]);
   }
   for (const double error : {0.7, 2.0, 10.0}) {
-    for (const TinQuality quality : {TinQuality::kGreedy, TinQuality::kRemoval}) {
+    for (const TinQuality quality : {TinQuality::greedy, TinQuality::removal}) {
       SCOPED_TRACE("error " + std::to_string(error) + ", quality " +
                    std::to_string(static_cast<int>(quality)));
       const PointTinOptions options = options_of(error, quality);
       const PointTin tin = point_tin(grid.rows(), frame, options);
       const PointTin from_points = point_tin(x, y, grid.z, frame, options);
       // Sweeps insert points before removal, which leaves a few per cent less here.
-      const double max_ratio = quality == TinQuality::kRemoval ? 1.08 : 1.04;
+      const double max_ratio = quality == TinQuality::removal ? 1.08 : 1.04;
       EXPECT_LE(static_cast<double>(tin.triangles.size()),
                 max_ratio * static_cast<double>(from_points.triangles.size()));
-      if (quality == TinQuality::kRemoval) {
+      if (quality == TinQuality::removal) {
         EXPECT_GT(tin.removed, tin.inserted / 5);
         EXPECT_EQ(tin.vertices.size(), frame.size() + tin.inserted - tin.removed);
       }
@@ -296,7 +296,7 @@ TEST(PointRows, AllInstructionSetsGiveTheSame) {
       const std::vector<Point3> frame = make_frame(extent, 3, 8);
       ASSERT_TRUE(tin::rows::padded_samples(grid.rows(), frame));
       ASSERT_TRUE(tin::rows::padded_samples(turned, frame));
-      const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
+      const PointTinOptions options = options_of(1.0, TinQuality::removal);
       const auto from_rows = [&](base::SimdPath set) {
         return tin::rows::make_tin(grid.rows(), frame, options, set);
       };
@@ -320,7 +320,7 @@ TEST(PointRows, ReportLatticesTooCoarseForTheError) {
   std::mt19937_64 random(9);
   for (double& z : grid.z) z = 100 * unit(random);
   const std::vector<Point3> frame = make_frame(20, 1, 10);
-  for (const TinQuality quality : {TinQuality::kGreedy, TinQuality::kRemoval}) {
+  for (const TinQuality quality : {TinQuality::greedy, TinQuality::removal}) {
     const PointTin tin = point_tin(grid.rows(), frame, options_of(1.0, quality));
     check_framed_mesh(tin, frame);
     check_errors(Places(grid), grid.z, tin, 1.0);
@@ -332,7 +332,7 @@ TEST(PointRows, ReportLatticesTooCoarseForTheError) {
 TEST(PointRows, KeepAnErrorOfZero) {
   const Grid grid = make_grid({20, 20, 1000, 0}, 0.1, 11);
   const std::vector<Point3> frame = make_frame(1000, 2, 12);
-  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, TinQuality::kRemoval));
+  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.0, TinQuality::removal));
   check_framed_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.0);
   // All samples inside are vertices, as their heights are rounded.
@@ -345,13 +345,13 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
   grid.y = {std::nextafter(0.0, -1.0), 250, 500, 750, 1000};
   grid.z.assign(25, 0.0);
   const std::vector<Point3> frame{{0, 0, 0}, {1000, 0, 0}, {1000, 1000, 0}, {0, 1000, 0}};
-  const PointTin flat = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::kGreedy));
+  const PointTin flat = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::greedy));
   EXPECT_EQ(flat.errors.covered, 16u);
   EXPECT_EQ(flat.errors.uncovered, 9u);
   EXPECT_EQ(flat.triangles.size(), 2u);
   // Beyond the bound outside, on a side, and inside.
   grid.z[4] = grid.z[9] = grid.z[22] = grid.z[12] = 300;
-  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::kGreedy));
+  const PointTin tin = point_tin(grid.rows(), frame, options_of(0.5, TinQuality::greedy));
   check_framed_mesh(tin, frame);
   check_errors(Places(grid), grid.z, tin, 0.5);
   EXPECT_EQ(tin.stuck, 1u);
@@ -361,7 +361,7 @@ TEST(PointRows, SamplesOnTheFrameAndAHairOutside) {
 
 TEST(PointRows, HandleFewSamples) {
   const std::vector<Point3> frame{{0, 0, 1}, {10, 0, 2}, {10, 10, 3}, {0, 10, 4}};
-  const PointTinOptions options = options_of(0.5, TinQuality::kRemoval);
+  const PointTinOptions options = options_of(0.5, TinQuality::removal);
   Grid grid;
   EXPECT_EQ(point_tin(grid.rows(), frame, options).triangles.size(), 2u);
   grid.x = {5};
@@ -389,7 +389,7 @@ TEST(PointRows, AcceptIrregularPlacesAndFrames) {
   Grid grid = make_grid({40, 40, 1000, 0}, 0.05, 13);
   grid.x[7] += 10;
   const std::vector<Point3> frame = make_frame(1000, 2, 14);
-  const PointTinOptions options = options_of(1.0, TinQuality::kRemoval);
+  const PointTinOptions options = options_of(1.0, TinQuality::removal);
   const PointTin uneven = point_tin(grid.rows(), frame, options);
   check_framed_mesh(uneven, frame);
   check_errors(Places(grid), grid.z, uneven, 1.0);
@@ -411,7 +411,7 @@ TEST(PointRows, AcceptIrregularPlacesAndFrames) {
 TEST(PointRows, RejectBadInput) {
   Grid grid = make_grid({10, 10, 1000, 0}, 0.0, 15);
   const std::vector<Point3> frame = make_frame(1000, 1, 16);
-  const PointTinOptions options = options_of(1.0, TinQuality::kGreedy);
+  const PointTinOptions options = options_of(1.0, TinQuality::greedy);
   const auto expect_refused = [&](const std::string& what) {
     try {
       static_cast<void>(point_tin(grid.rows(), frame, options));

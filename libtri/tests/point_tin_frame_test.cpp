@@ -71,7 +71,7 @@ TEST(PointTin, KeepsTheFrame) {
       cloud.z[cloud.size() - 1] = frame[0][2];
       cloud.x[cloud.size() - 2] = 2000;
       EXPECT_LE(measure(cloud, tin).largest, 2 + 1e-9);
-      if (quality == TinQuality::kGreedy) check_delaunay(tin);
+      if (quality == TinQuality::greedy) check_delaunay(tin);
     }
   }
 }

@@ -18,10 +18,10 @@ using namespace point_tin_oracle;
 
 TEST(PointTin, HandlesDuplicates) {
   const Cloud cloud{{0, 10, 10, 0, 5, 5, 5}, {0, 0, 10, 10, 5, 5, 5}, {0, 0, 0, 0, 7, 2, 6}};
-  const std::pair<PointDuplicates, double> cases[] = {{PointDuplicates::kFirst, 7},
-                                                      {PointDuplicates::kMin, 2},
-                                                      {PointDuplicates::kMax, 7},
-                                                      {PointDuplicates::kMean, 5}};
+  const std::pair<PointDuplicates, double> cases[] = {{PointDuplicates::first, 7},
+                                                      {PointDuplicates::min, 2},
+                                                      {PointDuplicates::max, 7},
+                                                      {PointDuplicates::mean, 5}};
   PointTinOptions options;
   for (const auto& [duplicates, height] : cases) {
     options.duplicates = duplicates;
@@ -33,9 +33,8 @@ TEST(PointTin, HandlesDuplicates) {
     EXPECT_EQ(tin.errors.largest, 0);
   }
   // All count: one of them is the vertex, and the other is measured there.
-  options.duplicates = PointDuplicates::kAll;
-  for (const TinQuality quality :
-       {TinQuality::kGreedy, TinQuality::kRemoval, TinQuality::kFitted}) {
+  options.duplicates = PointDuplicates::all;
+  for (const TinQuality quality : {TinQuality::greedy, TinQuality::removal, TinQuality::fitted}) {
     options.quality = quality;
     options.max_error = 5;
     const PointTin close = make(cloud, {}, options);
@@ -55,7 +54,7 @@ TEST(PointTin, HandlesDuplicates) {
         separate.errors.largest);
   }
   options = {};
-  options.duplicates = PointDuplicates::kError;
+  options.duplicates = PointDuplicates::error;
   try {
     make(cloud, {}, options);
     FAIL();
@@ -89,7 +88,7 @@ TEST(PointTin, HasNoSurfaceWithoutArea) {
 
 TEST(PointTin, HandlesHugeAndTinyCoordinates) {
   for (const double scale : {1e90, 1e-90, 1e-160}) {
-    Cloud cloud = make_cloud(PointSet::kUniform, 300, 11);
+    Cloud cloud = make_cloud(PointSet::uniform, 300, 11);
     for (std::size_t i = 0; i < cloud.size(); ++i) {
       cloud.x[i] = cloud.x[i] * scale - scale / 2;
       cloud.y[i] *= scale;

@@ -154,8 +154,8 @@ inline TinErrors brute_force(const Cloud& cloud, const PointTin& tin) {
   return result;
 }
 
-inline constexpr TinQuality kQualities[] = {TinQuality::kGreedy, TinQuality::kRemoval,
-                                            TinQuality::kFitted};
+inline constexpr TinQuality kQualities[] = {TinQuality::greedy, TinQuality::removal,
+                                            TinQuality::fitted};
 
 inline void check_frame(const PointTin& tin, const std::vector<Point3>& frame) {
   const auto border = check_mesh(tin);

@@ -17,7 +17,7 @@ using namespace point_tin_oracle;
 
 TEST(PointTin, KeepsTheErrorOverTheHull) {
   for (const PointSet kind : kPointSets) {
-    if (kind == PointSet::kHuge || kind == PointSet::kTiny) continue;
+    if (kind == PointSet::huge || kind == PointSet::tiny) continue;
     for (std::uint64_t seed = 1; seed <= 2; seed += TERRACE_TEST_SHARE) {
       const Cloud cloud = make_cloud(kind, 800, seed);
       for (const double error : {0.0, 0.5, 5.0, 200.0}) {
@@ -32,7 +32,7 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
           EXPECT_EQ(tin.duplicates, cloud.size() - cloud.places());
           check_mesh(tin);
           if (tin.triangles.empty()) {
-            EXPECT_TRUE(kind == PointSet::kHorizontal || kind == PointSet::kSlanted);
+            EXPECT_TRUE(kind == PointSet::horizontal || kind == PointSet::slanted);
             EXPECT_EQ(tin.errors.uncovered, cloud.places());
             continue;
           }
@@ -44,11 +44,11 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
           EXPECT_EQ(measured.covered, cloud.size());
           EXPECT_LE(measured.largest, error + 1e-9);
           EXPECT_NEAR(measured.largest, tin.errors.largest, 1e-9);
-          if (quality == TinQuality::kGreedy) {
+          if (quality == TinQuality::greedy) {
             check_delaunay(tin);
             EXPECT_EQ(tin.removed, 0u);
           }
-          if (quality != TinQuality::kFitted) {
+          if (quality != TinQuality::fitted) {
             for (std::size_t v = 0; v < tin.vertices.size(); ++v) {
               const std::uint32_t s = tin.sample[v];
               ASSERT_LT(s, cloud.size());
@@ -64,7 +64,7 @@ TEST(PointTin, KeepsTheErrorOverTheHull) {
 // So many samples that a few of them choose the first vertices, and the last vertices are inserted
 // in parts.
 TEST(PointTin, KeepsTheErrorOfManySamples) {
-  for (const PointSet kind : {PointSet::kUniform, PointSet::kGrid, PointSet::kClusters}) {
+  for (const PointSet kind : {PointSet::uniform, PointSet::grid, PointSet::clusters}) {
     const Cloud cloud = make_cloud(kind, 70000, 17);
     for (const double error : {0.6, 10.0}) {
       for (const TinQuality quality : kQualities) {
@@ -86,7 +86,7 @@ TEST(PointTin, KeepsTheErrorOfManySamples) {
 }
 
 TEST(PointTin, MeasureSurfaceAgreesWithBruteForce) {
-  for (const PointSet kind : {PointSet::kUniform, PointSet::kSevenBits, PointSet::kClusters}) {
+  for (const PointSet kind : {PointSet::uniform, PointSet::seven_bits, PointSet::clusters}) {
     for (const std::uint64_t seed : {3u, 4u}) {
       SCOPED_TRACE(name(kind) + ", seed " + std::to_string(seed));
       PointTinOptions options;
@@ -105,7 +105,7 @@ TEST(PointTin, MeasureSurfaceAgreesWithBruteForce) {
 }
 
 TEST(PointTin, LimitsThePoints) {
-  const Cloud cloud = make_cloud(PointSet::kUniform, 3000, 12);
+  const Cloud cloud = make_cloud(PointSet::uniform, 3000, 12);
   double before = std::numeric_limits<double>::infinity();
   for (const std::size_t points : {50u, 200u, 800u}) {
     double greedy = 0;
@@ -120,7 +120,7 @@ TEST(PointTin, LimitsThePoints) {
       EXPECT_LE(tin.vertices.size(), points);
       EXPECT_GE(tin.vertices.size(), points * 98 / 100);
       EXPECT_NEAR(tin.errors.largest, measure(cloud, tin).largest, 1e-9);
-      if (quality == TinQuality::kGreedy) greedy = tin.errors.largest;
+      if (quality == TinQuality::greedy) greedy = tin.errors.largest;
       EXPECT_LE(tin.errors.largest, greedy);
     }
     EXPECT_LT(greedy, before);
@@ -139,7 +139,7 @@ TEST(PointTin, LimitsThePoints) {
 
 // The number of vertices falls steeply with the bound, as for trees over flat ground.
 TEST(PointTin, UsesNearlyAllMaxPointsOnSpikes) {
-  Cloud cloud = make_cloud(PointSet::kUniform, 6000, 14);
+  Cloud cloud = make_cloud(PointSet::uniform, 6000, 14);
   std::mt19937_64 random(14);
   for (double& z : cloud.z)
     z = random() % 4 == 0 ? 20 + static_cast<double>(random() % 500) / 100 : 0.0;
@@ -168,7 +168,7 @@ TEST(MeasureSurface, NamesTheLeastPositionAmongEqualErrors) {
 
 TEST(PointTin, ResultDoesNotDependOnTheOrderOfSamples) {
   // All positions differ, so the order along the curve is the same, and so is everything else.
-  const Cloud cloud = make_cloud(PointSet::kUniform, 4000, 13);
+  const Cloud cloud = make_cloud(PointSet::uniform, 4000, 13);
   Cloud shuffled = cloud;
   std::mt19937_64 random(13);
   for (std::size_t i = cloud.size(); i-- > 1;) {
@@ -209,7 +209,7 @@ TEST(PointTin, PlanesNeedNoVertices) {
 }
 
 TEST(PointTin, BetterQualityMeansFewerTriangles) {
-  const Cloud cloud = make_cloud(PointSet::kUniform, 20000, 15);
+  const Cloud cloud = make_cloud(PointSet::uniform, 20000, 15);
   std::size_t triangles[3];
   for (std::size_t q = 0; q < 3; ++q) {
     PointTinOptions options;

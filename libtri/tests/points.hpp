@@ -14,22 +14,22 @@
 namespace terrace::tri {
 
 enum class PointSet {
-  kUniform,     ///< 26 bits (integers), [0, 1) (doubles)
-  kFewBits,     ///< 5 bits: duplicates, cocircular and collinear points everywhere
-  kSevenBits,   ///< 7 bits: cocircular points, fewer duplicates
-  kGrid,        ///< a complete grid, row by row
-  kHorizontal,  ///< on one line
-  kSlanted,     ///< on one line, with duplicates
-  kOffLine,     ///< collinear except the last point
-  kCircle,      ///< cocircular: integer points on one circle, then its centre
-  kClusters,    ///< tight clusters far apart
-  kHuge,        ///< at the ends of the range
-  kTiny,        ///< doubles near the smallest; integers 0..3
+  uniform,     ///< 26 bits (integers), [0, 1) (doubles)
+  few_bits,    ///< 5 bits: duplicates, cocircular and collinear points everywhere
+  seven_bits,  ///< 7 bits: cocircular points, fewer duplicates
+  grid,        ///< a complete grid, row by row
+  horizontal,  ///< on one line
+  slanted,     ///< on one line, with duplicates
+  off_line,    ///< collinear except the last point
+  circle,      ///< cocircular: integer points on one circle, then its centre
+  clusters,    ///< tight clusters far apart
+  huge,        ///< at the ends of the range
+  tiny,        ///< doubles near the smallest; integers 0..3
 };
 inline constexpr PointSet kPointSets[] = {
-    PointSet::kUniform,    PointSet::kFewBits, PointSet::kSevenBits, PointSet::kGrid,
-    PointSet::kHorizontal, PointSet::kSlanted, PointSet::kOffLine,   PointSet::kCircle,
-    PointSet::kClusters,   PointSet::kHuge,    PointSet::kTiny};
+    PointSet::uniform,    PointSet::few_bits, PointSet::seven_bits, PointSet::grid,
+    PointSet::horizontal, PointSet::slanted,  PointSet::off_line,   PointSet::circle,
+    PointSet::clusters,   PointSet::huge,     PointSet::tiny};
 
 inline std::string name(PointSet kind) {
   constexpr const char* kNames[] = {"uniform",    "few bits", "seven bits", "grid",
@@ -52,35 +52,35 @@ std::vector<std::array<Coord, 2>> make_points(PointSet kind, std::size_t count,
     const auto k = static_cast<Coord>(i);
     std::array<Coord, 2> p{};
     switch (kind) {
-      case PointSet::kUniform:
+      case PointSet::uniform:
         if constexpr (kDouble) {
           p = {to_unit(random()), to_unit(random())};
         } else {
           p = {below(1 << 26), below(1 << 26)};
         }
         break;
-      case PointSet::kFewBits:
+      case PointSet::few_bits:
         p = {below(32), below(32)};
         if constexpr (kDouble) p = {p[0] * 0.1, p[1] * 0.1};
         break;
-      case PointSet::kSevenBits:
+      case PointSet::seven_bits:
         p = {below(128), below(128)};
         break;
-      case PointSet::kGrid:
+      case PointSet::grid:
         p = {static_cast<Coord>(i % side * 7), static_cast<Coord>(i / side * 7)};
         break;
-      case PointSet::kHorizontal:
+      case PointSet::horizontal:
         p = {below(1 << 20), Coord{5}};
         break;
-      case PointSet::kSlanted:
+      case PointSet::slanted:
         p[0] = below(100);
         p[1] = 3 * p[0] + 1;
         break;
-      case PointSet::kOffLine:
+      case PointSet::off_line:
         p = {k, 2 * k};
         if (i + 1 == count) p[1] += 1;
         break;
-      case PointSet::kCircle: {
+      case PointSet::circle: {
         // A radius of 65 * 17 * 29 has many Pythagorean points.
         constexpr std::int64_t kRadius = 32045;
         if (i + 1 == count) {
@@ -104,13 +104,13 @@ std::vector<std::array<Coord, 2>> make_points(PointSet kind, std::size_t count,
         p = {static_cast<Coord>(kRadius + x), static_cast<Coord>(kRadius + y)};
         break;
       }
-      case PointSet::kClusters: {
+      case PointSet::clusters: {
         const std::uint64_t cluster = random() % 5;
         p = {static_cast<Coord>(cluster * 200'000'000 + random() % 40),
              static_cast<Coord>(cluster * cluster * 50'000'000 + random() % 40)};
         break;
       }
-      case PointSet::kHuge:
+      case PointSet::huge:
         if constexpr (kDouble) {
           p = {(to_unit(random()) - 0.5) * 0x1p1023, (to_unit(random()) - 0.5) * 0x1p1023};
         } else {
@@ -119,7 +119,7 @@ std::vector<std::array<Coord, 2>> make_points(PointSet kind, std::size_t count,
                random() % 3 == 0 ? below(1 << 30) : kLast - below(2)};
         }
         break;
-      case PointSet::kTiny:
+      case PointSet::tiny:
         p = {below(4), below(4)};
         if constexpr (kDouble) {
           const double unit = 0x1p-1074 * static_cast<double>(1 + random() % 3);

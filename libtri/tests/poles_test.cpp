@@ -27,9 +27,9 @@ TYPED_TEST_SUITE(PolesLawTest, PolesCoords);
 TYPED_TEST(PolesLawTest, EqualsTheDefinition) {
   for (const PointSet3 kind : kPointSets3) {
     // The oracle does not scale, so its numbers would overflow or vanish.
-    if (kind == PointSet3::kHuge || kind == PointSet3::kTiny) continue;
+    if (kind == PointSet3::huge || kind == PointSet3::tiny) continue;
     for (const std::size_t count : {0u, 4u, 5u, 8u, 20u, 45u}) {
-      if (kind == PointSet3::kCurves && count > 8) continue;
+      if (kind == PointSet3::curves && count > 8) continue;
       for (std::uint64_t seed = 1; seed <= 3; ++seed) {
         SCOPED_TRACE(name(kind) + " " + std::to_string(count) + ", seed " + std::to_string(seed));
         Delaunay3<TypeParam> triangulation;
@@ -226,7 +226,7 @@ TEST(PolesTest, TouchingPartsAreSeparated) {
 }
 
 TEST(PolesTest, AnyNumberOfThreadsGivesTheSame) {
-  const auto points = make_points3<double>(PointSet3::kSphere, 20000, 3);
+  const auto points = make_points3<double>(PointSet3::sphere, 20000, 3);
   Points more = ball(20000, 1.0, {}, 0.01, 4);
   more.insert(more.end(), points.begin(), points.end());
   Delaunay3<double> triangulation;
@@ -301,7 +301,7 @@ TEST(PolesTest, NearbyUpdatesFollowAnySets) {
     shape.restore(triangulation);
     std::mt19937_64 random(6);
     Delaunay3<double>::Changes changes;
-    const auto points = make_points3<double>(kind, kind == PointSet3::kCurves ? 40 : 250, 6);
+    const auto points = make_points3<double>(kind, kind == PointSet3::curves ? 40 : 250, 6);
     for (int step = 0; step < 40; ++step) {
       if (random() % 2 == 0) {
         const std::size_t begin = random() % points.size();

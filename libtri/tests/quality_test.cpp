@@ -74,7 +74,7 @@ TYPED_TEST(QualityTest, GridSums) {
 }
 
 TYPED_TEST(QualityTest, SumsAgreeWithBruteForce) {
-  for (const PointSet kind : {PointSet::kUniform, PointSet::kSevenBits, PointSet::kClusters}) {
+  for (const PointSet kind : {PointSet::uniform, PointSet::seven_bits, PointSet::clusters}) {
     SCOPED_TRACE(name(kind));
     Delaunay2<TypeParam> triangulation;
     triangulation.build(make_points<TypeParam>(kind, 300, 3));
@@ -137,7 +137,7 @@ TYPED_TEST(QualityTest, DistancesOfPointsNotInserted) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<Point3> points{{5, 5, 17 + 3},  {40, 40, 87}, {-1, 0, 0},
                                    {12, 3, 31 - 5}, {1, 2, nan},  {20.5, 39, 48 + 5.0}};
-  for (const Interpolation method : {Interpolation::kLinear, Interpolation::kNaturalNeighbour}) {
+  for (const Interpolation method : {Interpolation::linear, Interpolation::natural_neighbour}) {
     const VerticalDistances d = vertical_distances(grid, plane, points, method);
     EXPECT_EQ(d.count, 4u);
     EXPECT_EQ(d.outside, 2u);

@@ -140,7 +140,7 @@ TYPED_TEST(RegionalDelaunay, FollowsChangesOfAnyPoints) {
 TYPED_TEST(RegionalDelaunay, ReportsNetChanges) {
   using Coord = TypeParam;
   using T = RegionalDelaunay2<Coord>;
-  auto points = make_points<Coord>(PointSet::kUniform, 3000, 11);
+  auto points = make_points<Coord>(PointSet::uniform, 3000, 11);
   T triangles(three_regions(points));
   const auto last = std::span(points).last(100);
   triangles.build(std::span(points).first(2900));

@@ -77,7 +77,7 @@ TEST(RestoreTest, HandlesDegeneratePoints) {
     EXPECT_TRUE(restore_surface({}, options).surface.faces.empty());
     const std::vector<Point3> equal(5, Point3{1, 2, 3});
     EXPECT_TRUE(restore_surface(equal, options).surface.faces.empty());
-    for (const PointSet3 kind : {PointSet3::kLine, PointSet3::kPlane}) {
+    for (const PointSet3 kind : {PointSet3::line, PointSet3::plane}) {
       const auto points = make_points3<double>(kind, 30, 2);
       const Surface surface = restore_surface(points, options).surface;
       // Rounding moves points off their plane.
@@ -86,13 +86,13 @@ TEST(RestoreTest, HandlesDegeneratePoints) {
       }
       measure(surface);
     }
-    for (const PointSet3 kind : {PointSet3::kGrid, PointSet3::kFewBits, PointSet3::kOffPlane})
+    for (const PointSet3 kind : {PointSet3::grid, PointSet3::few_bits, PointSet3::off_plane})
       measure(restore_surface(make_points3<double>(kind, 60, 2), options).surface);
   }
 }
 
 TEST(RestoreTest, HandlesExtremeCoordinates) {
-  for (const PointSet3 kind : {PointSet3::kHuge, PointSet3::kTiny}) {
+  for (const PointSet3 kind : {PointSet3::huge, PointSet3::tiny}) {
     const auto points = make_points3<double>(kind, 100, 2);
     for (const unsigned bits : {0u, 24u}) {
       RestoreOptions options;

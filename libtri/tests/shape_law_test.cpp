@@ -14,8 +14,8 @@ namespace {
 
 std::vector<ShapeOptions> peeling_options() {
   std::vector<ShapeOptions> result;
-  for (const auto criterion : {ShapeCriterion::kGabriel, ShapeCriterion::kEdgeLength})
-    for (const auto rule : {ShapeRule::kFlood, ShapeRule::kPublished})
+  for (const auto criterion : {ShapeCriterion::gabriel, ShapeCriterion::edge_length})
+    for (const auto rule : {ShapeRule::flood, ShapeRule::published})
       for (const bool keep_vertices : {false, true})
         result.push_back({rule, criterion, 0.55, keep_vertices});
   return result;
@@ -28,17 +28,17 @@ std::vector<ShapeOptions> all_options() {
 }
 
 std::string name(const ShapeOptions& options) {
-  if (options.rule == ShapeRule::kPoles) return "poles";
-  return std::string(options.criterion == ShapeCriterion::kGabriel ? "Gabriel" : "edge length") +
-         (options.rule == ShapeRule::kFlood ? ", flood" : ", published") +
+  if (options.rule == ShapeRule::poles) return "poles";
+  return std::string(options.criterion == ShapeCriterion::gabriel ? "Gabriel" : "edge length") +
+         (options.rule == ShapeRule::flood ? ", flood" : ", published") +
          (options.keep_vertices ? ", no vertex lost" : "");
 }
 
 /// The edge lengths of huge and tiny points differ from the oracle's in the last bit, and their
 /// ties are frequent.
 bool comparable(PointSet3 kind, const ShapeOptions& options) {
-  return options.criterion == ShapeCriterion::kGabriel || kind == PointSet3::kUniform ||
-         kind == PointSet3::kFullRange;
+  return options.criterion == ShapeCriterion::gabriel || kind == PointSet3::uniform ||
+         kind == PointSet3::full_range;
 }
 
 template <class Coord>
@@ -49,7 +49,7 @@ TYPED_TEST_SUITE(ShapeLawTest, Coords);
 TYPED_TEST(ShapeLawTest, EqualsTheDefinition) {
   for (const PointSet3 kind : kPointSets3) {
     for (const std::size_t count : {0u, 3u, 4u, 5u, 8u, 20u, 60u}) {
-      if (kind == PointSet3::kCurves && count > 20) continue;
+      if (kind == PointSet3::curves && count > 20) continue;
       Delaunay3<TypeParam> triangulation;
       triangulation.build(make_points3<TypeParam>(kind, count, 5 + count));
       for (const ShapeOptions& options : peeling_options()) {
@@ -70,7 +70,7 @@ TYPED_TEST(ShapeLawTest, EqualsTheDefinition) {
 TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
   for (const PointSet3 kind : kPointSets3) {
     Delaunay3<TypeParam> triangulation;
-    triangulation.build(make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 60 : 1000, 8));
+    triangulation.build(make_points3<TypeParam>(kind, kind == PointSet3::curves ? 60 : 1000, 8));
     if (triangulation.tetrahedron_count() == 0) continue;
     for (ShapeOptions options : peeling_options()) {
       // With such a small factor only the guard keeps anything.
@@ -85,7 +85,7 @@ TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
         EXPECT_EQ(used.size(), triangulation.vertex_count());
       } else {
         EXPECT_EQ(used.size() + shape.lost_vertices().size(), triangulation.vertex_count());
-        if (options.criterion == ShapeCriterion::kEdgeLength) {
+        if (options.criterion == ShapeCriterion::edge_length) {
           EXPECT_EQ(used.size(), 0u);
         }
       }
@@ -96,14 +96,14 @@ TYPED_TEST(ShapeLawTest, NoVertexIsLost) {
 TYPED_TEST(ShapeLawTest, DependsOnThePointsAlone) {
   for (const PointSet3 kind : kPointSets3) {
     std::mt19937_64 random(3);
-    auto points = make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 60 : 300, 9);
+    auto points = make_points3<TypeParam>(kind, kind == PointSet3::curves ? 60 : 300, 9);
     Delaunay3<TypeParam> built;
     built.build(points);
     for (int round = 0; round < 2; ++round) {
       // Another order, and a history with temporary points.
       std::shuffle(points.begin(), points.end(), random);
       Delaunay3<TypeParam> grown;
-      for (const auto& p : make_points3<TypeParam>(PointSet3::kFiveBits, 40, 77)) grown.insert(p);
+      for (const auto& p : make_points3<TypeParam>(PointSet3::five_bits, 40, 77)) grown.insert(p);
       std::vector<VertexId> temporary;
       for (const VertexId v : grown.all_vertices()) temporary.push_back(v);
       const std::size_t half = points.size() / 2;
@@ -126,7 +126,7 @@ TYPED_TEST(ShapeLawTest, DependsOnThePointsAlone) {
 
 TEST(ShapeTest, IntegersAndDoublesGiveTheSame) {
   for (const PointSet3 kind : kPointSets3) {
-    const auto points = make_points3<std::int32_t>(kind, kind == PointSet3::kCurves ? 60 : 500, 4);
+    const auto points = make_points3<std::int32_t>(kind, kind == PointSet3::curves ? 60 : 500, 4);
     std::vector<std::array<double, 3>> doubles;
     for (const auto& p : points)
       doubles.push_back(
@@ -153,12 +153,12 @@ TYPED_TEST(ShapeLawTest, UpdateEqualsRestore) {
       SCOPED_TRACE(terrace::tri::name(kind) + " seed " + std::to_string(seed));
       std::mt19937_64 random(seed);
       const auto points =
-          make_points3<TypeParam>(kind, kind == PointSet3::kCurves ? 30 : 200, seed + 40);
+          make_points3<TypeParam>(kind, kind == PointSet3::curves ? 30 : 200, seed + 40);
       Triangulation triangulation;
       std::vector<Shape3<TypeParam>> shapes;
       for (const ShapeOptions& options : all_options()) {
         // Always computed from scratch, so one run is enough.
-        if (options.rule == ShapeRule::kPublished && shapes.size() != 2) continue;
+        if (options.rule == ShapeRule::published && shapes.size() != 2) continue;
         shapes.emplace_back(options);
       }
       triangulation.start_journal();

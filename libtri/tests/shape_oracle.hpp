@@ -69,7 +69,7 @@ inline bool oracle_in_smallest_sphere(const std::array<ShapePoint, 3>& f, const 
 
 inline bool oracle_boundary(const ShapeOptions& options, const std::array<ShapePoint, 3>& f,
                             const ShapePoint& apex) {
-  if (options.criterion == ShapeCriterion::kGabriel) return !oracle_in_smallest_sphere(f, apex);
+  if (options.criterion == ShapeCriterion::gabriel) return !oracle_in_smallest_sphere(f, apex);
   const auto length = [](const ShapePoint& a, const ShapePoint& b) {
     long double sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -94,7 +94,7 @@ class ShapeOracle {
       for (std::size_t i = 0; i < 4; ++i) by_facet_[facet(corners, i)].push_back(corners);
     }
     all_ = kept;
-    if (options.rule == ShapeRule::kFlood) {
+    if (options.rule == ShapeRule::flood) {
       flood();
       if (options.keep_vertices) rescue();
     } else {

@@ -145,8 +145,8 @@ TEST(ShapeTest, RestoresACup) {
 TEST(ShapeTest, RestoresASphereByEdgeLength) {
   Noise noise{std::mt19937_64(7), 0.001};
   ShapeOptions options;
-  options.rule = ShapeRule::kFlood;
-  options.criterion = ShapeCriterion::kEdgeLength;
+  options.rule = ShapeRule::flood;
+  options.criterion = ShapeCriterion::edge_length;
   options.edge_factor = 1.0;
   const SurfaceMeasures measured = restored(sphere(1.0, {0, 0, 0}, 0.1, noise), options);
   EXPECT_EQ(measured.components, 1u);
@@ -161,11 +161,11 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
   Delaunay3<double> triangulation;
   triangulation.build(points);
   ShapeOptions options;
-  options.rule = ShapeRule::kFlood;
+  options.rule = ShapeRule::flood;
   options.keep_vertices = false;
   Shape3<double> flood(options);
   flood.restore(triangulation);
-  options.rule = ShapeRule::kPublished;
+  options.rule = ShapeRule::published;
   Shape3<double> published(options);
   published.restore(triangulation);
   // The flood must remove every tetrahedron that the published rule removes.
@@ -179,11 +179,11 @@ TEST(ShapeTest, PublishedRuleLeavesMore) {
 
 TEST(ShapeTest, KeepsAGridWhole) {
   // No facet's smallest sphere contains a grid point in its interior.
-  const auto points = make_points3<std::int32_t>(PointSet3::kGrid, 512, 0);
+  const auto points = make_points3<std::int32_t>(PointSet3::grid, 512, 0);
   Delaunay3<std::int32_t> triangulation;
   triangulation.build(points);
   ShapeOptions options;
-  options.rule = ShapeRule::kFlood;
+  options.rule = ShapeRule::flood;
   Shape3<std::int32_t> shape(options);
   shape.restore(triangulation);
   const SurfaceMeasures measured = measure(shape.surface(triangulation).surface);
@@ -193,7 +193,7 @@ TEST(ShapeTest, KeepsAGridWhole) {
 }
 
 TEST(ShapeTest, IsEmptyWithoutTetrahedra) {
-  for (const PointSet3 kind : {PointSet3::kLine, PointSet3::kPlane}) {
+  for (const PointSet3 kind : {PointSet3::line, PointSet3::plane}) {
     for (const std::size_t count : {0u, 1u, 2u, 3u, 50u}) {
       Delaunay3<double> triangulation;
       triangulation.build(make_points3<double>(kind, count, 1));

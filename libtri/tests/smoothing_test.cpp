@@ -14,8 +14,7 @@
 namespace terrace::tri {
 namespace {
 
-constexpr Smoothing kSmoothings[] = {Smoothing::kLaplacian, Smoothing::kTaubin,
-                                     Smoothing::kBilateral};
+constexpr Smoothing kSmoothings[] = {Smoothing::laplacian, Smoothing::taubin, Smoothing::bilateral};
 
 SmoothingOptions options_of(Smoothing method, unsigned iterations = 10) {
   SmoothingOptions options;
@@ -60,7 +59,7 @@ using Coords = ::testing::Types<std::int32_t, double>;
 TYPED_TEST_SUITE(SmoothingTest, Coords);
 
 TYPED_TEST(SmoothingTest, ConstantsAndPlanesStay) {
-  for (const PointSet kind : {PointSet::kUniform, PointSet::kFewBits, PointSet::kGrid}) {
+  for (const PointSet kind : {PointSet::uniform, PointSet::few_bits, PointSet::grid}) {
     Delaunay2<TypeParam> triangulation;
     triangulation.build(make_points<TypeParam>(kind, 400, 1));
     double extent = 0;
@@ -69,9 +68,9 @@ TYPED_TEST(SmoothingTest, ConstantsAndPlanesStay) {
       SCOPED_TRACE(name(kind) + " method " + std::to_string(static_cast<int>(method)));
       const auto constant = heights_from(triangulation, [](double, double) { return 0.3; });
       const auto same = smooth(triangulation, constant, all(triangulation), options_of(method));
-      EXPECT_GT(same.size(), kind == PointSet::kFewBits ? 150u : 300u);
+      EXPECT_GT(same.size(), kind == PointSet::few_bits ? 150u : 300u);
       for (const auto& change : same) ASSERT_EQ(change.height, 0.3);
-      if (method == Smoothing::kBilateral && kind != PointSet::kGrid) continue;
+      if (method == Smoothing::bilateral && kind != PointSet::grid) continue;
       const auto plane = heights_from(
           triangulation, [&](double x, double y) { return 3 * x / extent - 5 * y / extent; });
       for (const auto& change :
@@ -119,7 +118,7 @@ TYPED_TEST(SmoothingTest, LaplacianAndBilateralObeyTheMaximumPrinciple) {
     Delaunay2<TypeParam> triangulation;
     triangulation.build(make_points<TypeParam>(kind, 300, 2));
     const auto heights = noise(triangulation);
-    for (const Smoothing method : {Smoothing::kLaplacian, Smoothing::kBilateral}) {
+    for (const Smoothing method : {Smoothing::laplacian, Smoothing::bilateral}) {
       for (const double strength : {0.5, 1.0}) {
         SmoothingOptions options = options_of(method, 30);
         options.strength = strength;
@@ -138,7 +137,7 @@ TYPED_TEST(SmoothingTest, LaplacianStepIsTheWeightedMean) {
   Delaunay2<TypeParam> triangulation;
   triangulation.build_grid(0, 0, 3, 9, 9);
   const auto heights = noise(triangulation);
-  SmoothingOptions options = options_of(Smoothing::kLaplacian, 1);
+  SmoothingOptions options = options_of(Smoothing::laplacian, 1);
   options.strength = 0.75;
   const auto changes = smooth(triangulation, heights, all(triangulation), options);
   ASSERT_EQ(changes.size(), 49u);
@@ -170,11 +169,11 @@ TYPED_TEST(SmoothingTest, TaubinKeepsWideFeaturesAndRemovesRoughness) {
       largest = std::max(largest, std::abs(result[slot(triangulation.nearest({x, 32}))]));
     return largest;
   };
-  EXPECT_GT(amplitude(32, Smoothing::kTaubin), 0.97);
-  EXPECT_LT(amplitude(32, Smoothing::kTaubin), 1.1);
-  EXPECT_LT(amplitude(32, Smoothing::kLaplacian), 0.85);
-  EXPECT_LT(amplitude(3, Smoothing::kTaubin), 0.01);
-  EXPECT_LT(amplitude(3, Smoothing::kLaplacian), 0.01);
+  EXPECT_GT(amplitude(32, Smoothing::taubin), 0.97);
+  EXPECT_LT(amplitude(32, Smoothing::taubin), 1.1);
+  EXPECT_LT(amplitude(32, Smoothing::laplacian), 0.85);
+  EXPECT_LT(amplitude(3, Smoothing::taubin), 0.01);
+  EXPECT_LT(amplitude(3, Smoothing::laplacian), 0.01);
 }
 
 TYPED_TEST(SmoothingTest, BilateralKeepsAStepThatTheLaplacianLoses) {
@@ -188,8 +187,8 @@ TYPED_TEST(SmoothingTest, BilateralKeepsAStepThatTheLaplacianLoses) {
     return applied(heights,
                    smooth(triangulation, heights, all(triangulation), options_of(method, 20)));
   };
-  const auto bilateral = result(Smoothing::kBilateral);
-  const auto laplacian = result(Smoothing::kLaplacian);
+  const auto bilateral = result(Smoothing::bilateral);
+  const auto laplacian = result(Smoothing::laplacian);
   for (TypeParam y = 10; y < 30; ++y) {
     const std::uint32_t low = slot(triangulation.nearest({19, y}));
     const std::uint32_t high = slot(triangulation.nearest({20, y}));
@@ -203,14 +202,14 @@ TYPED_TEST(SmoothingTest, BilateralKeepsAStepThatTheLaplacianLoses) {
 
 TYPED_TEST(SmoothingTest, OrderAndRepetitionInTheRegionDoNotMatter) {
   Delaunay2<TypeParam> triangulation;
-  triangulation.build(make_points<TypeParam>(PointSet::kUniform, 500, 4));
+  triangulation.build(make_points<TypeParam>(PointSet::uniform, 500, 4));
   const auto heights = noise(triangulation);
   std::vector<VertexId> region = all(triangulation);
-  const auto expected = smooth(triangulation, heights, region, options_of(Smoothing::kTaubin));
+  const auto expected = smooth(triangulation, heights, region, options_of(Smoothing::taubin));
   std::mt19937_64 random(1);
   std::shuffle(region.begin(), region.end(), random);
   region.push_back(region[7]);
-  const auto other = smooth(triangulation, heights, region, options_of(Smoothing::kTaubin));
+  const auto other = smooth(triangulation, heights, region, options_of(Smoothing::taubin));
   ASSERT_EQ(other.size(), expected.size());
   for (std::size_t i = 0; i < other.size(); ++i) {
     ASSERT_EQ(other[i].vertex, expected[i].vertex);
@@ -222,7 +221,7 @@ TEST(Smoothing, HandlesEmptyInput) {
   Delaunay2<double> triangulation;
   const std::vector<double> one(triangulation.vertex_slots());
   EXPECT_TRUE(smooth(triangulation, one, {}, {}).empty());
-  triangulation.build(make_points<double>(PointSet::kSlanted, 50, 1));
+  triangulation.build(make_points<double>(PointSet::slanted, 50, 1));
   const auto heights = noise(triangulation);
   EXPECT_TRUE(smooth(triangulation, heights, all(triangulation), {}).empty());
 }
@@ -232,7 +231,7 @@ TEST(Smoothing, RefusesBadData) {
   triangulation.build_grid(0, 0, 1, 5, 5);
   std::vector<double> heights(triangulation.vertex_slots(), 1.0);
   const auto refused = [&](auto change) {
-    SmoothingOptions options = options_of(Smoothing::kTaubin);
+    SmoothingOptions options = options_of(Smoothing::taubin);
     change(options);
     EXPECT_THROW(smooth(triangulation, heights, all(triangulation), options),
                  std::invalid_argument);
@@ -244,7 +243,7 @@ TEST(Smoothing, RefusesBadData) {
     refused([&](SmoothingOptions& o) { o.pass_band = pass_band; });
   for (const double edge_height : {0.0, -1.0, nan}) {
     refused([&](SmoothingOptions& o) {
-      o.method = Smoothing::kBilateral;
+      o.method = Smoothing::bilateral;
       o.edge_height = edge_height;
     });
   }

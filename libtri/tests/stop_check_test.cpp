@@ -152,7 +152,7 @@ TEST(StopCheck, EndsShapes) {
   const auto points = on_a_sphere(10000);
   Delaunay3<double> triangulation;
   triangulation.build(points);
-  for (const ShapeRule rule : {ShapeRule::kPoles, ShapeRule::kFlood, ShapeRule::kPublished}) {
+  for (const ShapeRule rule : {ShapeRule::poles, ShapeRule::flood, ShapeRule::published}) {
     SCOPED_TRACE(static_cast<int>(rule));
     ShapeOptions options;
     options.rule = rule;
@@ -196,8 +196,7 @@ TEST(StopCheck, EndsSmoothingAndFlips) {
   for (const VertexId v : vertices) {
     heights[slot(v)] = std::sin(triangulation.point(v)[0]);
   }
-  for (const Smoothing method :
-       {Smoothing::kLaplacian, Smoothing::kTaubin, Smoothing::kBilateral}) {
+  for (const Smoothing method : {Smoothing::laplacian, Smoothing::taubin, Smoothing::bilateral}) {
     SmoothingOptions options;
     options.method = method;
     options.edge_height = 1;
@@ -271,8 +270,7 @@ TEST(StopCheck, EndsTins) {
   }
   const GridWindow<double> window{kSize, kSize, heights};
   const std::vector<Point3> frame{{0, 0, 0}, {100, 0, 0}, {100, 100, 0}, {0, 100, 0}};
-  for (const TinQuality quality :
-       {TinQuality::kGreedy, TinQuality::kRemoval, TinQuality::kFitted}) {
+  for (const TinQuality quality : {TinQuality::greedy, TinQuality::removal, TinQuality::fitted}) {
     SCOPED_TRACE(static_cast<int>(quality));
     GridTinOptions grid{.max_error = 10, .quality = quality};
     expect_stops(

@@ -82,7 +82,7 @@ struct Triangulation<2, Metric> {
   static Simplex found(const Type& of, const typename Type::Point& p, tri::VertexId& hint) {
     const tri::Location at = of.locate(p, hint);
     hint = at.vertex;
-    return at.place == tri::Place::kOutside ? tri::kNoTriangle : at.triangle;
+    return at.place == tri::Place::outside ? tri::kNoTriangle : at.triangle;
   }
 };
 template <class Metric>
@@ -98,7 +98,7 @@ struct Triangulation<3, Metric> {
   static Simplex found(const Type& of, const typename Type::Point& p, tri::VertexId& hint) {
     const tri::Location3 at = of.locate(p, hint);
     hint = at.vertex;
-    return at.place == tri::Place3::kOutside ? tri::kNoTetrahedron : at.tetrahedron;
+    return at.place == tri::Place3::outside ? tri::kNoTetrahedron : at.tetrahedron;
   }
 };
 

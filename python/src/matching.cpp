@@ -80,8 +80,8 @@ py::tuple match(const Array<double>& array, const Array<std::uint32_t>& labels,
     options.check_stop = stop_check(stop);
     return match_large(points, options);
   });
-  return py::make_tuple(mark_missing(result.mate, matching::kNone), result.cost,
-                        result.dual_bound, result.optimal);
+  return py::make_tuple(mark_missing(result.mate, matching::kNone), result.cost, result.dual_bound,
+                        result.optimal);
 }
 
 /// Returns (mates, cost, number of iterations, rows of iteration and cost for each improvement).

@@ -41,38 +41,38 @@ const auto& tables() {
   using terrain::Fill, terrain::HeightReference, terrain::RasterValue;
   using tri::GradientFrom, tri::Interpolation, tri::PointDuplicates, tri::ShapeCriterion;
   using tri::ShapeRule, tri::Smoothing, tri::TinQuality;
-  static const std::tuple result{
+  static const std::tuple all{
       NameTable<Interpolation>{"Interpolation",
                                "method",
-                               {{"linear", Interpolation::kLinear},
-                                {"natural", Interpolation::kNaturalNeighbour},
-                                {"nearest", Interpolation::kNearest}}},
+                               {{"linear", Interpolation::linear},
+                                {"natural", Interpolation::natural_neighbour},
+                                {"nearest", Interpolation::nearest}}},
       NameTable<GradientFrom>{
           "GradientMethod",
           "method",
-          {{"linear", GradientFrom::kTriangles}, {"natural", GradientFrom::kNaturalNeighbours}}},
+          {{"linear", GradientFrom::triangles}, {"natural", GradientFrom::natural_neighbours}}},
       NameTable<TinQuality>{"Quality",
                             "quality",
-                            {{"greedy", TinQuality::kGreedy},
-                             {"removal", TinQuality::kRemoval},
-                             {"fitted", TinQuality::kFitted}}},
+                            {{"greedy", TinQuality::greedy},
+                             {"removal", TinQuality::removal},
+                             {"fitted", TinQuality::fitted}}},
       NameTable<PointDuplicates>{"Duplicates",
                                  "duplicates",
-                                 {{"all", PointDuplicates::kAll},
-                                  {"min", PointDuplicates::kMin},
-                                  {"max", PointDuplicates::kMax},
-                                  {"mean", PointDuplicates::kMean},
-                                  {"first", PointDuplicates::kFirst},
-                                  {"error", PointDuplicates::kError}}},
+                                 {{"all", PointDuplicates::all},
+                                  {"min", PointDuplicates::min},
+                                  {"max", PointDuplicates::max},
+                                  {"mean", PointDuplicates::mean},
+                                  {"first", PointDuplicates::first},
+                                  {"error", PointDuplicates::error}}},
       NameTable<Fill>{
           "Fill",
           "fill",
           {{"none", Fill::none}, {"flat", Fill::flat}, {"interpolate", Fill::interpolate}}},
       NameTable<Smoothing>{"Smoothing",
                            "method",
-                           {{"laplacian", Smoothing::kLaplacian},
-                            {"taubin", Smoothing::kTaubin},
-                            {"bilateral", Smoothing::kBilateral}}},
+                           {{"laplacian", Smoothing::laplacian},
+                            {"taubin", Smoothing::taubin},
+                            {"bilateral", Smoothing::bilateral}}},
       NameTable<RasterValue>{"RasterValue",
                              "value",
                              {{"height", RasterValue::height},
@@ -132,20 +132,20 @@ const auto& tables() {
                                   {"terrarium", HeightsOfColour::terrarium}}},
       NameTable<ShapeRule>{"ShapeRule",
                            "rule",
-                           {{"poles", ShapeRule::kPoles},
-                            {"flood", ShapeRule::kFlood},
-                            {"published", ShapeRule::kPublished}}},
+                           {{"poles", ShapeRule::poles},
+                            {"flood", ShapeRule::flood},
+                            {"published", ShapeRule::published}}},
       NameTable<ShapeCriterion>{
           "ShapeCriterion",
           "criterion",
-          {{"gabriel", ShapeCriterion::kGabriel}, {"edge-length", ShapeCriterion::kEdgeLength}}},
+          {{"gabriel", ShapeCriterion::gabriel}, {"edge-length", ShapeCriterion::edge_length}}},
       NameTable<ViewKind>{
           "ViewKind",
           "kind",
           {{"mesh", ViewKind::mesh}, {"points", ViewKind::points}, {"surface", ViewKind::surface}}},
       NameTable<ViewReader>{
           "ViewReader", "reader", {{"thread", ViewReader::thread}, {"frame", ViewReader::frame}}}};
-  return result;
+  return all;
 }
 
 /// Parameters that have different names in the libraries (first) and in the module.

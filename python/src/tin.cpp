@@ -104,7 +104,8 @@ py::dict measure_surface(const Array<double>& x, const Array<double>& y, const A
   const tri::TinErrors solution = released([&](const std::stop_token& stop) {
     return tri::measure_surface(xs, ys, zs, places, corners, stop_check(stop));
   });
-  py::dict result = measures(solution.largest, solution.rms, solution.covered + solution.uncovered, solution.uncovered);
+  py::dict result = measures(solution.largest, solution.rms, solution.covered + solution.uncovered,
+                             solution.uncovered);
   result["worst"] =
       solution.largest_at == tri::kNoSample ? std::int64_t{-1} : std::int64_t{solution.largest_at};
   return result;

@@ -214,7 +214,8 @@ void bind_trees(py::module_& module) {
                base::StopTicks ticks(stop_check(stop));
                for (std::size_t i = 0; i < queries.size(); ++i) {
                  ticks(kTicksOfQuery);
-                 if (const auto near = tree.nearest(queries[i])) found.set(i, *near, near->distance);
+                 if (const auto near = tree.nearest(queries[i]))
+                   found.set(i, *near, near->distance);
                }
              });
              return std::move(found).arrays();

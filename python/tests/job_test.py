@@ -94,14 +94,14 @@ class Jobs(StoreCase):
             import os, signal, threading, numpy as np, terrace
             random = np.random.default_rng(1)
             plane, space = random.random((6_000_000, 2)), random.random((3_000_000, 3))
-            noise = random.random((3000, 3000))
+            noise, pairs = random.random((2000, 2000)), random.integers(0, 1_000_000, (8_000_000, 2))
             for call in (lambda: terrace.Delaunay2(plane), lambda: terrace.Delaunay3(space), lambda: terrace.DynamicSurface(space),
                          lambda: terrace.linkage(space[:60_000], 'ward'), lambda: terrace.linkage(space[:20_000], 'average'),
                          lambda: terrace.linkage(space[:20_000], 'complete'), lambda: terrace.kmeans(space, 100_000),
                          lambda: terrace.cluster(space[:4000], method='greedy-stars'), lambda: terrace.cluster(space[:40_000], count=1000),
                          lambda: terrace.matching(space[:400_000]), lambda: terrace.assignment(space[:200_000], space[200_000:400_000]),
-                         lambda: terrace.bounded_mesh(space, 0.0), lambda: terrace.bounded_mesh(noise, 0.0),
-                         lambda: terrace.linkage(plane, edges=np.random.default_rng(2).integers(0, len(plane), (20_000_000, 2)))):
+                         lambda: terrace.bounded_mesh(space, 0.0), lambda: terrace.bounded_mesh(noise, 0.0, transform=(1, 0, 0, 0, -1, 0)),
+                         lambda: terrace.linkage(space[:1_000_000], edges=pairs)):
                 timer = threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT))
                 timer.start()
                 try:

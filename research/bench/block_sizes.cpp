@@ -102,12 +102,12 @@ std::vector<std::string> row_7_5(const std::string& name, const BlockSizeRun& te
 /// Returns the runs for the six block sizes of both tables, which share them.
 const std::vector<BlockSizeRun>& block_size_runs(const Setting& setting) {
   static const std::vector<BlockSizeRun> runs = [&] {
-    std::vector<BlockSizeRun> runs;
+    std::vector<BlockSizeRun> results;
     for (const ThesisRow& row : kThesis) {
-      runs.push_back(run_once(setting.points(lucy().thesis_points), setting.block(row.block),
-                              Effort::fine, FacilityStrategy::facilities));
+      results.push_back(run_once(setting.points(lucy().thesis_points), setting.block(row.block),
+                                 Effort::fine, FacilityStrategy::facilities));
     }
-    return runs;
+    return results;
   }();
   return runs;
 }

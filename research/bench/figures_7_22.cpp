@@ -73,13 +73,13 @@ const std::vector<SearchRun>& search_runs(const Setting& setting) {
     const bool small = setting.is_small();
     const std::uint64_t few = small ? 50 : 10'000;
     const std::uint64_t iterations = small ? 20 : setting.is_full() ? 50'000 : 20'000;
-    std::vector<SearchRun> runs;
+    std::vector<SearchRun> results;
     for (const std::uint64_t seed : {1u, 2u, 3u}) {
       const std::string set = std::string("100") + "abc"[seed - 1];
-      runs.push_back(search(setting, set, small ? 20 : 100, few, seed));
+      results.push_back(search(setting, set, small ? 20 : 100, few, seed));
     }
-    runs.push_back(search(setting, "500", small ? 50 : 500, iterations, 4));
-    return runs;
+    results.push_back(search(setting, "500", small ? 50 : 500, iterations, 4));
+    return results;
   }();
   return runs;
 }
@@ -167,9 +167,9 @@ void figure_7_22(Setting& setting) {
   setting.report.table(table);
   setting.report.data(data);
   const Series optimum_line{.name = "the optimum",
-                       .x = {1.0, static_cast<double>(iterations)},
-                       .y = {optimum, optimum},
-                       .mark = Series::Mark::dashes};
+                            .x = {1.0, static_cast<double>(iterations)},
+                            .y = {optimum, optimum},
+                            .mark = Series::Mark::dashes};
   setting.report.plot("figure-7.22",
                       {.title = "Iterations of the Monte Carlo method (figure 7.22)",
                        .x = {.label = "iteration, " + std::to_string(count) + " points"},

@@ -44,7 +44,7 @@ TYPED_TEST(EarQueueTest, RemovalEqualsThatOfTheLibrary) {
 }
 
 TYPED_TEST(EarQueueTest, ReinsertionRestoresTheTriangulation) {
-  for (const PointSet3 kind : {PointSet3::kUniform, PointSet3::kGrid, PointSet3::kSphere}) {
+  for (const PointSet3 kind : {PointSet3::uniform, PointSet3::grid, PointSet3::sphere}) {
     SCOPED_TRACE(name(kind));
     const auto points = make_points3<TypeParam>(kind, 800, 3);
     Delaunay3<TypeParam> triangulation;

@@ -219,7 +219,7 @@ struct Whole {
       return terrain::where_triangles_meet(place, terrain::on_edge(a, b, place), sides, too_long);
     };
     const tri::Location found = triangulation.locate(place);
-    if (found.place == tri::Place::kVertex) {
+    if (found.place == tri::Place::vertex) {
       std::vector<terrain::SurfaceTriangle> round;
       for (const tri::TriangleId t : triangulation.all_triangles()) {
         const auto v = triangulation.vertices(t);
@@ -227,14 +227,14 @@ struct Whole {
       }
       return terrain::where_triangles_meet(place, corner(found.vertex).height, round, too_long);
     }
-    if (found.place == tri::Place::kEdge) {
+    if (found.place == tri::Place::edge) {
       const auto v = triangulation.vertices(found.triangle);
       std::vector<terrain::SurfaceTriangle> sides{corners(found.triangle)};
       const tri::TriangleId other = triangulation.neighbours(found.triangle)[found.edge];
       if (other != tri::kNoTriangle) sides.push_back(corners(other));
       return on_segment(v[(found.edge + 1) % 3], v[(found.edge + 2) % 3], sides);
     }
-    if (found.place == tri::Place::kInside) {
+    if (found.place == tri::Place::inside) {
       const terrain::SurfaceTriangle t = corners(found.triangle);
       return terrain::is_surface(t, too_long) ? terrain::on_plane(t, place)
                                               : terrain::SurfacePoint{};
@@ -242,7 +242,7 @@ struct Whole {
     if (triangulation.triangle_count() > 0) return {};
     // All points are collinear.
     std::vector<tri::VertexWeight> weights;
-    tri::weights_at(triangulation, place, tri::Interpolation::kLinear, weights);
+    tri::weights_at(triangulation, place, tri::Interpolation::linear, weights);
     return weights.size() == 2 ? on_segment(weights[0].vertex, weights[1].vertex, {})
                                : terrain::SurfacePoint{};
   }

@@ -90,8 +90,8 @@ TEST_F(PointMesh, IsValidForManyRandomClouds) {
       });
     }
     auto wanted = options(random(0, 5), 50 + static_cast<std::size_t>(random(0, 300)));
-    wanted.quality = std::array{tri::TinQuality::kGreedy, tri::TinQuality::kRemoval,
-                                tri::TinQuality::kFitted}[seed % 3];
+    wanted.quality = std::array{tri::TinQuality::greedy, tri::TinQuality::removal,
+                                tri::TinQuality::fitted}[seed % 3];
     mesh_and_check(cloud, wanted);
   }
 }
@@ -100,7 +100,7 @@ TEST_F(PointMesh, HasFewMoreTrianglesThanOneWindow) {
   const Cloud cloud = uniform(60000, 5, 300);
   const stream::Store store = build(cloud);
   for (const tri::TinQuality quality :
-       {tri::TinQuality::kGreedy, tri::TinQuality::kRemoval, tri::TinQuality::kFitted}) {
+       {tri::TinQuality::greedy, tri::TinQuality::removal, tri::TinQuality::fitted}) {
     auto whole = options(2.0, 1U << 18), parts = options(2.0, 15000);
     whole.quality = parts.quality = quality;
     const auto one = mesh_and_check(store, cloud, whole);
@@ -157,7 +157,7 @@ TEST_F(PointMesh, KeepsAllSamplesOfAPositionWithinTheBound) {
       z.push_back(p[2]);
     }
     for (const auto quality :
-         {tri::TinQuality::kGreedy, tri::TinQuality::kRemoval, tri::TinQuality::kFitted}) {
+         {tri::TinQuality::greedy, tri::TinQuality::removal, tri::TinQuality::fitted}) {
       for (const std::size_t window : {400U, 1U << 20}) {
         SCOPED_TRACE(window);
         auto wanted = options(1.0, window);
@@ -209,12 +209,12 @@ TEST_F(PointMesh, UsesOneHeightPerPositionOnRequest) {
   }
   const stream::Store store = build(cloud);
   auto none = options(1.0, 500);
-  none.duplicates = tri::PointDuplicates::kError;
+  none.duplicates = tri::PointDuplicates::error;
   EXPECT_THROW(write_bounded_mesh(store, none, common()), stream::Error);
   const std::vector<std::pair<tri::PointDuplicates, double>> rules{
-      {tri::PointDuplicates::kMin, 0.0},
-      {tri::PointDuplicates::kMax, 0.5},
-      {tri::PointDuplicates::kMean, 0.25}};
+      {tri::PointDuplicates::min, 0.0},
+      {tri::PointDuplicates::max, 0.5},
+      {tri::PointDuplicates::mean, 0.25}};
   for (const auto& [rule, up] : rules) {
     auto wanted = options(0.0, 500);
     wanted.duplicates = rule;
@@ -237,7 +237,7 @@ TEST_F(PointMesh, UsesOneHeightPerPositionOnRequest) {
   Cloud heap = uniform(500, 7);
   for (int i = 0; i < 2000; ++i) heap.push_back({50, 50, 1.0 * (i % 10)});
   auto wanted = options(1.0, 300);
-  wanted.duplicates = tri::PointDuplicates::kMax;
+  wanted.duplicates = tri::PointDuplicates::max;
   const auto result = write_bounded_mesh(build(heap), wanted, common());
   EXPECT_EQ(result.duplicates, 1999U);
   EXPECT_LE(result.max_error, 1.0);
@@ -304,7 +304,7 @@ TEST_F(PointMesh, IsValidForALaserScan) {
   for (const double max_error : {0.5, 5.0}) {
     SCOPED_TRACE(max_error);
     auto wanted = options(max_error, 15000);
-    wanted.duplicates = tri::PointDuplicates::kMax;
+    wanted.duplicates = tri::PointDuplicates::max;
     const auto result = write_bounded_mesh(store, wanted, common(2));
     EXPECT_EQ(result.samples, scan.size());
     EXPECT_EQ(result.duplicates, scan.size() - cloud.size());

@@ -96,15 +96,15 @@ void check_heights(const stream::Store& store, unsigned level, std::size_t count
   const std::size_t finite = places.size() - 2;
   const std::span<const Point2> asked(places.data(), finite);
   for (const Interpolation method :
-       {Interpolation::kLinear, Interpolation::kNaturalNeighbour, Interpolation::kNearest}) {
+       {Interpolation::linear, Interpolation::natural_neighbour, Interpolation::nearest}) {
     SCOPED_TRACE("method " + std::to_string(static_cast<int>(method)));
     const auto found = sampled(store, {.method = method, .level = level}, places);
     EXPECT_TRUE(std::isnan(found[finite].height) && std::isnan(found[finite + 1].height));
     const auto heights = tri::heights_at(triangulation, whole.heights, asked, method, 1);
     const auto gradients = tri::gradients_at(triangulation, whole.heights, asked,
-                                             method == Interpolation::kNaturalNeighbour
-                                                 ? tri::GradientFrom::kNaturalNeighbours
-                                                 : tri::GradientFrom::kTriangles,
+                                             method == Interpolation::natural_neighbour
+                                                 ? tri::GradientFrom::natural_neighbours
+                                                 : tri::GradientFrom::triangles,
                                              1);
     for (std::size_t i = 0; i < finite; ++i) {
       SCOPED_TRACE("place " + std::to_string(i));
@@ -112,10 +112,10 @@ void check_heights(const stream::Store& store, unsigned level, std::size_t count
       if (!std::isnan(heights[i])) {
         ASSERT_NEAR(found[i].height, heights[i], 1e-7);
       }
-      if (method == Interpolation::kNearest) continue;
+      if (method == Interpolation::nearest) continue;
       const tri::Location location = triangulation.locate(places[i]);
-      const bool linear = method == Interpolation::kLinear;
-      if (linear && location.place != tri::Place::kInside) continue;  // a different average there
+      const bool linear = method == Interpolation::linear;
+      if (linear && location.place != tri::Place::inside) continue;  // a different average there
       ASSERT_EQ(std::isnan(found[i].per_column), std::isnan(gradients[i].x));
       if (std::isnan(gradients[i].x)) continue;
       const double size = std::hypot(gradients[i].x, gradients[i].y);
@@ -168,8 +168,8 @@ TEST(PointSampler, AnswersDoNotDependOnTheSizeOfWindows) {
   }
   const Whole whole(store, 0);
   const std::vector<double> expected =
-      tri::heights_at(whole.triangulation, whole.heights, places, Interpolation::kLinear, 1);
-  for (const Interpolation method : {Interpolation::kLinear, Interpolation::kNearest}) {
+      tri::heights_at(whole.triangulation, whole.heights, places, Interpolation::linear, 1);
+  for (const Interpolation method : {Interpolation::linear, Interpolation::nearest}) {
     std::vector<SurfacePoint> first(places.size()), out(places.size());
     terrain::make_sampler(store, {.method = method})->sample(places, first);
     for (const unsigned megabytes : {40U, 64U, 1024U}) {
@@ -180,7 +180,7 @@ TEST(PointSampler, AnswersDoNotDependOnTheSizeOfWindows) {
             ->sample(places, out);
         for (std::size_t i = 0; i < places.size(); ++i) {
           ASSERT_TRUE(same_bits(first[i], out[i])) << i;
-          if (method == Interpolation::kLinear && !std::isnan(expected[i])) {
+          if (method == Interpolation::linear && !std::isnan(expected[i])) {
             ASSERT_NEAR(out[i].height, expected[i], 1e-9) << i;
           }
         }
@@ -196,7 +196,7 @@ TEST(PointSampler, GivesNoHeightInTrianglesWithLongSides) {
   const Whole whole(store, 0);
   const std::vector<Point2> places = places_of(store, whole, 500);
   for (const Interpolation method :
-       {Interpolation::kLinear, Interpolation::kNaturalNeighbour, Interpolation::kNearest}) {
+       {Interpolation::linear, Interpolation::natural_neighbour, Interpolation::nearest}) {
     const auto all = sampled(store, {.method = method}, places);
     for (const double limit : {8.0, 25.0, 70.0}) {
       SCOPED_TRACE(limit);
@@ -205,9 +205,9 @@ TEST(PointSampler, GivesNoHeightInTrianglesWithLongSides) {
       for (std::size_t i = 0; i + 2 < places.size(); ++i) {
         SCOPED_TRACE(i);
         const tri::Location found = whole.triangulation.locate(places[i]);
-        if (found.place == tri::Place::kVertex || found.place == tri::Place::kEdge) continue;
-        bool is_long = found.place == tri::Place::kOutside;
-        if (found.place == tri::Place::kInside) {
+        if (found.place == tri::Place::vertex || found.place == tri::Place::edge) continue;
+        bool is_long = found.place == tri::Place::outside;
+        if (found.place == tri::Place::inside) {
           const auto v = whole.triangulation.vertices(found.triangle);
           for (std::size_t k = 0; k < 3; ++k) {
             const Point2 a = whole.triangulation.point(v[k]);

@@ -207,7 +207,7 @@ TEST(PointSampler, HalvesPartsThatDoNotFitWithoutChangingAnswers) {
     places.push_back({random.unit(), random.unit()});
     places.push_back({0.3 + 1e-3 * random.unit(), 0.7 + 1e-3 * random.unit()});
   }
-  for (const auto method : {tri::Interpolation::kLinear, tri::Interpolation::kNearest}) {
+  for (const auto method : {tri::Interpolation::linear, tri::Interpolation::nearest}) {
     terrain::SamplerOptions options;
     options.method = method;
     std::vector<SurfacePoint> expected(places.size()), found(places.size());

@@ -319,7 +319,7 @@ TEST(PointTileSurface, MatchesAllPointsAfterAnyEarlierQueries) {
         ASSERT_EQ(found[k], again[0]);
         if (k + 1 == found.size()) continue;
         const auto location = whole.locate({stored[k][0], stored[k][1]});
-        if (location.place != tri::Place::kInside) continue;
+        if (location.place != tri::Place::inside) continue;
         const tri::TriangleId triangle = location.triangle;
         std::array<stream::Point3, 3> corner;
         for (unsigned c = 0; c < 3; ++c) {

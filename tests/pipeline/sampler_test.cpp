@@ -137,10 +137,10 @@ void expect_near(double got, double expected, std::size_t i) {
 
 TEST_P(Sampler, LinearMatchesTheTriangulation) {
   const std::vector<Point2> queries = places(21, 4000);
-  const auto got = sampled(Interpolation::kLinear, queries);
-  const auto heights = tri::heights_at(triangulation_, slots_, queries, Interpolation::kLinear, 1);
+  const auto got = sampled(Interpolation::linear, queries);
+  const auto heights = tri::heights_at(triangulation_, slots_, queries, Interpolation::linear, 1);
   const auto gradients =
-      tri::gradients_at(triangulation_, slots_, queries, tri::GradientFrom::kTriangles, 1);
+      tri::gradients_at(triangulation_, slots_, queries, tri::GradientFrom::triangles, 1);
   std::size_t compared = 0, without = 0;
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (GetParam().holes) {
@@ -148,7 +148,7 @@ TEST_P(Sampler, LinearMatchesTheTriangulation) {
       // the lattice.
       if (i % 4 != 0) continue;
       std::vector<tri::VertexWeight> weights;
-      tri::weights_at(triangulation_, queries[i], Interpolation::kLinear, weights);
+      tri::weights_at(triangulation_, queries[i], Interpolation::linear, weights);
       bool small = weights.size() == 3;
       for (const tri::VertexWeight& w : weights) {
         const auto p = triangulation_.point(w.vertex);
@@ -174,7 +174,7 @@ TEST_P(Sampler, NaturalMatchesTheFullLattice) {
   if (GetParam().holes) {
     // There is no value where a neighbour has no data; elsewhere holes do not matter.
     const std::vector<Point2> queries = places(22, 1000);
-    const auto got = sampled(Interpolation::kNaturalNeighbour, queries);
+    const auto got = sampled(Interpolation::natural_neighbour, queries);
     std::size_t with = 0, without = 0;
     for (std::size_t i = 0; i < queries.size(); i += 4) {
       if (queries[i][0] < 0 || queries[i][1] < 0) continue;
@@ -194,11 +194,11 @@ TEST_P(Sampler, NaturalMatchesTheFullLattice) {
     return;
   }
   const std::vector<Point2> queries = places(23, 2000);
-  const auto got = sampled(Interpolation::kNaturalNeighbour, queries);
+  const auto got = sampled(Interpolation::natural_neighbour, queries);
   const auto heights =
-      tri::heights_at(triangulation_, slots_, queries, Interpolation::kNaturalNeighbour, 1);
+      tri::heights_at(triangulation_, slots_, queries, Interpolation::natural_neighbour, 1);
   const auto gradients =
-      tri::gradients_at(triangulation_, slots_, queries, tri::GradientFrom::kNaturalNeighbours, 1);
+      tri::gradients_at(triangulation_, slots_, queries, tri::GradientFrom::natural_neighbours, 1);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     expect_near(got[i].height, heights[i], i);
     expect_near(got[i].per_column, gradients[i].x, i);
@@ -208,7 +208,7 @@ TEST_P(Sampler, NaturalMatchesTheFullLattice) {
 
 TEST_P(Sampler, NearestReturnsTheSampleOfTheCell) {
   const std::vector<Point2> queries = places(24, 2000);
-  const auto got = sampled(Interpolation::kNearest, queries);
+  const auto got = sampled(Interpolation::nearest, queries);
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const auto last = [](std::uint32_t n) { return static_cast<double>(n - 1); };
     const bool inside = queries[i][0] >= -0.5 && queries[i][1] >= -0.5 &&
@@ -225,7 +225,7 @@ TEST_P(Sampler, NearestReturnsTheSampleOfTheCell) {
 TEST_P(Sampler, NonFinitePositionsHaveNoHeight) {
   const std::vector<Point2> queries{{NAN, 3}, {3, INFINITY}, {-INFINITY, NAN}, {1e300, 1e300}};
   for (const Interpolation method :
-       {Interpolation::kLinear, Interpolation::kNearest, Interpolation::kNaturalNeighbour}) {
+       {Interpolation::linear, Interpolation::nearest, Interpolation::natural_neighbour}) {
     for (const terrain::SurfacePoint& p : sampled(method, queries))
       EXPECT_TRUE(std::isnan(p.height));
     EXPECT_TRUE(sampled(method, {}).empty());

@@ -128,7 +128,7 @@ TEST_F(Stop, EndsSmoothingThatWouldNeverFinish) {
   std::stop_source stop;
   terrain::DetailMeshOptions options;
   options.heights.smoothing =
-      tri::SmoothingOptions{.method = tri::Smoothing::kBilateral, .iterations = 1'000'000'000};
+      tri::SmoothingOptions{.method = tri::Smoothing::bilateral, .iterations = 1'000'000'000};
   // After the store has been read, unless the machine is slow.
   const std::jthread later([&] {
     std::this_thread::sleep_for(std::chrono::seconds(1));

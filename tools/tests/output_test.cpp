@@ -145,11 +145,11 @@ TEST_F(MayReplace, FindsTheTagInAllKindsOfTiff) {
     for (const std::uint64_t entry : {std::uint64_t{256}, tag, std::uint64_t{322}, kGeoKeys}) {
       put(entry, 2);
       put(entry == tag ? 2 : 3, 2);
-      put(entry == tag ? name.size() : entry == kGeoKeys ? 4 : 1, word);
+      put(entry == tag ? name.size() : entry == kGeoKeys ? 4U : 1U, word);
       if (entry != tag && entry != kGeoKeys) {
         put(big_endian ? std::uint64_t{16} << 8 * (word - 2) : 16, word);
       } else if (!big_tiff) {
-        put(8 + 2 + 48 + 4 + (entry == tag ? 0 : 8), word);
+        put(8 + 2 + 48 + 4 + (entry == tag ? 0U : 8U), word);
       } else if (entry == tag) {
         bytes += name;
       } else {

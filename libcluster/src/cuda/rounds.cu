@@ -2,9 +2,9 @@
 #include <cstdint>
 
 #include "cuda/device.cuh"
-#include "cuda/rounds.hpp"
 #include "cuda/device_complete.hpp"
 #include "cuda/device_single.hpp"
+#include "cuda/rounds.hpp"
 
 namespace terrace::cluster::device {
 namespace {

@@ -113,7 +113,8 @@ KMeansTree::KMeansTree(std::span<const Point3> points, std::span<const double> w
     for (std::size_t k = 0; k < kBlock; ++k) {
       const std::size_t position = b * kBlock + k;
       const Point3 p = point(position);
-      single[k] = {{p, p}, 0.0, {w[position] * p[0], w[position] * p[1], w[position] * p[2]}, w[position]};
+      single[k] = {
+          {p, p}, 0.0, {w[position] * p[0], w[position] * p[1], w[position] * p[2]}, w[position]};
     }
     level[b] = join_nodes(single);
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/neighbour_lists.hpp"
 
+#include <algorithm>
 #include <limits>
 
 #include <terrace/base/parallel.hpp>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "linkage/spanning_tree.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <limits>

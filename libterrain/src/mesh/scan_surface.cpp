@@ -162,7 +162,7 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   need_points(store, "a surface");
   say_unknown_height_unit(Ground(store.schema()), context);
   const stream::Store source = store.with_stop(context.stop);
-  const bool poles = options.restore.shape.rule == tri::ShapeRule::kPoles;
+  const bool poles = options.restore.shape.rule == tri::ShapeRule::poles;
   check_surface_memory(source, detail,
                        options.method ? options.method->bytes_per_point
                                       : kSurfaceBytesPerPoint + (poles ? kPolesBytesPerPoint : 0),

@@ -56,9 +56,9 @@ class NaturalBlock {
           tri::Point2{places[i][0] - static_cast<double>(window.column),
                       places[i][1] - static_cast<double>(window.row)}};
       const double height = tri::heights_at(triangulation_, heights_, place,
-                                            tri::Interpolation::kNaturalNeighbour, 1)[0];
+                                            tri::Interpolation::natural_neighbour, 1)[0];
       const tri::Gradient gradient = tri::gradients_at(triangulation_, heights_, place,
-                                                       tri::GradientFrom::kNaturalNeighbours, 1)[0];
+                                                       tri::GradientFrom::natural_neighbours, 1)[0];
       out[i] = {height, gradient.x, gradient.y};
     }
   }
@@ -91,7 +91,7 @@ class LatticeSampler final : public HeightSampler {
         stop_(context.stop),
         raster_{0, 0, static_cast<std::int64_t>(store.schema().columns),
                 static_cast<std::int64_t>(store.schema().rows)},
-        tile_(options.method == tri::Interpolation::kNaturalNeighbour ? kNaturalTile : kTile),
+        tile_(options.method == tri::Interpolation::natural_neighbour ? kNaturalTile : kTile),
         workers_(std::clamp<std::uint64_t>(working_memory(context) / 2 / kWorkerBytes, 1,
                                            std::max(1U, context.threads))) {}
 
@@ -114,7 +114,7 @@ class LatticeSampler final : public HeightSampler {
     std::size_t begin = 0, end = 0;  ///< range in order_
   };
 
-  [[nodiscard]] bool nearest() const { return options_.method == tri::Interpolation::kNearest; }
+  [[nodiscard]] bool nearest() const { return options_.method == tri::Interpolation::nearest; }
 
   /// Whether a place can have a height.
   [[nodiscard]] bool inside(const Point2& p) const {
@@ -166,7 +166,7 @@ class LatticeSampler final : public HeightSampler {
   void answer_tile(Worker<T>& worker, const Tile& tile, std::span<const Point2> places,
                    std::span<SurfacePoint> out) {
     const std::span<std::uint32_t> numbers(order_.data() + tile.begin, tile.end - tile.begin);
-    if (options_.method == tri::Interpolation::kNaturalNeighbour) {
+    if (options_.method == tri::Interpolation::natural_neighbour) {
       const auto across = static_cast<std::uint64_t>((raster_.columns + tile_ - 1) / tile_);
       if (!worker.natural) worker.natural.emplace(raster_.columns, raster_.rows);
       worker.natural->answer(worker.reader, raster_,

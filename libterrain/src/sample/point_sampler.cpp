@@ -160,7 +160,7 @@ class PointSampler final : public HeightSampler {
 
   /// Whether a place may have an answer.
   [[nodiscard]] bool counts(const Point2& p) const {
-    if (options_.method == tri::Interpolation::kNearest) {
+    if (options_.method == tri::Interpolation::nearest) {
       return std::isfinite(p[0]) && std::isfinite(p[1]);
     }
     const stream::Box3& all = cloud_.store.bounds();
@@ -290,11 +290,11 @@ class PointSampler final : public HeightSampler {
 
   SurfacePoint answer(PointSurface& surface, const Point2& place) const {
     switch (options_.method) {
-      case tri::Interpolation::kLinear:
+      case tri::Interpolation::linear:
         break;
-      case tri::Interpolation::kNaturalNeighbour:
+      case tri::Interpolation::natural_neighbour:
         return surface.natural(place);
-      case tri::Interpolation::kNearest:
+      case tri::Interpolation::nearest:
         if (too_long_ && std::isnan(surface.linear(place).height)) return {};
         return options_.gradients ? surface.at_nearest(place)
                                   : SurfacePoint{surface.height(surface.nearest(place))};

@@ -157,7 +157,7 @@ class ProfileRun {
     context_.check_stop();
     surface_.assign(stored_.size(), {});
     const tri::Interpolation method = request_.sampler.method;
-    if (method == tri::Interpolation::kLinear) {
+    if (method == tri::Interpolation::linear) {
       for (std::size_t i = 0; i < stored_.size(); ++i) {
         if (!std::isnan(known_[i])) stored_[i] = {NAN, NAN};  // already known
       }
@@ -166,7 +166,7 @@ class ProfileRun {
     for (std::size_t i = 0; i < stored_.size(); ++i) {
       // On an edge, where rounding may lead outside.
       const bool missed = std::isnan(surface_[i].height);
-      if (missed && method != tri::Interpolation::kNearest) surface_[i].height = known_[i];
+      if (missed && method != tri::Interpolation::nearest) surface_[i].height = known_[i];
     }
     points_.resize(places_.size());
     for (std::size_t i = 0; i < places_.size(); ++i) {

@@ -28,7 +28,7 @@ PointHull::PointHull(const stream::Store& store, unsigned level) {
         for (unsigned corner = 0; corner < 4; ++corner) {
           const Point2 p{(corner & 1 ? branch.box.max : branch.box.min)[0],
                          (corner & 2 ? branch.box.max : branch.box.min)[1]};
-          if (find(p).side == Side::kOutside) return true;
+          if (find(p).side == Side::outside) return true;
         }
         return false;
       },
@@ -49,12 +49,12 @@ PointHull::Found PointHull::find(const Point2& place) const {
   if (place < corners_.front() || corners_[greatest_] < place) return {};
   const auto begin = corners_.begin();
   const auto middle = begin + static_cast<std::ptrdiff_t>(greatest_);
-  Found found{Side::kInside};
+  Found found{Side::inside};
   // Whether the place is not outside the edge that ends at corner `next`.
   const auto look_at = [&](std::size_t next) {
     const std::size_t count = corners_.size();
     const int side = tri::orientation(corners_[(next + count - 1) % count], corners_[next], place);
-    if (side == 0) found = {Side::kBorder, next};
+    if (side == 0) found = {Side::border, next};
     return side >= 0;
   };
   // The lower chain from the least corner to the greatest, then the upper chain back.
@@ -62,7 +62,7 @@ PointHull::Found PointHull::find(const Point2& place) const {
     const auto after = std::upper_bound(begin, middle + 1, place);
     if (!look_at(static_cast<std::size_t>(after - begin))) return {};
   }
-  if (place != *begin && found.side == Side::kInside) {
+  if (place != *begin && found.side == Side::inside) {
     const auto after = std::upper_bound(middle, corners_.end(), place,
                                         [](const Point2& a, const Point2& b) { return b < a; });
     if (!look_at(after == corners_.end() ? 0 : static_cast<std::size_t>(after - begin))) return {};
@@ -71,7 +71,7 @@ PointHull::Found PointHull::find(const Point2& place) const {
 }
 
 double PointHull::distance(const Point2& place) const {
-  if (!is_flat() && find(place).side != Side::kOutside) return 0.0;
+  if (!is_flat() && find(place).side != Side::outside) return 0.0;
   double least = HUGE_VAL;  // squared
   for (std::size_t i = 0; i < corners_.size(); ++i) {
     const Point2 &a = corners_[i], &b = corners_[(i + 1) % corners_.size()];

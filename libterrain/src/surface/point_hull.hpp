@@ -25,9 +25,9 @@ class PointHull {
   [[nodiscard]] std::span<const Point2> corners() const { return corners_; }
   [[nodiscard]] bool is_flat() const { return corners_.size() < 3; }
 
-  enum class Side : std::uint8_t { kOutside, kBorder, kInside };
+  enum class Side : std::uint8_t { outside, border, inside };
   struct Found {
-    Side side = Side::kOutside;
+    Side side = Side::outside;
     /// For places on the border: the corner after the place, counter-clockwise, not equal to it.
     std::size_t next = 0;
   };

@@ -97,11 +97,11 @@ std::optional<PointSurface::Target> PointSurface::target_of(const Point2& place,
   const PointHull::Found found = cloud_.hull.find(place);
   side = found.side;
   switch (side) {
-    case PointHull::Side::kOutside:
+    case PointHull::Side::outside:
       break;
-    case PointHull::Side::kBorder:
+    case PointHull::Side::border:
       return Target{place, cloud_.hull.corners()[found.next]};
-    case PointHull::Side::kInside:
+    case PointHull::Side::inside:
       return Target{place, cloud_.hull.corners()[0]};
   }
   return std::nullopt;
@@ -409,9 +409,9 @@ SurfacePoint PointSurface::natural_among(std::vector<Point2>& points, const Poin
     heights[tri::slot(vertices[i])] = height(points[i]);
   }
   const std::span<const Point2> one(&place, 1);
-  const double at = tri::heights_at(few, heights, one, tri::Interpolation::kNaturalNeighbour, 1)[0];
+  const double at = tri::heights_at(few, heights, one, tri::Interpolation::natural_neighbour, 1)[0];
   const tri::Gradient gradient =
-      tri::gradients_at(few, heights, one, tri::GradientFrom::kNaturalNeighbours, 1)[0];
+      tri::gradients_at(few, heights, one, tri::GradientFrom::natural_neighbours, 1)[0];
   return {at, gradient.x, gradient.y};
 }
 
@@ -424,13 +424,13 @@ SurfacePoint PointSurface::natural(const Point2& place) {
   const std::optional<Target> target = target_of(place, where);
   if (!target || (too_long_ && std::isnan(linear(place).height))) return {};
   points_.clear();
-  if (where == PointHull::Side::kBorder) {
+  if (where == PointHull::Side::border) {
     find_triangle(*target);
     const Corners& t = *triangle_;
     points_.assign(t.begin(), t.end());
   }
   // The neighbours that the place has, or would have if it were a point.
-  if (where == PointHull::Side::kInside || std::count(points_.begin(), points_.end(), place) > 0) {
+  if (where == PointHull::Side::inside || std::count(points_.begin(), points_.end(), place) > 0) {
     find_star(place);
     points_.clear();
     if (star_.has_centre()) points_.push_back(place);

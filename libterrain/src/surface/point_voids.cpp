@@ -27,7 +27,7 @@ PointVoids::PointVoids(const stream::Store& store, unsigned level)
     : store_(store), level_(level), most_looks_(kLooksPerPoint * store.levels()[level].points) {}
 
 bool PointVoids::count_looks(std::uint64_t boxes) {
-  return (looks_ += boxes) > most_looks_ && state_ != State::kNone;
+  return (looks_ += boxes) > most_looks_ && state_ != State::none;
 }
 
 bool PointVoids::find(PointWindow& window) {
@@ -37,7 +37,7 @@ bool PointVoids::find(PointWindow& window) {
     tree_.emplace(store_, level_, kPointsPerPart);
     parts_.resize(tree_->size());
   }
-  while (state_ == State::kUnknown && next_ < parts_.size()) {
+  while (state_ == State::unknown && next_ < parts_.size()) {
     const std::size_t part = next_++;
     ++at_work_;
     lock.unlock();
@@ -57,15 +57,15 @@ bool PointVoids::find(PointWindow& window) {
     fits = fits && (memory == 0 || points_ <= memory / kShareOfMemory / kBytesPerBorderPoint);
     parts_[part] = std::move(found);
     // The other threads must not wait for a part that failed.
-    if (error || !fits) state_ = State::kNone;
+    if (error || !fits) state_ = State::none;
     changed_.notify_all();
     if (error) std::rethrow_exception(error);
   }
-  changed_.wait(lock, [&] { return at_work_ == 0 || state_ != State::kUnknown; });
-  if (state_ == State::kUnknown) {
+  changed_.wait(lock, [&] { return at_work_ == 0 || state_ != State::unknown; });
+  if (state_ == State::unknown) {
     triangulate();
     // If all points are collinear, the border does not determine which points are neighbours.
-    state_ = border_.triangle_count() > 0 ? State::kKnown : State::kNone;
+    state_ = border_.triangle_count() > 0 ? State::known : State::none;
   }
   return known();
 }

@@ -49,7 +49,7 @@ class PointVoids {
   /// quarter of the window's memory, or if all points are collinear. Throws: stream::Error,
   /// stream::Stopped.
   bool find(PointWindow& window);
-  [[nodiscard]] bool known() const { return state_ == State::kKnown; }
+  [[nodiscard]] bool known() const { return state_ == State::known; }
 
   // The following require known().
   /// Returns how far around a box there may be points of triangles that meet it and have a corner
@@ -63,7 +63,7 @@ class PointVoids {
   void for_each_around(const Point2& place, const std::function<void(const Point2&)>& visit) const;
 
  private:
-  enum class State : std::uint8_t { kUnknown, kKnown, kNone };
+  enum class State : std::uint8_t { unknown, known, none };
   struct Part {
     std::vector<SurfaceCorner> border;
     double reach = 0;
@@ -74,7 +74,7 @@ class PointVoids {
   unsigned level_;
   std::uint64_t most_looks_;
   std::atomic<std::uint64_t> looks_ = 0;
-  std::atomic<State> state_ = State::kUnknown;
+  std::atomic<State> state_ = State::unknown;
 
   std::mutex mutex_;
   std::condition_variable changed_;

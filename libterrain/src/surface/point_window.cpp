@@ -223,10 +223,10 @@ void PointWindow::load_with_border() {
   insert_taken();
   cloud_.voids.for_each(box_, [this](const SurfaceCorner& corner) { take_distant(corner); });
   insert_taken();
-  states_.assign(triangulation_.triangle_slots(), State::kUnknown);
+  states_.assign(triangulation_.triangle_slots(), State::unknown);
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
     if (inner_.covers(circle(t).bounds()) || triangle_meets(corners(t), box_)) {
-      states_[tri::slot(t)] = State::kCertain;
+      states_[tri::slot(t)] = State::certain;
     }
   }
 }

@@ -81,7 +81,7 @@ class PointWindow {
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
   /// Whether a triangle belongs to the whole triangulation. Requires a living triangle.
   [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
-    return is_whole_ || states_[tri::slot(triangle)] == State::kCertain;
+    return is_whole_ || states_[tri::slot(triangle)] == State::certain;
   }
   /// In the store's vertical unit (scale and offset of the channel applied).
   [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
@@ -125,7 +125,7 @@ class PointWindow {
     CircleCover cover;
     tri::TriangleId triangle = tri::kNoTriangle;
   };
-  enum class State : std::uint8_t { kCertain, kSuspect, kUnknown };
+  enum class State : std::uint8_t { certain, suspect, unknown };
 
   void clear();
   /// Clears, then reads all clusters that meet the box; inner_ then contains all points of it.

@@ -49,12 +49,12 @@ void PointWindow::examine(tri::TriangleId triangle) {
   State& state = states_[tri::slot(triangle)];
   const CircleCover cover = circle(triangle);
   if (inner_.covers(cover.bounds())) {
-    state = State::kCertain;
+    state = State::certain;
   } else if (triangle_meets(corners(triangle), box_)) {
-    state = State::kSuspect;
+    state = State::suspect;
     suspects_.push_back({cover, triangle});
   } else {
-    state = State::kUnknown;
+    state = State::unknown;
   }
 }
 
@@ -113,16 +113,16 @@ void PointWindow::examine_all() {
   // As inner_ contains all vertices, a circle that leaves it contains places outside the hull.
   // The triangles whose circles contain such a place are connected across edges to each other and
   // to the hull, like those that an insertion there would remove. So the others need no test.
-  states_.assign(triangulation_.triangle_slots(), State::kCertain);
+  states_.assign(triangulation_.triangle_slots(), State::certain);
   std::vector<tri::TriangleId> reached = triangles_at_hull();
   while (!reached.empty()) {
     const tri::TriangleId t = reached.back();
     reached.pop_back();
-    if (states_[tri::slot(t)] != State::kCertain) continue;
+    if (states_[tri::slot(t)] != State::certain) continue;
     examine(t);
-    if (states_[tri::slot(t)] == State::kCertain) continue;
+    if (states_[tri::slot(t)] == State::certain) continue;
     for (const tri::TriangleId next : triangulation_.neighbours(t)) {
-      if (next != tri::kNoTriangle && states_[tri::slot(next)] == State::kCertain)
+      if (next != tri::kNoTriangle && states_[tri::slot(next)] == State::certain)
         reached.push_back(next);
     }
   }
@@ -130,16 +130,15 @@ void PointWindow::examine_all() {
 
 void PointWindow::examine_changes() {
   triangulation_.take_changes(changes_);
-  states_.resize(triangulation_.triangle_slots(), State::kUnknown);
-  for (const tri::TriangleId t : changes_.removed_triangles)
-    states_[tri::slot(t)] = State::kUnknown;
+  states_.resize(triangulation_.triangle_slots(), State::unknown);
+  for (const tri::TriangleId t : changes_.removed_triangles) states_[tri::slot(t)] = State::unknown;
   drop_settled();
   for (const tri::TriangleId t : changes_.added_triangles) examine(t);
 }
 
 void PointWindow::drop_settled() {
   std::erase_if(suspects_, [&](const Suspect& suspect) {
-    return states_[tri::slot(suspect.triangle)] != State::kSuspect;
+    return states_[tri::slot(suspect.triangle)] != State::suspect;
   });
 }
 
@@ -167,7 +166,7 @@ bool PointWindow::widen() {
   examine_changes();
   for (const Suspect& suspect : suspects_) {
     if (!inner_.covers(suspect.cover.bounds())) continue;
-    states_[tri::slot(suspect.triangle)] = State::kCertain;
+    states_[tri::slot(suspect.triangle)] = State::certain;
   }
   drop_settled();
   return true;
@@ -182,7 +181,7 @@ bool PointWindow::add_missing() {
       takes_too_long_ = cloud_.voids.count_looks(std::exchange(looks_, 0));
     }
     if (takes_too_long_) return false;
-    if (!is_missing) states_[tri::slot(suspect.triangle)] = State::kCertain;
+    if (!is_missing) states_[tri::slot(suspect.triangle)] = State::certain;
   }
   // Clusters are only read now; their points are found in the next round.
   const bool has_read = read_missing();

@@ -24,9 +24,9 @@ SurfacePoint on_needle(const SurfaceTriangle& corner, const Point2& place) {
     heights[tri::slot(v)] = c.height;
   }
   const std::array<Point2, 1> places{place};
-  const double height = tri::heights_at(alone, heights, places, tri::Interpolation::kLinear, 1)[0];
+  const double height = tri::heights_at(alone, heights, places, tri::Interpolation::linear, 1)[0];
   const tri::Gradient gradient =
-      tri::gradients_at(alone, heights, places, tri::GradientFrom::kTriangles, 1)[0];
+      tri::gradients_at(alone, heights, places, tri::GradientFrom::triangles, 1)[0];
   return {height, gradient.x, gradient.y};
 }
 

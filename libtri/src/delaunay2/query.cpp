@@ -23,7 +23,7 @@ Location locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p) 
                              });
   if (at == mesh.line.end()) --at;
   result.vertex = VertexId{*at};
-  if (mesh.point[*at] == p) result.place = Place::kVertex;
+  if (mesh.point[*at] == p) result.place = Place::vertex;
   return result;
 }
 
@@ -85,17 +85,17 @@ Location locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
   result.triangle = TriangleId{end.triangle};
   const std::uint32_t equal = equal_corner(mesh, end.triangle, p);
   if (equal != kNone) {
-    result.place = Place::kVertex;
+    result.place = Place::vertex;
     result.vertex = VertexId{equal};
     return result;
   }
-  result.place = Place::kInside;
+  result.place = Place::inside;
   result.vertex = VertexId{at.corner[0]};
   for (std::uint32_t i = 0; i < 3; ++i) {
     const auto& a = mesh.point[at.corner[next_index(i)]];
     const auto& b = mesh.point[at.corner[previous_index(i)]];
     if (Kernel::orientation(a, b, p) != 0) continue;
-    result.place = Place::kEdge;
+    result.place = Place::edge;
     result.edge = static_cast<std::uint8_t>(i);
     result.vertex = VertexId{at.corner[next_index(i)]};
   }

@@ -68,16 +68,15 @@ class CavityInsertion {
           // The other corners belong to t, which the part owns.
           if (!part_.owns(tetrahedron[other].corner[index_of(t.mate[i])])) return false;
         }
-        filtered[i] =
-            mark[other] == kUnknown ? conflicts.filter(tetrahedron[other]) : Verdict::kOut;
+        filtered[i] = mark[other] == kUnknown ? conflicts.filter(tetrahedron[other]) : Verdict::out;
       }
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
         // Reads the mark again, as a neighbour may occur twice.
         if (mark[other] == kUnknown) {
           const Tetrahedron& tested = tetrahedron[other];
-          if (filtered[i] == Verdict::kIn ||
-              (filtered[i] == Verdict::kOpen && conflicts.decide(tested))) {
+          if (filtered[i] == Verdict::in ||
+              (filtered[i] == Verdict::open && conflicts.decide(tested))) {
             mark[other] = kCollected;
             cavity_.inside[inside_count_++] = other;
             for (const Side mate : tested.mate) {

@@ -85,11 +85,11 @@ struct DoubleKernel {
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (!(test.value * test.value > 4.9e-28 * fifth && fifth > 0x1p-900 && fifth < 0x1p900))
           [[unlikely]] {
-        if (!(fifth < exact_fifth_)) return Verdict::kOpen;
+        if (!(fifth < exact_fifth_)) return Verdict::open;
         if (test.value == 0)
-          return inside_small_perturbed_sphere(rows) ? Verdict::kIn : Verdict::kOut;
+          return inside_small_perturbed_sphere(rows) ? Verdict::in : Verdict::out;
       }
-      return test.value > 0 ? Verdict::kIn : Verdict::kOut;
+      return test.value > 0 ? Verdict::in : Verdict::out;
     }
 
    private:

@@ -92,8 +92,8 @@ class EllipticalKernel : public DoubleKernel {
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (test.value * test.value > filter2_ * fifth && fifth > 0x1p-900 && fifth < 0x1p900)
           [[likely]]
-        return test.value > 0 ? Verdict::kIn : Verdict::kOut;
-      return Verdict::kOpen;
+        return test.value > 0 ? Verdict::in : Verdict::out;
+      return Verdict::open;
     }
 
    private:

@@ -14,7 +14,7 @@ namespace terrace::tri::spatial {
 using Pair = double __attribute__((vector_size(16)));
 
 /// A filter's verdict on the position of a point relative to a sphere.
-enum class Verdict : std::uint8_t { kOut, kIn, kOpen };  ///< kOpen: needs an exact test
+enum class Verdict : std::uint8_t { out, in, open };  ///< open: needs an exact test
 
 /// Four vectors from the tested point to the corners a, b, c, d: the coordinates of a and b, then
 /// those of c and d.

@@ -78,11 +78,11 @@ struct IntKernel {
       // sums. The total is 11 * 12 u < 1.5e-14.
       const double fifth = test.largest * test.largest * test.largest * test.largest * test.largest;
       if (!(test.value * test.value > 2.25e-28 * fifth)) [[unlikely]] {
-        if (!(fifth < kExactFifth)) return Verdict::kOpen;
+        if (!(fifth < kExactFifth)) return Verdict::open;
         if (test.value == 0)
-          return inside_small_perturbed_sphere(rows) ? Verdict::kIn : Verdict::kOut;
+          return inside_small_perturbed_sphere(rows) ? Verdict::in : Verdict::out;
       }
-      return test.value > 0 ? Verdict::kIn : Verdict::kOut;
+      return test.value > 0 ? Verdict::in : Verdict::out;
     }
 
    private:

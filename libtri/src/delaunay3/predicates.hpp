@@ -67,7 +67,7 @@ bool inside_sphere(const typename Kernel::Vertex& a, const typename Kernel::Vert
                    const typename Kernel::Vertex& c, const typename Kernel::Vertex& d,
                    const typename Kernel::Point& p, const typename Kernel::Lattice& lattice) {
   const Verdict filtered = typename Kernel::Probe(p, lattice).side(a, b, c, d);
-  if (filtered != Verdict::kOpen) return filtered == Verdict::kIn;
+  if (filtered != Verdict::open) return filtered == Verdict::in;
   return inside_sphere_exactly<Kernel>(a.point, b.point, c.point, d.point, p);
 }
 
@@ -88,7 +88,7 @@ class Conflicts {
   [[gnu::always_inline]] Verdict filter(const Tetrahedron& t) const {
     const auto& [a, b, c, d] = t.corner;
     if (has_ghost(t.corner)) [[unlikely]]
-      return Verdict::kOpen;
+      return Verdict::open;
     return probe_.side(vertex_[a], vertex_[b], vertex_[c], vertex_[d]);
   }
   /// True if the point, which is not a corner, is in conflict with a tetrahedron for which filter()
@@ -105,7 +105,7 @@ class Conflicts {
   }
   [[nodiscard]] bool operator()(const Tetrahedron& t) const {
     const Verdict filtered = filter(t);
-    return filtered == Verdict::kIn || (filtered == Verdict::kOpen && decide(t));
+    return filtered == Verdict::in || (filtered == Verdict::open && decide(t));
   }
 
  private:

@@ -25,7 +25,7 @@ Location3 locate_flat(const Mesh<Kernel>& mesh, const typename Kernel::Point& p)
                              });
   if (at == mesh.flat_vertices.end()) --at;
   result.vertex = VertexId{*at};
-  if (same_point(mesh.vertex[*at].point, p)) result.place = Place3::kVertex;
+  if (same_point(mesh.vertex[*at].point, p)) result.place = Place3::vertex;
   return result;
 }
 
@@ -87,21 +87,21 @@ Location3 locate(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std:
   result.tetrahedron = TetrahedronId{end.tetrahedron};
   const std::uint32_t equal = equal_corner(mesh, end.tetrahedron, p);
   if (equal != kNone) {
-    result.place = Place3::kVertex;
+    result.place = Place3::vertex;
     result.vertex = VertexId{equal};
     return result;
   }
-  result.place = Place3::kInside;
+  result.place = Place3::inside;
   std::array<bool, 4> on{};
   for (std::uint32_t i = 0; i < 4; ++i) {
     on[i] = orientation_with<Kernel>(mesh.vertex.data(), at, i, p) == 0;
     if (!on[i]) {
       result.vertex = VertexId{at.corner[i]};
-    } else if (result.place == Place3::kInside) {
-      result.place = Place3::kFacet;
+    } else if (result.place == Place3::inside) {
+      result.place = Place3::facet;
       result.corner[0] = static_cast<std::uint8_t>(i);
     } else {
-      result.place = Place3::kEdge;
+      result.place = Place3::edge;
       result.corner[1] = static_cast<std::uint8_t>(i);
     }
   }

@@ -121,7 +121,7 @@ template <class Kernel>
 std::span<const VertexWeight> Sampler<Kernel>::compute_weights(const Query& p,
                                                                Interpolation method) {
   weights_.clear();
-  if (method == Interpolation::kNearest) {
+  if (method == Interpolation::nearest) {
     const std::uint32_t nearest = nearest_vertex(mesh_, p, last_);
     if (nearest != kNone) weights_.push_back({VertexId{nearest}, 1});
     return weights_;
@@ -137,7 +137,7 @@ std::span<const VertexWeight> Sampler<Kernel>::compute_weights(const Query& p,
       weigh_edge(p, place.corner[0], place.corner[1]);
       break;
     case QueryPlace::kInside:
-      if (method == Interpolation::kLinear) {
+      if (method == Interpolation::linear) {
         weigh_triangle(p, place.triangle);
       } else {
         weigh_neighbours(p, place.triangle);
@@ -292,7 +292,7 @@ template <class Kernel>
 Gradient Sampler<Kernel>::gradient(const Query& p, const Heights& heights, GradientFrom from) {
   const QueryPlace place = find_place(mesh_, p, last_);
   if (mesh_.flat || place.kind == QueryPlace::kOutside) return {};
-  if (from == GradientFrom::kNaturalNeighbours) {
+  if (from == GradientFrom::natural_neighbours) {
     if (place.kind == QueryPlace::kInside) {
       find_cavity(mesh_, p, place.triangle, cavity_);
       return gradient_of_cell(p, heights, kNoVertex);

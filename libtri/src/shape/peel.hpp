@@ -284,7 +284,7 @@ void rescue(const Mesh& mesh, State& state) {
   for (const std::uint32_t v : state.lost) state.degree[v] = 0;
 }
 
-/// The published rule, in rounds, see ShapeRule::kPublished.
+/// The published rule, in rounds, see ShapeRule::published.
 template <class Criterion, class Mesh>
 void peel_as_published(const Mesh& mesh, State& state, const Criterion& criterion,
                        bool keep_vertices) {

@@ -12,7 +12,7 @@
 #include "spheres.hpp"
 #include "state.hpp"
 
-/// The poles rule, see ShapeRule::kPoles: decides which tetrahedra are inside by the strongest
+/// The poles rule, see ShapeRule::poles: decides which tetrahedra are inside by the strongest
 /// evidence among the angles between circumspheres.
 
 namespace terrace::tri::shape {

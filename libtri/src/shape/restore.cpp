@@ -62,7 +62,7 @@ RestoredSurface shape_faces(std::span<const typename Triangulation::Point> point
     point_of[slot(vertices[i])] = static_cast<std::uint32_t>(i);
   BasicShape3<Triangulation> shape(options.shape);
   shape.restore(triangulation, options.threads, options.check_stop);
-  ShapeSurface surface = options.shape.rule == ShapeRule::kPoles
+  ShapeSurface surface = options.shape.rule == ShapeRule::poles
                              ? shape.surface_without_lids(triangulation)
                              : shape.surface(triangulation);
   if (options.check_stop) options.check_stop();

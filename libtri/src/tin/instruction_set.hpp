@@ -23,9 +23,9 @@ GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
 /// check_grid_tin(). T: float or double.
 template <class T>
 GridTinCheck check_grid_tin_with(const GridWindow<T>& window, std::span<const Point3> points,
-                               std::span<const std::array<std::uint32_t, 3>> triangles,
-                               double tolerance, base::SimdPath set,
-                               const base::StopCheck& check_stop = {});
+                                 std::span<const std::array<std::uint32_t, 3>> triangles,
+                                 double tolerance, base::SimdPath set,
+                                 const base::StopCheck& check_stop = {});
 
 namespace rows {
 

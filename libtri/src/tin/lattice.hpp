@@ -159,10 +159,10 @@ Refinement<S> start_in_rectangle(S samples, std::vector<typename S::Vertex> fram
   for (std::uint32_t v = 0; v < frame.size(); ++v)
     if (is_corner(frame[v])) corner[corners++] = v;
   Refinement<S> refinement(std::move(samples),
-                     {std::move(frame),
-                      {{{corner[0], corner[1], corner[2]}, {kNone, 1, kNone}, 0, 0.0F},
-                       {{corner[0], corner[2], corner[3]}, {kNone, kNone, 0}, 0, 0.0F}}},
-                     std::move(check_stop));
+                           {std::move(frame),
+                            {{{corner[0], corner[1], corner[2]}, {kNone, 1, kNone}, 0, 0.0F},
+                             {{corner[0], corner[2], corner[3]}, {kNone, kNone, 0}, 0, 0.0F}}},
+                           std::move(check_stop));
   std::uint32_t near = 0;
   for (std::uint32_t v = 0; v < refinement.mesh().vertices.size(); ++v) {
     const Vertex p = refinement.mesh().vertices[v];
@@ -223,10 +223,10 @@ void refine_to_bound(Refinement<S>& refinement, TinQuality quality, std::size_t 
     refinement.judge_all(queue);
     refinement.refine(queue);
   }
-  if (quality == TinQuality::kGreedy) return;
+  if (quality == TinQuality::greedy) return;
   arrange(refinement, first);
   refinement.remove();
-  if (quality == TinQuality::kRemoval) return;
+  if (quality == TinQuality::removal) return;
   refinement.fit();
   refinement.remove();
 }

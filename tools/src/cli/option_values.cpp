@@ -66,26 +66,26 @@ HeightReference parse_height_reference(const std::string& text) {
 
 tri::TinQuality parse_quality(const std::string& text) {
   return choice<tri::TinQuality>(text, "--quality",
-                                 {{"greedy", tri::TinQuality::kGreedy},
-                                  {"removal", tri::TinQuality::kRemoval},
-                                  {"fitted", tri::TinQuality::kFitted}});
+                                 {{"greedy", tri::TinQuality::greedy},
+                                  {"removal", tri::TinQuality::removal},
+                                  {"fitted", tri::TinQuality::fitted}});
 }
 
 tri::PointDuplicates parse_duplicates(const std::string& text) {
   return choice<tri::PointDuplicates>(text, "--duplicates",
-                                      {{"all", tri::PointDuplicates::kAll},
-                                       {"min", tri::PointDuplicates::kMin},
-                                       {"max", tri::PointDuplicates::kMax},
-                                       {"mean", tri::PointDuplicates::kMean},
-                                       {"first", tri::PointDuplicates::kFirst},
-                                       {"error", tri::PointDuplicates::kError}});
+                                      {{"all", tri::PointDuplicates::all},
+                                       {"min", tri::PointDuplicates::min},
+                                       {"max", tri::PointDuplicates::max},
+                                       {"mean", tri::PointDuplicates::mean},
+                                       {"first", tri::PointDuplicates::first},
+                                       {"error", tri::PointDuplicates::error}});
 }
 
 tri::Interpolation parse_interpolation(const std::string& text) {
   return choice<tri::Interpolation>(text, "--method",
-                                    {{"linear", tri::Interpolation::kLinear},
-                                     {"natural", tri::Interpolation::kNaturalNeighbour},
-                                     {"nearest", tri::Interpolation::kNearest}});
+                                    {{"linear", tri::Interpolation::linear},
+                                     {"natural", tri::Interpolation::natural_neighbour},
+                                     {"nearest", tri::Interpolation::nearest}});
 }
 
 RasterValue parse_raster_value(const std::string& text) {
@@ -215,9 +215,9 @@ std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text) {
   const std::size_t colon = text.find(':');
   tri::SmoothingOptions options;
   options.method = choice<tri::Smoothing>(text.substr(0, colon), "--smooth",
-                                          {{"laplacian", tri::Smoothing::kLaplacian},
-                                           {"taubin", tri::Smoothing::kTaubin},
-                                           {"bilateral", tri::Smoothing::kBilateral}});
+                                          {{"laplacian", tri::Smoothing::laplacian},
+                                           {"taubin", tri::Smoothing::taubin},
+                                           {"bilateral", tri::Smoothing::bilateral}});
   if (colon != std::string::npos) {
     const std::uint64_t steps = parse_count(text.substr(colon + 1));
     if (steps == 0 || steps > 10000) throw UsageError("--smooth takes 1 to 10000 steps");

@@ -31,13 +31,13 @@ ScanSurfaceOptions parse_criterion(const std::string& text) {
   }
   tri::ShapeOptions& shape = options.restore.shape;
   if (name == "poles" && !value) {
-    shape.rule = tri::ShapeRule::kPoles;
+    shape.rule = tri::ShapeRule::poles;
   } else if (name == "gabriel" && !value) {
-    shape.rule = tri::ShapeRule::kFlood;
-    shape.criterion = tri::ShapeCriterion::kGabriel;
+    shape.rule = tri::ShapeRule::flood;
+    shape.criterion = tri::ShapeCriterion::gabriel;
   } else if (name == "edge") {
-    shape.rule = tri::ShapeRule::kPublished;
-    shape.criterion = tri::ShapeCriterion::kEdgeLength;
+    shape.rule = tri::ShapeRule::published;
+    shape.criterion = tri::ShapeCriterion::edge_length;
     shape.keep_vertices = false;
     if (value) shape.edge_factor = *value;
   } else if (name == "alpha-wrap") {

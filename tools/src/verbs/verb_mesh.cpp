@@ -134,7 +134,7 @@ class MeshCommand final : public Command {
                                    : max_points_.empty() ? "all"
                                                          : "mean";
     options.duplicates = parse_duplicates(duplicates);
-    if (options.duplicates == tri::PointDuplicates::kAll && !max_points_.empty()) {
+    if (options.duplicates == tri::PointDuplicates::all && !max_points_.empty()) {
       throw UsageError("--duplicates all needs the bound of --max-error");
     }
     options.fill = parse_fill(fill_);

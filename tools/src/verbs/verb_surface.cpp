@@ -72,7 +72,7 @@ class SurfaceCommand final : public Command {
           part_.path + ": the points enclose no volume, " +
           (surface.spanned == 0   ? "all are at one place"
            : surface.spanned == 1 ? "all are on a line"
-           : surface.spanned == 3 && options.restore.shape.rule == tri::ShapeRule::kPublished
+           : surface.spanned == 3 && options.restore.shape.rule == tri::ShapeRule::published
                ? "because --criterion edge keeps no tetrahedron; give it a larger factor, as edge:2"
                : "as if all were in one plane; 'terrace mesh' "
                  "triangulates heights over x and y"));

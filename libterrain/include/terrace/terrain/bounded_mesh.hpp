@@ -24,9 +24,9 @@ namespace terrace::terrain {
 struct BoundedMeshOptions {
   double max_error = 0.0;        ///< metres
   std::uint64_t max_points = 0;  ///< 0: no limit; otherwise max_error is ignored
-  tri::TinQuality quality = tri::TinQuality::kRemoval;
-  /// kAll: an error if samples at one place differ by more than max_error.
-  tri::PointDuplicates duplicates = tri::PointDuplicates::kAll;
+  tri::TinQuality quality = tri::TinQuality::removal;
+  /// With `all`: an error if samples at one place differ by more than max_error.
+  tri::PointDuplicates duplicates = tri::PointDuplicates::all;
   Fill fill = Fill::none;          ///< for cells of a raster without data
   std::optional<Region> region{};  ///< in the store's CRS
   /// Converts to the CRS of the mesh. The bound holds in that CRS: every sample is converted, then

@@ -25,7 +25,7 @@ struct SurfacePoint {
 };
 
 struct SamplerOptions {
-  tri::Interpolation method = tri::Interpolation::kLinear;
+  tri::Interpolation method = tri::Interpolation::linear;
   unsigned level = 0;  ///< uses the points of this level and above
   /// Ignores triangles with a side longer than this, in metres on the ground. Not for rasters at
   /// level 0.

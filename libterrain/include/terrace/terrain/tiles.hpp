@@ -25,7 +25,7 @@ struct TilesRequest {
   /// In metres at the deepest zoom; doubled at each zoom above. By default what globes expect at
   /// each zoom: 77067 / 2^zoom.
   std::optional<double> max_error{};
-  tri::TinQuality quality = tri::TinQuality::kRemoval;
+  tri::TinQuality quality = tri::TinQuality::removal;
   HeightReference vertical = HeightReference::recorded;
   std::string geoid{};  ///< a geoid grid file of GeographicLib; overrides PROJ's
   /// Globes have no holes, so `none` is not allowed. `interpolate` fills voids within the convex

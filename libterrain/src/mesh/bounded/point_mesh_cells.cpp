@@ -222,15 +222,15 @@ PointMeshCuts cut_for_point_mesh(std::vector<Point2> some, std::uint64_t period,
 
 double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates) {
   double height = heights.front();
-  if (duplicates == tri::PointDuplicates::kMin) {
+  if (duplicates == tri::PointDuplicates::min) {
     height = *std::min_element(heights.begin(), heights.end());
-  } else if (duplicates == tri::PointDuplicates::kMax) {
+  } else if (duplicates == tri::PointDuplicates::max) {
     height = *std::max_element(heights.begin(), heights.end());
-  } else if (duplicates == tri::PointDuplicates::kMean) {
+  } else if (duplicates == tri::PointDuplicates::mean) {
     double sum = 0.0;
     for (const double other : heights) sum += other - heights.front();
     height += sum / static_cast<double>(heights.size());
-  } else if (duplicates == tri::PointDuplicates::kAll) {
+  } else if (duplicates == tri::PointDuplicates::all) {
     const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
     height = *low + (*high - *low) / 2.0;
   }

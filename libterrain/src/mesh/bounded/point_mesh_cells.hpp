@@ -99,7 +99,7 @@ struct MeshSamples {
 };
 
 /// Returns the height that represents several samples at one place, as in tri::point_tin(). With
-/// kError it is that of the first, with kAll the middle between the lowest and the highest.
+/// `error` it is that of the first, with `all` the middle between the lowest and the highest.
 /// heights: in order, not empty.
 double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates);
 

@@ -57,10 +57,10 @@ class PointMeshEstimate {
 PointMeshEstimate::PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples& samples,
                                      tri::PointDuplicates duplicates)
     : cuts_(cuts), samples_(samples) {
-  options_.quality = tri::TinQuality::kGreedy;
+  options_.quality = tri::TinQuality::greedy;
   // Duplicates are refused elsewhere.
   options_.duplicates =
-      duplicates == tri::PointDuplicates::kError ? tri::PointDuplicates::kFirst : duplicates;
+      duplicates == tri::PointDuplicates::error ? tri::PointDuplicates::first : duplicates;
 }
 
 double PointMeshEstimate::in_cell(std::uint32_t number, double max_error) const {
@@ -198,7 +198,7 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
 
 double PointMesher::estimate(double max_error) const {
   // Removal leaves less than two thirds of the vertices that insertion makes.
-  const double left = options_.quality == tri::TinQuality::kGreedy ? 1.0 : 0.6;
+  const double left = options_.quality == tri::TinQuality::greedy ? 1.0 : 0.6;
   return left * PointMeshEstimate(cuts_, *samples_, options_.duplicates).per_cell(max_error) *
          static_cast<double>(cuts_.cells.size());
 }
@@ -221,7 +221,7 @@ stream::Error PointMesher::shared_places_error() const {
                          counted(shared.places, "place", "has", "have"),
                          readable_number(shared.range * metres_vertical()),
                          plain_number(shared.widest[0]), plain_number(shared.widest[1])))
-      .remedy(options_.duplicates == tri::PointDuplicates::kAll
+      .remedy(options_.duplicates == tri::PointDuplicates::all
                   ? stream::message(
                         "set {duplicates} to min, max, mean or first to choose one, or allow "
                         "a larger {max_error}")

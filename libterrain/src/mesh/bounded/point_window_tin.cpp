@@ -97,14 +97,15 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
                    [](const Along& a, const Along& b) { return a.at < b.at; });
   std::vector<double> at{sign * side.from[axis]}, height{from_height}, group;
   std::vector<tri::Point3> places{{side.from[0], side.from[1], from_height}};
-  double apart = 0.0;  // for kAll: the largest distance of a sample from the middle of its place
+  double apart = 0.0;  // for PointDuplicates::all: the largest distance of a sample from the middle
+                       // of its place
   for (std::size_t i = 0; i < side.samples.size(); ++i) {
     const Along& along = side.samples[i];
     group.push_back(along.sample[2]);
     if (i + 1 < side.samples.size() && side.samples[i + 1].at == along.at) continue;
     at.push_back(along.at);
     height.push_back(merged_height(group, options.duplicates));
-    if (options.duplicates == tri::PointDuplicates::kAll) {
+    if (options.duplicates == tri::PointDuplicates::all) {
       const double highest = *std::max_element(group.begin(), group.end());
       apart = std::max(apart, highest - height.back());
     }
@@ -187,7 +188,7 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
     if (own.empty()) continue;
     heights.clear();
     for (const std::size_t i : own) heights.push_back(samples.z[i]);
-    const bool differ = duplicates == tri::PointDuplicates::kAll &&
+    const bool differ = duplicates == tri::PointDuplicates::all &&
                         std::count(heights.begin(), heights.end(), v[2]) !=
                             static_cast<std::ptrdiff_t>(heights.size());
     if (differ || merged_height(heights, duplicates) != v[2]) continue;
@@ -209,7 +210,7 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
                           const stream::MeshRounding& rounding, const stream::Store& store,
                           bool may_miss) {
   store.check_stop();
-  const bool refuse = options.tin.duplicates == tri::PointDuplicates::kError;
+  const bool refuse = options.tin.duplicates == tri::PointDuplicates::error;
   MeshSamples left;
   const MeshSamples* taken = &samples;
   std::size_t vertex_places = 0;
@@ -226,9 +227,9 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
     SharedPlaces shared;
     if (refuse) shared.add(samples);
     if (shared.places > 0) throw SamplesShareAPlace{};
-    throw stream::Error(source, error.what()).remedy("check the store's points");
+    throw stream::Error(store.path().string(), error.what()).remedy("check the store's points");
   }
-  const bool all = options.tin.duplicates == tri::PointDuplicates::kAll;
+  const bool all = options.tin.duplicates == tri::PointDuplicates::all;
   if (all && tin.duplicate_range > options.tin.max_error) throw SamplesShareAPlace{};
   // The removed samples have no error.
   tin.errors.rms *=

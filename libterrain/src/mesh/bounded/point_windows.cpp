@@ -201,8 +201,8 @@ LocalSurface::LocalSurface(const MeshSamples& samples, tri::PointDuplicates dupl
 
 std::optional<double> LocalSurface::height(const Point2& place) const {
   const tri::Location found = delaunay_.locate(place);
-  if (found.place == tri::Place::kVertex) return heights_[slot(found.vertex)];
-  if (found.place == tri::Place::kOutside) return std::nullopt;
+  if (found.place == tri::Place::vertex) return heights_[slot(found.vertex)];
+  if (found.place == tri::Place::outside) return std::nullopt;
   const auto corners = delaunay_.vertices(found.triangle);
   const Point2 a = delaunay_.point(corners[0]);
   const Point2 b = delaunay_.point(corners[1]);

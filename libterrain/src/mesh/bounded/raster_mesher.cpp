@@ -8,7 +8,6 @@
 #include <map>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include <terrace/base/ordered_work.hpp>
 #include <terrace/base/portable_math.hpp>
@@ -244,7 +243,7 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
   std::int64_t cells = kWindowCells;
   Sample sample;
   if (LatticePlan(whole_, cells).size() > 1) {
-    sample = this->sample(max_error, tri::TinQuality::kGreedy, 2, 2);
+    sample = this->sample(max_error, tri::TinQuality::greedy, 2, 2);
     cells = window_cells(sample.vertices_per_sample);
   }
   const LatticePlan plan(whole_, std::min(cells, most_cells_));

@@ -91,7 +91,7 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   // Different places may be one on the globe, as at 180 degrees; the highest makes the result
   // independent of their order.
   tri::PointTinOptions highest = options;
-  highest.duplicates = tri::PointDuplicates::kMax;
+  highest.duplicates = tri::PointDuplicates::max;
   return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, highest);
 }
 

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 
 struct TileMeshOptions {
-  tri::TinQuality quality = tri::TinQuality::kRemoval;
+  tri::TinQuality quality = tri::TinQuality::removal;
   bool normals = false;
   bool water = false;
 };

@@ -55,21 +55,21 @@ constexpr Box3 box2(double min_x, double min_y, double max_x, double max_y) {
 
 /// Position of a point relative to a triangulation, see Delaunay2::locate().
 enum class Place : std::uint8_t {
-  kVertex,   ///< equal to a vertex
-  kEdge,     ///< inside an edge, including hull edges
-  kInside,   ///< inside a triangle
-  kOutside,  ///< outside the convex hull. Without triangles, every point that is not a vertex
+  vertex,   ///< equal to a vertex
+  edge,     ///< inside an edge, including hull edges
+  inside,   ///< inside a triangle
+  outside,  ///< outside the convex hull. Without triangles, every point that is not a vertex
 };
 
 struct Location {
-  Place place = Place::kOutside;
-  /// kVertex, kEdge, kInside: a triangle that contains the point (either of the two at an edge).
-  /// kOutside: a triangle at a hull edge that the point sees. kNoTriangle if there are no
+  Place place = Place::outside;
+  /// vertex, edge, inside: a triangle that contains the point (either of the two at an edge).
+  /// outside: a triangle at a hull edge that the point sees. kNoTriangle if there are no
   /// triangles.
   TriangleId triangle = kNoTriangle;
-  /// kEdge, kOutside: the edge opposite to vertices(triangle)[edge].
+  /// edge, outside: the edge opposite to vertices(triangle)[edge].
   std::uint8_t edge = 0;
-  /// kVertex: the vertex at the point. Otherwise a vertex of the triangle, useful as a hint, or
+  /// vertex: the vertex at the point. Otherwise a vertex of the triangle, useful as a hint, or
   /// kNoVertex in an empty triangulation.
   VertexId vertex = kNoVertex;
 };

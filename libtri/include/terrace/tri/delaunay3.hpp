@@ -38,22 +38,22 @@ inline constexpr TetrahedronId kNoTetrahedron{0xFFFFFFFFu};
 
 /// Position of a point relative to the tetrahedra, see Delaunay3::locate().
 enum class Place3 : std::uint8_t {
-  kVertex,   ///< equal to a vertex
-  kEdge,     ///< inside an edge, including hull edges
-  kFacet,    ///< inside a facet, including hull facets
-  kInside,   ///< inside a tetrahedron
-  kOutside,  ///< outside the convex hull. Without tetrahedra, every point that is not a vertex
+  vertex,   ///< equal to a vertex
+  edge,     ///< inside an edge, including hull edges
+  facet,    ///< inside a facet, including hull facets
+  inside,   ///< inside a tetrahedron
+  outside,  ///< outside the convex hull. Without tetrahedra, every point that is not a vertex
 };
 
 struct Location3 {
-  Place3 place = Place3::kOutside;
-  /// kVertex, kEdge, kFacet, kInside: a tetrahedron that contains the point (any of several).
-  /// kOutside: a tetrahedron at a hull facet that the point sees. kNoTetrahedron if there are none.
+  Place3 place = Place3::outside;
+  /// vertex, edge, facet, inside: a tetrahedron that contains the point (any of several).
+  /// outside: a tetrahedron at a hull facet that the point sees. kNoTetrahedron if there are none.
   TetrahedronId tetrahedron = kNoTetrahedron;
-  /// kFacet, kOutside: the facet opposite to vertices(tetrahedron)[corner[0]]. kEdge: the edge
+  /// facet, outside: the facet opposite to vertices(tetrahedron)[corner[0]]. edge: the edge
   /// joins the two corners other than corner[0] and corner[1].
   std::array<std::uint8_t, 2> corner = {0, 0};
-  /// kVertex: the vertex at the point. Otherwise a vertex of the tetrahedron, useful as a hint, or
+  /// vertex: the vertex at the point. Otherwise a vertex of the tetrahedron, useful as a hint, or
   /// kNoVertex in an empty triangulation.
   VertexId vertex = kNoVertex;
 };

@@ -15,7 +15,7 @@
 namespace terrace::tri {
 
 /// The surface from which a changing set of points was scanned. It holds the tetrahedra of the
-/// points, and which of them are inside the shape (ShapeRule::kPoles). It is read like a Delaunay2:
+/// points, and which of them are inside the shape (ShapeRule::poles). It is read like a Delaunay2:
 /// its "triangles" are the facets of the surface. It takes the place of a triangulation in a
 /// multiresolution model and in a view control.
 ///

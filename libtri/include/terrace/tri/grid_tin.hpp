@@ -73,16 +73,16 @@ extern template GridTinCheck check_grid_tin(const GridWindow<double>&, std::span
 
 /// How much work to spend on reducing the number of triangles.
 enum class TinQuality : std::uint8_t {
-  kGreedy,   ///< insertion only: a Delaunay triangulation of its vertices, except at settled sides
-  kRemoval,  ///< then one pass of removals within the bound: about 0.6 of the triangles
-  kFitted,   ///< then moves heights within the bound, so that a second pass can remove more
+  greedy,   ///< insertion only: a Delaunay triangulation of its vertices, except at settled sides
+  removal,  ///< then one pass of removals within the bound: about 0.6 of the triangles
+  fitted,   ///< then moves heights within the bound, so that a second pass can remove more
 };
 
 struct GridTinOptions {
   /// The error bound, >= 0, in the unit of heights. Bounds below about 2^-45 of the height range
   /// cannot be distinguished from 0. See `max_error` of the result.
   double max_error = 0;
-  TinQuality quality = TinQuality::kRemoval;
+  TinQuality quality = TinQuality::removal;
   /// Signed distance on the ground from one column and one row to the next, in the same unit, not
   /// 0. East and north are positive, so row_step is negative if the first row is the northernmost.
   /// Angles and empty circles are measured on the ground, with the squares of the steps rounded to
@@ -106,7 +106,8 @@ struct GridSides {
 struct GridVertex {
   std::uint32_t column = 0;
   std::uint32_t row = 0;
-  double height = 0;  ///< the sample's height, exact for T = float. With kFitted, a value of type T
+  double height =
+      0;  ///< the sample's height, exact for T = float. With `fitted`, a value of type T
 
   bool operator==(const GridVertex&) const = default;
 };
@@ -139,8 +140,9 @@ GridSides settle_sides(const GridWindow<T>& window, double max_error);
 /// Builds a TIN with the vertices `sides` on its sides, within the bound at every sample that it
 /// covers. T is float (which also holds integers of 24 bits) or double. A window of one row or
 /// column has no triangles. Takes about a microsecond per vertex inserted (a third less with
-/// kGreedy, half as much again with kFitted). About twice as many vertices are inserted as remain.
-/// Memory: about 190 bytes per vertex inserted, and 4 or 8 per sample (7 or 11 if data is missing).
+/// `greedy`, half as much again with `fitted`). About twice as many vertices are inserted as
+/// remain. Memory: about 190 bytes per vertex inserted, and 4 or 8 per sample (7 or 11 if data is
+/// missing).
 ///
 /// Deterministic: gives the same bytes on every processor.
 ///

@@ -67,14 +67,14 @@ class Heights {
 enum class Interpolation : std::uint8_t {
   /// The nearest vertex, also outside the hull. Of equally near vertices it is the
   /// lexicographically smallest.
-  kNearest,
+  nearest,
   /// Barycentric coordinates in the triangle.
-  kLinear,
+  linear,
   /// The areas that the query's Voronoi cell would take from the cells of its neighbours (R.
   /// Sibson, "A vector identity for the Dirichlet tessellation", doi:10.1017/S0305004100056589).
   /// Continuous, smooth except at vertices, and independent of how cocircular points are
   /// triangulated.
-  kNaturalNeighbour,
+  natural_neighbour,
 };
 
 struct VertexWeight {
@@ -83,9 +83,9 @@ struct VertexWeight {
 };
 
 /// Computes the weights of the vertices that interpolate at a query. They are >= 0, their sum is 1,
-/// and (except with kNearest) the weighted mean of the vertices is the query. There are none
-/// outside the hull (kLinear, kNaturalNeighbour) and in an empty triangulation. The hull counts as
-/// inside, decided exactly. If all points are collinear, the hull is the segment between the
+/// and (except with `nearest`) the weighted mean of the vertices is the query. There are none
+/// outside the hull (`linear`, `natural_neighbour`) and in an empty triangulation. The hull counts
+/// as inside, decided exactly. If all points are collinear, the hull is the segment between the
 /// outermost ones. On a vertex only that vertex has a weight. On a hull edge only its two ends have
 /// one.
 ///
@@ -123,11 +123,11 @@ struct Gradient {
 enum class GradientFrom : std::uint8_t {
   /// The gradient of the triangle. On edges and vertices, the area-weighted mean over the triangles
   /// that meet there.
-  kTriangles,
+  triangles,
   /// The derivative of natural neighbour interpolation. On a vertex, where the derivative does not
   /// exist, the mean over the vertex's Voronoi cell by the same formula, which is exact for planes.
-  /// On hull edges and hull vertices, whose cells are unbounded, the gradient of kTriangles.
-  kNaturalNeighbours,
+  /// On hull edges and hull vertices, whose cells are unbounded, the gradient of `triangles`.
+  natural_neighbours,
 };
 
 /// Returns the gradients at many queries. Otherwise like heights_at(). Gradients are undefined

@@ -23,15 +23,16 @@
 
 namespace terrace::tri {
 
-/// Which of several samples at the same x, y counts. Except with kAll, only its height is measured.
+/// Which of several samples at the same x, y counts. Except with `all`, only its height is
+/// measured.
 enum class PointDuplicates : std::uint8_t {
-  kFirst,
-  kMin,
-  kMax,
-  kMean,
-  kAll,    ///< the lowest and the highest are measured, which bounds the error of all others
-  kError,  ///< throws std::invalid_argument naming the first sample at the position of an earlier
-           ///< one
+  first,
+  min,
+  max,
+  mean,
+  all,    ///< the lowest and the highest are measured, which bounds the error of all others
+  error,  ///< throws std::invalid_argument naming the first sample at the position of an earlier
+          ///< one
 };
 
 /// A lattice for vertices: integer x and y, and heights origin + k * step for integer k.
@@ -44,8 +45,8 @@ struct PointTinOptions {
   /// The error bound, >= 0, in the unit of heights. 0 keeps every sample that is not exactly on the
   /// surface.
   double max_error = 0;
-  TinQuality quality = TinQuality::kRemoval;
-  PointDuplicates duplicates = PointDuplicates::kFirst;
+  TinQuality quality = TinQuality::removal;
+  PointDuplicates duplicates = PointDuplicates::first;
   /// Maximum number of vertices, including those of the frame (or the hull's corners), which are
   /// never dropped. 0 means no limit. If it is reached first, max_error is exceeded and
   /// PointTin::errors reports by how much.
@@ -79,14 +80,14 @@ struct PointTin {
   /// The sample from which each vertex was made, parallel to `vertices`.
   std::vector<std::uint32_t> sample;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertices, counter-clockwise
-  /// Errors of all samples after duplicates were merged. With kAll those of the lowest and the
+  /// Errors of all samples after duplicates were merged. With `all` those of the lowest and the
   /// highest sample of each position. errors.largest <= max_error, unless max_points was reached or
   /// samples are `stuck`.
   TinErrors errors;
   std::size_t duplicates = 0;  ///< samples at the position of an earlier one
   double duplicate_range = 0;  ///< the largest difference between heights at one position
   /// Samples beyond max_error that cannot become vertices: they are on a side of the frame, their
-  /// lattice position is taken or on a side, or their position already has a vertex (with kAll,
+  /// lattice position is taken or on a side, or their position already has a vertex (with `all`,
   /// where samples of one position differ by more than max_error).
   std::size_t stuck = 0;
   std::size_t inserted = 0;  ///< vertices inserted, not counting the corners of the frame or the
@@ -115,7 +116,7 @@ struct PointTin {
 ///
 /// Throws std::invalid_argument, naming the index, for a coordinate or height that is not finite or
 /// above 1e100 in absolute value, for a frame vertex where the polygon is not convex, and for a
-/// duplicate with kError. Throws it also for options out of range and arrays of different lengths.
+/// duplicate with `error`. Throws it also for options out of range and arrays of different lengths.
 /// Throws std::length_error for more than 2^29 samples.
 [[nodiscard]] PointTin point_tin(std::span<const double> x, std::span<const double> y,
                                  std::span<const double> z, std::span<const Point3> frame,

@@ -79,7 +79,7 @@ struct VerticalDistances {
 template <class Coord>
 VerticalDistances vertical_distances(const Delaunay2<Coord>& triangulation, const Heights& heights,
                                      std::span<const Point3> points,
-                                     Interpolation method = Interpolation::kLinear,
+                                     Interpolation method = Interpolation::linear,
                                      unsigned threads = 0);
 
 #define TERRACE_TRI_DECLARE(Coord)                                                          \

@@ -16,7 +16,7 @@
 
 /// Reconstructs the non-convex shape of points scanned from a surface. Delaunay tetrahedra fill the
 /// convex hull. Those inside the shape are kept, and their outer facets are the surface. Either the
-/// angles between circumspheres decide about every tetrahedron (ShapeRule::kPoles), or the
+/// angles between circumspheres decide about every tetrahedron (ShapeRule::poles), or the
 /// tetrahedra outside are peeled off, starting from the hull (J. Skala's thesis, section 8.3).
 ///
 /// restore_surface() goes from points to a surface in one call. BasicShape3 follows a changing
@@ -66,10 +66,10 @@ enum class ShapeCriterion : std::uint8_t {
   /// The interior of the smallest sphere that contains the facet does not contain the tetrahedron's
   /// fourth corner (K. Gabriel, R. Sokal, doi:10.2307/2412323). Two corners of the facet are on
   /// that sphere if the third sees them at an obtuse angle, otherwise all three. Exact.
-  kGabriel,
+  gabriel,
   /// The facet's perimeter is below edge_factor times the sum of the other three edges. Computed in
   /// doubles, with the same result for the same points.
-  kEdgeLength,
+  edge_length,
 };
 
 enum class ShapeRule : std::uint8_t {
@@ -97,24 +97,24 @@ enum class ShapeRule : std::uint8_t {
   /// of the samples may vary. Nearly every vertex ends on the surface, so the rule suits samples of
   /// surfaces but not of volumes, and outliers become spikes. Lids close an open surface, see
   /// BasicShape3::surface_without_lids().
-  kPoles,
+  poles,
   /// Removes a tetrahedron beyond an open facet as soon as that facet is not a boundary facet as
   /// seen from it. Open facets are those of the hull and of removed tetrahedra. The removed
   /// tetrahedra are therefore those reachable from outside: a function of the tetrahedra alone.
   /// Between surfaces that face each other across a gap or around a hole, a few tetrahedra whose
   /// facets are all boundary facets may stay.
-  kFlood,
+  flood,
   /// The rule as published: a tetrahedron with open facets is removed only if none of them is a
   /// boundary facet. The result depends on the order. Here it proceeds in rounds (the neighbours of
   /// the tetrahedra removed in one round come next), and within a round lexicographically by the
   /// corners sorted by x, y, z. It leaves slivers everywhere and is meant for comparison.
-  kPublished,
+  published,
 };
 
 struct ShapeOptions {
-  ShapeRule rule = ShapeRule::kPoles;
-  ShapeCriterion criterion = ShapeCriterion::kGabriel;  ///< for the rules that peel
-  /// For ShapeCriterion::kEdgeLength. Smaller values remove more. The thesis uses 0.5 with the
+  ShapeRule rule = ShapeRule::poles;
+  ShapeCriterion criterion = ShapeCriterion::gabriel;  ///< for the rules that peel
+  /// For ShapeCriterion::edge_length. Smaller values remove more. The thesis uses 0.5 with the
   /// published rule. The flood rule leaks through the first hole: with 0.5 it empties even a sphere
   /// of regular samples, which it restores with 1.
   double edge_factor = 0.5;
@@ -149,7 +149,7 @@ struct ShapeParts {
 /// Shape3 below.
 ///
 /// In an elliptical metric the tetrahedra are those of the metric, and smallest spheres are its
-/// smallest ellipsoids (exact). Edge lengths, used by ShapeCriterion::kEdgeLength and to choose the
+/// smallest ellipsoids (exact). Edge lengths, used by ShapeCriterion::edge_length and to choose the
 /// tetrahedra to put back, are its lengths (in doubles, of differences mapped by the
 /// triangulation's map). The result is the shape of the mapped points, so samples that are denser
 /// across the long axes than along them work as well as uniform ones.

@@ -16,26 +16,27 @@ namespace terrace::tri {
 
 enum class Smoothing : std::uint8_t {
   /// Moves every height towards the weighted mean of its neighbours. Many iterations flatten hills.
-  kLaplacian,
+  laplacian,
   /// Takes a step towards the mean, then a slightly larger one away from it (G. Taubin, "A signal
   /// processing approach to fair surface design", doi:10.1145/218380.218473). Removes roughness and
   /// preserves the height of wide features.
-  kTaubin,
+  taubin,
   /// Counts only neighbours of similar height, which preserves steps. The weight is Tukey's
   /// biweight, (1 - (d / edge_height)^2)^2 for differences d below edge_height, else 0. C. Tomasi,
   /// R. Manduchi, "Bilateral filtering for gray and color images", doi:10.1109/ICCV.1998.710815.
-  kBilateral,
+  bilateral,
 };
 
 struct SmoothingOptions {
-  Smoothing method = Smoothing::kLaplacian;
+  Smoothing method = Smoothing::laplacian;
   unsigned iterations = 10;
-  /// Fraction of the way to the mean that a step goes, 0 < strength <= 1 (about 0.6 suits kTaubin).
+  /// Fraction of the way to the mean that a step goes, 0 < strength <= 1 (about 0.6 suits
+  /// `taubin`).
   double strength = 0.5;
-  /// kTaubin: the pass band in units of the Laplacian's eigenvalues (0 to 2). Amplitudes below it
+  /// taubin: the pass band in units of the Laplacian's eigenvalues (0 to 2). Amplitudes below it
   /// grow slightly, those above it shrink. 0 < pass_band < 1.
   double pass_band = 0.1;
-  /// kBilateral: neighbours that differ by at least this much do not count. Positive, in the unit
+  /// bilateral: neighbours that differ by at least this much do not count. Positive, in the unit
   /// of heights.
   double edge_height = 0;
   base::StopCheck check_stop = {};
@@ -51,9 +52,9 @@ struct HeightChange {
 /// triangles are too thin for their angles to be computed in double.
 ///
 /// A neighbour's weight is the length of the common side of the two Voronoi cells divided by the
-/// distance in the plane. kLaplacian and kTaubin therefore preserve planes, however irregular the
-/// points. kBilateral does so where neighbours are placed symmetrically, as on grids. kLaplacian
-/// and kBilateral never leave the range of heights in the region.
+/// distance in the plane. `laplacian` and `taubin` therefore preserve planes, however irregular the
+/// points. `bilateral` does so where neighbours are placed symmetrically, as on grids. `laplacian`
+/// and `bilateral` never leave the range of heights in the region.
 ///
 /// Each iteration reads only the heights of the previous one, so the order of vertices does not
 /// matter. Time O(vertices of the region * iterations). Memory: 16 bytes per edge of the region.

@@ -139,9 +139,9 @@ namespace tin {
 
 template <class T>
 GridTinCheck check_grid_tin_with(const GridWindow<T>& window, std::span<const Point3> points,
-                               std::span<const std::array<std::uint32_t, 3>> triangles,
-                               double tolerance, base::SimdPath set,
-                               const base::StopCheck& check_stop) {
+                                 std::span<const std::array<std::uint32_t, 3>> triangles,
+                                 double tolerance, base::SimdPath set,
+                                 const base::StopCheck& check_stop) {
   check_shape(window, "check_grid_tin");
   if (!(tolerance >= 0 && tolerance <= 1))
     throw std::invalid_argument("check_grid_tin: tolerance must be in [0, 1]");
@@ -159,11 +159,11 @@ GridTinCheck check_grid_tin_with(const GridWindow<T>& window, std::span<const Po
 }
 
 template GridTinCheck check_grid_tin_with(const GridWindow<float>&, std::span<const Point3>,
-                                        std::span<const std::array<std::uint32_t, 3>>, double,
-                                        base::SimdPath, const base::StopCheck&);
+                                          std::span<const std::array<std::uint32_t, 3>>, double,
+                                          base::SimdPath, const base::StopCheck&);
 template GridTinCheck check_grid_tin_with(const GridWindow<double>&, std::span<const Point3>,
-                                        std::span<const std::array<std::uint32_t, 3>>, double,
-                                        base::SimdPath, const base::StopCheck&);
+                                          std::span<const std::array<std::uint32_t, 3>>, double,
+                                          base::SimdPath, const base::StopCheck&);
 
 }  // namespace tin
 
@@ -172,7 +172,7 @@ GridTinCheck check_grid_tin(const GridWindow<T>& window, std::span<const Point3>
                             std::span<const std::array<std::uint32_t, 3>> triangles,
                             double tolerance, const base::StopCheck& check_stop) {
   return tin::check_grid_tin_with(window, points, triangles, tolerance, base::best_simd_path(),
-                                check_stop);
+                                  check_stop);
 }
 
 template GridTinCheck check_grid_tin(const GridWindow<float>&, std::span<const Point3>,

@@ -67,9 +67,9 @@ class Maker {
     PointSamples samples(samples_, bound, options_, !frame_.empty(), integers, mesh.triangles);
     PointRefinement& refinement =
         refinement_.emplace(std::move(samples), std::move(mesh), options_.check_stop);
-    insert(refinement, max_vertices, quality != TinQuality::kGreedy);
+    insert(refinement, max_vertices, quality != TinQuality::greedy);
     removed_ = 0;
-    if (quality == TinQuality::kGreedy) {
+    if (quality == TinQuality::greedy) {
       insert_missed(refinement, max_vertices);
       inserted_ = refinement.mesh().vertices.size() - fixed;
       return true;
@@ -77,7 +77,7 @@ class Maker {
     inserted_ = refinement.mesh().vertices.size() - fixed;
     refinement.stop_delaunay();
     removed_ += refinement.remove();
-    if (quality == TinQuality::kFitted) {
+    if (quality == TinQuality::fitted) {
       // The moved vertices have errors at their own samples.
       for (Sample& sample : span_of(samples_))
         if (sample.next == kIsVertex) sample.next = kUnlisted;
@@ -171,9 +171,9 @@ class Maker {
 /// bound's inverse.
 bool make_of_points(Maker& maker, const PointTinOptions& options) {
   const std::size_t limit = options.max_points;
-  if (!maker.make(options.max_error, limit, TinQuality::kGreedy)) return false;
+  if (!maker.make(options.max_error, limit, TinQuality::greedy)) return false;
   // The fixed vertices alone may exceed the limit.
-  if (options.quality == TinQuality::kGreedy || maker.vertices() > limit) return true;
+  if (options.quality == TinQuality::greedy || maker.vertices() > limit) return true;
   const double vertices_times_bound =
       0.6 * static_cast<double>(limit) * maker.measured().errors.largest;
   const bool found = least_error({.max_vertices = limit,
@@ -190,7 +190,7 @@ bool make_of_points(Maker& maker, const PointTinOptions& options) {
                                         return static_cast<double>(maker.vertices());
                                       }});
   // Sweeps insert more vertices than greedy insertion, and removal may leave more.
-  return found || maker.make(options.max_error, limit, TinQuality::kGreedy);
+  return found || maker.make(options.max_error, limit, TinQuality::greedy);
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ namespace terrace::tri::tin::points {
 
 struct SampleList {
   /// In the order of a curve, so that consecutive samples are close to each other. Every position
-  /// occurs once, or with kAll twice if heights differ.
+  /// occurs once, or with PointDuplicates::all twice if heights differ.
   Pool<Sample> all;
   std::size_t duplicates = 0;
   double duplicate_range = 0;  ///< the largest difference between heights at one position

@@ -54,11 +54,11 @@ class Cells {
 
 double merged_height(std::span<const Sample> group, PointDuplicates duplicates) {
   double height = group[0].z;
-  if (duplicates == PointDuplicates::kMin || duplicates == PointDuplicates::kMax) {
+  if (duplicates == PointDuplicates::min || duplicates == PointDuplicates::max) {
     for (const Sample& sample : group)
-      height = duplicates == PointDuplicates::kMin ? std::min(height, sample.z)
-                                                   : std::max(height, sample.z);
-  } else if (duplicates == PointDuplicates::kMean) {
+      height = duplicates == PointDuplicates::min ? std::min(height, sample.z)
+                                                  : std::max(height, sample.z);
+  } else if (duplicates == PointDuplicates::mean) {
     // Adds differences from the first height, so that equal heights are preserved exactly.
     double sum = 0;
     for (const Sample& sample : group) sum += sample.z - group[0].z;
@@ -163,7 +163,7 @@ SampleList prepare_samples(std::span<const double> x, std::span<const double> y,
     Sample first = all[begin];
     std::uint32_t end = begin + 1;
     while (end < count && all[end].x == first.x && all[end].y == first.y) ++end;
-    if (end - begin > 1 && duplicates == PointDuplicates::kError)
+    if (end - begin > 1 && duplicates == PointDuplicates::error)
       throw std::invalid_argument("point_tin: sample " + std::to_string(all[begin + 1].id) +
                                   " is at the position of sample " + std::to_string(first.id));
     if (end - begin == 1) {
@@ -177,7 +177,7 @@ SampleList prepare_samples(std::span<const double> x, std::span<const double> y,
     const Sample lowest = *low, highest = *high;
     samples.duplicates += group.size() - 1;
     samples.duplicate_range = std::max(samples.duplicate_range, highest.z - lowest.z);
-    if (duplicates == PointDuplicates::kAll) {
+    if (duplicates == PointDuplicates::all) {
       // Once one of them is a vertex, the other cannot become one, because its position is taken.
       all[unique_count++] = lowest;
       if (highest.z > lowest.z) all[unique_count++] = highest;
