@@ -182,6 +182,8 @@ RESTRICTED = [
 # have only the standard library, and in headers, which every source would pay for.
 FORMATTED = ['libstream/src', 'libterrain/src', 'tools/src']
 CORE_MAKEFILE = 'viewer/core/Makefile'
+# The list of the command's tests. It runs long files class by class.
+CLI_TESTS = 'tests/cli/meson.build'
 
 # Functions of the C library whose last bit differs from release to release and from processor to
 # processor. Where bytes depend on them the same input gives other bytes elsewhere, so sources use
@@ -456,6 +458,16 @@ def check_folders(root):
                 yield f'{place}: has {count} sources, more than {MOST_SOURCES}'
 
 
+def check_test_classes(root):
+    """Yields test classes that tests/cli/meson.build omits, although it lists the classes of their file."""
+    listed = read(root, CLI_TESTS) if os.path.isfile(os.path.join(root, CLI_TESTS)) else ''
+    for name, classes in re.findall(r"'(\w+)' : \[([^\]]+)\]", listed):
+        path = f'{os.path.dirname(CLI_TESTS)}/{name}.py'
+        for found in re.findall(r'^class (\w+)\(.*\n(?:(?:[ #].*)?\n)*?    def test_', read(root, path), re.MULTILINE):
+            if f"'{found}'" not in classes:
+                yield f'{path}: {found} is not in the list of {CLI_TESTS}, so it never runs'
+
+
 def is_production(path):
     return path.endswith(('.cpp', '.hpp', '.h', '.cu', '.cuh')) and not re.search(r'(^|/)(tests|bench|fuzz|examples)/', path)
 
@@ -517,6 +529,7 @@ def breaches(root):
     yield from check_research(root)
     yield from check_versions(root)
     yield from check_folders(root)
+    yield from check_test_classes(root)
     yield from check_sizes(root)
 
 

@@ -169,6 +169,21 @@ class CheckLayout(unittest.TestCase):
                 found = self.breaches(lambda root: write(root, path, text))
                 self.assertTrue(any(path in b and expected in b for b in found), found)
 
+    def test_a_test_class_that_never_runs_is_found(self):
+        text = ('# SPDX-License-Identifier: GPL-3.0-or-later\nclass Base(TestCase):\n    def setUp(self):\n        pass\n\n\n'
+                'class ATest(Base):\n    def test_a(self):\n        pass\n\n\nclass BTest(Base):\n    """Has a docstring."""\n\n'
+                '    # A comment.\n    LIST = (1,\n            2)\n\n    def test_b(self):\n        pass\n')
+
+        def found(classes):
+            def change(root):
+                write(root, 'tests/cli/a_cli_test.py', text)
+                write(root, 'tests/cli/meson.build', f"# SPDX-License-Identifier: GPL-3.0-or-later\n  'a_cli_test' : [{classes}],\n")
+            return self.breaches(change)
+
+        self.assertEqual(found(''), [])
+        self.assertEqual(found("'ATest', 'BTest'"), [])
+        self.assertEqual(found("'ATest'"), ['tests/cli/a_cli_test.py: BTest is not in the list of tests/cli/meson.build, so it never runs'])
+
     def test_a_folder_of_many_sources_is_found(self):
         def fill(root):
             for number in range(41):
