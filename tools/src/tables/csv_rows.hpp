@@ -13,7 +13,7 @@ namespace terrace::tools {
 /// The lines of a text file after a header that identifies it.
 class CsvRows {
  public:
-  /// Opens the file. Returns nullopt if the first line differs or it is not a regular file.
+  /// Opens the file. Returns nullopt if its first line is not `header` or it is not a regular file.
   static std::optional<CsvRows> open(const std::string& path, std::string_view header);
 
   /// Sets `line` to the next non-empty line, without its end. Returns false at the end of the file.
@@ -32,8 +32,8 @@ class CsvRows {
   std::uint64_t number_ = 0;
 };
 
-/// Removes the number at the start of `text`, and the comma after it unless it is the last. Returns
-/// false if there is no such number.
+/// Parses the number at the start of `text` into `value` and removes it, with the comma after it.
+/// The `last` number of a row must end the text instead. Returns false if the text differs.
 template <class T>
 bool take_cell(std::string_view& text, T& value, bool last = false) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -44,7 +44,7 @@ std::optional<cluster::Dendrogram> read_dendrogram(
   std::optional<CsvRows> rows = CsvRows::open(path, kDendrogramHead);
   if (!rows) return std::nullopt;
   cluster::Dendrogram dendrogram;
-  const auto refused = [&](const std::string& cause) {
+  const auto format_error = [&](const std::string& cause) {
     return stream::Error(path, cause)
         .remedy(
             "rows must be a,b,height,size as written by 'terrace cluster --dendrogram' and SciPy's "
@@ -52,19 +52,20 @@ std::optional<cluster::Dendrogram> read_dendrogram(
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};
-    if (!parse_row(line, merge)) throw refused("is not a row of a dendrogram").at(rows->where());
+    if (!parse_row(line, merge))
+      throw format_error("is not a row of a dendrogram").at(rows->where());
     dendrogram.merges.push_back(merge);
     if (check_rows && dendrogram.merges.size() % kBetweenChecks == 0) {
       check_rows(dendrogram.merges.size());
     }
     if (dendrogram.merges.size() >= cluster::kMostDendrogramPoints) {
-      throw refused("is one row too many").at(rows->where());
+      throw format_error("is one row too many").at(rows->where());
     }
   }
   if (check_rows) check_rows(dendrogram.merges.size());
   dendrogram.points = dendrogram.merges.size() + 1;
   const std::string fault = cluster::dendrogram_fault(dendrogram);
-  if (!fault.empty()) throw refused("is not a dendrogram: " + fault);
+  if (!fault.empty()) throw format_error("is not a dendrogram: " + fault);
   return dendrogram;
 }
 

@@ -31,14 +31,15 @@ bool parse(std::string_view text, bool tree, Row& row) {
          (!tree || (take_cell(text, row.size) && take_cell(text, row.level, true)));
 }
 
-/// Checks rows one by one.
-class Checker {
+/// Checks the rows of a result, in the order of the file.
+class RowChecker {
  public:
-  Checker(std::size_t points, bool tree)
-      : points_(points), tree_(tree), taken_(tree ? 2 * points : points, false) {
+  RowChecker(std::size_t points, bool tree)
+      : points_(points), tree_(tree), joined_(tree ? 2 * points : points, false) {
     if (tree) nodes_.assign(2 * points, {1, 0});
   }
 
+  /// Returns the fault of the next row, which follows `rows_before` rows; empty if it is valid.
   std::string fault(const Row& row, std::size_t rows_before) {
     const std::size_t nodes = tree_ ? points_ + rows_before : points_;
     for (const std::uint32_t node : {row.a, row.b}) {
@@ -51,12 +52,12 @@ class Checker {
     }
     if (row.a == row.b) return fmt::format("joins {} with itself", row.a);
     for (const std::uint32_t node : {row.a, row.b}) {
-      if (taken_[node]) return fmt::format("joins {}, which an earlier row has joined", node);
+      if (joined_[node]) return fmt::format("joins {}, which an earlier row has joined", node);
     }
     if (!(row.distance >= 0 && std::isfinite(row.distance))) {
       return "has the distance " + plain_number(row.distance);
     }
-    taken_[row.a] = taken_[row.b] = true;
+    joined_[row.a] = joined_[row.b] = true;
     if (!tree_) return {};
     const Node &a = nodes_[row.a], &b = nodes_[row.b];
     if (row.size != a.size + b.size) {
@@ -76,7 +77,7 @@ class Checker {
   };
   std::size_t points_;
   bool tree_;
-  std::vector<bool> taken_;
+  std::vector<bool> joined_;
   std::vector<Node> nodes_;
 };
 
@@ -87,7 +88,7 @@ bool is_matching_result(const std::string& path) {
 }
 
 MatchingResult read_matching_result(const std::string& path, std::size_t points) {
-  const auto refused = [&](const std::string& cause) {
+  const auto format_error = [&](const std::string& cause) {
     return stream::Error(path, cause)
         .remedy(
             "pass the unchanged result of 'terrace match', and with --points the file that it was "
@@ -96,28 +97,30 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
   std::optional<CsvRows> rows = CsvRows::open(path, kPairsHead);
   MatchingResult result{.points = points, .tree = !rows, .lines = {}};
   if (result.tree) rows = CsvRows::open(path, kTreeHead);
-  if (!rows) throw refused("is not a result of 'terrace match'");
+  if (!rows) throw format_error("is not a result of 'terrace match'");
   // Tree nodes have 32-bit numbers.
-  if (points > std::numeric_limits<std::uint32_t>::max() / 2) throw refused("has too many points");
-  const std::size_t most = result.tree ? points - std::min<std::size_t>(points, 1) : points / 2;
-  Checker checker(points, result.tree);
+  if (points > std::numeric_limits<std::uint32_t>::max() / 2)
+    throw format_error("has too many points");
+  const std::size_t max_rows = result.tree ? points - std::min<std::size_t>(points, 1) : points / 2;
+  RowChecker row_checker(points, result.tree);
   for (std::string_view line; rows->next(line);) {
     Row row;
     if (!parse(line, result.tree, row)) {
-      throw refused(fmt::format("is not a row {}", result.tree ? kTreeHead : kPairsHead))
+      throw format_error(fmt::format("is not a row {}", result.tree ? kTreeHead : kPairsHead))
           .at(rows->where());
     }
-    if (result.lines.size() == most) {
-      throw refused("is one row too many for " + counted(points, "point")).at(rows->where());
+    if (result.lines.size() == max_rows) {
+      throw format_error("is one row too many for " + counted(points, "point")).at(rows->where());
     }
-    const std::string fault = checker.fault(row, result.lines.size());
-    if (!fault.empty()) throw refused(fault).at(rows->where());
+    const std::string fault = row_checker.fault(row, result.lines.size());
+    if (!fault.empty()) throw format_error(fault).at(rows->where());
     result.lines.push_back({row.a, row.b, row.level});
     result.top = std::max(result.top, row.level);
   }
-  if (result.tree && result.lines.size() < most) {
-    throw refused(fmt::format("has {}; a tree of {} has {}", counted(result.lines.size(), "row"),
-                              counted(points, "point"), with_commas(most)));
+  if (result.tree && result.lines.size() < max_rows) {
+    throw format_error(fmt::format("has {}; a tree of {} has {}",
+                                   counted(result.lines.size(), "row"), counted(points, "point"),
+                                   with_commas(max_rows)));
   }
   return result;
 }
@@ -135,11 +138,11 @@ void MatchingPicture::keep_levels(const std::string& level) {
 
 MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
                                       const CommonOptions& common,
-                                      const std::function<void(std::uint64_t)>& need) {
+                                      const std::function<void(std::uint64_t)>& check_memory) {
   const PointTable table = read_point_table(points_file, "", common.memory_or(0), common);
-  // Per point until the picture is drawn, measured.
-  const std::uint64_t each = CsvRows::open(path, kTreeHead) ? 120 : 64;
-  if (need) need(table.payload.size() + table.size() * each);
+  // Peak until the picture is drawn, measured.
+  const std::uint64_t bytes_per_point = CsvRows::open(path, kTreeHead) ? 120 : 64;
+  if (check_memory) check_memory(table.payload.size() + table.size() * bytes_per_point);
   const GroundFrame ground = GroundFrame::of(table, 1.0);
   MatchingPicture picture{.result = read_matching_result(path, table.size()),
                           .positions = {},
@@ -161,11 +164,11 @@ MatchingPicture read_matching_picture(const std::string& path, const std::string
   for (const MatchingLine& line : picture.result.lines) {
     const stream::Point3 &a = positions[line.a], &b = positions[line.b];
     const std::uint32_t size = sizes[line.a] + sizes[line.b];
-    const double share = static_cast<double>(sizes[line.b]) / size;
-    const stream::Point3 middle{(1 - share) * a[0] + share * b[0],
-                                (1 - share) * a[1] + share * b[1],
-                                (1 - share) * a[2] + share * b[2]};
-    positions.push_back(middle);
+    const double weight_b = static_cast<double>(sizes[line.b]) / size;
+    const stream::Point3 mean{(1 - weight_b) * a[0] + weight_b * b[0],
+                              (1 - weight_b) * a[1] + weight_b * b[1],
+                              (1 - weight_b) * a[2] + weight_b * b[2]};
+    positions.push_back(mean);
     sizes.push_back(size);
   }
   return picture;

@@ -28,7 +28,7 @@ struct MatchingResult {
   std::uint32_t top = 0;            ///< the highest level; 0 without lines
 };
 
-/// Returns whether a file starts like one written by `match`.
+/// Returns whether the first line of a file is one that `match` writes.
 bool is_matching_result(const std::string& path);
 
 /// Reads such a file for `points` points. Throws stream::Error, which names the line, if a row is
@@ -48,11 +48,11 @@ struct MatchingPicture {
   void keep_levels(const std::string& level);
 };
 
-/// Reads the result and the file of its points. Calls need, if given, with the bytes that the
-/// points and the picture will take before it allocates them; need may throw. Throws:
-/// stream::Error, stream::Stopped.
+/// Reads the result and the file of its points. Before it allocates the nodes, it calls
+/// check_memory, if set, with the bytes that the points and the picture take; check_memory may
+/// throw. Throws: stream::Error, stream::Stopped.
 MatchingPicture read_matching_picture(const std::string& path, const std::string& points_file,
                                       const CommonOptions& common,
-                                      const std::function<void(std::uint64_t)>& need = {});
+                                      const std::function<void(std::uint64_t)>& check_memory = {});
 
 }  // namespace terrace::tools

@@ -20,10 +20,10 @@ namespace terrace::tools {
 using namespace terrain;
 
 std::vector<double> PointTable::column(const std::string& name) const {
-  std::string known;
+  std::string names;
   for (std::size_t c = 0; c < info.attributes.size(); ++c) {
     const stream::Channel& channel = info.attributes[c];
-    known += (known.empty() ? "" : ", ") + channel.name;
+    names += (names.empty() ? "" : ", ") + channel.name;
     if (channel.name != name) continue;
     std::vector<double> values(size());
     const std::byte* at = payload.data() + info.attribute_offset(c);
@@ -35,7 +35,7 @@ std::vector<double> PointTable::column(const std::string& name) const {
   }
   throw UsageError(
       fmt::format("the points have no column '{}'{}", name,
-                  known.empty() ? ": they have only x, y and z" : "; there are: " + known));
+                  names.empty() ? ": they have only x, y and z" : "; there are: " + names));
 }
 
 void writing_within_memory(const stream::PointWriter& writer, const std::string& file,
@@ -85,9 +85,9 @@ PointTable read_point_table(const std::string& file, const std::string& format,
   table.info = source->info();
   const std::size_t bytes_per_point = sizeof(stream::Point3) + table.info.payload_size();
   const std::uint64_t fixed = kProgramMemory + reading;
-  const std::uint64_t most = (memory_bytes - std::min(memory_bytes, fixed)) / bytes_per_point;
+  const std::uint64_t max_points = (memory_bytes - std::min(memory_bytes, fixed)) / bytes_per_point;
   // Rasters, PLY and meshes may have fewer points than announced.
-  if (!table.info.grid && table.info.points && *table.info.points <= most) {
+  if (!table.info.grid && table.info.points && *table.info.points <= max_points) {
     table.positions.reserve(*table.info.points);
     table.payload.reserve(*table.info.points * table.info.payload_size());
   }
@@ -98,7 +98,7 @@ PointTable read_point_table(const std::string& file, const std::string& format,
     // A growing vector briefly exists twice.
     const std::size_t count = table.size() + block.size();
     const bool grows = count > table.positions.capacity();
-    if (count > (grows ? most / 2 : most)) {
+    if (count > (grows ? max_points / 2 : max_points)) {
       throw stream::Error(file,
                           fmt::format("has more points than {} can hold ({} so far)",
                                       readable_bytes(memory_bytes), with_commas(table.size())))

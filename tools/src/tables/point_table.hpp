@@ -14,7 +14,8 @@
 
 namespace terrace::tools {
 
-/// All points of a file in memory, in reading order (the order of the file, except for rasters).
+/// All points of a file in memory, in the order of reading. Except for rasters, that is the order
+/// of the file.
 struct PointTable {
   stream::SourceInfo info;
   std::vector<stream::Point3> positions;  ///< in CRS coordinates
