@@ -11,7 +11,7 @@ namespace terrace::tools {
 
 namespace {
 
-/// CGAL's default priority of a facet, after a stop check.
+/// Calls the stop check, then returns CGAL's default priority of a facet.
 struct CheckedPriority {
   const base::StopCheck* check_stop;
 
@@ -27,16 +27,16 @@ struct CheckedPriority {
 std::vector<std::array<std::uint32_t, 3>> advancing_front(std::span<const tri::Point3> points,
                                                           const base::StopCheck& check_stop) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-  std::vector<Kernel::Point_3> of_cgal;
-  of_cgal.reserve(points.size());
-  for (const tri::Point3& p : points) of_cgal.emplace_back(p[0], p[1], p[2]);
-  std::vector<std::array<std::size_t, 3>> found;
-  CGAL::advancing_front_surface_reconstruction(of_cgal.begin(), of_cgal.end(),
-                                               std::back_inserter(found),
+  std::vector<Kernel::Point_3> cgal_points;
+  cgal_points.reserve(points.size());
+  for (const tri::Point3& p : points) cgal_points.emplace_back(p[0], p[1], p[2]);
+  std::vector<std::array<std::size_t, 3>> triples;
+  CGAL::advancing_front_surface_reconstruction(cgal_points.begin(), cgal_points.end(),
+                                               std::back_inserter(triples),
                                                CheckedPriority{&check_stop}, 5.0, 0.52);
   std::vector<std::array<std::uint32_t, 3>> faces;
-  faces.reserve(found.size());
-  for (const auto& f : found)
+  faces.reserve(triples.size());
+  for (const auto& f : triples)
     faces.push_back({static_cast<std::uint32_t>(f[0]), static_cast<std::uint32_t>(f[1]),
                      static_cast<std::uint32_t>(f[2])});
   return faces;

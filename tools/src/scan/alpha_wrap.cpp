@@ -9,11 +9,11 @@ namespace terrace::tools {
 
 tri::Surface alpha_wrap(std::span<const tri::Point3> points, double alpha, double offset) {
   using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-  std::vector<Kernel::Point_3> of_cgal;
-  of_cgal.reserve(points.size());
-  for (const tri::Point3& p : points) of_cgal.emplace_back(p[0], p[1], p[2]);
+  std::vector<Kernel::Point_3> cgal_points;
+  cgal_points.reserve(points.size());
+  for (const tri::Point3& p : points) cgal_points.emplace_back(p[0], p[1], p[2]);
   CGAL::Surface_mesh<Kernel::Point_3> wrap;
-  CGAL::alpha_wrap_3(of_cgal, alpha, offset, wrap);
+  CGAL::alpha_wrap_3(cgal_points, alpha, offset, wrap);
   tri::Surface surface;
   std::vector<std::uint32_t> number(wrap.num_vertices() + wrap.number_of_removed_vertices());
   for (const auto v : wrap.vertices()) {

@@ -64,19 +64,19 @@ tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points
   triangulation.set_check_stop(check_stop);
   const std::vector<tri::VertexId> vertices = triangulation.build(points);
   if (triangulation.tetrahedron_count() == 0) return {};
-  std::vector<bool> met(triangulation.vertex_slots());
-  std::vector<tri::Point3> different;
+  std::vector<bool> seen(triangulation.vertex_slots());
+  std::vector<tri::Point3> distinct;
   std::vector<std::uint32_t> point_of;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (met[tri::slot(vertices[i])]) continue;
-    met[tri::slot(vertices[i])] = true;
-    different.push_back(points[i]);
+    if (seen[tri::slot(vertices[i])]) continue;
+    seen[tri::slot(vertices[i])] = true;
+    distinct.push_back(points[i]);
     point_of.push_back(static_cast<std::uint32_t>(i));
   }
   triangulation.clear();
 
   tri::RestoredSurface result;
-  result.surface.faces = advancing_front(different, check_stop);
+  result.surface.faces = advancing_front(distinct, check_stop);
   // Normalise the order of faces and corners, which in CGAL depends on memory addresses.
   for (auto& face : result.surface.faces) {
     std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
@@ -85,15 +85,15 @@ tri::RestoredSurface advancing_front_surface(std::span<const tri::Point3> points
 
   // Leave out points that are in no face.
   constexpr std::uint32_t kUnused = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> number(different.size(), kUnused);
+  std::vector<std::uint32_t> number(distinct.size(), kUnused);
   for (const auto& face : result.surface.faces) {
     for (const std::uint32_t v : face) number[v] = 0;
   }
-  for (std::size_t i = 0; i < different.size(); ++i) {
+  for (std::size_t i = 0; i < distinct.size(); ++i) {
     if (number[i] == kUnused) continue;
     number[i] = static_cast<std::uint32_t>(result.input.size());
     result.input.push_back(point_of[i]);
-    result.surface.points.push_back(different[i]);
+    result.surface.points.push_back(distinct[i]);
   }
   for (auto& face : result.surface.faces) {
     for (std::uint32_t& v : face) v = number[v];

@@ -116,18 +116,18 @@ Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
   double step = 0, field = 0, largest = 0;
   for (unsigned octave = 0; octave < kOctaves; ++octave) {
     weight[octave] = octave == 0 ? 1.0 : weight[octave - 1] * growth;
-    const Variances v = variances(octave);
-    step += weight[octave] * weight[octave] * kNoiseVariance * v.step;
-    field += weight[octave] * weight[octave] * kNoiseVariance * v.field;
+    const Variances variance = variances(octave);
+    step += weight[octave] * weight[octave] * kNoiseVariance * variance.step;
+    field += weight[octave] * weight[octave] * kNoiseVariance * variance.field;
     largest += weight[octave];
   }
-  double wanted = options.roughness * options.roughness;
-  if (options.rounded && options.roughness >= 1.0) wanted -= kRoundingStepVariance;
-  const double factor = std::sqrt(wanted / step);
+  double target_variance = options.roughness * options.roughness;
+  if (options.rounded && options.roughness >= 1.0) target_variance -= kRoundingStepVariance;
+  const double factor = std::sqrt(target_variance / step);
   for (unsigned octave = 0; octave < kOctaves; ++octave) {
     amplitude_[octave] = static_cast<float>(weight[octave] * factor);
   }
-  roughness_ = std::sqrt(wanted);
+  roughness_ = std::sqrt(target_variance);
   deviation_ = factor * std::sqrt(field);
   bound_ = factor * largest;
 }

@@ -20,7 +20,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Returns the k-th random number in [0, 1) of `n`.
+/// Returns the k-th random number of point `n`, in [0, 1).
 double random_unit(std::uint64_t seed, std::uint64_t n, std::uint64_t k) {
   return base::unit_interval(base::splitmix64(base::splitmix64(seed ^ (k << 48)) + n));
 }
@@ -43,21 +43,22 @@ stream::Point3 random_direction(std::uint64_t seed, std::uint64_t n) {
   return v;
 }
 
+/// The cloud of surface_cloud().
 class CloudSurface {
  public:
   CloudSurface(std::uint64_t points, std::uint64_t seed) : seed_(seed) {
     for (std::size_t i = 0; i < waves_.size(); ++i) {
-      // From broad lobes to fine bumps, which are flatter.
+      // The waves range from broad lobes to fine bumps, which are flatter.
       const double cycles = 1.0 + 0.8 * static_cast<double>(i * i) / 4;
       waves_[i].direction = random_direction(base::splitmix64(seed), i);
       waves_[i].degrees = 57.3 * cycles;
       waves_[i].phase = 360 * random_unit(base::splitmix64(seed), i, 9);
       waves_[i].amplitude = 0.12 / cycles;
     }
-    // Dense enough for all points; the last swath then ends a little early.
+    // Reduce the spacing until the swaths have room for all points. The last one is not quite full.
     spacing_ =
         std::sqrt(4 * std::numbers::pi / static_cast<double>(std::max<std::uint64_t>(points, 8)));
-    while (lay_swaths() < points) spacing_ *= 0.999;
+    while (make_swaths() < points) spacing_ *= 0.999;
   }
 
   stream::Point3 operator()(std::uint64_t n) const {
@@ -99,8 +100,8 @@ class CloudSurface {
     double south = 0, north = 0;  ///< latitudes, degrees
   };
 
-  /// Lays swaths from pole to pole. Returns their number of points.
-  std::uint64_t lay_swaths() {
+  /// Sets swaths_ from pole to pole at the current spacing. Returns their number of points.
+  std::uint64_t make_swaths() {
     constexpr double kAcross = 500;
     const double spacing_degrees = spacing_ / base::kRadiansPerDegree;
     const auto count = static_cast<std::uint64_t>(std::ceil(180 / (kAcross * spacing_degrees)));
@@ -211,21 +212,21 @@ DeliveryOrder::DeliveryOrder(const std::string& shuffle, std::uint64_t points, s
                                                 static_cast<double>(most - least + 1));
   }
   const Permutation order(std::max<std::size_t>(starts.size(), 1), seed);
-  std::uint64_t place = 0;
+  std::uint64_t position = 0;
   for (std::uint64_t i = 0; i < starts.size(); ++i) {
     const std::uint64_t piece = order(i);
-    delivered_.push_back(place);
-    made_.push_back(starts[piece]);
-    place += (piece + 1 < starts.size() ? starts[piece + 1] : points) - starts[piece];
+    positions_.push_back(position);
+    numbers_.push_back(starts[piece]);
+    position += (piece + 1 < starts.size() ? starts[piece + 1] : points) - starts[piece];
   }
 }
 
 std::uint64_t DeliveryOrder::operator()(std::uint64_t n) const {
   if (all_) return (*all_)(n);
-  if (delivered_.empty()) return n;
-  const auto next = std::upper_bound(delivered_.begin(), delivered_.end(), n);
-  const auto piece = static_cast<std::size_t>(next - delivered_.begin()) - 1;
-  return made_[piece] + (n - delivered_[piece]);
+  if (positions_.empty()) return n;
+  const auto next = std::upper_bound(positions_.begin(), positions_.end(), n);
+  const auto piece = static_cast<std::size_t>(next - positions_.begin()) - 1;
+  return numbers_[piece] + (n - positions_[piece]);
 }
 
 }  // namespace terrace::tools

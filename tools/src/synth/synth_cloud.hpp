@@ -39,8 +39,8 @@ class Permutation {
   unsigned half_bits_;
 };
 
-/// The order in which points are delivered: "" as generated, "all" fully shuffled, "pieces:MIN-MAX"
-/// in shuffled runs of random length.
+/// The order in which points are delivered: the order of generation (""), a random permutation
+/// ("all"), or shuffled runs of random length ("pieces:MIN-MAX").
 class DeliveryOrder {
  public:
   /// Throws UsageError for any other text, and stream::Error if the table of pieces would need more
@@ -52,8 +52,8 @@ class DeliveryOrder {
 
  private:
   std::unique_ptr<Permutation> all_;
-  std::vector<std::uint64_t> delivered_;  ///< delivery position of each piece's first point
-  std::vector<std::uint64_t> made_;       ///< its number in the order of generation
+  std::vector<std::uint64_t> positions_;  ///< delivery position of each piece's first point
+  std::vector<std::uint64_t> numbers_;    ///< number of that point, see Cloud
 };
 
 }  // namespace terrace::tools

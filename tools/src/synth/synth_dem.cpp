@@ -59,6 +59,7 @@ void to_samples(std::span<const float> heights, float base, Sample* samples) {
   }
 }
 
+/// Adds the steps and heights of a row to the statistics. `row_above` is null for the first row.
 template <class Sample>
 void measure(const Sample* row, const Sample* row_above, std::size_t width,
              Statistics& statistics) {
@@ -87,11 +88,12 @@ struct Piece {
   std::uint32_t tiles;
 };
 
+/// Generates the pieces of a DEM in parallel and writes them in order.
 template <class Sample>
-class Maker {
+class DemWriter {
  public:
-  Maker(const std::string& path, const SynthDemOptions& options, const Fractal& fractal, float base,
-        const std::function<void(std::uint64_t)>& progress)
+  DemWriter(const std::string& path, const SynthDemOptions& options, const Fractal& fractal,
+            float base, const std::function<void(std::uint64_t)>& progress)
       : options_(options),
         fractal_(fractal),
         base_(base),
@@ -99,8 +101,8 @@ class Maker {
         columns_(static_cast<std::uint32_t>(options.size.width)),
         rows_(static_cast<std::uint32_t>(options.size.height)),
         writer_(path, checked(writer_options(options), options.memory_bytes)) {
-    // Each thread holds a piece of samples and some rows of lattices, about 48 bytes per column.
-    // Two more pieces wait to be written.
+    // Each thread holds a piece of samples, and some rows of lattices with about 48 bytes per
+    // column. Two more pieces per thread wait until they are written.
     const std::uint64_t per_column = 3 * kSynthTile * sizeof(Sample) + 48;
     constexpr std::uint64_t kOverhead = 48u << 20;
     const std::uint64_t share =
@@ -111,16 +113,17 @@ class Maker {
     pieces_ = std::uint64_t{pieces_across_} * ((rows_ + kSynthTile - 1) / kSynthTile);
   }
 
+  /// Writes the file. Returns the statistics of its samples.
   Statistics run() {
     Statistics all;
     std::uint64_t cells = 0;
     base::in_order(
-        pieces_, options_.threads, [this](unsigned, std::size_t i) { return make(piece(i)); },
-        [&](std::size_t i, const Made& made) {
+        pieces_, options_.threads, [this](unsigned, std::size_t i) { return generate(piece(i)); },
+        [&](std::size_t i, const PieceSamples& result) {
           check_interrupt();
           const Piece p = piece(i);
-          write(p, made.tiles);
-          all.add(made.statistics);
+          write(p, result.tiles);
+          all.add(result.statistics);
           cells += std::uint64_t{p.columns} * p.rows;
           progress_(cells);
         });
@@ -129,12 +132,12 @@ class Maker {
   }
 
  private:
-  struct Made {
+  struct PieceSamples {
     std::vector<Sample> tiles;
     Statistics statistics;
   };
 
-  /// Returns `tiff`. Throws stream::Error if the file's tile table does not fit into memory.
+  /// Returns `tiff`. Throws std::runtime_error if the file's tile table does not fit into memory.
   static stream::GeoTiffOptions checked(stream::GeoTiffOptions tiff, std::uint64_t memory_bytes) {
     const std::uint64_t table = stream::geotiff_table_bytes(tiff);
     if (table <= memory_bytes / 4) return tiff;
@@ -152,7 +155,7 @@ class Maker {
     tiff.sample.name = "height";
     tiff.sample.type =
         std::is_same_v<Sample, float> ? stream::ScalarType::f32 : stream::ScalarType::i16;
-    // A place in the Alps, in UTM zone 32 or in degrees.
+    // The corner is in the Alps, in UTM zone 32 or in degrees.
     const double x = options.crs.geographic ? 8.0 : 400000.0;
     const double y = options.crs.geographic ? 47.0 : 5200000.0;
     const double c = options.cell;
@@ -176,22 +179,22 @@ class Maker {
     return p;
   }
 
-  Made make(const Piece& p) const {
+  PieceSamples generate(const Piece& p) const {
     constexpr std::size_t kTileSize = std::size_t{kSynthTile} * kSynthTile;
-    Made made{std::vector<Sample>(p.tiles * kTileSize), {}};
+    PieceSamples result{std::vector<Sample>(p.tiles * kTileSize), {}};
     std::vector<Sample> row(p.columns), above(p.columns);
     Fractal::Rows rows(fractal_, p.first_column, p.columns);
     for (std::uint32_t y = 0; y < p.rows; ++y) {
       to_samples(rows.row(p.first_row + y), base_, row.data());
-      measure(row.data(), y == 0 ? nullptr : above.data(), p.columns, made.statistics);
+      measure(row.data(), y == 0 ? nullptr : above.data(), p.columns, result.statistics);
       for (std::uint32_t t = 0; t < p.tiles; ++t) {
         const std::uint32_t width = std::min(kSynthTile, p.columns - t * kSynthTile);
-        std::memcpy(made.tiles.data() + t * kTileSize + std::size_t{y} * kSynthTile,
+        std::memcpy(result.tiles.data() + t * kTileSize + std::size_t{y} * kSynthTile,
                     row.data() + t * kSynthTile, width * sizeof(Sample));
       }
       row.swap(above);
     }
-    return made;
+    return result;
   }
 
   void write(const Piece& p, const std::vector<Sample>& tiles) {
@@ -213,7 +216,7 @@ class Maker {
   std::uint64_t pieces_ = 0;
 };
 
-/// Returns the RMS step of a small piece at the corner, before rounding.
+/// Returns the RMS step between neighbouring cells of a whole raster, before rounding.
 double measured_step(const Fractal& fractal, const ImageSize& size) {
   const auto width = static_cast<std::uint32_t>(size.width);
   Fractal::Rows rows(fractal, 0, width);
@@ -231,11 +234,11 @@ double measured_step(const Fractal& fractal, const ImageSize& size) {
 
 SynthDemResult write_synth_dem(const std::string& path, const SynthDemOptions& options,
                                const std::function<void(std::uint64_t)>& progress) {
-  FractalOptions wanted{.seed = options.seed,
-                        .hurst = options.hurst,
-                        .roughness = options.roughness,
-                        .rounded = !options.floats};
-  Fractal fractal(wanted);
+  FractalOptions fractal_options{.seed = options.seed,
+                                 .hurst = options.hurst,
+                                 .roughness = options.roughness,
+                                 .rounded = !options.floats};
+  Fractal fractal(fractal_options);
   constexpr std::uint64_t kSmall = 1u << 22;
   if (options.size.width * options.size.height <= kSmall) {
     const double step = measured_step(fractal, options.size);
@@ -243,16 +246,18 @@ SynthDemResult write_synth_dem(const std::string& path, const SynthDemOptions& o
   }
 
   constexpr double kLargest = 32767;
-  const double usual = std::ceil(4 * fractal.deviation());
-  const double base =
-      options.floats ? usual : std::min(usual, std::floor(kLargest - fractal.bound()));
+  const double four_deviations = std::ceil(4 * fractal.deviation());
+  const double base = options.floats
+                          ? four_deviations
+                          : std::min(four_deviations, std::floor(kLargest - fractal.bound()));
   if (!options.floats && fractal.bound() > kLargest) {
     throw UsageError("heights of this roughness may not fit int16; give --type float32");
   }
   const Statistics statistics =
       options.floats
-          ? Maker<float>(path, options, fractal, static_cast<float>(base), progress).run()
-          : Maker<std::int16_t>(path, options, fractal, static_cast<float>(base), progress).run();
+          ? DemWriter<float>(path, options, fractal, static_cast<float>(base), progress).run()
+          : DemWriter<std::int16_t>(path, options, fractal, static_cast<float>(base), progress)
+                .run();
   std::error_code ignored;
   return {.bytes = std::filesystem::file_size(path, ignored),
           .base = base,

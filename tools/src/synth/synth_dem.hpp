@@ -35,10 +35,12 @@ struct SynthDemResult {
 
 /// Writes a fractal DEM (see Fractal) as a tiled GeoTIFF, one row of tiles at a time. The mean
 /// height is about four standard deviations of the infinite plane, so nearly all heights are
-/// positive. A roughness that could overflow int16 is refused. Rasters of at most 2^22 cells are
-/// measured first and their roughness is corrected; larger ones have it within 1 % by the law of
-/// large numbers. Calls progress(cells done) from time to time from any thread, one call at a time.
-/// Throws UsageError, stream::Error and stream::Stopped.
+/// positive. Rasters of at most 2^22 cells are measured first and their roughness is corrected.
+/// Larger ones have the roughness within 1 % by the law of large numbers.
+///
+/// Calls progress(number of cells written) from time to time, from any thread but never
+/// concurrently. Throws UsageError, also for a roughness that could overflow int16, stream::Error
+/// and stream::Stopped.
 SynthDemResult write_synth_dem(const std::string& path, const SynthDemOptions& options,
                                const std::function<void(std::uint64_t)>& progress);
 
