@@ -16,8 +16,8 @@ std::optional<unsigned> hexadecimal_digit(char c) {
   return {};
 }
 
-/// Parses digits only. Numbers that are too large become the largest.
-std::optional<std::uint64_t> number(std::string_view text) {
+/// Parses a text of digits only. Numbers that are too large become UINT64_MAX.
+std::optional<std::uint64_t> decimal(std::string_view text) {
   if (text.empty() || text.find_first_not_of("0123456789") != std::string_view::npos) return {};
   std::uint64_t value = 0;
   const auto result = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -30,8 +30,8 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-/// Returns whether a list of entity tags contains this one, by weak comparison.
-bool lists(std::string_view tags, std::string_view tag) {
+/// Returns whether a list of entity tags contains `tag`, by weak comparison.
+bool contains_tag(std::string_view tags, std::string_view tag) {
   if (trimmed(tags) == "*") return true;
   while (!tags.empty()) {
     const std::size_t comma = std::min(tags.find(','), tags.size());
@@ -58,8 +58,9 @@ bool names_this_server(std::string_view host, std::uint16_t port) {
   return name == "127.0.0.1" || name == "localhost" || name == "[::1]";
 }
 
-/// Compares in constant time, whatever the position of the first difference.
-bool same(std::string_view a, std::string_view b) {
+/// Compares texts of one length in a time that does not depend on their contents, so that a token
+/// cannot be guessed byte by byte.
+bool equal_in_constant_time(std::string_view a, std::string_view b) {
   if (a.size() != b.size()) return false;
   unsigned difference = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -69,7 +70,8 @@ bool same(std::string_view a, std::string_view b) {
   return difference == 0;
 }
 
-const char* phrase(unsigned status) {
+/// Returns the reason phrase of a status line.
+const char* reason_phrase(unsigned status) {
   switch (status) {
     case 200:
       return "OK";
@@ -125,18 +127,18 @@ RangeKind parse_range(std::string_view text, std::uint64_t size, ByteSpan& span)
   if (dash == std::string_view::npos || text.find(',') != std::string_view::npos) {
     return RangeKind::none;
   }
-  const std::string_view before = trimmed(text.substr(0, dash)),
-                         behind = trimmed(text.substr(dash + 1));
-  if (before.empty()) {
-    const auto last = number(behind);  // the number of final bytes
+  const std::string_view first_text = trimmed(text.substr(0, dash)),
+                         last_text = trimmed(text.substr(dash + 1));
+  if (first_text.empty()) {
+    const auto last = decimal(last_text);  // the number of final bytes
     if (!last) return RangeKind::none;
     if (*last == 0 || size == 0) return RangeKind::unsatisfiable;
     span.length = std::min(*last, size);
     span.first = size - span.length;
     return RangeKind::single;
   }
-  const auto first = number(before);
-  const auto last = behind.empty() ? UINT64_MAX : number(behind);
+  const auto first = decimal(first_text);
+  const auto last = last_text.empty() ? UINT64_MAX : decimal(last_text);
   if (!first || !last || *last < *first) return RangeKind::none;
   if (*first >= size) return RangeKind::unsatisfiable;
   span.first = *first;
@@ -173,7 +175,8 @@ Answer answer_to(const Request& request, const Site& site, const Access& access)
   if (path->empty()) path = "index.html";
   const auto at = site.find(*path);
   if (at == site.end() || !at->second.open_to_all) {
-    if (!request.trusted && !same(query_value(request.target, "token"), access.token)) {
+    if (!request.trusted &&
+        !equal_in_constant_time(query_value(request.target, "token"), access.token)) {
       return {.status = 403, .reason = "no token"};
     }
     if (at == site.end()) return {.status = 404, .reason = "not found"};
@@ -181,16 +184,17 @@ Answer answer_to(const Request& request, const Site& site, const Access& access)
   const Resource& resource = at->second;
   const std::uint64_t size = resource.bytes->size();
   Answer answer{.type = resource.type, .tag = resource.tag, .size = size};
-  if (!request.if_none_match.empty() && lists(request.if_none_match, resource.tag)) {
+  if (!request.if_none_match.empty() && contains_tag(request.if_none_match, resource.tag)) {
     answer.status = 304;
     return answer;
   }
   answer.bytes = resource.bytes;
   answer.length = size;
   ByteSpan span;
-  const bool of_this = request.if_range.empty() || trimmed(request.if_range) == resource.tag;
-  const RangeKind kind =
-      request.range.empty() || !of_this ? RangeKind::none : parse_range(request.range, size, span);
+  const bool range_applies = request.if_range.empty() || trimmed(request.if_range) == resource.tag;
+  const RangeKind kind = request.range.empty() || !range_applies
+                             ? RangeKind::none
+                             : parse_range(request.range, size, span);
   if (kind == RangeKind::single) {
     answer.status = 206;
     answer.first = span.first;
@@ -203,32 +207,34 @@ Answer answer_to(const Request& request, const Site& site, const Access& access)
   return answer;
 }
 
-std::string header_of(const Answer& a) {
-  const bool bodiless = a.status == 304;
-  const std::string body = a.bytes || bodiless || a.reason.empty() ? "" : a.reason + "\n";
-  std::string text = fmt::format("HTTP/1.1 {} {}\r\n", a.status, phrase(a.status));
+std::string header_of(const Answer& answer) {
+  const bool bodiless = answer.status == 304;
+  const std::string body =
+      answer.bytes || bodiless || answer.reason.empty() ? "" : answer.reason + "\n";
+  std::string text = fmt::format("HTTP/1.1 {} {}\r\n", answer.status, reason_phrase(answer.status));
   const auto field = [&](std::string_view name, const std::string& value) {
     text.append(name).append(": ").append(value).append("\r\n");
   };
   if (!bodiless) {
-    field("Content-Length", fmt::format("{}", a.bytes ? a.length : body.size()));
-    field("Content-Type", a.bytes ? a.type : "text/plain; charset=utf-8");
+    field("Content-Length", fmt::format("{}", answer.bytes ? answer.length : body.size()));
+    field("Content-Type", answer.bytes ? answer.type : "text/plain; charset=utf-8");
   }
-  if (a.status == 206) {
-    field("Content-Range", fmt::format("bytes {}-{}/{}", a.first, a.first + a.length - 1, a.size));
+  if (answer.status == 206) {
+    field("Content-Range", fmt::format("bytes {}-{}/{}", answer.first,
+                                       answer.first + answer.length - 1, answer.size));
   }
-  if (a.status == 416) field("Content-Range", fmt::format("bytes */{}", a.size));
-  if (!a.tag.empty()) field("ETag", a.tag);
-  if (a.status == 405) field("Allow", "GET, HEAD");
+  if (answer.status == 416) field("Content-Range", fmt::format("bytes */{}", answer.size));
+  if (!answer.tag.empty()) field("ETag", answer.tag);
+  if (answer.status == 405) field("Allow", "GET, HEAD");
   field("Accept-Ranges", "bytes");
   field("Cache-Control", "no-cache");
-  // Pages of other origins must neither read nor use the stores, and the token must stay on this
-  // page.
+  // These fields keep pages of other origins from reading or using the stores, and the token on
+  // this page.
   field("Content-Security-Policy", kContentPolicy);
   field("Cross-Origin-Resource-Policy", "same-origin");
   field("Referrer-Policy", "no-referrer");
   field("X-Content-Type-Options", "nosniff");
-  if (a.close) field("Connection", "close");
+  if (answer.close) field("Connection", "close");
   return text + "\r\n" + body;
 }
 

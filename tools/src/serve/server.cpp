@@ -41,7 +41,7 @@ namespace http = beast::http;
 using asio::ip::tcp;
 using boost::system::error_code;
 
-constexpr std::size_t kPiece = std::size_t{64} * 1024;
+constexpr std::size_t kChunkBytes = std::size_t{64} * 1024;
 
 /// Returns 128 random bits from the operating system as hexadecimal digits.
 std::string random_token() {
@@ -56,14 +56,15 @@ std::string random_token() {
   return text;
 }
 
-/// Returns an endpoint in the notation of /proc/net/tcp.
-std::string end_text(std::uint32_t address, std::uint16_t port) {
+/// Returns an endpoint in the notation of /proc/net/tcp, such as "0100007F:1F90".
+std::string endpoint_text(std::uint32_t address, std::uint16_t port) {
   char text[16];
   std::snprintf(text, sizeof text, "%08X:%04X", address, port);
   return text;
 }
 
-/// Returns the number of the client's socket if it belongs to this user, otherwise an empty string.
+/// Returns the inode number of the client's socket if it belongs to this user, otherwise an empty
+/// string. `client` is the endpoint in the notation of endpoint_text().
 std::string socket_of_client(const std::string& client, std::uint16_t server_port) {
   std::ifstream table("/proc/net/tcp");
   std::string line, skipped, local, remote, user, socket;
@@ -71,7 +72,7 @@ std::string socket_of_client(const std::string& client, std::uint16_t server_por
   while (std::getline(table, line)) {
     std::istringstream fields(line);
     fields >> skipped >> local >> remote;
-    if (local != client || !remote.ends_with(end_text(0, server_port).substr(8))) continue;
+    if (local != client || !remote.ends_with(endpoint_text(0, server_port).substr(8))) continue;
     for (int i = 0; i < 4; ++i) fields >> skipped;  // state, queues, timer, retransmissions
     fields >> user >> skipped >> socket;
     return user == fmt::format("{}", ::geteuid()) && socket != "0" ? socket : std::string();
@@ -79,13 +80,12 @@ std::string socket_of_client(const std::string& client, std::uint16_t server_por
   return {};
 }
 
-/// Returns whether the program at the other end of a connection over 127.0.0.1 belongs to this
-/// process's user and session, like a command typed in the same terminal. Returns false if the
-/// system does not say. `address` is that of the other end, as in sockaddr_in; ports are in host
-/// byte order.
+/// Returns whether the client of a connection over 127.0.0.1 belongs to this process's user and
+/// session, like a command typed in the same terminal. Returns false if the system does not reveal
+/// it. `address` is the client's, as in sockaddr_in. Ports are in host byte order.
 bool is_of_this_session(std::uint32_t address, std::uint16_t client_port,
                         std::uint16_t server_port) {
-  const std::string socket = socket_of_client(end_text(address, client_port), server_port);
+  const std::string socket = socket_of_client(endpoint_text(address, client_port), server_port);
   const pid_t session = ::getsid(0);
   if (socket.empty() || session <= 0) return false;
   const std::string link = "socket:[" + socket + "]";
@@ -116,7 +116,7 @@ struct Connections {
   std::list<Session*> waiting;
 
   /// Ends the connection that has waited longest, so that idle ones never block others. Returns
-  /// false if none waits.
+  /// false if none is waiting.
   bool end_oldest();
 };
 
@@ -124,13 +124,17 @@ struct Connections {
 class Session : public std::enable_shared_from_this<Session> {
  public:
   Session(tcp::socket socket, const std::function<const Site&()>& site, const Access& access,
-          const ServerLimits& limits, Connections& all)
-      : stream_(std::move(socket)), site_(site), access_(access), limits_(limits), all_(all) {
-    ++all_.open;
+          const ServerLimits& limits, Connections& connections)
+      : stream_(std::move(socket)),
+        site_(site),
+        access_(access),
+        limits_(limits),
+        connections_(connections) {
+    ++connections_.open;
   }
   ~Session() {
     stop_waiting();
-    --all_.open;
+    --connections_.open;
   }
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
@@ -150,12 +154,13 @@ class Session : public std::enable_shared_from_this<Session> {
     stream_.close();
   }
   void stop_waiting() {
-    if (place_) all_.waiting.erase(*std::exchange(place_, std::nullopt));
+    if (waiting_position_)
+      connections_.waiting.erase(*std::exchange(waiting_position_, std::nullopt));
   }
 
  private:
   void read() {
-    place_ = all_.waiting.insert(all_.waiting.end(), this);
+    waiting_position_ = connections_.waiting.insert(connections_.waiting.end(), this);
     parser_.emplace();
     parser_->header_limit(static_cast<std::uint32_t>(limits_.header_bytes));
     parser_->body_limit(0);
@@ -175,10 +180,12 @@ class Session : public std::enable_shared_from_this<Session> {
                     false);
     }
     if (error) {
-      // If closed, reset or too slow, there is no one to answer. Anything else is not HTTP.
-      const bool spoken =
+      // There is no one to answer if the connection was closed or reset or the request took too
+      // long. All other errors mean that the bytes are not HTTP.
+      const bool is_http =
           error.category() == http::make_error_code(http::error::bad_method).category();
-      if (!spoken || error == http::error::end_of_stream || error == http::error::partial_message) {
+      if (!is_http || error == http::error::end_of_stream ||
+          error == http::error::partial_message) {
         return close();
       }
       return answer({.status = 400, .close = true, .reason = "not an HTTP request"}, false);
@@ -200,8 +207,8 @@ class Session : public std::enable_shared_from_this<Session> {
     reply.close = reply.close || !request.keep_alive();
     answer(std::move(reply), request.method() == http::verb::head);
   }
-  /// Returns whether a request without a token comes from a program of this session. A browser does
-  /// not count, because it acts for the pages that it shows.
+  /// Returns whether a request without a token comes from a program of this session. Browsers do
+  /// not count, because they act for the pages that they show.
   bool is_trusted() {
     const auto& request = parser_->get();
     const beast::string_view target = request.target();
@@ -223,26 +230,27 @@ class Session : public std::enable_shared_from_this<Session> {
   void answer(Answer reply, bool head) {
     reply_ = std::move(reply);
     header_ = header_of(reply_);
-    at_ = reply_.first;
-    left_ = head || reply_.bytes == nullptr ? 0 : reply_.length;
+    offset_ = reply_.first;
+    remaining_ = head || reply_.bytes == nullptr ? 0 : reply_.length;
     write(true);
   }
   void write(bool with_header) {
-    const std::size_t size = static_cast<std::size_t>(std::min<std::uint64_t>(left_, kPiece));
+    const std::size_t size =
+        static_cast<std::size_t>(std::min<std::uint64_t>(remaining_, kChunkBytes));
     try {
-      piece_.resize(size);
-      if (size > 0) reply_.bytes->read(at_, piece_);
+      chunk_.resize(size);
+      if (size > 0) reply_.bytes->read(offset_, chunk_);
     } catch (const stream::Error&) {
-      return close();  // the file was truncated: the client sees a short body
+      return close();  // The file was truncated, so the client receives a short body.
     }
-    at_ += size;
-    left_ -= size;
+    offset_ += size;
+    remaining_ -= size;
     const std::array<asio::const_buffer, 2> buffers{
-        with_header ? asio::buffer(header_) : asio::const_buffer(), asio::buffer(piece_)};
-    stream_.expires_after(limits_.piece);
+        with_header ? asio::buffer(header_) : asio::const_buffer(), asio::buffer(chunk_)};
+    stream_.expires_after(limits_.chunk);
     asio::async_write(stream_, buffers, [self = shared_from_this()](error_code error, std::size_t) {
       if (error) return self->close();
-      if (self->left_ > 0) return self->write(false);
+      if (self->remaining_ > 0) return self->write(false);
       if (self->reply_.close) return self->close();
       self->read();
     });
@@ -251,14 +259,14 @@ class Session : public std::enable_shared_from_this<Session> {
   const std::function<const Site&()>& site_;
   const Access& access_;
   const ServerLimits& limits_;
-  Connections& all_;
-  std::optional<std::list<Session*>::iterator> place_;  ///< position in the waiting list
+  Connections& connections_;
+  std::optional<std::list<Session*>::iterator> waiting_position_;  ///< position in the waiting list
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   Answer reply_;
   std::string header_;
-  std::vector<std::byte> piece_;
-  std::uint64_t at_ = 0, left_ = 0;
+  std::vector<std::byte> chunk_;
+  std::uint64_t offset_ = 0, remaining_ = 0;
   std::optional<bool> own_session_;  ///< whether the client is trusted, once known
 };
 
@@ -273,8 +281,8 @@ bool Connections::end_oldest() {
 }  // namespace
 
 struct Server::Impl {
-  Impl(std::function<const Site&()> given, const ServerLimits& given_limits)
-      : site(std::move(given)), limits(given_limits) {}
+  Impl(std::function<const Site&()> site_function, const ServerLimits& server_limits)
+      : site(std::move(site_function)), limits(server_limits) {}
 
   void accept() {
     acceptor.async_accept([this](error_code error, tcp::socket socket) {
@@ -285,11 +293,11 @@ struct Server::Impl {
             ->start(full);
         return accept();
       }
-      // Out of descriptors: free one for another connection.
+      // The process has no file descriptors left, so free one for another connection.
       connections.end_oldest();
       pause.expires_after(std::chrono::milliseconds(50));
-      pause.async_wait([this](error_code again) {
-        if (!again) accept();
+      pause.async_wait([this](error_code failure) {
+        if (!failure) accept();
       });
     });
   }

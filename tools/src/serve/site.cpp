@@ -26,12 +26,13 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kManifest = "manifest.json";
-/// How long a check of all files, or a failed attempt to serve them, stays valid.
-constexpr std::chrono::milliseconds kLook{100};
-/// Attempts at the start to serve stores whose files are changing.
+/// Interval between checks of all files, and between attempts to rebuild the site.
+constexpr std::chrono::milliseconds kCheckInterval{100};
+/// Number of attempts to build the first site while files are changing.
 constexpr int kAttempts = 20;
 
-std::string type_of(const std::string& name) {
+/// Returns the media type of a file by its ending.
+std::string media_type(const std::string& name) {
   static constexpr std::pair<std::string_view, std::string_view> kTypes[] = {
       {".html", "text/html; charset=utf-8"},
       {".js", "text/javascript; charset=utf-8"},
@@ -55,22 +56,23 @@ std::string hexadecimal(std::uint64_t value) {
   return text;
 }
 
-/// FNV-1a (RFC 9923).
+/// Returns the FNV-1a hash (RFC 9923).
 std::uint64_t hash_of(std::string_view bytes) {
   std::uint64_t hash = 0xCBF29CE484222325;
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001B3;
   return hash;
 }
 
+/// Adds a file with this text to the site.
 Resource& add_text(Site& site, const std::string& name, std::string_view text) {
   std::vector<std::byte> bytes(text.size());
   std::transform(text.begin(), text.end(), bytes.begin(),
                  [](char c) { return static_cast<std::byte>(c); });
-  return site[name] = {stream::bytes_in_memory(name, std::move(bytes)), type_of(name),
+  return site[name] = {stream::bytes_in_memory(name, std::move(bytes)), media_type(name),
                        '"' + hexadecimal(hash_of(text)) + '"'};
 }
 
-/// Returns the manifest and the files that it lists.
+/// Returns the names of the manifest and of the files that it lists.
 std::vector<std::string> files_of(const stream::Store& store) {
   const auto source = stream::open_file(store.path() / kManifest);
   std::string text(source->size(), '\0');
@@ -87,11 +89,12 @@ std::vector<std::string> files_of(const stream::Store& store) {
   return names;
 }
 
+/// Returns the name of a store in a site that contains stores with the names `taken`.
 std::string name_of(const stream::Store& store, const std::vector<std::string>& taken) {
   fs::path path = fs::absolute(store.path()).lexically_normal();
   if (!path.has_filename()) path = path.parent_path();
   std::string name = path.filename().string();
-  // Cut all endings, so that a copy under this name gets the same name again.
+  // Cut all endings, so that a copy under the resulting name gets the same name again.
   const auto cut = [&](std::string_view ending) {
     if (name.size() <= ending.size() || !name.ends_with(ending)) return false;
     name.resize(name.size() - ending.size());
@@ -116,12 +119,13 @@ std::string name_of(const stream::Store& store, const std::vector<std::string>& 
   return unique;
 }
 
-/// Records the ranges read from a store's files.
-struct Readings {
+/// The ranges that were read of a store's files.
+struct ReadRanges {
   std::mutex mutex;
-  std::map<std::string, std::map<std::uint64_t, std::uint64_t>> ends;  // by offset
+  /// By file and offset: the end of the longest range there.
+  std::map<std::string, std::map<std::uint64_t, std::uint64_t>> ends;
 
-  void note(const std::string& file, std::uint64_t offset, std::uint64_t bytes) {
+  void add(const std::string& file, std::uint64_t offset, std::uint64_t bytes) {
     const std::lock_guard lock(mutex);
     std::uint64_t& end = ends[file][offset];
     end = std::max(end, offset + bytes);
@@ -129,7 +133,7 @@ struct Readings {
 };
 
 /// Returns the bytes compressed in zlib format (RFC 1950), which browsers decompress.
-std::string packed(const std::string& bytes) {
+std::string compressed(const std::string& bytes) {
   uLongf size = compressBound(static_cast<uLong>(bytes.size()));
   std::string result(size, '\0');
   const auto* in = reinterpret_cast<const Bytef*>(bytes.data());
@@ -141,12 +145,14 @@ std::string packed(const std::string& bytes) {
   return result;
 }
 
-std::uint8_t class_in(double value) {
+/// Returns the class that an attribute value means; values outside 0 to 255 are clamped.
+std::uint8_t class_of_value(double value) {
   return value > 0 ? static_cast<std::uint8_t>(std::min(value, 255.0)) : 0;
 }
 
-/// Returns the classes of a cloud's points, for a legend; nullopt if there are none or finding them
-/// takes too long. Reads only clusters that may have a class not found yet.
+/// Returns the classes of a cloud's points in ascending order, for a legend. Returns nullopt if
+/// there are none or finding them takes too long. Reads only clusters whose range of values
+/// contains a class not found yet.
 std::optional<std::vector<int>> classes_of(const stream::Store& store) {
   constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 26;
   const stream::StoreSchema& schema = store.schema();
@@ -159,8 +165,8 @@ std::optional<std::vector<int>> classes_of(const stream::Store& store) {
         schema.attributes.begin());
     return number < schema.attributes.size();
   };
-  if (!find("classification") && !find("class"))
-    return std::nullopt;  // the names that the viewer looks for
+  // The viewer looks for the same names.
+  if (!find("classification") && !find("class")) return std::nullopt;
   const stream::ScalarType type = schema.attributes[number].type;
   const std::size_t offset = schema.attribute_offset(number), bytes = schema.payload_size();
   std::array<bool, 256> seen{};
@@ -169,12 +175,12 @@ std::optional<std::vector<int>> classes_of(const stream::Store& store) {
     for (std::uint64_t i = 0; i < level.clusters; ++i) {
       const stream::ClusterId id = stream::cluster_id(level.level, i);
       const stream::ValueRange range = store.attribute_ranges(id)[number];
-      const auto first = seen.begin() + class_in(range.low);
-      const auto end = seen.begin() + class_in(range.high) + 1;
+      const auto first = seen.begin() + class_of_value(range.low);
+      const auto end = seen.begin() + class_of_value(range.high) + 1;
       if (!range.nan && first < end && std::all_of(first, end, std::identity())) continue;
       store.read(id, points);
       for (std::size_t at = offset; at < points.payload.size(); at += bytes) {
-        seen[class_in(stream::to_double(type, points.payload.data() + at))] = true;
+        seen[class_of_value(stream::to_double(type, points.payload.data() + at))] = true;
       }
     }
   }
@@ -185,33 +191,34 @@ std::optional<std::vector<int>> classes_of(const stream::Store& store) {
   return classes;
 }
 
-template <class Shown>
+/// Returns the map from stored coordinates to the ground as a view of samples of this type has it.
+template <class Sample>
 stream::LinearMap ground_of(const stream::Store& store) {
-  using View = terrain::StoreView<Shown>;
+  using View = terrain::StoreView<Sample>;
   return View(store, {}, View::Reader::in_frame).ground();
 }
 
 }  // namespace
 
 std::string start_file(const stream::Store& store) {
-  const auto readings = std::make_shared<Readings>();
+  const auto ranges = std::make_shared<ReadRanges>();
   const stream::OpenByName files = [&](const std::string& name) {
     std::shared_ptr<stream::ByteSource> file = stream::open_file(store.path() / name);
     return stream::bytes_by_function(
         file->name(), file->size(),
-        [file, name, readings](std::uint64_t offset, std::span<std::byte> out) {
-          readings->note(name, offset, out.size());
+        [file, name, ranges](std::uint64_t offset, std::span<std::byte> out) {
+          ranges->add(name, offset, out.size());
           file->read(offset, out);
         });
   };
-  const stream::Store noted = stream::Store::open(store.path().string(), files);
-  // A view starts with the root and the records of the clusters below it.
-  const Json ground =
-      store.schema().grid ? ground_of<std::int32_t>(noted) : ground_of<tri::PointCloud>(noted);
+  const stream::Store recorded_store = stream::Store::open(store.path().string(), files);
+  // This reads the root and the records of the clusters below it, as a view does at its start.
+  const Json ground = store.schema().grid ? ground_of<std::int32_t>(recorded_store)
+                                          : ground_of<tri::PointCloud>(recorded_store);
 
   Json parts = Json::array();
   std::string bytes;
-  for (const auto& [name, ends] : readings->ends) {
+  for (const auto& [name, ends] : ranges->ends) {
     const auto file = stream::open_file(store.path() / name);
     for (auto at = ends.begin(); at != ends.end();) {
       const std::uint64_t begin = at->first;
@@ -226,7 +233,7 @@ std::string start_file(const stream::Store& store) {
   }
   Json head = {{"format", "terrace-start"}, {"version", 2}, {"ground", ground}, {"parts", parts}};
   if (const auto classes = classes_of(store)) head["classes"] = *classes;
-  return head.dump() + "\n" + packed(bytes);
+  return head.dump() + "\n" + compressed(bytes);
 }
 
 std::vector<std::string> site_names(std::span<const stream::Store> stores) {
@@ -256,7 +263,7 @@ Site make_site(std::span<const stream::Store> stores) {
       }
       std::shared_ptr<const stream::ByteSource> bytes = stream::open_file(path);
       const std::string tag = fmt::format("\"{}-{}\"", checksum, hexadecimal(bytes->size()));
-      site[folder + file] = {std::move(bytes), type_of(file), tag};
+      site[folder + file] = {std::move(bytes), media_type(file), tag};
     }
     add_text(site, "stores/" + name + kStartEnding, start_file(store));
     list.push_back({{"name", name}, {"points", store.points()}, {"checksum", checksum}});
@@ -273,30 +280,30 @@ LiveSite::LiveSite(std::vector<std::string> paths,
                    std::function<stream::Store(const std::string& path)> open)
     : paths_(std::move(paths)), open_(std::move(open)) {
   for (const std::string& path : paths_) manifests_.push_back(fs::path(path) / kManifest);
-  for (int attempts = 1; !make(); ++attempts) {
+  for (int attempts = 1; !rebuild(); ++attempts) {
     if (attempts < kAttempts) continue;
     throw stream::Error(paths_.front(), "the files of a store keep changing")
         .remedy("wait until they have been copied");
   }
 }
 
-const Site& LiveSite::now() {
+const Site& LiveSite::current() {
   const std::vector<Stamp> manifests = stamps(manifests_);
   const Clock::time_point begin = Clock::now();
-  const bool replaced = manifests != (stale_ ? tried_ : manifest_stamps_);
-  if (!replaced && begin < next_look_) return site_;
-  next_look_ = begin + kLook;
-  if (!replaced && !stale_ && stamps(files_) == file_stamps_) return site_;
-  tried_ = manifests;
+  const bool replaced = manifests != (last_attempt_failed_ ? attempted_stamps_ : manifest_stamps_);
+  if (!replaced && begin < next_check_) return site_;
+  next_check_ = begin + kCheckInterval;
+  if (!replaced && !last_attempt_failed_ && stamps(files_) == file_stamps_) return site_;
+  attempted_stamps_ = manifests;
   try {
-    stale_ = !make();
+    last_attempt_failed_ = !rebuild();
   } catch (const stream::Stopped&) {
     throw;
   } catch (const std::exception&) {
-    stale_ = true;  // missing, damaged, or still being copied
+    last_attempt_failed_ = true;  // A store is missing, damaged, or still being copied.
   }
   const Clock::time_point end = Clock::now();
-  next_look_ = end + std::max<Clock::duration>(kLook, 3 * (end - begin));
+  next_check_ = end + std::max<Clock::duration>(kCheckInterval, 3 * (end - begin));
   return site_;
 }
 
@@ -313,7 +320,7 @@ std::vector<LiveSite::Stamp> LiveSite::stamps(std::span<const fs::path> files) {
   return stamps;
 }
 
-bool LiveSite::make() {
+bool LiveSite::rebuild() {
   std::vector<Stamp> manifests = stamps(manifests_);
   std::vector<stream::Store> stores;
   std::vector<fs::path> files;

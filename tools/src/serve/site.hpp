@@ -20,6 +20,7 @@
 
 namespace terrace::tools {
 
+/// A file of a site.
 struct Resource {
   std::shared_ptr<const stream::ByteSource> bytes;
   std::string type;          ///< media type
@@ -31,26 +32,26 @@ struct Resource {
 /// becomes a file system path.
 using Site = std::map<std::string, Resource>;
 
-/// Returns a site with the viewer, `stores.json`, and for each store its files in `stores/NAME/`
-/// and `stores/NAME.start`, which has the parts needed for the first picture. Names come from the
-/// folders and are made unique, start files included. Files are opened here and stay open. Throws
+/// Returns a site with the viewer and `stores.json`. Each store has its files in `stores/NAME/`,
+/// and `stores/NAME.start` with the parts needed for the first picture. NAME is the name of the
+/// store's folder, changed where it is not unique. Opens the files, which stay open. Throws
 /// stream::Error, also if a file of a store is a link.
 Site make_site(std::span<const stream::Store> stores);
 
-/// The site of stores. It is rebuilt when a store has been replaced, either by a rename or by
-/// copying files over its own, which takes a while. An answer in progress keeps the files that it
-/// started with.
+/// The site of stores that may be replaced meanwhile, either by a rename or by copying files over
+/// those of a store, which takes a while. The site is then rebuilt. An answer in progress keeps the
+/// files that it started with.
 class LiveSite {
  public:
-  /// `open` opens the store at a path. Throws stream::Error.
+  /// Builds the site. `open` opens the store at a path. Throws stream::Error.
   LiveSite(std::vector<std::string> paths,
            std::function<stream::Store(const std::string& path)> open);
 
-  /// Returns the site of the stores now at their paths. While one of them is missing or cannot be
-  /// served, it returns the previous site and keeps retrying. A new manifest is noticed at once,
-  /// other changed files within a tenth of a second. Throws stream::Stopped if reading a store is
-  /// stopped.
-  const Site& now();
+  /// Returns the site of the stores that are at their paths now. While one of them is missing or
+  /// cannot be served, returns the previous site and retries at the next calls. Notices a new
+  /// manifest at once, and other changed files within a tenth of a second. Throws stream::Stopped
+  /// if reading a store is stopped.
+  const Site& current();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -58,22 +59,21 @@ class LiveSite {
   using Stamp = std::array<std::int64_t, 5>;
   static Stamp stamp(const std::filesystem::path& file);
   static std::vector<Stamp> stamps(std::span<const std::filesystem::path> files);
-  /// Rebuilds the site. Returns whether the files stayed the same meanwhile, so that the site shows
-  /// one state of the stores.
-  bool make();
+  /// Rebuilds the site. Returns false, without a change, if files changed meanwhile, because the
+  /// site would mix two states of the stores.
+  bool rebuild();
 
   std::vector<std::string> paths_;
   std::function<stream::Store(const std::string& path)> open_;
-  std::vector<std::filesystem::path> manifests_, files_;  ///< files_: all others
-  std::vector<Stamp> manifest_stamps_,
-      file_stamps_;           ///< stamps of the files that site_ was made from
-  std::vector<Stamp> tried_;  ///< manifest stamps of the last attempt
-  bool stale_ = false;        ///< the last attempt failed
-  Clock::time_point next_look_{};
+  std::vector<std::filesystem::path> manifests_, files_;  ///< files_: all except the manifests
+  std::vector<Stamp> manifest_stamps_, file_stamps_;      ///< of the files in site_
+  std::vector<Stamp> attempted_stamps_;                   ///< of the manifests, at the last attempt
+  bool last_attempt_failed_ = false;
+  Clock::time_point next_check_{};
   Site site_;
 };
 
-/// Ending of a start file, which otherwise has the store's name.
+/// Ending of a start file, whose name is the store's plus this.
 inline constexpr const char* kStartEnding = ".start";
 
 /// Returns the name of each store in a site.
@@ -83,15 +83,16 @@ std::vector<std::string> site_names(std::span<const stream::Store> stores);
 /// the list of parts, then their bytes. See docs/background/viewer.md.
 std::string start_file(const stream::Store& store);
 
-struct Published {
+/// The number of files of a site and their total size.
+struct SiteSize {
   std::uint64_t files = 0, bytes = 0;
 };
 
-/// Writes the site of the stores as a folder for any web server. It appears complete and synced by
-/// one rename. With `replace`, it replaces a folder that terrace published, unless that contains
-/// other files. If repack_threads is not 0, stores are repacked by that many threads. Throws
+/// Writes the site of the stores as a folder for any web server. The folder appears complete and
+/// synced by one rename. With `replace`, it replaces a folder that terrace published, unless that
+/// contains other files. If repack_threads is not 0, that many threads repack the stores. Throws
 /// stream::Error, and stream::Stopped if reading a store is stopped.
-Published publish(std::span<const stream::Store> stores, const std::filesystem::path& folder,
-                  bool replace, unsigned repack_threads);
+SiteSize publish(std::span<const stream::Store> stores, const std::filesystem::path& folder,
+                 bool replace, unsigned repack_threads);
 
 }  // namespace terrace::tools

@@ -33,14 +33,12 @@ class PublishCommand final : public Command {
     const Stopwatch watch;
     std::vector<stream::Store> stores;
     for (const std::string& path : stores_) stores.push_back(open_store(path));
-    const Published published =
-        publish(stores, output_, common.force, repack_ ? common.threads : 0);
+    const SiteSize size = publish(stores, output_, common.force, repack_ ? common.threads : 0);
     Summary summary;
-    summary.json = {
-        {"stores", stores.size()}, {"files", published.files}, {"bytes", published.bytes}};
+    summary.json = {{"stores", stores.size()}, {"files", size.files}, {"bytes", size.bytes}};
     summary.add_cost(watch);
     summary.text = fmt::format("{}: {}, {}, in {}; copy the folder to any web server\n", output_,
-                               counted(published.files, "file"), readable_bytes(published.bytes),
+                               counted(size.files, "file"), readable_bytes(size.bytes),
                                readable_seconds(watch.seconds()));
     return summary;
   }

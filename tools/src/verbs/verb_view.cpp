@@ -24,7 +24,8 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Returns false if there is no xdg-open. It exits on its own; whether a browser opened is unknown.
+/// Starts xdg-open, which opens the address in a browser and then exits. Returns false if it is not
+/// installed; whether a browser opened is unknown.
 bool open_browser(const std::string& address) {
   std::string program = "xdg-open", argument = address;
   char* const arguments[] = {program.data(), argument.data(), nullptr};
@@ -51,7 +52,7 @@ class ViewCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     LiveSite site(stores_, [](const std::string& path) { return open_store(path); });
-    Server server([&site]() -> const Site& { return site.now(); },
+    Server server([&site]() -> const Site& { return site.current(); },
                   static_cast<std::uint16_t>(port_));
     const std::string address =
         fmt::format("http://127.0.0.1:{}/?token={}", server.access().port, server.access().token);
