@@ -68,7 +68,7 @@ bool parse(std::string_view name, const std::string& value) {
   } else if (name == "criterion") {
     static_cast<void>(parse_criterion(value));
   } else if (name == "channel") {
-    const auto [channel, weight] = channel_of(value);
+    const auto [channel, weight] = parse_channel(value);
     require(!channel.empty() && weight >= 0 && std::isfinite(weight), "a channel and its weight");
   } else if (name == "shuffle") {
     constexpr std::uint64_t kPoints = 50, kMemory = 1 << 20;

@@ -24,7 +24,7 @@ namespace {
 /// thread.
 std::atomic<bool> stop_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
-/// A pipe from the signal handler to a thread that does what a handler must not.
+/// Pipe from the signal handler to a thread, which may call functions that a handler must not call.
 std::array<int, 2> wake_pipe{-1, -1};
 
 extern "C" void on_stop_signal(int signal) {
@@ -42,9 +42,10 @@ extern "C" void on_stop_signal(int signal) {
 /// How long work may continue after a stop request.
 constexpr std::chrono::seconds kGrace{2};
 
-/// Forwards signals to `stop`, and ends the process if the work does not end in time, for example
-/// in the middle of a large triangulation. That is as safe as killing it, because no partial file
-/// has its final name yet. If the thread cannot be started, only loops that poll the flag end.
+/// Forwards signals to `stop`, and ends the process if the work does not end within kGrace, for
+/// example in the middle of a large triangulation. That is as safe as killing it, because no
+/// partial file has its final name yet. If the thread cannot be started, only loops that poll the
+/// flag end.
 void watch_for_signals(const std::stop_source& stop) {
   if (wake_pipe[0] < 0) return;
   // Block signals in this thread, so that they interrupt system calls of the others.
@@ -94,9 +95,9 @@ void check_interrupt() {
 std::stop_token stop_token() {
   // Never destroyed: the thread that asks it to stop outlives main().
   static std::stop_source& source = *[] {
-    auto* made = new std::stop_source;
-    watch_for_signals(*made);
-    return made;
+    auto* new_source = new std::stop_source;
+    watch_for_signals(*new_source);
+    return new_source;
   }();
   return source.get_token();
 }

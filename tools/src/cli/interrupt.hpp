@@ -25,16 +25,18 @@ void install_signal_handlers();
 void check_interrupt();
 
 /// Opens a store, restricted to the points that satisfy `where` unless it is empty. Reading from it
-/// throws stream::Stopped once the user has asked to stop. Throws what stream::Store::open and
-/// where throw.
+/// throws stream::Stopped once the user has asked to stop. Throws what stream::Store::open() and
+/// stream::Store::where() throw.
 [[nodiscard]] stream::Store open_store(const std::filesystem::path& path,
                                        const std::string& where = {});
 
-/// Returns the stop request as a token, which ends reads and writes of pipes with stream::Stopped.
+/// Returns a token for the stop request. Reads and writes of pipes that have it end with
+/// stream::Stopped.
 [[nodiscard]] std::stop_token stop_token();
 
-/// Calls a library on points in memory. Rethrows exceptions; std::invalid_argument and
-/// std::bad_alloc become a stream::Error that names the file.
+/// Calls `work`, which runs a method of a library on the points of a file. Turns
+/// std::invalid_argument and std::bad_alloc into a stream::Error that names the file, and lets
+/// other exceptions pass.
 void call_library(const std::string& file, const std::string& method,
                   const std::function<void()>& work);
 

@@ -19,7 +19,8 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
+/// Returns the level, or the top for nullopt. Throws UsageError if the store has no such level.
+unsigned level_in_store(std::optional<unsigned> level, const stream::Store& store) {
   const unsigned top = store.top();
   if (level && *level > top) {
     throw UsageError(fmt::format("the store has no level {}: its top is level {}", *level, top));
@@ -27,7 +28,8 @@ unsigned checked(std::optional<unsigned> level, const stream::Store& store) {
   return level.value_or(top);
 }
 
-/// `depth` guards against files crafted to exhaust the stack.
+/// Adds the coordinates of each LineString of a GeoJSON object to `lines`. `depth` is the nesting
+/// of the object; deep nesting is ignored, because a crafted file could exhaust the stack.
 void collect_line(const nlohmann::json& object, int depth,
                   std::vector<std::vector<Point2>>& lines) {
   if (depth > 8) return;
@@ -108,7 +110,7 @@ cluster::FacilityStrategy parse_strategy(const std::string& text) {
                                    {"facilities", FacilityStrategy::facilities}});
 }
 
-std::pair<std::string, double> channel_of(const std::string& text) {
+std::pair<std::string, double> parse_channel(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) {
     throw UsageError("--channel " + text + ": write NAME:WEIGHT, as in intensity:0.5");
@@ -124,7 +126,7 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
                     const std::vector<std::string>& focuses, const RegionConversion& conversion) {
   Detail detail;
   if (!level.empty()) {
-    detail.level = checked(parse_level(level), store);
+    detail.level = level_in_store(parse_level(level), store);
   } else if (!focuses.empty()) {
     detail.level = store.top();
   }
@@ -133,9 +135,9 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
     const std::string name = "--focus " + text;
     try {
       Focus focus = parse_focus(text);
-      detail.focuses.push_back({conversion(std::move(focus.region)), checked(focus.level, store)});
+      detail.focuses.push_back({conversion(std::move(focus.region)), level_in_store(focus.level, store)});
     } catch (const UsageError& error) {
-      throw UsageError(name + ": " + error.what());
+      throw UsageError(stream::message("{}: {}", name, error.message()));
     } catch (const stream::Error& error) {
       // Names the option in place of its value and of "the region".
       stream::Error::Parts parts = error.parts();
@@ -180,32 +182,34 @@ Focus parse_focus(const std::string& text) {
 }
 
 Line parse_line(const std::string& text) {
-  const auto bad = [&](const std::string& cause) {
+  const auto line_error = [&](const std::string& cause) {
     return stream::Error(text, cause)
         .remedy("give x1,y1,x2,y2,... or a GeoJSON file with one LineString");
   };
   Line line;
   if (text.find(',') != std::string::npos &&
       text.find_first_not_of("0123456789+-.,eE ") == std::string::npos) {
-    const std::vector<double> v = parse_numbers(text, "--line");
-    if (v.size() < 4 || v.size() % 2 != 0) {
-      throw UsageError("--line has " + counted(v.size(), "number") +
+    const std::vector<double> numbers = parse_numbers(text, "--line");
+    if (numbers.size() < 4 || numbers.size() % 2 != 0) {
+      throw UsageError("--line has " + counted(numbers.size(), "number") +
                        "; write x1,y1,x2,y2 and any further pairs");
     }
-    for (std::size_t i = 0; i < v.size(); i += 2) line.places.push_back({v[i], v[i + 1]});
+    for (std::size_t i = 0; i < numbers.size(); i += 2) {
+      line.places.push_back({numbers[i], numbers[i + 1]});
+    }
     return line;
   }
   const auto json = json_of_file(text, kMostGeoJsonBytes, convert_to_geojson(text), stop_token());
-  if (!json) throw bad("is neither a list of places nor a readable file");
+  if (!json) throw line_error("is neither a list of places nor a readable file");
   std::vector<std::vector<Point2>> lines;
   try {
     collect_line(*json, 0, lines);
     line.crs = crs_of_geojson(*json, text);
   } catch (const nlohmann::json::exception& error) {
-    throw bad(fmt::format("is not GeoJSON ({})", error.what()));
+    throw line_error(fmt::format("is not GeoJSON ({})", error.what()));
   }
-  if (lines.size() != 1) throw bad("holds " + counted(lines.size(), "line"));
-  if (lines.front().size() < 2) throw bad("the line has fewer than two places");
+  if (lines.size() != 1) throw line_error("holds " + counted(lines.size(), "line"));
+  if (lines.front().size() < 2) throw line_error("the line has fewer than two places");
   line.places = std::move(lines.front());
   return line;
 }

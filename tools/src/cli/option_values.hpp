@@ -41,7 +41,7 @@ T choice(const std::string& text, const char* option,
 
 /// Parses "none", "flat" or "interpolate".
 terrain::Fill parse_fill(const std::string& text);
-/// Parses "ellipsoidal", "orthometric" or "ignore". An empty text means what the store records.
+/// Parses "ellipsoidal", "orthometric" or "ignore". An empty text gives HeightReference::recorded.
 terrain::HeightReference parse_height_reference(const std::string& text);
 /// Parses "greedy", "removal" or "fitted".
 tri::TinQuality parse_quality(const std::string& text);
@@ -65,8 +65,9 @@ std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text);
 
 /// Parses the NAME:WEIGHT of --channel. The name may contain colons; the weight is a non-negative
 /// number.
-std::pair<std::string, double> channel_of(const std::string& text);
+std::pair<std::string, double> parse_channel(const std::string& text);
 
+/// A line of straight segments.
 struct Line {
   std::vector<terrain::Point2> places;      ///< at least two
   std::optional<terrain::PlacesCrs> crs{};  ///< as Region::crs()
@@ -86,8 +87,8 @@ struct Focus {
 /// Parses "BOX:L", where L is a number or "top". Throws as Region::parse does.
 Focus parse_focus(const std::string& text);
 
-/// Parses the requested levels and checks them against the store. An empty level means the top if
-/// there are focuses, otherwise level 0. `conversion` applies to regions given in another CRS.
+/// Parses the requested levels and checks that the store has them. An empty level means the top if
+/// there are focuses, otherwise level 0. `conversion` converts regions to the store's CRS.
 /// Throws as Region::parse does, and UsageError for a level above the store's top.
 terrain::Detail parse_detail(const stream::Store& store, const std::string& level,
                              const std::string& region, const std::vector<std::string>& focuses,

@@ -39,7 +39,7 @@ void ProgressMeter::update(std::uint64_t count, double fraction) {
 
 void ProgressMeter::show(std::uint64_t count, double fraction, double seconds) {
   const double rate = static_cast<double>(count) / seconds;
-  const double left = fraction > 0 ? seconds * (1 - fraction) / fraction : -1;
+  const double remaining = fraction > 0 ? seconds * (1 - fraction) / fraction : -1;
   if (mode_ == ProgressMode::json) {
     nlohmann::ordered_json line;
     line["progress"] = fraction;
@@ -47,13 +47,13 @@ void ProgressMeter::show(std::uint64_t count, double fraction, double seconds) {
     line[what_ + "_per_second"] = rate;
     line["seconds"] = seconds;
     line["seconds_left"] =
-        left < 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(left);
+        remaining < 0 ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(remaining);
     std::fprintf(stderr, "%s\n", line.dump().c_str());
   } else {
     std::string text = fmt::format("{} {}, {}", with_commas(count), what_, readable_rate(rate));
-    if (left >= 0) {
-      text +=
-          fmt::format(", {} %, {} left", static_cast<int>(fraction * 100), readable_seconds(left));
+    if (remaining >= 0) {
+      text += fmt::format(", {} %, {} left", static_cast<int>(fraction * 100),
+                          readable_seconds(remaining));
     }
     std::fprintf(stderr, "\r%s\033[K", text.c_str());
     line_shown_ = true;

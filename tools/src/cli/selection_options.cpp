@@ -78,12 +78,12 @@ terrain::RegionConversion SelectionOptions::conversion(
         named.crs = *reading.crs;
         return terrain::RegionConversion(named, {}, shift);
       }
-      const bool stated = region.crs() && !region.crs()->name.empty();
-      if (region_crs_.empty() && !stated) return {};
+      const bool region_names_crs = region.crs() && !region.crs()->name.empty();
+      if (region_crs_.empty() && !region_names_crs) return {};
       throw terrain::UsageError(fmt::format(
-          "{} up the CRS of the input before it is read: {} can be read only once; name a file",
-          region_crs_.empty() ? "the crs of " + region.crs()->file + " makes it necessary to look"
-                              : std::string("--region-crs looks"),
+          "{} needs the CRS of the input before it is read, but {} can be read only once; name a "
+          "file",
+          region_crs_.empty() ? "the crs of " + region.crs()->file : std::string("--region-crs"),
           input));
     }
   }

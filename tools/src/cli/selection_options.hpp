@@ -23,17 +23,19 @@ struct CommonOptions;
 class SelectionOptions {
  public:
   void define(CLI::App& app);
-  /// Returns whether points may be left out.
+  /// Returns whether --where or --region may exclude points.
   [[nodiscard]] bool selects() const { return !where_.empty() || !region_.empty(); }
-  /// Returns the selection of points and attributes for reading `inputs` with `reading`. The inputs
-  /// are opened beforehand if their CRS may matter; `shift` is that CRS's datum shift. Throws
-  /// UsageError for an invalid list or region, and stream::Error.
+  /// Returns the selection of points and attributes for reading `inputs` with `reading`. Opens the
+  /// inputs if it needs their CRS; `shift` is the datum shift of that CRS. Throws UsageError for an
+  /// invalid list or region, and stream::Error.
   [[nodiscard]] stream::Selection selection(std::span<const std::string> inputs,
                                             const stream::SourceOptions& reading,
                                             const std::optional<terrain::DatumShift>& shift,
                                             const CommonOptions& common) const;
 
  private:
+  /// Returns the conversion of `region` to the CRS of the inputs. Throws UsageError if it needs the
+  /// CRS of an input that can be read only once.
   [[nodiscard]] terrain::RegionConversion conversion(
       std::span<const std::string> inputs, const stream::SourceOptions& reading,
       const std::optional<terrain::DatumShift>& shift, const terrain::Region& region) const;

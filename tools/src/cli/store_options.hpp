@@ -24,37 +24,39 @@ namespace terrace::tools {
 struct CommonOptions;
 
 /// The CRS of coordinates in the request (--region-crs unless the verb names it otherwise),
-/// --to-crs and --towgs84.
+/// --to-crs and --towgs84. All functions that return a transformation or conversion print a note on
+/// the operation between datums and throw what transformation_to() throws.
 class CrsOptions {
  public:
-  /// Adds all three. `given` completes "the CRS of ...".
+  /// Adds all three. `subject` completes "the CRS of ...".
   void define(CLI::App& app, const std::string& name = "--region-crs",
-              const std::string& given = "regions and focuses");
+              const std::string& subject = "regions and focuses");
   /// Adds all but --to-crs.
-  void define_given(CLI::App& app, const std::string& name = "--region-crs",
-                    const std::string& given = "regions and focuses");
-  /// The functions below report the operation that they use between datums and throw what
-  /// transformation_to throws.
-  /// Returns the transformation from the store's CRS to that of the request; nullopt if none is
-  /// named.
-  [[nodiscard]] std::optional<terrain::Transformation> given(const stream::Store& store,
-                                                             const CommonOptions& common) const;
+  void define_input(CLI::App& app, const std::string& name = "--region-crs",
+                    const std::string& subject = "regions and focuses");
+
+  /// Returns the transformation from the store's CRS to that of the request; nullopt if the request
+  /// names none.
+  [[nodiscard]] std::optional<terrain::Transformation> from_store_to_input(
+      const stream::Store& store, const CommonOptions& common) const;
+  /// Returns the conversion of regions and focuses to the store's CRS.
   [[nodiscard]] terrain::RegionConversion regions(const stream::Store& store,
-                                                  const CommonOptions& common) const;
+                                         const CommonOptions& common) const;
+  /// Returns the conversion of positions from the store's CRS to --to-crs.
   [[nodiscard]] terrain::PlaceConversion places(const stream::Store& store,
-                                                const CommonOptions& common) const;
-  /// Returns the transformation to --to-crs, from `given` or otherwise from the store's CRS;
-  /// nullopt without --to-crs.
-  [[nodiscard]] std::optional<terrain::Transformation> written(
+                                       const CommonOptions& common) const;
+  /// Returns the transformation to --to-crs, from the CRS of the request if `input` is given and
+  /// otherwise from the store's CRS. Returns nullopt without --to-crs.
+  [[nodiscard]] std::optional<terrain::Transformation> from_input_to_output(
       const stream::Store& store, const CommonOptions& common,
-      const std::optional<terrain::Transformation>& given = {}) const;
-  /// Returns the transformation from the store's CRS to --to-crs; nullopt also if both are the
-  /// same.
-  [[nodiscard]] std::optional<terrain::Transformation> to(const stream::Store& store,
-                                                          const CommonOptions& common) const;
+      const std::optional<terrain::Transformation>& input = {}) const;
+  /// Returns the transformation from the store's CRS to --to-crs; nullopt without --to-crs, and if
+  /// both are the same.
+  [[nodiscard]] std::optional<terrain::Transformation> from_store_to_output(
+      const stream::Store& store, const CommonOptions& common) const;
 
  private:
-  std::string given_, to_, shift_;
+  std::string input_crs_, output_crs_, datum_shift_;
 };
 
 /// Selects a part of a store and its detail: the store, --level, --region, --focus, --cluster,
@@ -64,10 +66,10 @@ struct PartOptions {
   std::vector<std::string> focuses;
   CrsOptions crs;
 
-  /// `kept` says what a region keeps, such as "only points inside".
-  void define(CLI::App& app, const std::string& kept);
-  /// Adds --cluster. `given` says what the option outputs for a cluster.
-  CLI::Option* define_cluster(CLI::App& app, const std::string& given);
+  /// `region_effect` describes the effect of --region, such as "only points inside".
+  void define(CLI::App& app, const std::string& region_effect);
+  /// Adds --cluster. `cluster_effect` describes what the verb writes for a cluster.
+  CLI::Option* define_cluster(CLI::App& app, const std::string& cluster_effect);
   /// Throws as parse_detail does.
   [[nodiscard]] terrain::Detail detail(const stream::Store& store,
                                        const CommonOptions& common) const;

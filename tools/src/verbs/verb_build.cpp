@@ -37,9 +37,9 @@ namespace {
 /// Points that the trial run of --dry-run reads before it extrapolates.
 constexpr std::uint64_t kTrialPoints = 1'000'000;
 
-/// Makes freed memory return to the system at once, if the C library supports it. Otherwise blocks
-/// of points that one thread freed stay with that thread while others allocate more: a third of the
-/// peak resident set where points are sorted.
+/// Makes freed memory return to the system at once, if the C library supports it. Otherwise a
+/// thread keeps the blocks of points that it freed while other threads allocate more. While points
+/// are sorted, that was a third of the peak resident set.
 void return_freed_memory() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
@@ -74,6 +74,51 @@ class BuildCommand final : public Command {
     add_skip_damaged(app, request_.skip_damaged);
     add_heights_of_colour(app, request_.heights_of_colour);
     add_cell_of_source(app, request_.cell);
+    define_clustering(app);
+    app.add_option(
+           "--order", order_,
+           "order of points: stream keeps the input order, spatial sorts nearby points together "
+           "(through a temporary file next to the store), auto sorts only if needed")
+        ->check(CLI::IsMember({"auto", "stream", "spatial"}))
+        ->capture_default_str();
+    app.add_flag("--dry-run", dry_run_,
+                 "only estimate points, disk space and time from a trial run");
+  }
+
+  Summary run(const CommonOptions& common) override {
+    format_of_output(outputs::kStore, output_);
+    request_.store = output_;
+    request_.replace = common.force;
+    request_.effort = *effort_of(effort_);
+    request_.entities = *stream::entities_named(entities_);  // validated by the option
+    if (!crs_.empty()) request_.crs = crs_named(crs_);
+    request_.datum_shift = parse_datum_shift(shift_);
+    if (block_ < 2 || block_ > 1'000'000) {
+      throw UsageError(fmt::format("--block must be between 2 and 1000000, not {}", block_));
+    }
+    request_.block_points = block_;
+    request_.metric = MetricChoice::parse(metric_);
+    request_.strategy = parse_strategy(strategy_);
+    if (outlier_price_) request_.outlier_price = *outlier_price_;
+    for (const std::string& channel : channels_)
+      request_.channels.push_back(parse_channel(channel));
+    request_.selection =
+        selection_.selection(request_.inputs, source_options(), request_.datum_shift, common);
+    request_.seed = common.seed;
+    request_.order = order_ == "stream"    ? stream::Order::stream
+                     : order_ == "spatial" ? stream::Order::spatial
+                                           : stream::Order::automatic;
+    std::error_code ignored;
+    if (!common.force && std::filesystem::exists(request_.store, ignored)) {
+      throw stream::Error(output_, "exists already")
+          .remedy("name another output, or give --force to replace it");
+    }
+    return dry_run_ ? estimate(common) : build(common);
+  }
+
+ private:
+  /// Adds the options of the clusters in each block.
+  void define_clustering(CLI::App& app) {
     app.add_option("--block", block_, "maximum number of points clustered together")
         ->capture_default_str();
     add_number(app, "--facility-cost", request_.facility_cost,
@@ -100,49 +145,12 @@ class BuildCommand final : public Command {
                    "search for clusters: automatic, or one of the thesis's slower local searches")
         ->type_name("NAME")
         ->capture_default_str();
-    app.add_option(
-           "--order", order_,
-           "order of points: stream keeps the input order, spatial sorts nearby points together "
-           "(through a temporary file next to the store), auto sorts only if needed")
-        ->check(CLI::IsMember({"auto", "stream", "spatial"}))
-        ->capture_default_str();
-    app.add_flag("--dry-run", dry_run_,
-                 "only estimate points, disk space and time from a trial run");
   }
 
-  Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kStore, output_);
-    request_.store = output_;
-    request_.replace = common.force;
-    request_.effort = *effort_of(effort_);
-    request_.entities = *stream::entities_named(entities_);  // validated by the option
-    if (!crs_.empty()) request_.crs = crs_named(crs_);
-    request_.datum_shift = parse_datum_shift(shift_);
-    if (block_ < 2 || block_ > 1'000'000) {
-      throw UsageError(fmt::format("--block must be between 2 and 1000000, not {}", block_));
-    }
-    request_.block_points = block_;
-    request_.metric = MetricChoice::parse(metric_);
-    request_.strategy = parse_strategy(strategy_);
-    if (outlier_price_) request_.outlier_price = *outlier_price_;
-    for (const std::string& channel : channels_) request_.channels.push_back(channel_of(channel));
-    request_.selection =
-        selection_.selection(request_.inputs, reading(), request_.datum_shift, common);
-    request_.seed = common.seed;
-    request_.order = order_ == "stream"    ? stream::Order::stream
-                     : order_ == "spatial" ? stream::Order::spatial
-                                           : stream::Order::automatic;
-    std::error_code ignored;
-    if (!common.force && std::filesystem::exists(request_.store, ignored)) {
-      throw stream::Error(output_, "exists already")
-          .remedy("name another output, or give --force to replace it");
-    }
-    return dry_run_ ? estimate(common) : build(common);
-  }
-
- private:
   /// Returns the singular of the store's entities, such as "point".
   [[nodiscard]] std::string entity() const { return entities_.substr(0, entities_.size() - 1); }
+
+  /// Builds the store and returns its summary.
   Summary build(const CommonOptions& common) {
     const Stopwatch watch;
     return_freed_memory();
@@ -170,26 +178,26 @@ class BuildCommand final : public Command {
             ? fmt::format("{} of them{} marked: outlier = 1\n", with_commas(outcome.outliers),
                           outcome.outliers == 1 ? " is" : " are")
             : std::string();
-    std::string left_out;
+    std::string exclusions;
     if (outcome.nodata > 0) {
-      left_out = outcome.raster ? counted(outcome.nodata, "cell") + " without data"
-                                : with_commas(outcome.nodata) + " without a coordinate";
+      exclusions = outcome.raster ? counted(outcome.nodata, "cell") + " without data"
+                                  : with_commas(outcome.nodata) + " without a coordinate";
     }
     if (outcome.excluded > 0) {
-      left_out += (left_out.empty() ? "" : " and ") +
-                  counted(outcome.excluded, "point", "that was", "that were") + " not selected";
+      exclusions += (exclusions.empty() ? "" : " and ") +
+                    counted(outcome.excluded, "point", "that was", "that were") + " not selected";
     }
-    if (!left_out.empty()) left_out = " (" + left_out + " left out)";
+    if (!exclusions.empty()) exclusions = " (" + exclusions + " left out)";
     summary.text =
         fmt::format("{}{} in {}, {}\n{}{}: {}, {}, peak memory {}\n",
-                    counted(outcome.points, entity()), left_out, readable_seconds(seconds),
+                    counted(outcome.points, entity()), exclusions, readable_seconds(seconds),
                     readable_rate(rate), outliers, output_, counted(outcome.top + 1, "level"),
                     readable_bytes(outcome.store_bytes), readable_bytes(peak_rss_bytes()));
     return summary;
   }
 
-  /// Returns the options for opening files that are examined before the build.
-  [[nodiscard]] stream::SourceOptions reading() const {
+  /// Returns the options for opening the inputs before the build.
+  [[nodiscard]] stream::SourceOptions source_options() const {
     return {.format = request_.input_format,
             .entities = request_.entities,
             .band = request_.band,
@@ -200,12 +208,12 @@ class BuildCommand final : public Command {
             .stop = stop_token()};
   }
 
-  /// Builds a store of the first points, measures it and removes it.
+  /// Builds a store of the first points, removes it and extrapolates its size and time.
   Summary estimate(const CommonOptions& common) {
     if (std::find(request_.inputs.begin(), request_.inputs.end(), "-") != request_.inputs.end()) {
       throw UsageError("--dry-run reads its input before the build does: name files instead of -");
     }
-    stream::SourceOptions options = reading();
+    stream::SourceOptions options = source_options();
     options.memory_bytes = common.reading_memory();
     options.selection = request_.selection;
     const auto source = stream::open_source(request_.inputs, options);
@@ -218,13 +226,19 @@ class BuildCommand final : public Command {
     const BuildOutcome trial = build_store(request_, context);
     const double seconds = watch.seconds();
 
-    // The number of points with data is unknown until they are read, so use the trial's share.
-    const double valid =
+    // How many points have data is unknown before they are read, so assume the share of the trial.
+    const double valid_share =
         static_cast<double>(trial.points) /
         static_cast<double>(std::max<std::uint64_t>(1, trial.points + trial.nodata));
-    double points = info.points ? static_cast<double>(*info.points) * valid : -1.0;
-    const bool whole = trial.points < kTrialPoints;
-    if (whole) points = static_cast<double>(trial.points);
+    double points = info.points ? static_cast<double>(*info.points) * valid_share : -1.0;
+    const bool read_all = trial.points < kTrialPoints;
+    if (read_all) points = static_cast<double>(trial.points);
+    return summary_of_estimate(trial, points, seconds);
+  }
+
+  /// Extrapolates from a trial run to `points`, which is negative if their number is unknown.
+  [[nodiscard]] Summary summary_of_estimate(const BuildOutcome& trial, double points,
+                                            double seconds) const {
     const double scale = points / static_cast<double>(trial.points);
     Summary summary;
     if (points < 0) {

@@ -360,7 +360,7 @@ ChannelTable read_channels(const PointTable& table, const std::vector<std::strin
   ChannelTable channels;
   std::vector<std::vector<double>> columns;
   for (const std::string& text : options) {
-    const auto& [name, weight] = channel_of(text);
+    const auto& [name, weight] = parse_channel(text);
     columns.push_back(table.column(name));
     channels.weights.push_back(weight);
   }

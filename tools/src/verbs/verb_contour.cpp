@@ -38,7 +38,7 @@ class ContourCommand final : public Command {
     app.add_flag("--own-crs", request_.own_crs,
                  "write x and y of the store's CRS, which may be unknown, instead of longitude and "
                  "latitude");
-    crs_.define_given(app);
+    crs_.define_input(app);
   }
 
   Summary run(const CommonOptions& common) override {

@@ -73,22 +73,22 @@ class PointsCommand final : public Command {
     const Stopwatch watch;
     const stream::Store store = open_store(part_.path, part_.where);
     const Detail detail = part_.detail(store, common);
-    if (!near_.empty()) return near(store, detail, watch, common);
+    if (!near_.empty()) return write_near_points(store, detail, watch, common);
     if (format == "geojson") {
-      return lines(store, detail, watch, common);
+      return write_lines(store, detail, watch, common);
     }
     std::optional<stream::Overlay> overlay;
     if (!overlay_.empty()) overlay.emplace(open_height_overlay(overlay_, store));
-    const std::optional<Transformation> to = part_.crs.to(store, common);
+    const std::optional<Transformation> to = part_.crs.from_store_to_output(store, common);
     const auto writer =
-        stream::open_point_writer(output_, header(store, store.schema().attributes, to),
+        stream::open_point_writer(output_, header_of(store, store.schema().attributes, to),
                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
     report_lost_unit(*writer, store, to, common);
-    const std::uint64_t replaced = write_points(store, detail, *writer, places(to),
+    const std::uint64_t replaced = write_points(store, detail, *writer, conversion_to(to),
                                                 overlay ? &*overlay : nullptr, common.context());
     const std::uint64_t points = writer->points();
-    if (points == 0) need_some(store, detail);
+    if (points == 0) refuse_empty_selection(store, detail);
     writer->finish();
 
     Summary summary;
@@ -106,30 +106,37 @@ class PointsCommand final : public Command {
 
  private:
   /// Throws stream::Error if the options select no point of a store that has points.
-  void need_some(const stream::Store& store, const Detail& detail) const {
+  void refuse_empty_selection(const stream::Store& store, const Detail& detail) const {
     if (store.whole().points() == 0) return;
     if (detail.region) throw_none_inside(store);
     throw stream::Error(
         part_.path, "no point is selected; all of the store's have " + extent_text(store.whole()))
         .remedy("give another --where, --focus or --cluster");
   }
-  static PlaceConversion places(const std::optional<Transformation>& to) {
+
+  static PlaceConversion conversion_to(const std::optional<Transformation>& to) {
     return to ? PlaceConversion(*to) : PlaceConversion();
   }
+
+  /// Returns the CRS of the output if it is not the store's.
   static std::optional<stream::Crs> crs_of(const std::optional<Transformation>& to) {
     return to ? std::optional(to->to().crs()) : std::nullopt;
   }
+
+  /// Prints a note if the file's format cannot record the unit of heights.
   void report_lost_unit(const stream::PointWriter& writer, const stream::Store& store,
                         const std::optional<Transformation>& to,
                         const CommonOptions& common) const {
     const std::string note = lost_height_unit(output_, writer, store.schema(), crs_of(to));
     if (!note.empty()) common.say(note);
   }
-  /// Returns the header. In another CRS the points have neither the store's lattice nor its bounds.
-  static stream::PointHeader header(const stream::Store& store,
-                                    std::vector<stream::Channel> attributes,
-                                    const std::optional<Transformation>& to) {
-    stream::PointHeader wanted{.attributes = std::move(attributes),
+
+  /// Returns the header of a point file. Points in another CRS have neither the store's lattice nor
+  /// its bounds.
+  static stream::PointHeader header_of(const stream::Store& store,
+                                       std::vector<stream::Channel> attributes,
+                                       const std::optional<Transformation>& to) {
+    stream::PointHeader header{.attributes = std::move(attributes),
                                .comments = {kWriterMark},
                                .crs =
                                    [&store, other = crs_of(to)] {
@@ -141,23 +148,24 @@ class PointsCommand final : public Command {
                                      return height_unit_of_point_file(store.schema(), other);
                                    }};
     if (!to) {
-      wanted.lattice = lattice_of(store.schema());
-      wanted.bounds = world_box(store.schema(), store.whole().bounds());
+      header.lattice = lattice_of(store.schema());
+      header.bounds = world_box(store.schema(), store.whole().bounds());
     }
-    return wanted;
+    return header;
   }
 
-  Summary lines(const stream::Store& store, const Detail& detail, const Stopwatch& watch,
-                const CommonOptions& common) const {
+  /// Writes the lines of a store of segments or polylines as GeoJSON.
+  Summary write_lines(const stream::Store& store, const Detail& detail, const Stopwatch& watch,
+                      const CommonOptions& common) const {
     if (!holds_lines(store.schema()) || !overlay_.empty()) {
       throw UsageError(
           "GeoJSON is for the lines of a store of segments or polylines, without --overlay; name "
           "another ending, e.g. .csv");
     }
     LineSet lines = detail_lines(store, detail, common.context());
-    if (lines.lines.empty()) need_some(store, detail);
-    const std::optional<Transformation> to = part_.crs.to(store, common);
-    places(to)(lines.vertices, check_interrupt);
+    if (lines.lines.empty()) refuse_empty_selection(store, detail);
+    const std::optional<Transformation> to = part_.crs.from_store_to_output(store, common);
+    conversion_to(to)(lines.vertices, check_interrupt);
     stream::Sink file(output_, may_replace(output_, common.force), stop_token());
     write_geojson(lines, to ? to->to().crs() : store.schema().crs,
                   [&](std::string_view text) { file.write(text); });
@@ -171,13 +179,14 @@ class PointsCommand final : public Command {
     return summary;
   }
 
-  Summary near(const stream::Store& store, const Detail& detail, const Stopwatch& watch,
-               const CommonOptions& common) const {
-    const std::vector<double> v = parse_numbers(near_, "--near");
-    if (v.size() != 2 && v.size() != 3) throw UsageError("--near needs X,Y or X,Y,Z");
+  /// Writes the points near --near, nearest first, with their distances.
+  Summary write_near_points(const stream::Store& store, const Detail& detail,
+                            const Stopwatch& watch, const CommonOptions& common) const {
+    const std::vector<double> xyz = parse_numbers(near_, "--near");
+    if (xyz.size() != 2 && xyz.size() != 3) throw UsageError("--near needs X,Y or X,Y,Z");
     if (!count_ && !radius_) throw UsageError("--near needs -k or --within");
-    NearPlace place{.xy = WholeTurns(store.schema(), store.whole().bounds())({v[0], v[1]})};
-    if (v.size() == 3) place.z = v[2];
+    NearPlace place{.xy = WholeTurns(store.schema(), store.whole().bounds())({xyz[0], xyz[1]})};
+    if (xyz.size() == 3) place.z = xyz[2];
     stream::StoreQuery query(store);
     const std::vector<stream::FoundPoint> found =
         count_ ? nearest_points(query, place, *count_, detail.level)
@@ -199,12 +208,13 @@ class PointsCommand final : public Command {
     }
     std::vector<stream::Channel> attributes = store.schema().attributes;
     attributes.push_back({.name = "distance", .unit = "metre"});
-    const std::optional<Transformation> to = part_.crs.to(store, common);
-    const auto writer = stream::open_point_writer(output_, header(store, std::move(attributes), to),
-                                                  point_writer_options(output_, format_, common));
+    const std::optional<Transformation> to = part_.crs.from_store_to_output(store, common);
+    const auto writer =
+        stream::open_point_writer(output_, header_of(store, std::move(attributes), to),
+                                  point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
     report_lost_unit(*writer, store, to, common);
-    write_found_points(query, found, *writer, places(to));
+    write_found_points(query, found, *writer, conversion_to(to));
     writer->finish();
     Summary summary;
     summary.json = {{"vertices", found.size()}, {"triangles", 0}};

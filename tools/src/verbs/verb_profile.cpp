@@ -33,7 +33,7 @@ class ProfileCommand final : public Command {
                    "store's CRS between its places")
         ->required()
         ->type_name("LINE");
-    crs_.define_given(app, "--line-crs", "the line's places");
+    crs_.define_input(app, "--line-crs", "the line's places");
     add_number(app, "--step", step_,
                "metres between rows (default: a row wherever the line crosses the lattice, one of "
                "its diagonals, or an edge of the triangulated points)",
@@ -49,7 +49,7 @@ class ProfileCommand final : public Command {
     Line line = parse_line(line_);
     request.line = std::move(line.places);
     const stream::Store store = surface_.open(request.sampler);
-    request.to_line = crs_.given(store, common);
+    request.to_line = crs_.from_store_to_input(store, common);
     if (!request.to_line && line.crs) {
       stream::Box3 box;
       for (const Point2& p : request.line) box.include(stream::Point3{p[0], p[1], 0});

@@ -58,7 +58,7 @@ class RasterCommand final : public Command {
     const stream::Store store = surface_.open(request.sampler);
     if (!region_.empty())
       request.region = crs_.regions(store, common)(Region::parse(region_, stop_token()));
-    request.to = crs_.to(store, common);
+    request.to = crs_.from_store_to_output(store, common);
     request.output = output_;
     request.replace = may_replace(output_, common.force);
     const RasterOutcome outcome = write_raster(store, request, common.context());

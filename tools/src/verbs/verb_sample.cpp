@@ -77,19 +77,21 @@ class SampleCommand final : public Command {
   }
 
  private:
+  /// Returns the conversions of the places to the store's CRS and to that of the output.
   [[nodiscard]] PlaceConversions conversions_for(const stream::Store& store,
                                                  const CommonOptions& common) const {
     PlaceConversions conversions;
-    const std::optional<Transformation> given = crs_.given(store, common);
-    if (given) {
-      conversions.most_latitude = given->to().most_latitude();
-      conversions.to_store = [given](std::span<Point2> here) { given->reverse(here); };
-    } else if (const auto own = CoordinateSystem::of(store.schema().crs, store.path().string())) {
-      conversions.most_latitude = own->most_latitude();
+    const std::optional<Transformation> input = crs_.from_store_to_input(store, common);
+    if (input) {
+      conversions.most_latitude = input->to().most_latitude();
+      conversions.to_store = [input](std::span<Point2> places) { input->reverse(places); };
+    } else if (const auto system =
+                   CoordinateSystem::of(store.schema().crs, store.path().string())) {
+      conversions.most_latitude = system->most_latitude();
     }
-    if (const auto written = crs_.written(store, common, given)) {
-      conversions.writes_degrees = written->to().is_geographic();
-      conversions.to_written = [written](std::span<Point2> here) { written->forward(here); };
+    if (const auto output = crs_.from_input_to_output(store, common, input)) {
+      conversions.writes_degrees = output->to().is_geographic();
+      conversions.to_written = [output](std::span<Point2> places) { output->forward(places); };
     }
     return conversions;
   }
