@@ -126,6 +126,7 @@ SINGLE_USER_HEADERS = {
     'research/cluster/lp_rounding.hpp': EXPERIMENT,
     'research/tri/ear_queue.hpp': EXPERIMENT,
     'tools/src/pch/command.hpp': 'the precompiled header, which the compiler includes',
+    'tools/src/picture/picture_input.hpp': 'reads what a verb draws',
     'tools/src/scan/criterion.hpp': 'options that a fuzz target parses too',
     'tools/src/serve/server.hpp': 'hides Boost from the verb',
     'tools/src/synth/fractal.hpp': TESTED,

@@ -15,7 +15,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Distinct from both snow and shadow.
+/// A colour unlike both snow and shadow.
 constexpr std::array<float, 3> kBackground{0.90F, 0.92F, 0.94F};
 
 }  // namespace
@@ -59,7 +59,7 @@ Light Light::for_terrain(const ViewDirection& view, double relief) {
           .flat = half};
 }
 
-Light Light::beside(const Camera& camera) {
+Light Light::headlight(const Camera& camera) {
   stream::Point3 direction{};
   for (std::size_t i = 0; i < 3; ++i) {
     direction[i] = camera.toward[i] + 0.45 * camera.up[i] - 0.45 * camera.right[i];

@@ -23,11 +23,11 @@ class Canvas {
   [[nodiscard]] std::uint32_t width() const { return width_; }    ///< in samples
   [[nodiscard]] std::uint32_t height() const { return height_; }  ///< in samples
 
-  /// Returns the colour of a sample (red, green and blue from 0 to 1). The depth below is -infinity
-  /// for an empty sample.
+  /// Returns the colour of a sample: red, green and blue from 0 to 1.
   [[nodiscard]] std::array<float, 3>& colour(std::uint32_t x, std::uint32_t y) {
     return colours_[std::size_t{y} * width_ + x];
   }
+  /// Returns the depth of a sample in metres toward the viewer; -infinity if it is empty.
   [[nodiscard]] float& depth(std::uint32_t x, std::uint32_t y) {
     return depths_[std::size_t{y} * width_ + x];
   }
@@ -50,8 +50,8 @@ struct Light {
 
   /// Returns cartographic light from the north-west, 45 degrees high, that turns with the viewer.
   static Light for_terrain(const ViewDirection& view, double relief);
-  /// Returns a light next to the viewer, for bodies seen from any side.
-  static Light beside(const Camera& camera);
+  /// Returns a light at the viewer, slightly above and to the left, for bodies seen from any side.
+  static Light headlight(const Camera& camera);
 
   /// Returns the brightness, from 0 to 1, of a surface with that unit normal seen from `toward`.
   /// The normal is first turned to the viewer, because surfaces have two sides.

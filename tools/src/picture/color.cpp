@@ -13,16 +13,17 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-struct Stop {
-  double place;
+struct ColourStop {
+  double position;
   Rgb colour;
 };
 
-Rgb ramp(std::span<const Stop> stops, double place) {
-  if (!(place > stops.front().place)) return stops.front().colour;
+Rgb ramp(std::span<const ColourStop> stops, double position) {
+  if (!(position > stops.front().position)) return stops.front().colour;
   for (std::size_t i = 1; i < stops.size(); ++i) {
-    if (place > stops[i].place) continue;
-    const double t = (place - stops[i - 1].place) / (stops[i].place - stops[i - 1].place);
+    if (position > stops[i].position) continue;
+    const double t =
+        (position - stops[i - 1].position) / (stops[i].position - stops[i - 1].position);
     Rgb mixed{};
     for (std::size_t c = 0; c < 3; ++c) {
       mixed[c] = static_cast<std::uint8_t>(
@@ -36,34 +37,34 @@ Rgb ramp(std::span<const Stop> stops, double place) {
 }  // namespace
 
 Rgb land_colour(double share) {
-  static constexpr std::array<Stop, 7> kLand{{{0.00, {96, 145, 92}},
-                                              {0.18, {150, 178, 110}},
-                                              {0.36, {212, 201, 140}},
-                                              {0.54, {196, 160, 105}},
-                                              {0.70, {160, 122, 92}},
-                                              {0.85, {178, 166, 158}},
-                                              {1.00, {250, 250, 250}}}};
+  static constexpr std::array<ColourStop, 7> kLand{{{0.00, {96, 145, 92}},
+                                                    {0.18, {150, 178, 110}},
+                                                    {0.36, {212, 201, 140}},
+                                                    {0.54, {196, 160, 105}},
+                                                    {0.70, {160, 122, 92}},
+                                                    {0.85, {178, 166, 158}},
+                                                    {1.00, {250, 250, 250}}}};
   return ramp(kLand, share);
 }
 
 Rgb sea_colour(double share) {
-  static constexpr std::array<Stop, 4> kSea{
+  static constexpr std::array<ColourStop, 4> kSea{
       {{0.0, {20, 42, 92}}, {0.5, {44, 92, 150}}, {0.85, {104, 160, 202}}, {1.0, {168, 208, 228}}}};
   return ramp(kSea, share);
 }
 
 Rgb slope_colour(double degrees) {
-  static constexpr std::array<Stop, 4> kSlope{
+  static constexpr std::array<ColourStop, 4> kSlope{
       {{0, {250, 250, 245}}, {15, {250, 215, 110}}, {35, {205, 70, 45}}, {60, {75, 15, 30}}}};
   return ramp(kSlope, degrees);
 }
 
 Rgb store_level_colour(unsigned level, unsigned top) {
-  static constexpr std::array<Stop, 5> kLevels{{{0.00, {68, 34, 112}},
-                                                {0.25, {49, 104, 142}},
-                                                {0.50, {53, 183, 121}},
-                                                {0.75, {180, 221, 44}},
-                                                {1.00, {253, 231, 80}}}};
+  static constexpr std::array<ColourStop, 5> kLevels{{{0.00, {68, 34, 112}},
+                                                      {0.25, {49, 104, 142}},
+                                                      {0.50, {53, 183, 121}},
+                                                      {0.75, {180, 221, 44}},
+                                                      {1.00, {253, 231, 80}}}};
   return ramp(kLevels, top > 0 ? 1 - static_cast<double>(level) / top : 1);
 }
 

@@ -36,14 +36,14 @@ Rgb class_colour(std::int64_t number);
 /// neighbours. Negative numbers, points without a cluster, are light grey.
 Rgb cluster_colour(std::int64_t cluster);
 
-/// The height range of the tints. It leaves out the outermost 0.5 % of the picture at either end,
-/// and has a shore at 0 if there is both land and sea.
+/// The height range of the tints. It excludes the lowest and the highest 0.5 % of the picture. If
+/// there is both land and sea, a shore at 0 separates their tints.
 struct HeightTint {
   double low = 0.0, high = 1.0;
   bool shore = false;
 
-  /// Each of the `heights` represents an equal part of the picture. Heights that are not finite are
-  /// ignored. O(n log n).
+  /// Returns the range for `heights`, each of which represents an equal part of the picture.
+  /// Ignores heights that are not finite. O(n log n).
   static HeightTint of(std::vector<double> heights);
   [[nodiscard]] Rgb colour(double height) const;
 };

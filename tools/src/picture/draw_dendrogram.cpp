@@ -15,9 +15,9 @@ namespace {
 using cluster::Dendrogram;
 using cluster::Merge;
 
-/// Returns the points in the order of the tree's leaves. Uses a stack, because a tree may be as
-/// deep as it is wide.
-std::vector<double> leaf_places(const Dendrogram& tree) {
+/// Returns the position of each point along the row of leaves, in leaf spacings. Uses a stack,
+/// because a tree may be as deep as it is wide.
+std::vector<double> leaf_positions(const Dendrogram& tree) {
   std::vector<double> place(tree.points, 0.0);
   const auto points = static_cast<std::uint32_t>(tree.points);
   std::vector<std::uint32_t> stack{
@@ -55,6 +55,7 @@ std::vector<std::int64_t> groups_below(const Dendrogram& tree, double threshold)
   return group;
 }
 
+/// Fills a rectangle of samples; its part outside the canvas moves to the border.
 void fill(double x0, double y0, double x1, double y1, const Rgb& rgb, Canvas& canvas) {
   const auto left = static_cast<std::uint32_t>(std::clamp(x0, 0.0, canvas.width() - 1.0));
   const auto right = static_cast<std::uint32_t>(std::clamp(x1, 0.0, canvas.width() - 1.0));
@@ -73,19 +74,21 @@ void fill(double x0, double y0, double x1, double y1, const Rgb& rgb, Canvas& ca
 void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
   if (tree.merges.empty()) return;
   const double margin = 0.03 * std::min(canvas.width(), canvas.height());
-  const double wide = canvas.width() - 2 * margin, high = canvas.height() - 2 * margin;
-  // An inversion may be lower than its parts, even the last merge.
+  const double plot_width = canvas.width() - 2 * margin, plot_height = canvas.height() - 2 * margin;
+  // Any merge may be the highest: an inversion is lower than its parts, even the last merge.
   double top = 0.0;
   for (const Merge& merge : tree.merges) top = std::max(top, merge.height);
-  // All merges of equal points are at 0.
-  const double scale = top > 0 ? high / top : 0.0;
-  const double step = wide / static_cast<double>(tree.points);
+  // The height is 0 if all points are equal.
+  const double scale = top > 0 ? plot_height / top : 0.0;
+  const double step = plot_width / static_cast<double>(tree.points);
   // A pixel has two samples across; crowded lines are one sample wide.
   const double half = step >= 8 ? 1.0 : 0.5;
-  const auto row = [&](double height) { return canvas.height() - margin - scale * height; };
+  const auto row_of_height = [&](double height) {
+    return canvas.height() - margin - scale * height;
+  };
 
-  const std::vector<double> leaf = leaf_places(tree);
-  // SciPy colours clusters below the same share of the height.
+  const std::vector<double> leaf = leaf_positions(tree);
+  // The same threshold as SciPy's.
   const std::vector<std::int64_t> group = groups_below(tree, 0.7 * top);
   std::vector<double> middle(tree.merges.size());
   const auto points = static_cast<std::uint32_t>(tree.points);
@@ -99,10 +102,10 @@ void draw_dendrogram(const Dendrogram& tree, Canvas& canvas) {
     const auto height = [&](std::uint32_t node) {
       return node < points ? 0.0 : tree.merges[node - points].height;
     };
-    const double a = place(merge.a), b = place(merge.b), y = row(merge.height);
+    const double a = place(merge.a), b = place(merge.b), y = row_of_height(merge.height);
     middle[r] = 0.5 * (a + b);
     for (const auto& [x, node] : {std::pair{a, merge.a}, std::pair{b, merge.b}}) {
-      const double end = row(height(node));
+      const double end = row_of_height(height(node));
       fill(x - half, std::min(y, end), x + half, std::max(y, end), colour, canvas);
     }
     fill(std::min(a, b) - half, y - half, std::max(a, b) + half, y + half, colour, canvas);

@@ -32,13 +32,13 @@ class Brush {
               const Colour& colour) {
     const double reach = radius + 0.5;
     const double dx = b[0] - a[0], dy = b[1] - a[1], square = dx * dx + dy * dy;
-    // Skip NaN and places far outside the picture.
+    // Skip NaN and positions far outside the picture.
     if (!(square < 1e18 && std::abs(a[0]) + std::abs(a[1]) < 1e9)) return;
     const double top = std::max(std::floor(std::min(a[1], b[1]) - reach), double{0.0} + first_);
     const double bottom = std::min(std::ceil(std::max(a[1], b[1]) + reach), double{0.0} + last_);
     for (double y = top; y < bottom; ++y) {
       check_interrupt();
-      // The part of the line near this row.
+      // Examine only the part of the line near this row.
       double from = 0, to = 1;
       if (dy != 0) {
         const double s = (y + 0.5 - reach - a[1]) / dy, t = (y + 0.5 + reach - a[1]) / dy;
@@ -57,15 +57,17 @@ class Brush {
       }
     }
   }
+  /// Paints a disc.
   void dot(const std::array<double, 3>& centre, double radius, const Colour& colour) {
     stroke(centre, centre, radius, colour);
   }
 
  private:
-  void blend(double x, double y, double cover, const Colour& colour) {
-    if (cover <= 0) return;
+  /// Mixes `colour` into a sample by the covered share of its area.
+  void blend(double x, double y, double coverage, const Colour& colour) {
+    if (coverage <= 0) return;
     Colour& sample = canvas_.colour(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
-    const auto share = static_cast<float>(std::min(cover, 1.0));
+    const auto share = static_cast<float>(std::min(coverage, 1.0));
     for (std::size_t c = 0; c < 3; ++c) sample[c] += share * (colour[c] - sample[c]);
   }
 
@@ -80,6 +82,18 @@ void fill_with_paper(Canvas& canvas, std::uint32_t first_row, std::uint32_t last
   }
 }
 
+/// Returns Camera::project() of each position.
+std::vector<std::array<double, 3>> project_all(const std::vector<stream::Point3>& positions,
+                                               const Camera& camera) {
+  std::vector<std::array<double, 3>> projected;
+  projected.reserve(positions.size());
+  for (const stream::Point3& p : positions) {
+    check_interrupt();
+    projected.push_back(camera.project(p));
+  }
+  return projected;
+}
+
 /// Returns the colour of a level: red at the bottom, black at the top.
 Colour level_colour(std::uint32_t level, std::uint32_t top) {
   const float share = top > 1 ? static_cast<float>(level - 1) / static_cast<float>(top - 1) : 0.0F;
@@ -87,17 +101,18 @@ Colour level_colour(std::uint32_t level, std::uint32_t top) {
   return {0.87F * light, 0.11F * light * light, 0.10F * light * light};
 }
 
-/// Returns half the width of a line. Higher levels have fewer lines and room for wider ones:
-/// distances grow by a factor of sqrt(2) per level.
-double width_of_level(std::uint32_t level, double thin) {
-  const double thick = std::max(4.6, 1.8 * thin);
-  double width = thin;
-  while (--level > 0 && width < thick) width *= 1.2;
-  return std::min(width, thick);
+/// Returns half the width of a line, which is `lowest` for level 1. Higher levels have fewer lines
+/// and room for wider ones: distances grow by a factor of sqrt(2) per level.
+double half_width_of_level(std::uint32_t level, double lowest) {
+  const double highest = std::max(4.6, 1.8 * lowest);
+  double width = lowest;
+  while (--level > 0 && width < highest) width *= 1.2;
+  return std::min(width, highest);
 }
 
-/// Returns the lines in drawing order, with higher levels first or last.
-std::vector<std::uint32_t> by_level(const std::vector<MatchingLine>& lines, bool higher_first) {
+/// Returns the indices of the lines in drawing order, with higher levels first or last.
+std::vector<std::uint32_t> drawing_order(const std::vector<MatchingLine>& lines,
+                                         bool higher_first) {
   std::vector<std::uint32_t> order(lines.size());
   std::iota(order.begin(), order.end(), 0u);
   std::stable_sort(order.begin(), order.end(), [&](std::uint32_t i, std::uint32_t j) {
@@ -107,26 +122,26 @@ std::vector<std::uint32_t> by_level(const std::vector<MatchingLine>& lines, bool
   return order;
 }
 
-/// Returns the usual distance between neighbours in samples: the median length of pairs, or the
+/// Returns the typical distance between neighbours in samples: the median length of pairs, or the
 /// spacing of evenly spread points if that is less.
-double usual_distance(const std::vector<MatchingLine>& lines,
-                      const std::vector<std::array<double, 3>>& places, std::size_t points,
-                      const Canvas& canvas) {
+double typical_spacing(const std::vector<MatchingLine>& lines,
+                       const std::vector<std::array<double, 3>>& projected, std::size_t points,
+                       const Canvas& canvas) {
   std::vector<double> lengths;
   for (const MatchingLine& line : lines) {
     check_interrupt();
-    const auto &a = places[line.a], &b = places[line.b];
+    const auto &a = projected[line.a], &b = projected[line.b];
     const double length = base::hypot(a[0] - b[0], a[1] - b[1]);
     if (line.level == 1 && std::isfinite(length)) lengths.push_back(length);
   }
-  double usual = 0.4 * std::sqrt(static_cast<double>(canvas.width()) * canvas.height() /
-                                 static_cast<double>(std::max<std::size_t>(points, 1)));
+  double spacing = 0.4 * std::sqrt(static_cast<double>(canvas.width()) * canvas.height() /
+                                   static_cast<double>(std::max<std::size_t>(points, 1)));
   if (!lengths.empty()) {
     const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
     std::nth_element(lengths.begin(), middle, lengths.end());
-    usual = std::min(usual, *middle);
+    spacing = std::min(spacing, *middle);
   }
-  return usual;
+  return spacing;
 }
 
 }  // namespace
@@ -135,12 +150,7 @@ void draw_lines(const std::vector<stream::Point3>& positions,
                 const std::vector<LineSet::Line>& lines, const std::vector<Rgb>& colours,
                 const Camera& camera, const DrawOptions& options, Canvas& canvas) {
   constexpr double kRadius = 1.0;
-  std::vector<std::array<double, 3>> places;
-  places.reserve(positions.size());
-  for (const stream::Point3& p : positions) {
-    check_interrupt();
-    places.push_back(camera.project(p));
-  }
+  const std::vector<std::array<double, 3>> projected = project_all(positions, camera);
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
@@ -152,7 +162,7 @@ void draw_lines(const std::vector<stream::Point3>& positions,
         for (std::size_t c = 0; c < 3 && !colours.empty(); ++c) {
           colour[c] = static_cast<float>(colours[i][c]) / 255.0F;
         }
-        brush.stroke(places[i], places[i + 1], kRadius, colour);
+        brush.stroke(projected[i], projected[i + 1], kRadius, colour);
       }
     }
   });
@@ -162,25 +172,20 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
                    Canvas& canvas) {
   const std::vector<MatchingLine>& lines = picture.result.lines;
   const std::size_t points = picture.result.points;
-  std::vector<std::array<double, 3>> places;
-  places.reserve(picture.positions.size());
-  for (const stream::Point3& p : picture.positions) {
-    check_interrupt();
-    places.push_back(camera.project(p));
-  }
-  std::vector<bool> reached(points, false);
+  const std::vector<std::array<double, 3>> projected = project_all(picture.positions, camera);
+  std::vector<bool> matched(points, false);
   for (const MatchingLine& line : lines) {
     check_interrupt();
-    if (line.a < points) reached[line.a] = true;
-    if (line.b < points) reached[line.b] = true;
+    if (line.a < points) matched[line.a] = true;
+    if (line.b < points) matched[line.b] = true;
   }
-  const double usual = usual_distance(lines, places, points, canvas);
-  // Pairs do not overlap; the lowest lines of a crowded tree leave room for the others.
-  const double thin = std::clamp(0.055 * usual, picture.result.top > 1 ? 0.75 : 1.0, 4.0);
+  const double spacing = typical_spacing(lines, projected, points, canvas);
+  // Pairs do not overlap, so they may be wider than the lowest lines of a crowded tree.
+  const double half_width = std::clamp(0.055 * spacing, picture.result.top > 1 ? 0.75 : 1.0, 4.0);
   // In a crowded picture, dots would hide the lines, and small lines the large ones.
-  const bool crowded = usual < 14;
-  const std::vector<std::uint32_t> order = by_level(lines, !crowded);
-  const double dot = std::max(2.1 * thin, 1.5);
+  const bool crowded = spacing < 14;
+  const std::vector<std::uint32_t> order = drawing_order(lines, !crowded);
+  const double dot = std::max(2.1 * half_width, 1.5);
 
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     fill_with_paper(canvas, first, last);
@@ -188,18 +193,18 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
     for (const std::uint32_t i : order) {
       check_interrupt();
       const MatchingLine& line = lines[i];
-      const double radius = width_of_level(line.level, thin);
+      const double radius = half_width_of_level(line.level, half_width);
       const Colour colour = level_colour(line.level, picture.result.top);
-      brush.stroke(places[line.a], places[line.b], radius, colour);
+      brush.stroke(projected[line.a], projected[line.b], radius, colour);
       for (const std::uint32_t node : {line.a, line.b}) {
-        if (node >= points) brush.dot(places[node], 1.6 * radius, colour);
+        if (node >= points) brush.dot(projected[node], 1.6 * radius, colour);
       }
     }
     for (std::size_t i = 0; i < points; ++i) {
       check_interrupt();
-      if (reached[i] && crowded) continue;
-      brush.dot(places[i], dot, kDot);
-      if (!reached[i] && !lines.empty()) brush.dot(places[i], 0.55 * dot, kPaper);
+      if (matched[i] && crowded) continue;
+      brush.dot(projected[i], dot, kDot);
+      if (!matched[i] && !lines.empty()) brush.dot(projected[i], 0.55 * dot, kPaper);
     }
   });
 }

@@ -23,6 +23,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
+/// The disc that represents a point: position and radius in samples, depth in metres.
 struct Splat {
   float x, y, depth, radius;
 };
@@ -30,13 +31,13 @@ struct Splat {
 /// Radius of the disc at each sample of the canvas, 0 where there is none.
 using Radii = std::vector<float>;
 
-/// Returns the depth step between samples above which a surface counts as two surfaces.
-float jump(float radius, const Camera& camera) {
+/// Returns the depth step between samples above which they belong to different surfaces.
+float max_depth_step(float radius, const Camera& camera) {
   return 4 * (radius + 1) / static_cast<float>(camera.scale);
 }
 
-/// Returns the number of samples that the cloud covers, ignoring its gaps. Counts the cells of a
-/// grid so coarse that a covered cell holds several points.
+/// Returns the number of samples that the cloud covers, including the gaps between its points.
+/// Counts the cells of a grid so coarse that a covered cell contains several points.
 double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   double area = 1;
   for (std::uint32_t cell = 2; cell <= 256; cell *= 2) {
@@ -63,7 +64,8 @@ double covered_area(const std::vector<Splat>& splats, const Canvas& canvas) {
   return area;
 }
 
-std::vector<Splat> projected(const std::vector<stream::Point3>& positions, const Camera& camera) {
+/// Returns a splat of radius 0 for each position.
+std::vector<Splat> splats_of(const std::vector<stream::Point3>& positions, const Camera& camera) {
   std::vector<Splat> splats;
   splats.reserve(positions.size());
   for (const stream::Point3& position : positions) {
@@ -74,37 +76,38 @@ std::vector<Splat> projected(const std::vector<stream::Point3>& positions, const
   return splats;
 }
 
-/// Returns the radius for points scattered evenly over an area, of which discs of radius r leave
-/// exp(-points * pi * r^2 / area) uncovered. Half of a closed body's points are on its back, so
-/// half a percent of it stays uncovered, but nothing of a terrain.
-double usual_radius(const std::vector<Splat>& splats, const Canvas& canvas) {
+/// Returns the radius of the discs for points scattered evenly over the covered area. Discs of
+/// radius r leave a share of exp(-points * pi * r^2 / area) uncovered. That is nothing of a
+/// terrain, and half a percent of a closed body, because half of its points are on its back.
+double even_radius(const std::vector<Splat>& splats, const Canvas& canvas) {
   constexpr double kCover = 1.9;
   const double per_point = covered_area(splats, canvas) / static_cast<double>(splats.size());
   return std::clamp(kCover * std::sqrt(per_point), 1.0, 60.0);
 }
 
-/// Sets radii for a cloud with coarser parts, large enough for each part: from the distances to a
-/// few neighbours among points of the same coarseness, but not much above the usual distance among
-/// them.
+/// Sets the radii for a cloud with coarser parts, large enough for each part. They follow from the
+/// distances to a few neighbours among points of the same coarseness, and are limited by the median
+/// distance among these points.
 void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& canvas,
                const DrawOptions& options, std::vector<Splat>& splats) {
   constexpr unsigned kRank = 8;
-  // Points of one side. Scattered points get the same cover as below; representatives, which keep
-  // apart, need less.
+  // Radius per distance, for the points of one side of a body. Scattered points get the same
+  // coverage as by even_radius(). Representatives keep a distance from each other, so they need
+  // less.
   const double scattered = 1.34 * std::sqrt(std::numbers::pi / kRank);
-  const double apart = 0.8 * std::sqrt(std::numbers::pi / kRank);
-  // Discs as large as a tenth of the picture show no shape.
-  const double most = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
+  const double spaced = 0.8 * std::sqrt(std::numbers::pi / kRank);
+  // Discs larger than a tenth of the picture would hide the shape.
+  const double max_radius = std::max(1.0, 0.1 * std::min(canvas.width(), canvas.height()));
   std::array<std::vector<std::uint32_t>, 256> groups;
   for (std::size_t i = 0; i < splats.size(); ++i) {
     check_interrupt();
     groups[cloud.left_out[i]].push_back(static_cast<std::uint32_t>(i));
   }
   std::vector<stream::Point3> positions;
-  for (std::size_t coarse = 0; coarse < groups.size(); ++coarse) {
-    const std::vector<std::uint32_t>& group = groups[coarse];
+  for (std::size_t coarseness = 0; coarseness < groups.size(); ++coarseness) {
+    const std::vector<std::uint32_t>& group = groups[coarseness];
     if (group.size() < 2) continue;
-    const double per_distance = coarse > 0 ? apart : scattered;
+    const double radius_per_distance = coarseness > 0 ? spaced : scattered;
     positions.clear();
     for (const std::uint32_t i : group) {
       check_interrupt();
@@ -118,41 +121,42 @@ void set_radii(const TriangleMesh& cloud, const Camera& camera, const Canvas& ca
     for (std::size_t k = 0; k < group.size(); ++k) {
       check_interrupt();
       const double distance = std::min(distances[k], 1.5F * *middle);
-      splats[group[k]].radius =
-          static_cast<float>(std::clamp(per_distance * distance * camera.scale, 1.0, most));
+      splats[group[k]].radius = static_cast<float>(
+          std::clamp(radius_per_distance * distance * camera.scale, 1.0, max_radius));
     }
   }
 }
 
 /// Averages depths over a square somewhat larger than the disc, first along rows, then along
-/// columns. Neighbours beyond a jump are left out. Without smoothing, the normals would be those of
-/// the discs.
+/// columns. Excludes neighbours on other surfaces (max_depth_step()). Without smoothing, the
+/// normals would be those of the discs.
 void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, unsigned threads) {
   using Floats __attribute__((vector_size(16))) = float;
   constexpr int kLanes = 4;
   const std::uint32_t width = canvas.width(), height = canvas.height();
-  // Rows and columns as lines, each followed by some samples without depth, so that all lanes can
-  // be read.
+  // Copy rows and columns to lines with some samples without depth at the end, so that all lanes
+  // can be read.
   const std::size_t row_size = width + kLanes, column_size = height + kLanes;
   std::vector<float> rows = base::filled(row_size * height, -HUGE_VALF, check_interrupt);
   std::vector<float> columns = base::filled(column_size * width, -HUGE_VALF, check_interrupt);
   const auto smooth = [&](const float* line, std::uint32_t size, std::uint32_t index, float disc) {
     const float centre = line[index];
     if (!std::isfinite(centre)) return centre;
-    const float per_jump = 1 / jump(disc, camera);
+    const float per_max_step = 1 / max_depth_step(disc, camera);
     const int radius = std::max(1, static_cast<int>(std::lround(1.2F * disc)));
     const int at = static_cast<int>(index), first = std::max(at - radius, 0);
     const int last = std::min(at + radius, static_cast<int>(size) - 1);
-    Floats sum{}, weight{}, off = static_cast<float>(first - at) + Floats{0, 1, 2, 3};
-    for (int i = first; i <= last; i += kLanes, off += static_cast<float>(kLanes)) {
-      Floats away;
-      std::memcpy(&away, line + i, sizeof away);
-      away -= centre;
-      const Floats jumps = away * per_jump, left = 1 - jumps * jumps;
-      const Floats reach = static_cast<float>(radius + 1) - (off < 0 ? -off : off);
-      const auto near = (left > 0) & (reach > 0);
-      const Floats w = near ? reach * left * left : Floats{};
-      sum += near ? w * away : Floats{};
+    Floats sum{}, weight{}, offset = static_cast<float>(first - at) + Floats{0, 1, 2, 3};
+    for (int i = first; i <= last; i += kLanes, offset += static_cast<float>(kLanes)) {
+      Floats difference;
+      std::memcpy(&difference, line + i, sizeof difference);
+      difference -= centre;
+      const Floats steps = difference * per_max_step, depth_weight = 1 - steps * steps;
+      const Floats distance_weight =
+          static_cast<float>(radius + 1) - (offset < 0 ? -offset : offset);
+      const auto near = (depth_weight > 0) & (distance_weight > 0);
+      const Floats w = near ? distance_weight * depth_weight * depth_weight : Floats{};
+      sum += near ? w * difference : Floats{};
       weight += w;
     }
     return centre +
@@ -177,17 +181,18 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
   });
 }
 
-/// Returns the slope of the depths at a sample along one axis, from the side without a jump.
-float slope(float before, float here, float after, float step) {
+/// Returns the slope of the depths at a sample along one axis, in metres per sample. Differences
+/// larger than max_step are between two surfaces and do not count.
+float slope(float before, float here, float after, float max_step) {
   const float back = here - before, ahead = after - here;
-  const bool back_good = std::abs(back) <= step, ahead_good = std::abs(ahead) <= step;
-  if (back_good && ahead_good) return 0.5F * (back + ahead);
-  if (back_good) return back;
-  if (ahead_good) return ahead;
+  const bool back_valid = std::abs(back) <= max_step, ahead_valid = std::abs(ahead) <= max_step;
+  if (back_valid && ahead_valid) return 0.5F * (back + ahead);
+  if (back_valid) return back;
+  if (ahead_valid) return ahead;
   return 0;
 }
 
-/// Lights every sample by the normal computed from the depths of it and its neighbours.
+/// Lights every sample by a normal computed from its depth and those of its neighbours.
 void light_by_depth(const Camera& camera, const Light& light, const Radii& radii, unsigned threads,
                     Canvas& canvas) {
   for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
@@ -196,7 +201,7 @@ void light_by_depth(const Camera& camera, const Light& light, const Radii& radii
       for (std::uint32_t x = 0; x < canvas.width(); ++x) {
         const float here = canvas.depth(x, y);
         if (!std::isfinite(here)) continue;
-        const float step = jump(radii[std::size_t{y} * canvas.width() + x], camera);
+        const float step = max_depth_step(radii[std::size_t{y} * canvas.width() + x], camera);
         const float left = canvas.depth(x == 0 ? x : x - 1, y);
         const float right = canvas.depth(std::min(x + 1, canvas.width() - 1), y);
         const float above = canvas.depth(x, y == 0 ? y : y - 1);
@@ -217,8 +222,8 @@ void light_by_depth(const Camera& camera, const Light& light, const Radii& radii
   });
 }
 
-/// Returns whether the drawn samples hide the whole disc. A single visible sample is enough: on a
-/// steep slope most of the disc is hidden.
+/// Returns whether drawn samples nearer than `depth` hide the whole disc. A single visible sample
+/// is enough, because on a steep slope most of the disc is hidden.
 bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth) {
   const auto inside = [](double value, std::uint32_t size) {
     return static_cast<std::uint32_t>(std::clamp(value, 0.0, size - 1.0));
@@ -227,34 +232,19 @@ bool is_hidden(Canvas& canvas, double cx, double cy, double radius, double depth
        y <= inside(cy + radius, canvas.height()); ++y) {
     for (std::uint32_t x = inside(cx - radius, canvas.width());
          x <= inside(cx + radius, canvas.width()); ++x) {
-      // There is nothing outside the outline.
+      // Empty samples are outside the cloud and do not count as visible.
       if (std::isfinite(canvas.depth(x, y)) && canvas.depth(x, y) <= depth) return false;
     }
   }
   return true;
 }
 
-}  // namespace
-
-void fit_discs(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas) {
-  if (positions.empty()) return;
-  // The radius may grow a little, because the area is measured in coarse cells.
-  constexpr double kMargin = 0.02, kGrowth = 1.3;
-  const double side = std::min(canvas.width(), canvas.height());
-  const double beyond =
-      kGrowth * usual_radius(projected(positions, camera), canvas) - kMargin * side;
-  if (beyond > 0) camera.scale *= std::max(0.5, 1 - 2 * beyond / ((1 - 2 * kMargin) * side));
-}
-
-void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
-                 const Light& light, const DrawOptions& options, Canvas& canvas) {
-  std::vector<Splat> splats = projected(cloud.positions, camera);
-  if (splats.empty()) return;
-  const auto usual = static_cast<float>(usual_radius(splats, canvas));
-  const bool own_normals = cloud.normals.size() == cloud.positions.size();
-  for (Splat& splat : splats) splat.radius = usual;
-  if (cloud.left_out.size() == splats.size()) set_radii(cloud, camera, canvas, options, splats);
-
+/// Draws the splats with a depth buffer, lit by the points' normals if they have any. Returns the
+/// radii of the visible discs.
+Radii draw_splats(const TriangleMesh& cloud, const std::vector<Rgb>& colours,
+                  const std::vector<Splat>& splats, const Camera& camera, const Light& light,
+                  const DrawOptions& options, Canvas& canvas) {
+  const bool has_normals = cloud.normals.size() == cloud.positions.size();
   Radii radii = base::filled(std::size_t{canvas.width()} * canvas.height(), 0.0F, check_interrupt);
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::size_t i = 0; i < splats.size(); ++i) {
@@ -268,7 +258,7 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
           std::min(std::floor(s.x + radius - 0.5F) + 1, static_cast<float>(canvas.width()));
       if (!(y0 < y1 && x0 < x1)) continue;
       float shade = 1;
-      if (own_normals) {
+      if (has_normals) {
         const auto& n = cloud.normals[i];
         shade = light.shade({n[0], n[1], n[2]}, camera.toward);
       }
@@ -291,8 +281,33 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
       }
     }
   });
-  if (own_normals) return;
-  // Smooth twice: the second pass removes the edges that the squares of the first leave.
+  return radii;
+}
+
+}  // namespace
+
+void fit_discs(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas) {
+  if (positions.empty()) return;
+  // The radius may grow a little, because the area is measured in coarse cells.
+  constexpr double kMargin = 0.02, kGrowth = 1.3;
+  const double side = std::min(canvas.width(), canvas.height());
+  const double overhang =
+      kGrowth * even_radius(splats_of(positions, camera), canvas) - kMargin * side;
+  if (overhang > 0) camera.scale *= std::max(0.5, 1 - 2 * overhang / ((1 - 2 * kMargin) * side));
+}
+
+void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, const Camera& camera,
+                 const Light& light, const DrawOptions& options, Canvas& canvas) {
+  std::vector<Splat> splats = splats_of(cloud.positions, camera);
+  if (splats.empty()) return;
+  const auto even = static_cast<float>(even_radius(splats, canvas));
+  const bool has_normals = cloud.normals.size() == cloud.positions.size();
+  for (Splat& splat : splats) splat.radius = even;
+  if (cloud.left_out.size() == splats.size()) set_radii(cloud, camera, canvas, options, splats);
+
+  const Radii radii = draw_splats(cloud, colours, splats, camera, light, options, canvas);
+  if (has_normals) return;
+  // The second pass removes the edges that the squares of the first one leave.
   smooth_depths(canvas, radii, camera, options.threads);
   smooth_depths(canvas, radii, camera, options.threads);
   light_by_depth(camera, light, radii, options.threads, canvas);
@@ -301,10 +316,10 @@ void draw_points(const TriangleMesh& cloud, const std::vector<Rgb>& colours, con
 void draw_marks(const std::vector<stream::Point3>& positions, const Camera& camera,
                 const DrawOptions& options, Canvas& canvas) {
   if (positions.empty()) return;
-  // As large as possible without merging, up to a few pixels.
-  const double share =
+  // Make the marks as large as possible without merging, up to a few pixels.
+  const double area_per_mark =
       static_cast<double>(canvas.width()) * canvas.height() / static_cast<double>(positions.size());
-  const double radius = std::clamp(0.14 * std::sqrt(share), 1.0, 8.0);
+  const double radius = std::clamp(0.14 * std::sqrt(area_per_mark), 1.0, 8.0);
   const double core = 0.6 * radius;
   constexpr std::array<float, 3> kRim{1.0F, 1.0F, 1.0F}, kCore{0.1F, 0.1F, 0.12F};
   double nearest = -std::numeric_limits<double>::infinity(), farthest = -nearest;
@@ -314,9 +329,10 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
     nearest = std::max(nearest, depth);
     farthest = std::min(farthest, depth);
   }
-  // A surface just in front is the disc of the point itself or of a neighbour. The margin is a
-  // share of the whole, as heights may be in another unit than the scale.
-  const double behind = std::max(12.0 / camera.scale, 0.02 * (nearest - farthest));
+  // A surface just in front is the disc of the point itself or of a neighbour, which does not hide
+  // the mark. The margin is a share of the depth range, because heights may be in another unit than
+  // the scale.
+  const double tolerance = std::max(12.0 / camera.scale, 0.02 * (nearest - farthest));
   for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (const stream::Point3& position : positions) {
       check_interrupt();
@@ -326,7 +342,7 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
       const double x0 = std::max(std::floor(cx - radius), 0.0);
       const double x1 = std::min(std::ceil(cx + radius), static_cast<double>(canvas.width()));
       if (!(y0 < y1 && x0 < x1)) continue;
-      if (is_hidden(canvas, cx, cy, radius, depth + behind)) continue;
+      if (is_hidden(canvas, cx, cy, radius, depth + tolerance)) continue;
       for (auto y = static_cast<std::uint32_t>(y0); y < static_cast<std::uint32_t>(y1); ++y) {
         for (auto x = static_cast<std::uint32_t>(x0); x < static_cast<std::uint32_t>(x1); ++x) {
           const double distance = base::hypot(x + 0.5 - cx, y + 0.5 - cy);
