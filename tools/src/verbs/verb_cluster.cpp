@@ -2,26 +2,18 @@
 // cluster: clusters one file of points in memory, by any method of libcluster.
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/core.h>
-#include <terrace/cluster/block.hpp>
-#include <terrace/cluster/dendrogram.hpp>
-#include <terrace/cluster/facility_location.hpp>
-#include <terrace/cluster/k_means.hpp>
-#include <terrace/cluster/k_median.hpp>
-#include <terrace/cluster/linkage.hpp>
 
 #include "base/units.hpp"
 #include "cli/interrupt.hpp"
@@ -37,9 +29,11 @@
 #include "terrace/terrain/metric_choice.hpp"
 #include "terrace/terrain/output_kinds.hpp"
 #include "terrace/terrain/point_file_crs.hpp"
+#include "verbs/cluster_methods.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
+<<<<<<< HEAD
 
 using namespace terrain;
 
@@ -48,305 +42,9 @@ using cluster::FacilitySolution;
 using cluster::FacilityStrategy;
 using cluster::Point3;
 
+=======
+>>>>>>> 7af28edf (cluster: Move the methods apart from the verb)
 namespace {
-
-enum class ClusterMethod : std::uint8_t {
-  facility,
-  primal_dual,
-  k_means,
-  k_median,
-  linkage,
-};
-
-/// The request of `terrace cluster`, for points on the ground.
-struct ClusterRequest {
-  ClusterMethod method = ClusterMethod::facility;
-  cluster::LinkageMethod linkage = cluster::LinkageMethod::single;
-  std::string linkage_name;  ///< as the user wrote it
-  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< for facility
-  std::string iterations;  ///< for facility: tenth, log10, log2 or a number; empty: by effort
-  cluster::Effort effort = cluster::Effort::standard;
-  std::size_t batch = 1;  ///< gains evaluated at once
-  std::size_t k = 0;      ///< requested clusters; 0: not given
-  std::optional<double> height;
-  std::optional<std::uint32_t> bound_iterations;  ///< for the lower bound; 0: none
-  std::size_t restarts = 1;
-  bool single_precision = false;  ///< for the linkage matrix
-  bool cuda = false;
-  std::uint64_t seed = 1;
-  unsigned threads = 1;
-  std::uint64_t memory_bytes = 0;
-};
-
-struct ClusterOutcome {
-  std::vector<std::uint32_t> representatives;  ///< per cluster: index of a point
-  std::vector<std::uint32_t> labels;           ///< per point: its cluster, or cluster::kOutlier
-  /// Set if the method minimises a cost. For k-means the connection cost is the sum of squares.
-  std::optional<double> opening_cost, connection_cost, outlier_cost, lower_bound;
-  std::optional<cluster::Dendrogram> dendrogram;
-  std::vector<std::string> notes;  ///< notes for the user
-};
-
-/// Called from time to time with the share of the work done, if known; may throw to stop.
-using ClusterProgress = std::function<void(double fraction)>;
-
-/// Returns the costs, facilities and assignment of a solution.
-ClusterOutcome outcome_of(FacilitySolution&& solution) {
-  ClusterOutcome outcome;
-  outcome.opening_cost = solution.opening_cost;
-  outcome.connection_cost = solution.connection_cost;
-  outcome.outlier_cost = solution.outlier_cost;
-  if (solution.lower_bound > 0.0) outcome.lower_bound = solution.lower_bound;
-  outcome.representatives = std::move(solution.facilities);
-  outcome.labels = std::move(solution.assignment);
-  return outcome;
-}
-
-void no_channels(const FacilityPoints& problem, const char* method) {
-  if (problem.channels.size() > 0) {
-    throw UsageError(std::string("--channel is for the methods facility, primal-dual and k-median, "
-                                 "not for ") +
-                     method);
-  }
-}
-
-/// Returns the number of steps for the lower bound that take some seconds; 0 if the fewest that are
-/// useful take much longer, because there are many points and few clusters. Each step examines as
-/// many points around each point as a few clusters have.
-std::uint32_t default_bound_steps(std::size_t points, std::size_t clusters) {
-  constexpr double kFewest = 15.0, kMost = 300.0;
-  constexpr double kDistances = 3e9, kMostDistances = 6e9;
-  const double per_step = 4.0 * static_cast<double>(points) * static_cast<double>(points) /
-                          static_cast<double>(clusters);
-  if (kFewest * per_step > kMostDistances) return 0;
-  return static_cast<std::uint32_t>(std::clamp(kDistances / per_step, kFewest, kMost));
-}
-
-/// Returns the outcome of `solution` with a lower bound, or with a note that none was computed.
-ClusterOutcome bounded_outcome(const ClusterRequest& request, const FacilityPoints& problem,
-                               FacilitySolution&& solution, const ClusterProgress& progress) {
-  const std::uint32_t steps = request.bound_iterations.value_or(
-      default_bound_steps(problem.points.size(), solution.facilities.size()));
-  if (steps > 0) {
-    cluster::LowerBoundOptions options;
-    options.steps = steps;
-    options.threads = request.threads;
-    options.progress = [&](std::size_t done, std::size_t total) {
-      progress(static_cast<double>(done) / static_cast<double>(total));
-      return true;
-    };
-    options.check_stop = check_interrupt;
-    solution.lower_bound = std::max(solution.lower_bound,
-                                    cluster::lower_bound(problem, solution, options).lower_bound);
-  }
-  ClusterOutcome outcome = outcome_of(std::move(solution));
-  if (steps == 0 && !request.bound_iterations && !outcome.lower_bound) {
-    outcome.notes.emplace_back(
-        "no lower bound of the cost: with few clusters of many points it takes long; "
-        "--bound-iterations 15 computes one");
-  }
-  return outcome;
-}
-
-ClusterOutcome cluster_by_facilities(const ClusterRequest& request, const FacilityPoints& problem,
-                                     const ClusterProgress& progress) {
-  cluster::FacilityOptions options;
-  options.strategy = request.strategy;
-  // Here `fast` equals `default`: on one block it would only save milliseconds.
-  options.effort = std::max(request.effort, cluster::Effort::standard);
-  if (request.iterations == "tenth") {
-    options.effort = cluster::Effort::standard;
-  } else if (request.iterations == "log10") {
-    options.effort = cluster::Effort::fine;
-  } else if (request.iterations == "log2") {
-    options.effort = cluster::Effort::full;
-  } else if (!request.iterations.empty()) {
-    options.steps = parse_count(request.iterations);
-  }
-  options.seed = request.seed;
-  options.threads = request.threads;
-  options.batch = request.batch;
-  options.assign_nearest = true;
-  options.progress = [&](std::size_t done, std::size_t total) {
-    progress(static_cast<double>(done) / static_cast<double>(std::max<std::size_t>(total, 1)));
-    return true;
-  };
-  options.check_stop = check_interrupt;
-  // Use the production engine, unless an option asks for something that it does not support.
-  constexpr std::size_t kFastPoints = std::size_t{1} << 24;
-  if (request.strategy == FacilityStrategy::automatic && request.iterations.empty() &&
-      request.batch == 1 && problem.channels.size() == 0 && std::isinf(problem.outlier_price) &&
-      problem.points.size() < kFastPoints &&
-      cluster::linear_map(problem.metric, base::box_of(problem.points))) {
-    options.strategy = FacilityStrategy::fast;
-  }
-  FacilitySolution solution = cluster::solve(problem, options);
-  progress(1.0);
-  return bounded_outcome(request, problem, std::move(solution), progress);
-}
-
-/// Clusters by the primal-dual method.
-ClusterOutcome cluster_by_growth(const ClusterRequest& request, const FacilityPoints& problem,
-                                 const ClusterProgress& progress) {
-  // Besides the matrix, the method keeps the clients sorted by facility: half as much again.
-  FacilitySolution solution = cluster::solve(problem, {.strategy = FacilityStrategy::greedy_stars,
-                                                       .memory_limit = request.memory_bytes / 3 * 2,
-                                                       .check_stop = check_interrupt});
-  return bounded_outcome(request, problem, std::move(solution), progress);
-}
-
-ClusterOutcome cluster_by_k_means(const ClusterRequest& request, const FacilityPoints& problem) {
-  no_channels(problem, "k-means");
-  const bool squared = std::holds_alternative<cluster::SquaredEuclidean>(problem.metric);
-  const auto linear =
-      cluster::linear_points(squared ? cluster::Euclidean{} : problem.metric, problem.points);
-  if (!linear) {
-    throw UsageError(
-        "--method k-means sums squares: it takes --metric euclidean, squared, or elliptical with "
-        "one region for all points");
-  }
-  const std::vector<Point3>& points = *linear;
-  const cluster::KMeansResult result = cluster::k_means(points, problem.weights,
-                                                        {.clusters = request.k,
-                                                         .seed = request.seed,
-                                                         .restarts = request.restarts,
-                                                         .threads = request.threads,
-                                                         .check_stop = check_interrupt});
-  ClusterOutcome outcome;
-  outcome.connection_cost = result.sse;
-  outcome.labels = result.assignment;
-  // Clusters that stayed empty for lack of distinct points do not count.
-  std::vector<std::uint32_t> number(request.k, cluster::kOutlier);
-  std::uint32_t used = 0;
-  for (std::uint32_t& label : outcome.labels) {
-    if (number[label] == cluster::kOutlier) number[label] = used++;
-    label = number[label];
-  }
-  if (used < request.k) {
-    outcome.notes.push_back(fmt::format("{}{}, and therefore no more clusters",
-                                        used == 1 ? "there is only " : "there are only ",
-                                        counted(used, "distinct point")));
-  }
-  if (!result.converged) {
-    outcome.notes.push_back("k-means stopped after " + counted(result.iterations, "iteration") +
-                            ", before it converged");
-  }
-  outcome.representatives = cluster::nearest_to_means(points, outcome.labels, used);
-  return outcome;
-}
-
-ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const FacilityPoints& problem) {
-  // Each step computes the distances of all pairs. Fewer than a hundred steps give no useful bound.
-  constexpr std::size_t kMostForBound = 10'000;
-  const std::uint32_t steps =
-      request.bound_iterations.value_or(problem.points.size() <= kMostForBound ? 100 : 0);
-  ClusterOutcome outcome =
-      outcome_of(cluster::k_median(problem, request.k,
-                                   {.restarts = static_cast<std::uint32_t>(request.restarts),
-                                    .bound_steps = steps,
-                                    .seed = request.seed,
-                                    .threads = request.threads,
-                                    .check_stop = check_interrupt}));
-  outcome.opening_cost.reset();
-  return outcome;
-}
-
-/// Returns the whole tree, computed on the CPU.
-cluster::Dendrogram tree_of(const ClusterRequest& request, const FacilityPoints& problem,
-                            const std::optional<std::vector<Point3>>& points) {
-  const std::string method = "--method " + request.linkage_name;
-  cluster::LinkageOptions options;
-  options.threads = request.threads;
-  options.entry =
-      request.single_precision ? cluster::MatrixEntry::float32 : cluster::MatrixEntry::float64;
-  options.memory_limit = request.memory_bytes;
-  options.check_stop = check_interrupt;
-  if (points) return cluster::linkage(*points, request.linkage, options);
-  switch (request.linkage) {
-    case cluster::LinkageMethod::complete:
-    case cluster::LinkageMethod::average:
-    case cluster::LinkageMethod::weighted:
-      break;
-    case cluster::LinkageMethod::single:
-      throw UsageError(method +
-                       " uses the Euclidean minimum spanning tree: it takes --metric euclidean, or "
-                       "elliptical with one region for all points");
-    case cluster::LinkageMethod::ward:
-    case cluster::LinkageMethod::centroid:
-    case cluster::LinkageMethod::median:
-      throw UsageError(method +
-                       " measures distances of means: it takes --metric euclidean, or elliptical "
-                       "with one region for all points");
-  }
-  if (!cluster::is_symmetric(problem.metric)) {
-    throw UsageError(method +
-                     " needs a symmetric metric: a field of ellipses is not symmetric (the points "
-                     "are in several of its regions)");
-  }
-  return cluster::linkage(
-      problem.points.size(),
-      [&](std::uint32_t i, std::uint32_t j) {
-        return cluster::distance(problem.metric, problem.points[i], problem.points[j]);
-      },
-      request.linkage, options);
-}
-
-ClusterOutcome cluster_by_linkage(const ClusterRequest& request, const FacilityPoints& problem) {
-  no_channels(problem, request.linkage_name.c_str());
-  if (!problem.weights.empty())
-    throw UsageError("--weight does not apply to linkage, which counts no points");
-  const std::optional<std::vector<Point3>> points =
-      cluster::linear_points(problem.metric, problem.points);
-  ClusterOutcome outcome;
-  if (request.cuda) {
-    if (!points) throw UsageError("--device cuda takes --metric euclidean or elliptical");
-    outcome.dendrogram =
-        request.linkage == cluster::LinkageMethod::single
-            ? cluster::cuda_single_linkage(*points)
-            : cluster::cuda_complete_linkage(*points, request.single_precision
-                                                          ? cluster::MatrixEntry::float32
-                                                          : cluster::MatrixEntry::float64);
-  } else {
-    outcome.dendrogram = tree_of(request, problem, points);
-  }
-  if (request.k != 0) outcome.labels = cluster::cut_count(*outcome.dendrogram, request.k);
-  if (request.height) outcome.labels = cluster::cut_height(*outcome.dendrogram, *request.height);
-  if (outcome.labels.empty()) return outcome;
-  const std::size_t clusters =
-      std::size_t{*std::max_element(outcome.labels.begin(), outcome.labels.end())} + 1;
-  if (request.k != 0 && clusters < request.k) {
-    outcome.notes.push_back(fmt::format("merges of equal height leave no cut into {}: there are {}",
-                                        counted(request.k, "cluster"), clusters));
-  }
-  outcome.representatives = cluster::nearest_to_means(problem.points, outcome.labels, clusters);
-  return outcome;
-}
-
-/// Clusters points. Throws UsageError for options that do not go together, std::invalid_argument
-/// for invalid data, std::runtime_error (too little memory, no device), and what `progress` throws.
-ClusterOutcome run_clustering(const ClusterRequest& request, const cluster::FacilityPoints& problem,
-                              const ClusterProgress& progress) {
-  // Checked here so that the message names the point for every method.
-  cluster::check(problem);
-  if (request.k > problem.points.size()) {
-    throw UsageError(fmt::format("-k {} asks for more clusters than there are points ({})",
-                                 request.k, problem.points.size()));
-  }
-  progress(0.0);
-  switch (request.method) {
-    case ClusterMethod::facility:
-      return cluster_by_facilities(request, problem, progress);
-    case ClusterMethod::primal_dual:
-      return cluster_by_growth(request, problem, progress);
-    case ClusterMethod::k_means:
-      return cluster_by_k_means(request, problem);
-    case ClusterMethod::k_median:
-      return cluster_by_k_median(request, problem);
-    case ClusterMethod::linkage:
-      break;
-  }
-  return cluster_by_linkage(request, problem);
-}
 
 /// Columns that contribute to distances.
 struct ChannelTable {
@@ -373,26 +71,28 @@ ChannelTable read_channels(const PointTable& table, const std::vector<std::strin
   return channels;
 }
 
+/// The bytes of one attribute within a record of a table.
+struct AttributeBytes {
+  std::size_t offset = 0, size = 0;
+};
+
 /// Writes the table with two more columns, `cluster` and `representative` (the index of the point
-/// that represents the cluster). Both are -1 for outliers. Existing columns of these names are
-/// replaced. Throws stream::Error and stream::Stopped.
-void write_clustered(const std::string& path, stream::WriterOptions writing,
-                     const PointTable& table, const ClusterOutcome& outcome,
-                     const CommonOptions& common) {
-  // Replace the columns of an earlier clustering.
-  struct Kept {
-    std::size_t offset = 0, size = 0;
-  };
+/// that represents the cluster). Both are -1 for outliers. They replace existing columns of the
+/// same names, which are from an earlier clustering. Throws stream::Error and stream::Stopped.
+void write_clustered_points(const std::string& path, stream::WriterOptions writing,
+                            const PointTable& table, const ClusterOutcome& outcome,
+                            const CommonOptions& common) {
   std::vector<stream::Channel> attributes;
-  std::vector<Kept> kept;
+  std::vector<AttributeBytes> copied;
   for (std::size_t c = 0; c < table.info.attributes.size(); ++c) {
     const stream::Channel& channel = table.info.attributes[c];
     if (channel.name == "cluster" || channel.name == "representative") continue;
     attributes.push_back(channel);
-    kept.push_back({table.info.attribute_offset(c), stream::size_of(channel.type)});
+    copied.push_back({table.info.attribute_offset(c), stream::size_of(channel.type)});
   }
   attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
+<<<<<<< HEAD
   const std::uint64_t held = table.payload.size() + table.size() * sizeof(stream::Point3);
   writing.memory_bytes -= std::min(writing.memory_bytes, held);
   const auto writer = stream::open_point_writer(
@@ -407,16 +107,31 @@ void write_clustered(const std::string& path, stream::WriterOptions writing,
   const std::string lost = lost_height_unit(path, *writer, table.info);
   if (!lost.empty()) common.say(lost);
   constexpr std::size_t kBlock = 65536;
+=======
+  const std::uint64_t table_bytes = table.payload.size() + table.size() * sizeof(stream::Point3);
+  writing.memory_bytes -= std::min(writing.memory_bytes, table_bytes);
+  const auto writer =
+      stream::open_point_writer(path,
+                                {.attributes = std::move(attributes),
+                                 .comments = {kWriterMark},
+                                 .crs = [&table] { return crs_of_point_file(table.info); },
+                                 .lattice = lattice_of(table.info)},
+                                writing);
+  writing_within_memory(*writer, path, common.memory_or(0), table_bytes);
+  const std::string unit_note = lost_height_unit(path, *writer, table.info);
+  if (!unit_note.empty()) common.say(unit_note);
+  constexpr std::size_t kBlockPoints = 65536;
+>>>>>>> 7af28edf (cluster: Move the methods apart from the verb)
   const std::size_t record_bytes = table.info.payload_size();
   stream::PointBlock block;
-  for (std::size_t begin = 0; begin < table.size(); begin += kBlock) {
+  for (std::size_t begin = 0; begin < table.size(); begin += kBlockPoints) {
     check_interrupt();
-    const std::size_t end = std::min(begin + kBlock, table.size());
+    const std::size_t end = std::min(begin + kBlockPoints, table.size());
     block.clear();
     for (std::size_t i = begin; i < end; ++i) {
       block.positions.push_back(table.positions[i]);
       const std::byte* const record = table.payload.data() + i * record_bytes;
-      for (const Kept& part : kept) {
+      for (const AttributeBytes& part : copied) {
         block.payload.insert(block.payload.end(), record + part.offset,
                              record + part.offset + part.size);
       }
@@ -433,7 +148,7 @@ void write_clustered(const std::string& path, stream::WriterOptions writing,
   writer->finish();
 }
 
-/// Returns the summary: clusters, costs, and the distance from the optimum.
+/// Returns the summary: clusters, costs, and the relative gap to the lower bound of the cost.
 Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const Stopwatch& watch) {
   const auto rounded = [](double value) { return readable_number(value, 6); };
   const auto outliers = static_cast<std::size_t>(
@@ -485,6 +200,49 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
 class ClusterCommand final : public Command {
  public:
   void define(CLI::App& app) override {
+    define_files(app);
+    define_method(app);
+    define_search(app);
+    define_distances(app);
+  }
+
+  Summary run(const CommonOptions& common) override {
+    if (!output_.empty()) format_of_output(outputs::kPointFile, output_, format_);
+    if (!labels_.empty()) format_of_output(outputs::kLabelFile, labels_);
+    if (!dendrogram_.empty()) format_of_output(outputs::kDendrogramTable, dendrogram_);
+    const Stopwatch watch;
+    set_request(common);
+    check_usage(common);
+    const MetricChoice metric = MetricChoice::parse(metric_);
+    stream::OutputGroup outputs;
+    stream::WriterOptions writing;
+    if (!output_.empty()) writing = point_writer_options(output_, format_, common);
+    writing.replace.group = &outputs;
+    stream::Naming replace_labels, replace_tree;
+    if (!labels_.empty()) replace_labels = may_replace(labels_, common.force, outputs);
+    if (!dendrogram_.empty()) replace_tree = may_replace(dendrogram_, common.force, outputs);
+
+    request_.memory_bytes = common.memory_or(0);
+    const PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
+    if (table.size() > std::numeric_limits<std::int32_t>::max()) {
+      throw stream::Error(input_, "has " + counted(table.size(), "point"))
+          .remedy("at most 2,147,483,647 are clustered in memory; build a store");
+    }
+    check_memory(table, common);
+    const ClusterOutcome outcome = cluster_table(table, metric, common);
+
+    if (!labels_.empty()) write_labels(labels_, outcome.labels, replace_labels);
+    if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
+    if (!output_.empty()) write_clustered_points(output_, writing, table, outcome, common);
+    outputs.commit();
+    Summary summary = summary_of(outcome, table.size(), watch);
+    // The costs are a result too, unless another result goes to standard output.
+    summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
+    return summary;
+  }
+
+ private:
+  void define_files(CLI::App& app) {
     app.add_option("input", input_, "file of points (or cells); - is standard input")
         ->required()
         ->type_name("FILE");
@@ -499,6 +257,9 @@ class ClusterCommand final : public Command {
         ->type_name("FILE.csv");
     add_point_format(app, format_);
     add_input_format(app, input_format_);
+  }
+
+  void define_method(CLI::App& app) {
     app.add_option("--method", method_,
                    "facility, primal-dual, k-means, k-median, or linkage: single, complete, "
                    "average, weighted, ward, centroid, median")
@@ -515,6 +276,10 @@ class ClusterCommand final : public Command {
     add_number(app, "--outlier-price", outlier_price_,
                "facility: leave a point out if that is cheaper; times the diagonal", kFactor)
         ->type_name("PRICE");
+  }
+
+  /// Adds the options that trade time for quality.
+  void define_search(CLI::App& app) {
     app.add_option("--strategy", strategy_,
                    "facility: automatic, fast, full-scan, quadtree, octree, kd-tree or facilities")
         ->capture_default_str()
@@ -536,6 +301,10 @@ class ClusterCommand final : public Command {
                    "steps for a lower bound of the cost; 0: none (default: a few seconds' worth; "
                    "none if 15 steps take much longer)")
         ->type_name("N");
+  }
+
+  /// Adds the options that change the distances between points, and how their matrix is computed.
+  void define_distances(CLI::App& app) {
     app.add_option(
            "--metric", metric_,
            "euclidean, squared, minkowski:P or elliptical:FILE (JSON: boxes with semi-axes)")
@@ -553,28 +322,9 @@ class ClusterCommand final : public Command {
         ->capture_default_str();
   }
 
-  Summary run(const CommonOptions& common) override {
-    if (!output_.empty()) format_of_output(outputs::kPointFile, output_, format_);
-    if (!labels_.empty()) format_of_output(outputs::kLabelFile, labels_);
-    if (!dendrogram_.empty()) format_of_output(outputs::kDendrogramTable, dendrogram_);
-    const Stopwatch watch;
-    check_usage(common);
-    const MetricChoice metric = MetricChoice::parse(metric_);
-    stream::OutputGroup outputs;
-    stream::WriterOptions writing;
-    if (!output_.empty()) writing = point_writer_options(output_, format_, common);
-    writing.replace.group = &outputs;
-    stream::Naming replace_labels, replace_tree;
-    if (!labels_.empty()) replace_labels = may_replace(labels_, common.force, outputs);
-    if (!dendrogram_.empty()) replace_tree = may_replace(dendrogram_, common.force, outputs);
-
-    request_.memory_bytes = common.memory_or(0);
-    PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
-    if (table.size() > std::numeric_limits<std::int32_t>::max()) {
-      throw stream::Error(input_, "has " + counted(table.size(), "point"))
-          .remedy("at most 2,147,483,647 are clustered in memory; build a store");
-    }
-    need_memory(table, common);
+  /// Clusters the points of the table and prints notes. Throws what run_clustering() throws.
+  ClusterOutcome cluster_table(const PointTable& table, const MetricChoice& metric,
+                               const CommonOptions& common) {
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
     if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
     std::vector<cluster::Point3> positions(table.size());
@@ -605,30 +355,19 @@ class ClusterCommand final : public Command {
       });
     }
     for (const std::string& note : outcome.notes) common.say(note);
-
-    if (!labels_.empty()) write_labels(labels_, outcome.labels, replace_labels);
-    if (!dendrogram_.empty()) write_dendrogram(dendrogram_, *outcome.dendrogram, replace_tree);
-    if (!output_.empty()) {
-      write_clustered(output_, writing, table, outcome, common);
-    }
-    outputs.commit();
-    Summary summary = summary_of(outcome, table.size(), watch);
-    // Costs are a result too, unless another result goes to standard output.
-    summary.text_is_result = output_ != "-" && labels_ != "-" && dendrogram_ != "-";
-    return summary;
+    return outcome;
   }
 
- private:
-  /// Sets request_.memory_bytes to the memory left after the table. Throws stream::Error if the
+  /// Sets request_.memory_bytes to the memory that the table leaves. Throws stream::Error if the
   /// method needs more.
-  void need_memory(const PointTable& table, const CommonOptions& common) {
-    // Measured peak bytes per point. Methods that use a matrix check it themselves.
-    const std::uint64_t each = request_.method == ClusterMethod::k_means   ? 120
-                               : request_.method == ClusterMethod::linkage ? 240
-                                                                           : 300;
-    const std::uint64_t held =
+  void check_memory(const PointTable& table, const CommonOptions& common) {
+    // Measured peak. Methods with a distance matrix check its size themselves.
+    const std::uint64_t bytes_per_point = request_.method == ClusterMethod::k_means   ? 120
+                                          : request_.method == ClusterMethod::linkage ? 240
+                                                                                      : 300;
+    const std::uint64_t used =
         kProgramMemory + table.payload.size() + table.size() * sizeof(stream::Point3);
-    const std::uint64_t needed = held + table.size() * each;
+    const std::uint64_t needed = used + table.size() * bytes_per_point;
     const std::uint64_t memory = common.memory_or(0);
     if (needed > memory) {
       throw stream::Error(input_,
@@ -637,53 +376,58 @@ class ClusterCommand final : public Command {
                                       readable_bytes(memory)))
           .remedy("raise --memory, or build a store, which takes points of any number");
     }
-    request_.memory_bytes = memory - held;
+    request_.memory_bytes = memory - used;
   }
 
-  void check_usage(const CommonOptions& common) {
-    const auto method = choice<ClusterMethod>(method_, "--method",
-                                              {{"facility", ClusterMethod::facility},
-                                               {"primal-dual", ClusterMethod::primal_dual},
-                                               {"k-means", ClusterMethod::k_means},
-                                               {"k-median", ClusterMethod::k_median},
-                                               {"single", ClusterMethod::linkage},
-                                               {"complete", ClusterMethod::linkage},
-                                               {"average", ClusterMethod::linkage},
-                                               {"weighted", ClusterMethod::linkage},
-                                               {"ward", ClusterMethod::linkage},
-                                               {"centroid", ClusterMethod::linkage},
-                                               {"median", ClusterMethod::linkage}});
-    request_.method = method;
+  /// Sets request_ from the options. Throws UsageError if an option names nothing known.
+  void set_request(const CommonOptions& common) {
+    request_.method = choice<ClusterMethod>(method_, "--method",
+                                            {{"facility", ClusterMethod::facility},
+                                             {"primal-dual", ClusterMethod::primal_dual},
+                                             {"k-means", ClusterMethod::k_means},
+                                             {"k-median", ClusterMethod::k_median},
+                                             {"single", ClusterMethod::linkage},
+                                             {"complete", ClusterMethod::linkage},
+                                             {"average", ClusterMethod::linkage},
+                                             {"weighted", ClusterMethod::linkage},
+                                             {"ward", ClusterMethod::linkage},
+                                             {"centroid", ClusterMethod::linkage},
+                                             {"median", ClusterMethod::linkage}});
     request_.strategy = parse_strategy(strategy_);
     request_.effort = *effort_of(effort_);
     request_.cuda = device_ == "cuda";
     request_.seed = common.seed;
     request_.threads = common.threads;
-    const bool tree = method == ClusterMethod::linkage;
-    if (tree) {
+    if (request_.method == ClusterMethod::linkage) {
       request_.linkage = *cluster::linkage_method_named(method_);
       request_.linkage_name = method_;
     }
-    const bool flat = !output_.empty() || !labels_.empty();
-    if (!flat && dendrogram_.empty()) {
+  }
+
+  /// Throws UsageError if the options contradict each other.
+  void check_usage(const CommonOptions& common) const {
+    const ClusterMethod method = request_.method;
+    const bool linkage = method == ClusterMethod::linkage;
+    const bool needs_clusters = !output_.empty() || !labels_.empty();
+    if (!needs_clusters && dendrogram_.empty()) {
       throw UsageError("no output given; pass -o FILE, --labels FILE or --dendrogram FILE");
     }
-    if (!tree && (!dendrogram_.empty() || request_.height)) {
+    if (!linkage && (!dendrogram_.empty() || request_.height)) {
       throw UsageError(
           "--dendrogram and --height are for the methods of linkage: single, complete, average, "
           "weighted, ward, centroid and median");
     }
-    if (request_.cuda && (!tree || (request_.linkage != cluster::LinkageMethod::single &&
-                                    request_.linkage != cluster::LinkageMethod::complete))) {
+    if (request_.cuda && (!linkage || (request_.linkage != cluster::LinkageMethod::single &&
+                                       request_.linkage != cluster::LinkageMethod::complete))) {
       throw UsageError("--device cuda is for the methods single and complete");
     }
-    if (tree && flat && request_.k == 0 && !request_.height) {
+    if (linkage && needs_clusters && request_.k == 0 && !request_.height) {
       throw UsageError("--method " + method_ + " gives a tree; cut it with -k K or --height H");
     }
     if (request_.k != 0 && request_.height) throw UsageError("give either -k or --height");
-    const bool counts = method == ClusterMethod::k_means || method == ClusterMethod::k_median;
-    if (counts && request_.k == 0) throw UsageError("--method " + method_ + " needs -k K");
-    if (!counts && !tree && request_.k != 0) {
+    const bool needs_k = method == ClusterMethod::k_means || method == ClusterMethod::k_median;
+    if (needs_k && request_.k == 0) throw UsageError("--method " + method_ + " needs -k K");
+    if (!needs_k && !linkage && request_.k != 0) {
       throw UsageError("--method " + method_ +
                        " finds the number of clusters itself, by --facility-cost; -k is for "
                        "k-means, k-median and linkage");
@@ -694,12 +438,17 @@ class ClusterCommand final : public Command {
       throw UsageError(
           "--outlier-price, --strategy, --iterations and --batch are for --method facility");
     }
+    check_outputs(common);
+  }
+
+  /// Throws UsageError if two outputs have the same name or use standard output.
+  void check_outputs(const CommonOptions& common) const {
     for (const auto& [a, b] : {std::pair(&output_, &labels_), std::pair(&output_, &dendrogram_),
                                std::pair(&labels_, &dendrogram_)}) {
       if (!a->empty() && *a == *b && *a != "-") throw UsageError("'" + *a + "' is named twice");
     }
-    const int on_output = (output_ == "-") + (labels_ == "-") + (dendrogram_ == "-") + common.json;
-    if (on_output > 1) throw UsageError("only one thing can go to standard output");
+    const int on_stdout = (output_ == "-") + (labels_ == "-") + (dendrogram_ == "-") + common.json;
+    if (on_stdout > 1) throw UsageError("only one thing can go to standard output");
   }
 
   ClusterRequest request_;
