@@ -33,17 +33,9 @@
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
-<<<<<<< HEAD
 
 using namespace terrain;
 
-using cluster::FacilityPoints;
-using cluster::FacilitySolution;
-using cluster::FacilityStrategy;
-using cluster::Point3;
-
-=======
->>>>>>> 7af28edf (cluster: Move the methods apart from the verb)
 namespace {
 
 /// Columns that contribute to distances.
@@ -92,9 +84,8 @@ void write_clustered_points(const std::string& path, stream::WriterOptions writi
   }
   attributes.push_back({.name = "cluster", .type = stream::ScalarType::i32});
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
-<<<<<<< HEAD
-  const std::uint64_t held = table.payload.size() + table.size() * sizeof(stream::Point3);
-  writing.memory_bytes -= std::min(writing.memory_bytes, held);
+  const std::uint64_t table_bytes = table.payload.size() + table.size() * sizeof(stream::Point3);
+  writing.memory_bytes -= std::min(writing.memory_bytes, table_bytes);
   const auto writer = stream::open_point_writer(
       path,
       {.attributes = std::move(attributes),
@@ -103,25 +94,10 @@ void write_clustered_points(const std::string& path, stream::WriterOptions writi
        .height_unit = [&table] { return height_unit_of_point_file(table.info); },
        .lattice = lattice_of(table.info)},
       writing);
-  writing_within_memory(*writer, path, common.memory_or(0), held);
-  const std::string lost = lost_height_unit(path, *writer, table.info);
-  if (!lost.empty()) common.say(lost);
-  constexpr std::size_t kBlock = 65536;
-=======
-  const std::uint64_t table_bytes = table.payload.size() + table.size() * sizeof(stream::Point3);
-  writing.memory_bytes -= std::min(writing.memory_bytes, table_bytes);
-  const auto writer =
-      stream::open_point_writer(path,
-                                {.attributes = std::move(attributes),
-                                 .comments = {kWriterMark},
-                                 .crs = [&table] { return crs_of_point_file(table.info); },
-                                 .lattice = lattice_of(table.info)},
-                                writing);
   writing_within_memory(*writer, path, common.memory_or(0), table_bytes);
   const std::string unit_note = lost_height_unit(path, *writer, table.info);
   if (!unit_note.empty()) common.say(unit_note);
   constexpr std::size_t kBlockPoints = 65536;
->>>>>>> 7af28edf (cluster: Move the methods apart from the verb)
   const std::size_t record_bytes = table.info.payload_size();
   stream::PointBlock block;
   for (std::size_t begin = 0; begin < table.size(); begin += kBlockPoints) {

@@ -67,88 +67,109 @@ class ConvertCommand : public Command {
     if (skip_damaged_) reading.on_damage = damage.taker();
     const std::unique_ptr<stream::PointSource> source = stream::open_source(inputs_, reading);
     const std::uint64_t memory = common.memory_or(0);
-    const std::uint64_t held = reading_within_memory(*source, memory);
-    writing.memory_bytes -= std::min(writing.memory_bytes, held);
+    const std::uint64_t reading_bytes = reading_within_memory(*source, memory);
+    writing.memory_bytes -= std::min(writing.memory_bytes, reading_bytes);
     const stream::SourceInfo& info = source->info();
     const auto writer = stream::open_point_writer(
         output_,
         {.attributes = info.attributes,
          .comments = {kWriterMark},
-         .crs = [&info] { return crs_of_point_file(located(info)); },
-         .height_unit = [&info] { return height_unit_of_point_file(located(info)); },
+         .crs = [&info] { return crs_of_point_file(with_source_crs(info)); },
+         .height_unit = [&info] { return height_unit_of_point_file(with_source_crs(info)); },
          .lattice = lattice_of(info)},
         writing);
-    writing_within_memory(*writer, output_, memory, held);
+    writing_within_memory(*writer, output_, memory, reading_bytes);
     UndeclaredVoids voids(info);
-    ProgressMeter meter(common.progress, "points");
-    // Each thread holds one block as read and one as encoded, both with some room to grow.
-    const std::uint64_t of_thread = 5 * reading.block_points * (24 + info.payload_size());
-    const std::uint64_t taken = kProgramMemory + held + writer->writing_bytes();
-    const auto threads = static_cast<unsigned>(std::clamp<std::uint64_t>(
-        (memory - std::min(memory, taken)) / of_thread, 1, common.threads));
-    std::vector<stream::PointBlock> blocks(threads);
-    base::each_in_order(
-        threads,
-        [&](unsigned worker) -> std::optional<stream::PointBlock*> {
-          check_interrupt();
-          if (!source->next(blocks[worker])) return {};
-          meter.update(source->progress().points, source->progress().fraction);
-          return &blocks[worker];
-        },
-        [&](unsigned, stream::PointBlock* block) {
-          voids.add(*block);
-          stream::to_world(info, *block);
-          return writer->encode(*block);
-        },
-        [&](stream::PointWriter::EncodedPtr points) { writer->append(std::move(points)); });
+    const unsigned threads =
+        threads_within(memory - std::min(memory, reading_bytes + writer->writing_bytes()),
+                       reading.block_points * (24 + info.payload_size()), common);
+    convert(*source, *writer, voids, threads, common);
     if (writer->points() == 0 && selection_.selects()) {
       throw stream::Error(inputs_.front(),
-                          "none of its " + selected_of(source->progress()) + "points is selected")
+                          "none of its " + examined_text(source->progress()) + "points is selected")
           .remedy("give another --where or --region");
     }
     writer->finish();
     if (writer->points() == 0) common.say(inputs_.front() + ": contains no points");
-    const std::string lost = lost_height_unit(output_, *writer, located(info));
-    if (!lost.empty()) common.say(lost);
+    const std::string unit_note = lost_height_unit(output_, *writer, with_source_crs(info));
+    if (!unit_note.empty()) common.say(unit_note);
     tell_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
     if (const stream::Message note = voids.note(); !note.empty()) common.say(note);
     damage.tell(common.context());
 
-    Summary summary;
-    summary.json = {{"points", writer->points()},
-                    {"nodata", source->progress().nodata},
-                    {"empty_values", source->progress().empty_values},
-                    {"excluded", source->progress().excluded},
-                    {"lost", source->progress().lost}};
-    summary.add_cost(watch);
-    const stream::Progress done = source->progress();
-    std::string left_out;
-    if (done.excluded > 0)
-      left_out =
-          with_commas(done.excluded) + (done.excluded == 1 ? " was" : " were") + " not selected";
-    if (done.nodata > 0 && !info.grid) {
-      left_out +=
-          (left_out.empty() ? "" : ", ") + with_commas(done.nodata) + " lacked a coordinate";
-    }
-    if (done.empty_values > 0) {
-      left_out += (left_out.empty() ? "" : ", ") + counted(done.empty_values, "attribute") +
-                  " without a value are NaN";
-    }
-    summary.text = fmt::format("{}: {}{}, {}\n", output_, counted(writer->points(), "point"),
-                               left_out.empty() ? "" : " (" + left_out + ")",
-                               readable_seconds(watch.seconds()));
+    Summary summary = summary_of(source->progress(), writer->points(), info.grid, watch);
     report_rounding(*writer, summary);
     return summary;
   }
 
  private:
-  /// Returns "1,234 ", the number of points examined. Parts outside the region were not read.
-  static std::string selected_of(const stream::Progress& done) {
-    return done.excluded > 0 ? with_commas(done.excluded) + ' ' : std::string();
+  /// Returns the number of threads whose blocks fit into `memory` bytes besides the program itself.
+  /// Each thread holds one block as read and one as encoded, both with some room to grow.
+  static unsigned threads_within(std::uint64_t memory, std::uint64_t block_bytes,
+                                 const CommonOptions& common) {
+    const std::uint64_t available = memory - std::min(memory, kProgramMemory);
+    return static_cast<unsigned>(
+        std::clamp<std::uint64_t>(available / (5 * block_bytes), 1, common.threads));
   }
+
+  /// Copies all points from the source to the writer, in order. Blocks are encoded in parallel.
+  static void convert(stream::PointSource& source, stream::PointWriter& writer,
+                      UndeclaredVoids& voids, unsigned threads, const CommonOptions& common) {
+    ProgressMeter meter(common.progress, "points");
+    std::vector<stream::PointBlock> blocks(threads);
+    base::each_in_order(
+        threads,
+        [&](unsigned worker) -> std::optional<stream::PointBlock*> {
+          check_interrupt();
+          if (!source.next(blocks[worker])) return {};
+          meter.update(source.progress().points, source.progress().fraction);
+          return &blocks[worker];
+        },
+        [&](unsigned, stream::PointBlock* block) {
+          voids.add(*block);
+          stream::to_world(source.info(), *block);
+          return writer.encode(*block);
+        },
+        [&](stream::PointWriter::EncodedPtr points) { writer.append(std::move(points)); });
+  }
+
+  [[nodiscard]] Summary summary_of(const stream::Progress& progress, std::uint64_t points,
+                                   bool raster, const Stopwatch& watch) const {
+    Summary summary;
+    summary.json = {{"points", points},
+                    {"nodata", progress.nodata},
+                    {"empty_values", progress.empty_values},
+                    {"excluded", progress.excluded},
+                    {"lost", progress.lost}};
+    summary.add_cost(watch);
+    std::string remarks;
+    if (progress.excluded > 0) {
+      remarks = with_commas(progress.excluded) + (progress.excluded == 1 ? " was" : " were") +
+                " not selected";
+    }
+    if (progress.nodata > 0 && !raster) {
+      remarks +=
+          (remarks.empty() ? "" : ", ") + with_commas(progress.nodata) + " lacked a coordinate";
+    }
+    if (progress.empty_values > 0) {
+      remarks += (remarks.empty() ? "" : ", ") + counted(progress.empty_values, "attribute") +
+                 " without a value are NaN";
+    }
+    summary.text =
+        fmt::format("{}: {}{}, {}\n", output_, counted(points, "point"),
+                    remarks.empty() ? "" : " (" + remarks + ")", readable_seconds(watch.seconds()));
+    return summary;
+  }
+
+  /// Returns the number of points examined, such as "1,234 ". It is empty if none were, because
+  /// parts outside the region are not read.
+  static std::string examined_text(const stream::Progress& progress) {
+    return progress.excluded > 0 ? with_commas(progress.excluded) + ' ' : std::string();
+  }
+
   /// Returns the placement with the CRS of the file or of the .prj file next to it.
-  static stream::Placement located(const stream::SourceInfo& info) {
+  static stream::Placement with_source_crs(const stream::SourceInfo& info) {
     stream::Placement placement = info;
     try {
       placement.crs = crs_of_source(info).crs;

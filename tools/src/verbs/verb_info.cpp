@@ -49,28 +49,28 @@ Json json_of(const stream::Box3& box) {
 }
 
 /// Returns the text, or null if it is empty.
-Json known(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
+Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
 /// Returns {"epsg": n, "name": ..., "wkt": ...}, with null for unknown values.
 Json json_of(const stream::Crs& crs) {
   if (crs == stream::Crs{}) return nullptr;
   Json json;
   json["epsg"] = crs.epsg == 0 ? Json(nullptr) : Json(crs.epsg);
-  json["name"] = known(crs.name);
-  json["wkt"] = known(crs.wkt);
+  json["name"] = text_or_null(crs.name);
+  json["wkt"] = text_or_null(crs.wkt);
   json["geographic"] = crs.geographic;
-  json["horizontal_unit"] = known(crs.horizontal_unit);
+  json["horizontal_unit"] = text_or_null(crs.horizontal_unit);
   json["vertical_epsg"] = crs.vertical_epsg == 0 ? Json(nullptr) : Json(crs.vertical_epsg);
-  json["vertical_unit"] = known(crs.vertical_unit);
+  json["vertical_unit"] = text_or_null(crs.vertical_unit);
   return json;
 }
 
-/// Adds the extent of the points, and the lattice of a raster.
+/// Adds the extent of the points, the CRS, and the lattice of a raster.
 void add_placement(const stream::Schema& schema, const stream::Box3& bounds, const stream::Crs& crs,
                    const std::string& vertical, Json& json) {
   json["bounds"] = json_of(bounds);
   json["crs"] = json_of(crs);
-  json["vertical"] = known(vertical);
+  json["vertical"] = text_or_null(vertical);
   if (schema.grid) {
     json["columns"] = schema.columns;
     json["rows"] = schema.rows;
@@ -158,52 +158,55 @@ std::string channels_line(const stream::Schema& schema) {
   return text;
 }
 
-/// Compensated sum of a long stream of doubles. Without compensation, the mean of a billion heights
-/// would be off in its last digits (A. Neumaier 1974, doi:10.1002/zamm.19740540106).
-class Sum {
+/// Compensated sum of doubles, so that the mean of a billion heights is exact in its last digits
+/// (A. Neumaier 1974, doi:10.1002/zamm.19740540106).
+class CompensatedSum {
  public:
   void add(double value) {
     const double sum = sum_ + value;
-    rest_ += std::abs(sum_) >= std::abs(value) ? (sum_ - sum) + value : (value - sum) + sum_;
+    compensation_ +=
+        std::abs(sum_) >= std::abs(value) ? (sum_ - sum) + value : (value - sum) + sum_;
     sum_ = sum;
   }
-  [[nodiscard]] double value() const { return sum_ + rest_; }
+  [[nodiscard]] double value() const { return sum_ + compensation_; }
 
  private:
-  double sum_ = 0, rest_ = 0;
+  double sum_ = 0, compensation_ = 0;
 };
 
-struct Contents {
+/// Counts and extent of all points of a source.
+struct SourceScan {
   std::uint64_t points = 0, nodata = 0, empty_values = 0, withheld = 0;
-  stream::Box3 stored, world;
-  double mean = 0;      ///< stored coordinate 2
-  std::string comment;  ///< about heights; empty if there is none
+  stream::Box3 stored, world;  ///< in stored coordinates, and in the CRS
+  double mean = 0;             ///< of stored coordinate 2
+  std::string note;            ///< about heights; empty if there is none
 };
 
-Contents stream_through(stream::PointSource& source, const CommonOptions& common) {
+/// Reads a source to its end. Throws what for_each_block() throws.
+SourceScan scan_points(stream::PointSource& source, const CommonOptions& common) {
   const stream::SourceInfo& info = source.info();
   const stream::Placement& placement = info;
-  // Without rotation the stored box maps to the box in the CRS, so points need not be transformed.
-  const bool upright = info.world.xy[1] == 0 && info.world.xy[3] == 0;
-  Contents contents;
-  Sum heights;
+  // Without rotation, the stored box maps to the box in the CRS, so only the box is transformed.
+  const bool unrotated = info.world.xy[1] == 0 && info.world.xy[3] == 0;
+  SourceScan scan;
+  CompensatedSum heights;
   UndeclaredVoids voids(info);
   for_each_block(source, common, [&](const stream::PointBlock& block) {
     for (const stream::Point3& p : block.positions) {
-      contents.stored.include(p);
+      scan.stored.include(p);
       heights.add(p[2]);
-      if (!upright) contents.world.include(world_point(placement, p));
+      if (!unrotated) scan.world.include(world_point(placement, p));
     }
-    contents.points += block.size();
+    scan.points += block.size();
     voids.add(block);
   });
-  contents.comment = option_text(voids.note());
-  contents.nodata = source.progress().nodata;
-  contents.empty_values = source.progress().empty_values;
-  contents.withheld = source.progress().withheld;
-  if (upright) contents.world = world_box(placement, contents.stored);
-  if (contents.points > 0) contents.mean = heights.value() / static_cast<double>(contents.points);
-  return contents;
+  scan.note = option_text(voids.note());
+  scan.nodata = source.progress().nodata;
+  scan.empty_values = source.progress().empty_values;
+  scan.withheld = source.progress().withheld;
+  if (unrotated) scan.world = world_box(placement, scan.stored);
+  if (scan.points > 0) scan.mean = heights.value() / static_cast<double>(scan.points);
+  return scan;
 }
 
 /// Returns the size of the files; for EPT, of all files in its folder. nullopt for pipes.
@@ -225,23 +228,25 @@ std::optional<std::uint64_t> bytes_of(const stream::SourceInfo& info) {
   return bytes;
 }
 
-/// Sizes of a level's clusters, including the representative: percentiles 0, 5, 50, 95 and 100.
-struct Sizes {
+/// Percentiles 0, 5, 50, 95 and 100 of the sizes of a level's clusters, and their mean. A size
+/// includes the representative.
+struct ClusterSizes {
   std::array<std::uint64_t, 5> percentiles{};
   double mean = 0;
 };
 
-Sizes sizes_of(const stream::Store& store, const stream::LevelInfo& level) {
-  // For a level with very many clusters, every n-th one is enough.
-  constexpr std::uint64_t kMost = 200000;
-  const std::uint64_t stride = level.clusters / kMost + 1;
+/// Returns the sizes of a level's clusters.
+ClusterSizes sizes_of_clusters(const stream::Store& store, const stream::LevelInfo& level) {
+  // Of a level with very many clusters, every n-th one is enough.
+  constexpr std::uint64_t kMaxClusters = 200000;
+  const std::uint64_t stride = level.clusters / kMaxClusters + 1;
   const std::uint64_t representative = level.level == store.top() ? 0 : 1;
   std::vector<std::uint64_t> sizes;
   for (std::uint64_t i = 0; i < level.clusters; i += stride) {
     check_interrupt();
     sizes.push_back(store.record(stream::cluster_id(level.level, i)).points + representative);
   }
-  Sizes result;
+  ClusterSizes result;
   if (sizes.empty()) return result;
   std::sort(sizes.begin(), sizes.end());
   constexpr std::array<std::size_t, 5> kPercent{0, 5, 50, 95, 100};
@@ -254,11 +259,26 @@ Sizes sizes_of(const stream::Store& store, const stream::LevelInfo& level) {
   return result;
 }
 
-std::string padded(const std::string& text, std::size_t width) {
+/// Returns the text aligned to the right in a column of `width` characters.
+std::string align_right(const std::string& text, std::size_t width) {
   return std::string(width - std::min(width, text.size()), ' ') + text;
 }
 
-/// The CRS, or the error that would make a build fail as its note.
+/// The description of files that `info` prints.
+struct FileInfo {
+  const stream::SourceInfo& source;
+  SourceScan scan;
+  SourceCrs crs;
+  std::optional<std::uint64_t> bytes;  ///< see bytes_of()
+  std::vector<std::string> comments;
+
+  [[nodiscard]] std::string vertical() const {
+    return crs.heights == Heights::unknown ? "" : name_of(crs.heights);
+  }
+};
+
+/// Returns the CRS of a source. An error that would make a build fail becomes a note, so that it is
+/// reported along with the rest of the file.
 SourceCrs crs_with_note(const stream::SourceInfo& info) {
   try {
     return crs_of_source(info);
@@ -272,93 +292,88 @@ SourceCrs crs_with_note(const stream::SourceInfo& info) {
   }
 }
 
-/// Empty if unknown.
-std::string vertical_of(const SourceCrs& crs) {
-  return crs.heights == Heights::unknown ? "" : name_of(crs.heights);
-}
-
-std::vector<std::string> comments_of(const stream::SourceInfo& info, const Contents& contents) {
-  std::vector<std::string> comments = info.comments;
-  if (!contents.comment.empty()) comments.push_back(contents.comment);
-  return comments;
-}
-
-Json json_of_files(const stream::SourceInfo& info, const Contents& contents, const SourceCrs& crs) {
+Json json_of(const FileInfo& file) {
+  const stream::SourceInfo& info = file.source;
+  const SourceScan& scan = file.scan;
   Json json;
   json["format"] = info.format;
   json["files"] = info.files.size();
   json["version"] = nullptr;
-  json["points"] = contents.points;
-  json["nodata"] = contents.nodata;
-  if (contents.empty_values > 0) json["empty_values"] = contents.empty_values;
-  if (contents.withheld > 0) json["withheld"] = contents.withheld;
+  json["points"] = scan.points;
+  json["nodata"] = scan.nodata;
+  if (scan.empty_values > 0) json["empty_values"] = scan.empty_values;
+  if (scan.withheld > 0) json["withheld"] = scan.withheld;
   if (info.octree) {
     json["octree"] = {{"spacing", info.octree->spacing},
                       {"depths", info.octree->depths},
                       {"nodes", info.octree->nodes}};
   }
   json["levels"] = Json::array();
-  add_placement(info, contents.world, crs.crs, vertical_of(crs), json);
+  add_placement(info, scan.world, file.crs.crs, file.vertical(), json);
   if (info.grid) json["nodata_value"] = or_null(info.nodata);
   json["height"] = nullptr;
-  if (contents.points > 0) {
+  if (scan.points > 0) {
     const stream::Channel& z = info.coordinates[2];
-    const auto real = [&z](double raw) { return raw * z.scale + z.offset; };
+    const auto to_height = [&z](double raw) { return raw * z.scale + z.offset; };
     const auto [low, high] =
-        std::minmax({real(contents.stored.min[2]), real(contents.stored.max[2])});
-    json["height"] = {{"min", low}, {"max", high}, {"mean", real(contents.mean)}};
+        std::minmax({to_height(scan.stored.min[2]), to_height(scan.stored.max[2])});
+    json["height"] = {{"min", low}, {"max", high}, {"mean", to_height(scan.mean)}};
   }
   json["channels"] = channels_of(info);
   json["parameters"] = Json::object();
-  json["comments"] = comments_of(info, contents);
-  const std::optional<std::uint64_t> bytes = bytes_of(info);
-  json["bytes"] = bytes ? Json(*bytes) : Json(nullptr);
+  json["comments"] = file.comments;
+  json["bytes"] = file.bytes ? Json(*file.bytes) : Json(nullptr);
   return json;
 }
 
-/// height: as in the JSON.
-std::string text_of_files(const stream::SourceInfo& info, const Contents& contents,
-                          const SourceCrs& crs, const Json& height) {
-  std::string text;
-  text += "format:    " + info.format;
+/// Returns the lines on the format, the cells of a raster and the points.
+std::string contents_lines(const FileInfo& file) {
+  const stream::SourceInfo& info = file.source;
+  const SourceScan& scan = file.scan;
+  std::string text = "format:    " + info.format;
   if (info.files.size() > 1) text += ", " + counted(info.files.size(), "file");
-  if (const auto bytes = bytes_of(info)) text += ", " + readable_bytes(*bytes);
+  if (file.bytes) text += ", " + readable_bytes(*file.bytes);
   text += '\n';
   if (info.grid) {
     text += raster_line(info);
     text += fmt::format("cell:      {} {}\n", readable_number(info.world.xy[0], 10),
                         readable_number(info.world.xy[4], 10));
-    text += fmt::format("nodata:    {}{}\n", counted(contents.nodata, "cell"),
+    text += fmt::format("nodata:    {}{}\n", counted(scan.nodata, "cell"),
                         info.nodata ? ", value " + plain_number(*info.nodata) : std::string());
   }
-  text += fmt::format("points:    {}{}\n", with_commas(contents.points),
-                      !info.grid && contents.nodata > 0
-                          ? ", and " + with_commas(contents.nodata) + " without a coordinate"
+  text += fmt::format("points:    {}{}\n", with_commas(scan.points),
+                      !info.grid && scan.nodata > 0
+                          ? ", and " + with_commas(scan.nodata) + " without a coordinate"
                           : std::string());
   if (info.octree) {
     text += fmt::format("octree:    {} of {}, the root's points {} apart\n",
                         counted(info.octree->nodes, "node"), counted(info.octree->depths, "depth"),
                         readable_number(info.octree->spacing, 6));
   }
-  if (contents.empty_values > 0) {
-    text += "empty:     " + counted(contents.empty_values, "attribute") +
-            " without a value, read as NaN\n";
+  if (scan.empty_values > 0) {
+    text +=
+        "empty:     " + counted(scan.empty_values, "attribute") + " without a value, read as NaN\n";
   }
-  if (contents.withheld > 0) {
-    text += "withheld:  " + with_commas(contents.withheld) + " of them\n";
+  if (scan.withheld > 0) text += "withheld:  " + with_commas(scan.withheld) + " of them\n";
+  return text;
+}
+
+/// Returns the text for people. `height` is the value of that name in json_of().
+std::string text_of(const FileInfo& file, const Json& height) {
+  std::string text = contents_lines(file);
+  text += "crs:       " + printable_line(text_of(file.crs.crs, file.scan.world)) + '\n';
+  if (!file.crs.note.empty()) {
+    text += "note:      " + printable_line(option_text(file.crs.note)) + '\n';
   }
-  text += "crs:       " + printable_line(text_of(crs.crs, contents.world)) + '\n';
-  if (!crs.note.empty()) text += "note:      " + printable_line(option_text(crs.note)) + '\n';
-  if (const std::string vertical = vertical_of(crs); !vertical.empty()) {
+  if (const std::string vertical = file.vertical(); !vertical.empty()) {
     text += "vertical:  " + vertical + '\n';
   }
-  text += "bounds:    " + text_of(contents.world) + '\n';
-  if (contents.points > 0) {
-    text += heights_line(height["min"], height["max"], height["mean"]);
-  }
-  text += channels_line(info);
-  for (const std::string& comment : comments_of(info, contents))
+  text += "bounds:    " + text_of(file.scan.world) + '\n';
+  if (!height.is_null()) text += heights_line(height["min"], height["max"], height["mean"]);
+  text += channels_line(file.source);
+  for (const std::string& comment : file.comments) {
     text += "comment:   " + printable_line(comment) + '\n';
+  }
   return text;
 }
 
@@ -374,14 +389,48 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
                                   .blocks_ahead = 8,
                                   .threads = common.threads});
   reading_within_memory(*source, common.memory_or(0));
-  const Contents contents = stream_through(*source, common);
+  SourceScan scan = scan_points(*source, common);
   const stream::SourceInfo& info = source->info();
-  const SourceCrs crs = crs_with_note(info);
+  std::vector<std::string> comments = info.comments;
+  if (!scan.note.empty()) comments.push_back(scan.note);
+  const FileInfo file{.source = info,
+                      .scan = std::move(scan),
+                      .crs = crs_with_note(info),
+                      .bytes = bytes_of(info),
+                      .comments = std::move(comments)};
   Summary summary;
   summary.text_is_result = true;
-  summary.json = json_of_files(info, contents, crs);
-  summary.text = text_of_files(info, contents, crs, summary.json["height"]);
+  summary.json = json_of(file);
+  summary.text = text_of(file, summary.json["height"]);
   return summary;
+}
+
+/// Adds the levels of a store, as a JSON list and as a table.
+void add_levels(const stream::Store& store, Json& json, std::string& text) {
+  text += "level          points    clusters        bytes   cluster sizes: 5 %  median   95 %\n";
+  for (const stream::LevelInfo& level : store.levels()) {
+    const ClusterSizes sizes = sizes_of_clusters(store, level);
+    json.push_back({{"level", level.level},
+                    {"points", level.points},
+                    {"clusters", level.clusters},
+                    {"bytes", level.bytes},
+                    {"members", level.members},
+                    {"index_bytes", level.index_bytes},
+                    {"cluster_sizes",
+                     {{"min", sizes.percentiles[0]},
+                      {"p5", sizes.percentiles[1]},
+                      {"median", sizes.percentiles[2]},
+                      {"p95", sizes.percentiles[3]},
+                      {"max", sizes.percentiles[4]},
+                      {"mean", sizes.mean}}}});
+    text += align_right(fmt::format("{}", level.level), 5) +
+            align_right(with_commas(level.points), 16) +
+            align_right(with_commas(level.clusters), 12) +
+            align_right(readable_bytes(level.bytes), 13) +
+            align_right(fmt::format("{}", sizes.percentiles[1]), 20) +
+            align_right(fmt::format("{}", sizes.percentiles[2]), 8) +
+            align_right(fmt::format("{}", sizes.percentiles[3]), 7) + '\n';
+  }
 }
 
 /// Describes a store from its manifest and indices. Throws stream::Error.
@@ -425,28 +474,7 @@ Summary info_of_store(const std::string& path) {
   text += channels_line(schema);
   for (const auto& [name, value] : schema.parameters)
     text += "parameter: " + printable_line(name + ' ' + value) + '\n';
-  text += "level          points    clusters        bytes   cluster sizes: 5 %  median   95 %\n";
-  for (const stream::LevelInfo& level : store.levels()) {
-    const Sizes sizes = sizes_of(store, level);
-    json["levels"].push_back({{"level", level.level},
-                              {"points", level.points},
-                              {"clusters", level.clusters},
-                              {"bytes", level.bytes},
-                              {"members", level.members},
-                              {"index_bytes", level.index_bytes},
-                              {"cluster_sizes",
-                               {{"min", sizes.percentiles[0]},
-                                {"p5", sizes.percentiles[1]},
-                                {"median", sizes.percentiles[2]},
-                                {"p95", sizes.percentiles[3]},
-                                {"max", sizes.percentiles[4]},
-                                {"mean", sizes.mean}}}});
-    text += padded(fmt::format("{}", level.level), 5) + padded(with_commas(level.points), 16) +
-            padded(with_commas(level.clusters), 12) + padded(readable_bytes(level.bytes), 13) +
-            padded(fmt::format("{}", sizes.percentiles[1]), 20) +
-            padded(fmt::format("{}", sizes.percentiles[2]), 8) +
-            padded(fmt::format("{}", sizes.percentiles[3]), 7) + '\n';
-  }
+  add_levels(store, json["levels"], text);
   return summary;
 }
 

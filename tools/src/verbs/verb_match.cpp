@@ -57,13 +57,13 @@ struct MatchRequest {
   double seconds = 0.0;                     ///< for halving; 0: no limit
   std::uint64_t seed = 1;
   unsigned threads = 1;
-  std::uint64_t memory_bytes = 0;  ///< for all
-  std::uint64_t held_bytes = 0;    ///< of that, of the program and the points
+  std::uint64_t memory_bytes = 0;  ///< limit for the whole process; 0: no limit
+  std::uint64_t used_bytes = 0;    ///< used by the program and the points already
 };
 
 struct MatchOutcome {
-  std::vector<std::uint32_t>
-      mate;  ///< partner of each point; matching::kNone for a point left over
+  /// Partner of each point; matching::kNone for the unmatched one of an odd number.
+  std::vector<std::uint32_t> mate;
   double cost = 0.0;
   std::uint64_t iterations = 0;       ///< iterations of halving, or rounds of windows
   std::optional<double> lower_bound;  ///< if the method provides one
@@ -76,34 +76,36 @@ struct TreeOutcome {
   std::size_t clusters = 0;  ///< clusters with separate trees; 0: none
 };
 
-/// Size of the clusters that are matched first in large sets, in points.
+/// Size in points of the clusters that are matched first in large sets.
 constexpr double kClusterSize = 10000;
-/// Measured memory of an exact matching, in bytes per point.
+/// Memory of an exact matching in bytes per point, measured.
 constexpr std::uint64_t kExactBytes = 800;
-/// Memory of windows, in bytes per point, besides the windows being solved.
+/// Memory of a matching by windows in bytes per point, without the windows being solved.
 constexpr std::uint64_t kWindowBytes = 110;
 
-/// needed: besides what is held already.
+/// Throws std::runtime_error, which suggests `remedy`, if `needed` bytes in addition to the used
+/// ones exceed the memory limit.
 void check_memory(std::uint64_t needed, const MatchRequest& request, std::size_t points,
                   const char* remedy) {
-  needed += request.held_bytes;
+  needed += request.used_bytes;
   if (request.memory_bytes == 0 || needed <= request.memory_bytes) return;
   throw std::runtime_error(fmt::format("matching {} takes about {} and --memory is {}: {}",
                                        counted(points, "point"), readable_bytes(needed),
                                        readable_bytes(request.memory_bytes), remedy));
 }
 
-std::size_t distinct(std::span<const std::uint32_t> labels) {
+std::size_t count_distinct(std::span<const std::uint32_t> labels) {
   std::vector<std::uint32_t> sorted(labels.begin(), labels.end());
   std::sort(sorted.begin(), sorted.end());
   return static_cast<std::size_t>(std::unique(sorted.begin(), sorted.end()) - sorted.begin());
 }
 
-/// Memory for a method: not 0, which would be no limit.
-std::uint64_t left_for(const MatchRequest& request) {
+/// Returns the memory that a method may use, in bytes. If there is a limit it is at least 1,
+/// because 0 means no limit.
+std::uint64_t available_memory(const MatchRequest& request) {
   if (request.memory_bytes == 0) return 0;
   return std::max<std::uint64_t>(
-      request.memory_bytes - std::min(request.memory_bytes, request.held_bytes), 1);
+      request.memory_bytes - std::min(request.memory_bytes, request.used_bytes), 1);
 }
 
 matching::HalvingOptions halving_options(const MatchRequest& request) {
@@ -114,17 +116,17 @@ matching::HalvingOptions halving_options(const MatchRequest& request) {
   if (request.seconds > 0) options.seconds = request.seconds;
   options.seed = request.seed;
   options.threads = request.threads;
-  options.memory_limit = left_for(request);
+  options.memory_limit = available_memory(request);
   options.check_stop = check_interrupt;
   return options;
 }
 
-bool halves(MatchMethod method) {
+bool uses_halving(MatchMethod method) {
   return method == MatchMethod::monotone || method == MatchMethod::monte_carlo;
 }
 
-/// Returns whether clusters are matched first: the caller's, or those of facility location if there
-/// are too many points to match at once.
+/// Returns whether clusters are matched first. They come from the caller, or from facility location
+/// if there are too many points to match at once.
 bool has_clusters(const MatchRequest& request, std::size_t points) {
   if (!request.labels.empty()) return true;
   return request.method == MatchMethod::automatic &&
@@ -147,7 +149,7 @@ std::vector<std::uint32_t> clusters_of(const MatchRequest& request, std::span<co
 MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> points,
                           const MatchProgress& progress) {
   MatchOutcome outcome;
-  if (halves(request.method)) {
+  if (uses_halving(request.method)) {
     matching::HalvingOptions options = halving_options(request);
     options.progress = progress;
     matching::HalvingMatching matching = matching::match_by_halving(points, options);
@@ -177,7 +179,7 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
   outcome.iterations = matching.rounds;
   outcome.lower_bound = matching.dual_bound;
   outcome.optimal = matching.optimal;
-  outcome.clusters = exact ? 0 : distinct(labels);
+  outcome.clusters = exact ? 0 : count_distinct(labels);
   return outcome;
 }
 
@@ -185,7 +187,7 @@ MatchOutcome run_matching(const MatchRequest& request, std::span<const Point3> p
 /// as run_matching() does.
 TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point3> points,
                               const MatchProgress& progress) {
-  // The tree, and the level being matched.
+  // The tree and the level being matched.
   const std::uint64_t tree_bytes = 120 * points.size();
   check_memory(
       has_clusters(request, points.size()) ? tree_bytes : tree_bytes + kExactBytes * points.size(),
@@ -194,11 +196,11 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
   matching::MatchingTreeOptions<Point3> options;
   options.labels = labels;
   options.threads = request.threads;
-  options.memory_limit = left_for(request);
-  if (halves(request.method)) {
+  options.memory_limit = available_memory(request);
+  if (uses_halving(request.method)) {
     options.matcher = [&](std::span<const Point3> nodes) {
       matching::HalvingOptions halving = halving_options(request);
-      // The clusters already run in parallel.
+      // The clusters are matched in parallel already.
       if (!labels.empty()) halving.threads = 1;
       return std::move(matching::match_by_halving(nodes, halving).mate);
     };
@@ -211,7 +213,8 @@ TreeOutcome run_matching_tree(const MatchRequest& request, std::span<const Point
   }
   options.progress = [&](std::size_t done, std::size_t total) { return progress(done, total, 0); };
   options.check_stop = check_interrupt;
-  return {matching::make_matching_tree(points, options), labels.empty() ? 0 : distinct(labels)};
+  return {matching::make_matching_tree(points, options),
+          labels.empty() ? 0 : count_distinct(labels)};
 }
 
 class MatchCommand final : public Command {
@@ -270,7 +273,7 @@ class MatchCommand final : public Command {
     std::vector<std::uint32_t> labels;
     if (!labels_.empty()) labels = read_labels(labels_, table.size());
     request.labels = labels;
-    request.held_bytes = kProgramMemory + table.payload.size() +
+    request.used_bytes = kProgramMemory + table.payload.size() +
                          table.size() * 2 * sizeof(stream::Point3) +
                          boxes.size() * sizeof(base::Box3);
     positions_.resize(table.size());
@@ -286,20 +289,7 @@ class MatchCommand final : public Command {
       TreeOutcome outcome;
       call_library(input_, method_,
                    [&] { outcome = run_matching_tree(request, positions_, progress); });
-      if (!triangles) {
-        write(rows_of(outcome), replace);
-        return summary_of(outcome, watch);
-      }
-      const matching::BoundingVolumeHierarchy<3> hierarchy(
-          matching::tree_children(outcome.tree.rows), boxes);
-      write(rows_of(outcome, std::move(boxes)), replace);
-      Summary summary = summary_of(outcome, watch);
-      summary.json["depth"] = hierarchy.depth();
-      summary.json["surface_area_cost"] = hierarchy.surface_area_cost();
-      summary.text += fmt::format(
-          "as a bounding volume hierarchy: depth {}, surface area cost {}\n",
-          with_commas(hierarchy.depth()), readable_number(hierarchy.surface_area_cost(), 4));
-      return summary;
+      return write_tree(outcome, std::move(boxes), replace, watch);
     }
     MatchOutcome outcome;
     call_library(input_, method_, [&] { outcome = run_matching(request, positions_, progress); });
@@ -309,6 +299,26 @@ class MatchCommand final : public Command {
   }
 
  private:
+  /// Writes the tree and returns its summary. `boxes` are those of the triangles, if it has any:
+  /// the tree is then also a bounding volume hierarchy.
+  [[nodiscard]] Summary write_tree(const TreeOutcome& outcome, std::vector<base::Box3> boxes,
+                                   const stream::Naming& replace, const Stopwatch& watch) const {
+    if (boxes.empty()) {
+      write(rows_of(outcome), replace);
+      return summary_of(outcome, watch);
+    }
+    const matching::BoundingVolumeHierarchy<3> hierarchy(matching::tree_children(outcome.tree.rows),
+                                                         boxes);
+    write(rows_of(outcome, std::move(boxes)), replace);
+    Summary summary = summary_of(outcome, watch);
+    summary.json["depth"] = hierarchy.depth();
+    summary.json["surface_area_cost"] = hierarchy.surface_area_cost();
+    summary.text += fmt::format("as a bounding volume hierarchy: depth {}, surface area cost {}\n",
+                                with_commas(hierarchy.depth()),
+                                readable_number(hierarchy.surface_area_cost(), 4));
+    return summary;
+  }
+
   [[nodiscard]] MatchRequest request_of(const CommonOptions& common) const {
     MatchRequest request;
     request.method = choice<MatchMethod>(method_, "--method",
@@ -316,7 +326,7 @@ class MatchCommand final : public Command {
                                           {"exact", MatchMethod::exact},
                                           {"monotone", MatchMethod::monotone},
                                           {"monte-carlo", MatchMethod::monte_carlo}});
-    if (!halves(request.method) && (!iterations_.empty() || seconds_)) {
+    if (!uses_halving(request.method) && (!iterations_.empty() || seconds_)) {
       throw UsageError("--iterations and --seconds are for --method monotone and monte-carlo");
     }
     if (!labels_.empty() && !tree_ && request.method != MatchMethod::automatic) {
@@ -333,12 +343,13 @@ class MatchCommand final : public Command {
     return request;
   }
 
+  /// Returns the rows of the pairs and adds their number to `pairs`.
   std::string rows_of(const MatchOutcome& outcome, std::size_t& pairs) const {
     std::string text = std::string(kPairsHead) + '\n';
     for (std::uint32_t a = 0; a < outcome.mate.size(); ++a) {
       check_interrupt();
       const std::uint32_t b = outcome.mate[a];
-      // A point without a partner has a mate beyond all indices.
+      // The mate of an unmatched point is larger than all indices.
       if (b <= a || b >= outcome.mate.size()) continue;
       const stream::Point3 &p = positions_[a], &q = positions_[b];
       const double distance = base::hypot(base::hypot(p[0] - q[0], p[1] - q[1]), p[2] - q[2]);
@@ -370,16 +381,16 @@ class MatchCommand final : public Command {
     return boxes;
   }
 
-  /// Returns the rows of a tree. `boxes` are those of the entities, in the file's coordinates;
-  /// without any, rows have no boxes.
+  /// Returns the rows of a tree. `boxes` are those of the entities in the file's coordinates. If it
+  /// is empty, the rows have no boxes.
   static std::string rows_of(const TreeOutcome& outcome, std::vector<base::Box3> boxes = {}) {
-    const bool boxed = !boxes.empty();
-    std::string text = std::string(boxed ? kBoxTreeHead : kTreeHead) + '\n';
+    const bool has_boxes = !boxes.empty();
+    std::string text = std::string(has_boxes ? kBoxTreeHead : kTreeHead) + '\n';
     for (const matching::MatchingTreeRow& row : outcome.tree.rows) {
       check_interrupt();
       text += fmt::format("{},{},{},{},{}", row.a, row.b, number_text(row.distance), row.size,
                           row.level);
-      if (boxed) {
+      if (has_boxes) {
         base::Box3 box = boxes[row.a];
         for (std::size_t axis = 0; axis < 3; ++axis) {
           box.min[axis] = std::min(box.min[axis], boxes[row.b].min[axis]);
@@ -403,8 +414,8 @@ class MatchCommand final : public Command {
   [[nodiscard]] Summary summary_of(const MatchOutcome& outcome, std::size_t pairs,
                                    const Stopwatch& watch) const {
     Summary summary;
-    const auto alone = std::find(outcome.mate.begin(), outcome.mate.end(), matching::kNone);
-    const bool odd = alone != outcome.mate.end();
+    const auto unmatched = std::find(outcome.mate.begin(), outcome.mate.end(), matching::kNone);
+    const bool odd = unmatched != outcome.mate.end();
     summary.json = {{"pairs", pairs},
                     {"cost", outcome.cost},
                     {"iterations", outcome.iterations},
@@ -412,14 +423,14 @@ class MatchCommand final : public Command {
                     {"optimal", outcome.optimal},
                     {"clusters", outcome.clusters}};
     summary.json["left_over"] = nullptr;
-    if (odd) summary.json["left_over"] = alone - outcome.mate.begin();
+    if (odd) summary.json["left_over"] = unmatched - outcome.mate.begin();
     summary.json["lower_bound"] = or_null(outcome.lower_bound);
     summary.text = counted(pairs, "pair") + ", total distance " + readable_number(outcome.cost, 6);
-    summary.text += guarantee(outcome);
+    summary.text += quality_text(outcome);
     if (odd) {
-      summary.text += fmt::format(", point {} left over", alone - outcome.mate.begin());
+      summary.text += fmt::format(", point {} left over", unmatched - outcome.mate.begin());
     }
-    finish(summary, watch);
+    finish_summary(summary, watch);
     return summary;
   }
 
@@ -440,19 +451,20 @@ class MatchCommand final : public Command {
     summary.text = fmt::format("a tree of {} on {}, total distance {}",
                                counted(outcome.tree.rows.size(), "pair"), counted(levels, "level"),
                                readable_number(cost, 6));
-    finish(summary, watch);
+    finish_summary(summary, watch);
     return summary;
   }
 
-  /// Returns a text on the quality of the matching.
-  static std::string guarantee(const MatchOutcome& outcome) {
+  /// Returns " (the optimum)" or the bound of the gap to it, for the summary.
+  static std::string quality_text(const MatchOutcome& outcome) {
     if (outcome.optimal) return " (the optimum)";
     if (!outcome.lower_bound || !(*outcome.lower_bound > 0.0)) return " (no bound)";
-    const double share = std::max(0.0, outcome.cost / *outcome.lower_bound - 1.0);
-    return " (at most " + readable_bound(100.0 * share) + " % above the optimum)";
+    const double gap = std::max(0.0, outcome.cost / *outcome.lower_bound - 1.0);
+    return " (at most " + readable_bound(100.0 * gap) + " % above the optimum)";
   }
 
-  void finish(Summary& summary, const Stopwatch& watch) const {
+  /// Adds the cost of the work and ends the text.
+  void finish_summary(Summary& summary, const Stopwatch& watch) const {
     summary.add_cost(watch);
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     summary.text_is_result = output_ != "-";

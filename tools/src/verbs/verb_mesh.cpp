@@ -35,10 +35,9 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Keeps freed memory in the process, if the C library supports it, for work on several threads
-/// that allocates and frees blocks of similar sizes again and again. Otherwise the system takes
-/// large blocks back and clears each new page, which took 7 % of the meshing time. The peak does
-/// not grow.
+/// Keeps freed memory in the process, if the C library supports it. Meshing on several threads
+/// allocates and frees blocks of similar sizes again and again. If the system takes large blocks
+/// back, it has to clear each new page, which took 7 % of the meshing time. The peak does not grow.
 void keep_freed_memory() {
 #ifdef __GLIBC__
   constexpr int kMegabyte = 1 << 20;
@@ -107,38 +106,15 @@ class MeshCommand final : public Command {
       throw UsageError("--save-overlay and --output are the same file");
     }
     if (!save_overlay_.empty()) format_of_output(outputs::kOverlayFile, save_overlay_);
-    return max_error_ || !max_points_.empty() ? bounded(common) : multiresolution(common);
+    return max_error_ || !max_points_.empty() ? write_bounded(common) : write_detail(common);
   }
 
  private:
-  Summary bounded(const CommonOptions& common) const {
+  /// Writes the mesh with few triangles within --max-error or of --max-points.
+  Summary write_bounded(const CommonOptions& common) const {
     const Stopwatch watch;
-    if ((!part_.level.empty() && part_.level != "0") || !part_.focuses.empty() ||
-        !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty() ||
-        !part_.cluster.empty()) {
-      throw UsageError(
-          "--max-error and --max-points apply to all samples: they exclude --level, --focus, "
-          "--cluster, --smooth, --overlay and --metric");
-    }
-    BoundedMeshOptions options;
-    if (max_error_ && !max_points_.empty()) {
-      throw UsageError("give either --max-error or --max-points, not both");
-    }
-    options.max_error = max_error_.value_or(0.0);
-    if (!max_points_.empty()) {
-      options.max_points = count_of_option("--max-points", max_points_);
-      if (options.max_points < 4) throw UsageError("--max-points must be at least 4");
-    }
-    options.quality = parse_quality(quality_);
-    const std::string duplicates = !duplicates_.empty()  ? duplicates_
-                                   : max_points_.empty() ? "all"
-                                                         : "mean";
-    options.duplicates = parse_duplicates(duplicates);
-    if (options.duplicates == tri::PointDuplicates::all && !max_points_.empty()) {
-      throw UsageError("--duplicates all needs the bound of --max-error");
-    }
-    options.fill = parse_fill(fill_);
-    options.path = output_;
+    BoundedMeshOptions options = bounded_options();
+    const std::string duplicates = duplicates_choice();
     const stream::Store store = open_store(part_.path, part_.where);
     options.region = part_.detail(store, common).region;
     options.places = part_.crs.places(store, common);
@@ -179,11 +155,47 @@ class MeshCommand final : public Command {
           duplicates == "all"
               ? "the bound holds for each of them"
               : fmt::format("the bound holds for the {} of each place (--duplicates {})",
-                            counting(duplicates), duplicates));
+                            adjective_of(duplicates), duplicates));
     }
     return summary;
   }
 
+  /// Returns --duplicates, or its default.
+  [[nodiscard]] std::string duplicates_choice() const {
+    if (!duplicates_.empty()) return duplicates_;
+    return max_points_.empty() ? "all" : "mean";
+  }
+
+  /// Returns the options that do not depend on the store. Throws UsageError if options contradict
+  /// each other.
+  [[nodiscard]] BoundedMeshOptions bounded_options() const {
+    if ((!part_.level.empty() && part_.level != "0") || !part_.focuses.empty() ||
+        !smooth_.empty() || metric_ != "euclidean" || !overlay_.empty() || !save_overlay_.empty() ||
+        !part_.cluster.empty()) {
+      throw UsageError(
+          "--max-error and --max-points apply to all samples: they exclude --level, --focus, "
+          "--cluster, --smooth, --overlay and --metric");
+    }
+    BoundedMeshOptions options;
+    if (max_error_ && !max_points_.empty()) {
+      throw UsageError("give either --max-error or --max-points, not both");
+    }
+    options.max_error = max_error_.value_or(0.0);
+    if (!max_points_.empty()) {
+      options.max_points = count_of_option("--max-points", max_points_);
+      if (options.max_points < 4) throw UsageError("--max-points must be at least 4");
+    }
+    options.quality = parse_quality(quality_);
+    options.duplicates = parse_duplicates(duplicates_choice());
+    if (options.duplicates == tri::PointDuplicates::kAll && !max_points_.empty()) {
+      throw UsageError("--duplicates all needs the bound of --max-error");
+    }
+    options.fill = parse_fill(fill_);
+    options.path = output_;
+    return options;
+  }
+
+  /// Returns the reason why samples are on no triangle, for the summary.
   static std::string why_uncovered(const BoundedMeshResult& result, bool grid, bool region) {
     if (result.triangles == 0) return "nothing spans an area";
     if (grid && region) return "they are at the region's border or next to cells without data";
@@ -191,26 +203,32 @@ class MeshCommand final : public Command {
                 : "the file's format rounds the border of the mesh";
   }
 
-  static std::string why_flat(const std::vector<stream::Point3>& positions) {
-    const bool one = std::all_of(positions.begin(), positions.end(), [&](const stream::Point3& p) {
-      return p[0] == positions.front()[0] && p[1] == positions.front()[1];
-    });
+  /// Returns the reason why positions give no triangles, for a note.
+  static std::string why_no_triangles(const std::vector<stream::Point3>& positions) {
+    const bool same_position =
+        std::all_of(positions.begin(), positions.end(), [&](const stream::Point3& p) {
+          return p[0] == positions.front()[0] && p[1] == positions.front()[1];
+        });
     return std::string("there are no triangles, because ") +
-           (one ? "all points have the same x and y" : "all points are on one line over x and y");
+           (same_position ? "all points have the same x and y"
+                          : "all points are on one line over x and y");
   }
 
-  /// A store with a CRS is not a scan, so no ground map is needed.
+  /// Returns whether a store holds points on the surface of a body rather than on terrain. A store
+  /// with a CRS does not.
   static bool looks_like_scan(const stream::Store& store) {
     const stream::Crs& crs = store.schema().crs;
     return !store.schema().grid && crs.epsg == 0 && crs.wkt.empty() &&
            is_scan(store, StoreView<tri::PointCloud>(store).ground());
   }
 
-  static std::string counting(const std::string& duplicates) {
+  /// Returns "lowest" for "min" and so on: the sample of a place that --duplicates chooses.
+  static std::string adjective_of(const std::string& duplicates) {
     return duplicates == "min" ? "lowest" : duplicates == "max" ? "highest" : duplicates;
   }
 
-  Summary multiresolution(const CommonOptions& common) const {
+  /// Writes the mesh of a part of the store at the chosen levels.
+  Summary write_detail(const CommonOptions& common) const {
     const Stopwatch watch;
     if (quality_ != "removal" || !duplicates_.empty() || fill_ != "none") {
       throw UsageError("--quality, --duplicates and --fill need --max-error or --max-points");
@@ -236,7 +254,7 @@ class MeshCommand final : public Command {
     }
     TriangleMesh mesh = detail_mesh(store, detail, options, common.context());
     if (mesh.positions.empty()) throw_none_inside(store, "triangle");
-    if (mesh.triangles.empty()) common.say(part_.path + ": " + why_flat(mesh.positions));
+    if (mesh.triangles.empty()) common.say(part_.path + ": " + why_no_triangles(mesh.positions));
     places(mesh.positions, check_interrupt);
     const MeshCoordinates coordinates =
         write_mesh(output_, mesh, {.format = format_, .replace = replace, .stop = stop_token()},

@@ -25,7 +25,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Parses "LAST" or "FIRST-LAST". An empty text leaves the request unchanged.
+/// Sets the zooms from "LAST" or "FIRST-LAST". An empty text changes nothing. Throws UsageError.
 void set_zooms(const std::string& text, TilesRequest& request) {
   if (text.empty()) return;
   const auto number = [&](std::string_view part) {
@@ -41,7 +41,7 @@ void set_zooms(const std::string& text, TilesRequest& request) {
       number(std::string_view(text).substr(dash == std::string::npos ? 0 : dash + 1));
 }
 
-/// Parses "interpolate", "flat" or "flat:METRES".
+/// Sets the fill from "interpolate", "flat" or "flat:METRES". Throws UsageError.
 void set_fill(const std::string& text, TilesRequest& request) {
   if (text.starts_with("flat:")) {
     request.flat_height = parse_number(text.substr(5), "--fill flat");

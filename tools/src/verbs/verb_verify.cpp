@@ -25,7 +25,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-/// Adds a problem to both forms of the summary.
+/// Adds a problem to the JSON list and to the text of the summary.
 void add_problem(const stream::Problem& problem, nlohmann::ordered_json& list, std::string& text) {
   list.push_back({{"file", problem.file}, {"offset", problem.offset}, {"what", problem.what}});
   text += fmt::format("{}: byte {}: {}\n", problem.file, problem.offset, problem.what);
@@ -52,7 +52,7 @@ class VerifyCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    if (is_tile_folder(path_)) return tiles(common);
+    if (is_tile_folder(path_)) return verify_tiles(common);
     if (!store_.empty() || has_store_options()) {
       throw UsageError(
           "--store, --where, --max-error, --vertical and --geoid are for tile sets, and " + path_ +
@@ -62,14 +62,15 @@ class VerifyCommand final : public Command {
       throw stream::Error(path_, "there is neither a store nor a tile set here")
           .remedy("give a folder written by terrace build or terrace tile");
     }
-    return store(common);
+    return verify_store(common);
   }
 
  private:
   [[nodiscard]] bool has_store_options() const {
     return !where_.empty() || max_error_ || !vertical_.empty() || !geoid_.empty();
   }
-  [[nodiscard]] Summary store(const CommonOptions& common) const {
+
+  [[nodiscard]] Summary verify_store(const CommonOptions& common) const {
     const Stopwatch watch;
     const stream::Store store = open_store(path_);
     Summary summary;
@@ -88,7 +89,8 @@ class VerifyCommand final : public Command {
     summary.exit_code = ok ? 0 : 1;
     return summary;
   }
-  [[nodiscard]] Summary tiles(const CommonOptions& common) const {
+
+  [[nodiscard]] Summary verify_tiles(const CommonOptions& common) const {
     const Stopwatch watch;
     if (store_.empty() && has_store_options()) {
       throw UsageError("--where, --max-error, --vertical and --geoid need --store");
@@ -107,27 +109,7 @@ class VerifyCommand final : public Command {
     for (const stream::Problem& problem : result.problems) {
       add_problem(problem, problems, summary.text);
     }
-    nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
-    for (const ZoomCheck& zoom : result.zooms) {
-      nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
-      summary.text += fmt::format("zoom {}: {}", zoom.zoom, counted(zoom.tiles, "tile"));
-      if (store) {
-        line["samples"] = zoom.samples;
-        line["covered"] = zoom.samples - zoom.uncovered;
-        line["uncovered"] = zoom.uncovered;
-        line["max_error"] = zoom.max_error;
-        summary.text += fmt::format(
-            ", within {} m of {}{}", readable_bound(zoom.max_error),
-            zoom.uncovered == 0 ? "all " : with_commas(zoom.samples - zoom.uncovered) + " of ",
-            counted(zoom.samples, "sample"));
-        if (zoom.uncovered > 0) {
-          summary.text += fmt::format(" ({}{} on no triangle)", with_commas(zoom.uncovered),
-                                      zoom.uncovered == 1 ? " is" : " are");
-        }
-      }
-      summary.text += "\n";
-      zooms.push_back(std::move(line));
-    }
+    const nlohmann::ordered_json zooms = add_zooms(result, store.has_value(), summary.text);
     const bool ok = result.problems.empty();
     if (result.torn > 0) {
       summary.text += counted(result.torn, "file") +
@@ -145,6 +127,34 @@ class VerifyCommand final : public Command {
                                 readable_seconds(watch.seconds()));
     summary.exit_code = ok ? 0 : 1;
     return summary;
+  }
+
+  /// Returns the zooms as a JSON list and adds a line for each to `text`. `has_samples` means that
+  /// the tiles were compared with the samples of a store.
+  static nlohmann::ordered_json add_zooms(const TileCheckResult& result, bool has_samples,
+                                          std::string& text) {
+    nlohmann::ordered_json zooms = nlohmann::ordered_json::array();
+    for (const ZoomCheck& zoom : result.zooms) {
+      nlohmann::ordered_json line{{"zoom", zoom.zoom}, {"tiles", zoom.tiles}};
+      text += fmt::format("zoom {}: {}", zoom.zoom, counted(zoom.tiles, "tile"));
+      if (has_samples) {
+        line["samples"] = zoom.samples;
+        line["covered"] = zoom.samples - zoom.uncovered;
+        line["uncovered"] = zoom.uncovered;
+        line["max_error"] = zoom.max_error;
+        text += fmt::format(
+            ", within {} m of {}{}", readable_bound(zoom.max_error),
+            zoom.uncovered == 0 ? "all " : with_commas(zoom.samples - zoom.uncovered) + " of ",
+            counted(zoom.samples, "sample"));
+        if (zoom.uncovered > 0) {
+          text += fmt::format(" ({}{} on no triangle)", with_commas(zoom.uncovered),
+                              zoom.uncovered == 1 ? " is" : " are");
+        }
+      }
+      text += "\n";
+      zooms.push_back(std::move(line));
+    }
+    return zooms;
   }
 
   std::string path_, store_, where_, vertical_, geoid_;
