@@ -28,13 +28,14 @@ std::vector<tri::Point3> sphere(std::size_t count) {
   return points;
 }
 
+/// Expects a closed manifold of one part without holes.
 void expect_sphere(const tri::Surface& surface) {
-  const tri::SurfaceMeasures measured = tri::measure(surface);
-  EXPECT_TRUE(measured.closed);
-  EXPECT_EQ(measured.components, 1u);
-  EXPECT_EQ(measured.euler_characteristic, 2);
-  EXPECT_EQ(measured.non_manifold_edges, 0u);
-  EXPECT_EQ(measured.vertices, surface.points.size());
+  const tri::SurfaceMeasures measures = tri::measure(surface);
+  EXPECT_TRUE(measures.closed);
+  EXPECT_EQ(measures.components, 1u);
+  EXPECT_EQ(measures.euler_characteristic, 2);
+  EXPECT_EQ(measures.non_manifold_edges, 0u);
+  EXPECT_EQ(measures.vertices, surface.points.size());
 }
 
 double volume_ratio(const tri::Surface& surface) {
@@ -44,25 +45,25 @@ double volume_ratio(const tri::Surface& surface) {
 TEST(CgalSurfaceTest, AdvancingFrontRestoresASphere) {
   std::vector<tri::Point3> points = sphere(1500);
   points.push_back(points[0]);
-  const tri::RestoredSurface found = advancing_front_surface(points);
-  expect_sphere(found.surface);
-  EXPECT_NEAR(volume_ratio(found.surface), 1.0, 0.02);
-  ASSERT_EQ(found.input.size(), 1500u);
-  for (std::size_t i = 0; i < found.input.size(); ++i) {
-    ASSERT_EQ(found.surface.points[i], points[found.input[i]]);
+  const tri::RestoredSurface result = advancing_front_surface(points);
+  expect_sphere(result.surface);
+  EXPECT_NEAR(volume_ratio(result.surface), 1.0, 0.02);
+  ASSERT_EQ(result.input.size(), 1500u);
+  for (std::size_t i = 0; i < result.input.size(); ++i) {
+    ASSERT_EQ(result.surface.points[i], points[result.input[i]]);
   }
-  EXPECT_EQ(advancing_front_surface(points).surface.faces.size(), found.surface.faces.size());
+  EXPECT_EQ(advancing_front_surface(points).surface.faces.size(), result.surface.faces.size());
 }
 
 TEST(CgalSurfaceTest, AlphaWrapEnclosesThePointsInASphere) {
   const std::vector<tri::Point3> points = sphere(1500);
-  const tri::Surface found = alpha_wrap_surface(points);
-  expect_sphere(found);
-  EXPECT_GT(volume_ratio(found), 1.0);
-  EXPECT_LT(volume_ratio(found), 1.25);
+  const tri::Surface result = alpha_wrap_surface(points);
+  expect_sphere(result);
+  EXPECT_GT(volume_ratio(result), 1.0);
+  EXPECT_LT(volume_ratio(result), 1.25);
   const tri::Surface again = alpha_wrap_surface(points);
-  EXPECT_TRUE(again.faces == found.faces);
-  EXPECT_TRUE(again.points == found.points);
+  EXPECT_TRUE(again.faces == result.faces);
+  EXPECT_TRUE(again.points == result.points);
 }
 
 TEST(CgalSurfaceTest, HandlesDegeneratePoints) {
@@ -87,23 +88,23 @@ TEST(CgalSurfaceTest, HandlesDegeneratePoints) {
 }
 
 TEST(CgalSurfaceTest, ErrorsNameUnsupportedPoints) {
-  const auto refused = [](const std::vector<tri::Point3>& points, const char* why) {
+  const auto expect_rejected = [](const std::vector<tri::Point3>& points, const char* message) {
     try {
       alpha_wrap_surface(points);
-      ADD_FAILURE() << "not refused: " << why;
+      ADD_FAILURE() << "not rejected: " << message;
     } catch (const std::invalid_argument& error) {
-      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(message), std::string::npos) << error.what();
     }
     EXPECT_THROW(advancing_front_surface(points), std::invalid_argument);
   };
   std::vector<tri::Point3> points = sphere(10);
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), -1e101}) {
-    points[7][1] = bad;
-    refused(points, "point 7");
+  for (const double invalid : {std::numeric_limits<double>::quiet_NaN(), -1e101}) {
+    points[7][1] = invalid;
+    expect_rejected(points, "point 7");
   }
   points = sphere(10);
   for (auto& p : points) p = {(p[0] - 10) * 1e-120, p[1] * 1e-120, p[2] * 1e-120};
-  refused(points, "1e-100");
+  expect_rejected(points, "1e-100");
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 class DendrogramFile : public ::testing::Test {
  protected:
-  void hold(const std::string& text) const { std::ofstream(path_) << text; }
+  void write_file(const std::string& text) const { std::ofstream(path_) << text; }
 
   tests::TemporaryFolder scratch_;
   std::string path_ = scratch_.path() / "dendrogram.csv";
@@ -26,15 +26,15 @@ const cluster::Dendrogram kDendrogram{4, {{0, 1, 0.1, 2}, {2, 3, 1.0 / 3.0, 2}, 
 
 TEST_F(DendrogramFile, RoundTripsExactly) {
   write_dendrogram(path_, kDendrogram, true);
-  const auto back = read_dendrogram(path_);
-  ASSERT_TRUE(back);
-  EXPECT_EQ(*back, kDendrogram);
+  const auto result = read_dendrogram(path_);
+  ASSERT_TRUE(result);
+  EXPECT_EQ(*result, kDendrogram);
 }
 
 TEST_F(DendrogramFile, IgnoresOtherFiles) {
   for (const char* text :
        {"", "a", "a,b,height", "a,b,height,sizes\n0,1,2,2\n", "x,y,z\n1,2,3\n"}) {
-    hold(text);
+    write_file(text);
     EXPECT_FALSE(read_dendrogram(path_)) << text;
   }
   EXPECT_FALSE(read_dendrogram(scratch_.path()));
@@ -42,7 +42,7 @@ TEST_F(DendrogramFile, IgnoresOtherFiles) {
 }
 
 TEST_F(DendrogramFile, AcceptsAllLineEnds) {
-  hold("a,b,height,size\r\n0,1,2.5,2\r\n\r\n");
+  write_file("a,b,height,size\r\n0,1,2.5,2\r\n\r\n");
   const auto tree = read_dendrogram(path_);
   ASSERT_TRUE(tree);
   EXPECT_EQ(tree->merges.front().height, 2.5);
@@ -51,11 +51,11 @@ TEST_F(DendrogramFile, AcceptsAllLineEnds) {
 TEST_F(DendrogramFile, RejectsMalformedDendrograms) {
   for (const char* rows : {"0,1,2", "0,1,2,2,3", "0,1,x,2", "0;1;2;2", "-1,1,2,2", "0,1,nan,2",
                            "0,1,-1,2", "0,2,1,2", "0,1,1,3", "0,0,1,2", "0,1,1,2\n0,2,2,3"}) {
-    hold(std::string("a,b,height,size\n") + rows + "\n");
+    write_file(std::string("a,b,height,size\n") + rows + "\n");
     EXPECT_THROW(read_dendrogram(path_), stream::Error) << rows;
   }
   try {
-    hold("a,b,height,size\n0,1,1,2\nnonsense\n");
+    write_file("a,b,height,size\n0,1,1,2\nnonsense\n");
     (void)read_dendrogram(path_);
     FAIL();
   } catch (const stream::Error& error) {
@@ -64,23 +64,23 @@ TEST_F(DendrogramFile, RejectsMalformedDendrograms) {
 }
 
 TEST(DrawDendrogram, LinesRiseFromTheLeavesToTheRoot) {
-  const auto drawn = [](Canvas& canvas, double x, double y) {
+  const auto is_drawn = [](Canvas& canvas, double x, double y) {
     return std::isfinite(canvas.depth(static_cast<std::uint32_t>(x * canvas.width()),
                                       static_cast<std::uint32_t>(y * canvas.height())));
   };
   Canvas canvas(400, 200);
   draw_dendrogram({4, {{0, 1, 1.0, 2}, {2, 3, 2.0, 2}, {4, 5, 4.0, 4}}}, canvas);
   // The margin is 12 samples of 800 x 400; leaves are at 1/8, 3/8, 5/8 and 7/8 of the inside.
-  const auto across = [](double share) { return (12 + share * 776) / 800; };
-  const auto up = [](double share) { return (388 - share * 376) / 400; };
+  const auto x_of = [](double share) { return (12 + share * 776) / 800; };
+  const auto y_of = [](double share) { return (388 - share * 376) / 400; };
   for (const double leaf : {0.125, 0.375, 0.625, 0.875})
-    EXPECT_TRUE(drawn(canvas, across(leaf), up(0.1)));
-  EXPECT_TRUE(drawn(canvas, across(0.25), up(0.25)));   // across the first pair
-  EXPECT_FALSE(drawn(canvas, across(0.25), up(0.2)));   // nothing below it
-  EXPECT_TRUE(drawn(canvas, across(0.25), up(0.6)));    // its stem
-  EXPECT_FALSE(drawn(canvas, across(0.375), up(0.4)));  // a leaf ends at its merge
-  EXPECT_TRUE(drawn(canvas, across(0.875), up(0.4)));
-  EXPECT_TRUE(drawn(canvas, across(0.5), up(1.0)));  // the root
+    EXPECT_TRUE(is_drawn(canvas, x_of(leaf), y_of(0.1)));
+  EXPECT_TRUE(is_drawn(canvas, x_of(0.25), y_of(0.25)));   // across the first pair
+  EXPECT_FALSE(is_drawn(canvas, x_of(0.25), y_of(0.2)));   // nothing is below it
+  EXPECT_TRUE(is_drawn(canvas, x_of(0.25), y_of(0.6)));    // its stem
+  EXPECT_FALSE(is_drawn(canvas, x_of(0.375), y_of(0.4)));  // a leaf ends at its merge
+  EXPECT_TRUE(is_drawn(canvas, x_of(0.875), y_of(0.4)));
+  EXPECT_TRUE(is_drawn(canvas, x_of(0.5), y_of(1.0)));  // the root
 }
 
 TEST(DrawDendrogram, DrawsDeepAndFlatTrees) {

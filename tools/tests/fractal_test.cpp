@@ -67,7 +67,7 @@ TEST(Fractal, StructureFunctionFollowsTheHurstExponent) {
   }
 }
 
-// The computed bound and deviation hold for the generated heights.
+// The heights stay within five of the computed deviations, and these within the bound.
 TEST(Fractal, StaysWithinItsBound) {
   const Fractal fractal({.seed = 3, .hurst = 0.5});
   const std::vector<float> heights = field(fractal, 4096, 512);
@@ -76,10 +76,10 @@ TEST(Fractal, StaysWithinItsBound) {
   EXPECT_LT(5 * fractal.deviation(), fractal.bound());
 }
 
-TEST(Fractal, PiecesMatchTheWhole) {
+TEST(Fractal, PiecesMatchTheFullField) {
   const Fractal fractal({.seed = 9});
   const std::uint32_t width = 301;
-  const std::vector<float> whole = field(fractal, width, 200);
+  const std::vector<float> full = field(fractal, width, 200);
   for (const std::uint32_t first : {0u, 1u, 2u, 77u, 300u}) {
     for (const std::uint32_t top : {0u, 1u, 63u, 199u}) {
       const std::uint32_t piece_width = std::min(width - first, 45u);
@@ -87,15 +87,15 @@ TEST(Fractal, PiecesMatchTheWhole) {
       for (std::uint32_t y = top; y < std::min(top + 9, 200u); ++y) {
         const auto row = rows.row(y);
         ASSERT_TRUE(std::equal(row.begin(), row.end(),
-                               whole.begin() + static_cast<std::ptrdiff_t>(y * width + first)))
+                               full.begin() + static_cast<std::ptrdiff_t>(y * width + first)))
             << first << ' ' << y;
       }
     }
   }
 }
 
-// Golden: these bytes must be the same on every machine and compiler. A change of the method
-// changes them, and with them the input of every benchmark.
+// The heights must have the same bytes on every machine and with every compiler. A change of the
+// method changes them, and with them the input of every benchmark.
 TEST(Fractal, BytesAreFixed) {
   const Fractal fractal({.seed = 1});
   std::uint64_t hash = 14695981039346656037u;  // FNV-1a

@@ -22,10 +22,10 @@ constexpr const char* kTree = "a,b,distance,size,level\n";
 
 class MatchingResultFile : public ::testing::Test {
  protected:
-  void hold(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
+  void write_file(const std::string& text) const { std::ofstream(path_, std::ios::binary) << text; }
   /// Returns the error for a file with this text.
-  [[nodiscard]] stream::Error::Parts fault(const std::string& text, std::size_t points) const {
-    hold(text);
+  [[nodiscard]] stream::Error::Parts error_of(const std::string& text, std::size_t points) const {
+    write_file(text);
     try {
       (void)read_matching_result(path_, points);
     } catch (const stream::Error& error) {
@@ -42,53 +42,53 @@ class MatchingResultFile : public ::testing::Test {
 TEST_F(MatchingResultFile, IsRecognisedByItsFirstLine) {
   for (const char* text : {"a,b,distance", "a,b,distance\n", "a,b,distance\r\n0,1,2\r\n",
                            "a,b,distance,size,level\n0,1,nonsense"}) {
-    hold(text);
+    write_file(text);
     EXPECT_TRUE(is_matching_result(path_)) << text;
   }
   for (const char* text : {"", "a", "a,b,distances\n", "a,b,distance \n", "a,b,height,size\n",
                            "a,b,distance,size\n", "x,y,z\n1,2,3\n", "\n\na,b,distance\n"}) {
-    hold(text);
+    write_file(text);
     EXPECT_FALSE(is_matching_result(path_)) << text;
   }
-  hold(std::string("a,b,distance\0\n", 14));
+  write_file(std::string("a,b,distance\0\n", 14));
   EXPECT_FALSE(is_matching_result(path_));
   EXPECT_FALSE(is_matching_result(scratch_.path()));
   EXPECT_FALSE(is_matching_result(path_ + ".none"));
 }
 
 TEST_F(MatchingResultFile, ReadsPairs) {
-  hold(std::string(kPairs) + "0,3,1.5\r\n\n4,1,0\n");
+  write_file(std::string(kPairs) + "0,3,1.5\r\n\n4,1,0\n");
   const MatchingResult result = read_matching_result(path_, 5);
   EXPECT_FALSE(result.tree);
   EXPECT_EQ(result.top, 1u);
   ASSERT_EQ(result.lines.size(), 2u);
   EXPECT_EQ(result.lines[1].a, 4u);
   EXPECT_EQ(result.lines[1].b, 1u);
-  hold(kPairs);
+  write_file(kPairs);
   EXPECT_EQ(read_matching_result(path_, 1).top, 0u);
 }
 
 TEST_F(MatchingResultFile, ReadsTrees) {
   // Rows need not be sorted by level, because clusters follow one another.
-  hold(std::string(kTree) + "0,1,1,2,1\n2,5,1,3,2\n3,4,1,2,1\n6,7,9,5,3");
+  write_file(std::string(kTree) + "0,1,1,2,1\n2,5,1,3,2\n3,4,1,2,1\n6,7,9,5,3");
   const MatchingResult result = read_matching_result(path_, 5);
   EXPECT_TRUE(result.tree);
   EXPECT_EQ(result.top, 3u);
   EXPECT_EQ(result.lines.back().b, 7u);
-  hold(kTree);
+  write_file(kTree);
   EXPECT_EQ(read_matching_result(path_, 1).lines.size(), 0u);
 }
 
 TEST_F(MatchingResultFile, RejectsMalformedPairs) {
   for (const char* row : {"0,1", "0,1,2,3", "0;1;2", "-1,1,2", "0,1,x", "0,1,nan", "0,1,inf",
                           "0,1,-1", "0,0,1", "0,4,1", "4294967296,1,1", "0,1,1 ", " 0,1,1"}) {
-    const auto parts = fault(std::string(kPairs) + "2,3,1\n" + row + "\n", 4);
+    const auto parts = error_of(std::string(kPairs) + "2,3,1\n" + row + "\n", 4);
     EXPECT_EQ(parts.where, "line 3") << row;
   }
-  EXPECT_EQ(fault(std::string(kPairs) + "0,1,1\n1,2,1\n", 4).where, "line 3");
-  EXPECT_EQ(fault(std::string(kPairs) + "0,1,1\n2,3,1\n", 3).where, "line 3");
-  EXPECT_EQ(fault(std::string(kPairs) + "0,1,1\n", 0).where, "line 2");
-  EXPECT_NE(fault(std::string(kPairs) + "0,9,1\n", 5).cause.text().find("there are 5 points"),
+  EXPECT_EQ(error_of(std::string(kPairs) + "0,1,1\n1,2,1\n", 4).where, "line 3");
+  EXPECT_EQ(error_of(std::string(kPairs) + "0,1,1\n2,3,1\n", 3).where, "line 3");
+  EXPECT_EQ(error_of(std::string(kPairs) + "0,1,1\n", 0).where, "line 2");
+  EXPECT_NE(error_of(std::string(kPairs) + "0,9,1\n", 5).cause.text().find("there are 5 points"),
             std::string::npos);
 }
 
@@ -97,16 +97,16 @@ TEST_F(MatchingResultFile, RejectsMalformedTrees) {
   for (const char* row : {"2,3,1,2", "2,3,1", "2,3,1,2,1,1", "2,3,1,3,1", "2,4,1,2,2", "2,4,1,3,1",
                           "2,5,1,2,1", "2,6,1,2,1", "2,7,1,2,1", "1,2,1,2,1", "2,2,1,2,1",
                           "2,3,nan,2,1", "2,3,1,2,0", "2,3,1,2,-1", "2,3,1,2,99999999999"}) {
-    EXPECT_EQ(fault(first + row + "\n", 4).where, "line 3") << row;
+    EXPECT_EQ(error_of(first + row + "\n", 4).where, "line 3") << row;
   }
-  EXPECT_NE(fault(first + "2,5,1,2,1\n", 4).cause.text().find("before"), std::string::npos);
+  EXPECT_NE(error_of(first + "2,5,1,2,1\n", 4).cause.text().find("before"), std::string::npos);
   // A tree has exactly one row fewer than points.
-  EXPECT_NE(fault(first + "2,3,1,2,1\n", 4).cause.text().find("has 2 rows"), std::string::npos);
-  EXPECT_EQ(fault(first + "2,3,1,3,2\n", 2).where, "line 3");
+  EXPECT_NE(error_of(first + "2,3,1,2,1\n", 4).cause.text().find("has 2 rows"), std::string::npos);
+  EXPECT_EQ(error_of(first + "2,3,1,3,2\n", 2).where, "line 3");
 }
 
 TEST_F(MatchingResultFile, RejectsEndlessLines) {
-  const auto parts = fault(kPairs + std::string(100000, '1'), 4);
+  const auto parts = error_of(kPairs + std::string(100000, '1'), 4);
   EXPECT_EQ(parts.where, "line 2");
   EXPECT_NE(parts.cause.text().find("longer"), std::string::npos);
 }
@@ -114,7 +114,7 @@ TEST_F(MatchingResultFile, RejectsEndlessLines) {
 TEST_F(MatchingResultFile, PlacesNodesAtTheMeanOfTheirPoints) {
   const std::string points = path_ + ".points.csv";
   std::ofstream(points) << "x,y,z\n0,0,0\n3,0,0\n0,9,3\n3,3,3\n";
-  hold(std::string(kTree) + "0,1,3,2,1\n2,4,1,3,2\n3,5,1,4,3\n");
+  write_file(std::string(kTree) + "0,1,3,2,1\n2,4,1,3,2\n3,5,1,4,3\n");
   MatchingPicture picture = read_matching_picture(path_, points, {});
   ASSERT_EQ(picture.positions.size(), 7u);
   const auto offset = [&](std::size_t node, std::size_t axis) {

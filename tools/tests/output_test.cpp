@@ -123,55 +123,55 @@ TEST_F(MayReplace, ForceDependsOnTheMarkOfEachFormat) {
   expect_ours_by_mark("terrace", "tiff");
 }
 
-/// BigTIFF keeps up to eight bytes in the entry itself, and other writers may use the opposite byte
-/// order.
+/// BigTIFF stores a value of up to eight bytes in the entry itself, and other programs may write
+/// the opposite byte order.
 TEST_F(MayReplace, FindsTheTagInAllKindsOfTiff) {
   const auto tiff = [](bool big_endian, bool big_tiff, std::uint64_t tag, const std::string& name) {
     std::string bytes = big_endian ? "MM" : "II";
-    const auto put = [&](std::uint64_t number, std::size_t size) {
+    const auto append_number = [&](std::uint64_t number, std::size_t size) {
       for (std::size_t i = 0; i < size; ++i) {
         bytes += static_cast<char>(number >> 8 * (big_endian ? size - 1 - i : i));
       }
     };
     const std::size_t word = big_tiff ? 8 : 4;
-    put(big_tiff ? 43 : 42, 2);
-    if (big_tiff) put(8, 2), put(0, 2);
-    put(big_tiff ? 16 : 8, word);  // offset of the directory
-    put(4, big_tiff ? 8 : 2);
+    append_number(big_tiff ? 43 : 42, 2);
+    if (big_tiff) append_number(8, 2), append_number(0, 2);
+    append_number(big_tiff ? 16 : 8, word);  // offset of the directory
+    append_number(4, big_tiff ? 8 : 2);
     constexpr std::uint64_t kGeoKeys = 34735;
     const auto put_geo_keys = [&] {
-      for (const std::uint64_t number : {1U, 1U, 1U, 0U}) put(number, 2);
+      for (const std::uint64_t number : {1U, 1U, 1U, 0U}) append_number(number, 2);
     };
     for (const std::uint64_t entry : {std::uint64_t{256}, tag, std::uint64_t{322}, kGeoKeys}) {
-      put(entry, 2);
-      put(entry == tag ? 2 : 3, 2);
-      put(entry == tag ? name.size() : entry == kGeoKeys ? 4U : 1U, word);
+      append_number(entry, 2);
+      append_number(entry == tag ? 2 : 3, 2);
+      append_number(entry == tag ? name.size() : entry == kGeoKeys ? 4U : 1U, word);
       if (entry != tag && entry != kGeoKeys) {
-        put(big_endian ? std::uint64_t{16} << 8 * (word - 2) : 16, word);
+        append_number(big_endian ? std::uint64_t{16} << 8 * (word - 2) : 16, word);
       } else if (!big_tiff) {
-        put(8 + 2 + 48 + 4 + (entry == tag ? 0U : 8U), word);
+        append_number(8 + 2 + 48 + 4 + (entry == tag ? 0U : 8U), word);
       } else if (entry == tag) {
         bytes += name;
       } else {
         put_geo_keys();
       }
     }
-    put(0, word);
+    append_number(0, word);
     if (!big_tiff) {
       bytes += name;
       put_geo_keys();
     }
     return bytes;
   };
-  const std::string ours("terrace\0", 8), other("terrain\0", 8);
+  const std::string our_name("terrace\0", 8), foreign_name("terrain\0", 8);
   for (const bool big_endian : {false, true}) {
     for (const bool big_tiff : {false, true}) {
-      const std::string bytes = tiff(big_endian, big_tiff, 305, ours);
+      const std::string bytes = tiff(big_endian, big_tiff, 305, our_name);
       write(bytes);
       expect_ours("TIFF");
-      write(tiff(big_endian, big_tiff, 305, other));
+      write(tiff(big_endian, big_tiff, 305, foreign_name));
       expect_foreign("of another program");
-      write(tiff(big_endian, big_tiff, 270, ours));
+      write(tiff(big_endian, big_tiff, 270, our_name));
       expect_foreign("in its description");
       write(bytes + "tile");
       expect_foreign("with the directory before the tiles, as GDAL writes it");
@@ -183,7 +183,8 @@ TEST_F(MayReplace, FindsTheTagInAllKindsOfTiff) {
   }
 }
 
-/// Text files have no mark, and other programs may write the same text.
+/// Text files have no mark, and other programs may write the same text, so extended attributes
+/// identify ours.
 TEST_F(MayReplace, ForceReplacesUnchangedText) {
   write("");
   expect_ours("empty");

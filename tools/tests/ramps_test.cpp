@@ -18,18 +18,18 @@ namespace {
 
 using Json = nlohmann::json;
 
-Json shared() {
+Json viewer_ramps() {
   std::ifstream file(TERRACE_RAMPS);
   EXPECT_TRUE(file) << TERRACE_RAMPS;
   return Json::parse(file);
 }
 
-/// Mixes colours as ramps.ts does.
-Rgb mixed(const Json& stops, double place) {
+/// Returns the colour at a position between the stops, as ramps.ts computes it.
+Rgb interpolate(const Json& stops, double position) {
   std::size_t next = 1;
-  while (next + 1 < stops.size() && stops[next][0] < place) ++next;
+  while (next + 1 < stops.size() && stops[next][0] < position) ++next;
   const double from = stops[next - 1][0], to = stops[next][0];
-  const double t = std::clamp((place - from) / (to - from), 0.0, 1.0);
+  const double t = std::clamp((position - from) / (to - from), 0.0, 1.0);
   Rgb colour{};
   for (std::size_t c = 0; c < 3; ++c) {
     const double a = stops[next - 1][c + 1], b = stops[next][c + 1];
@@ -39,17 +39,17 @@ Rgb mixed(const Json& stops, double place) {
 }
 
 TEST(Ramps, ViewerMatchesTheCommand) {
-  const Json ramps = shared();
+  const Json ramps = viewer_ramps();
   for (int i = -10; i <= 1010; ++i) {
     const double share = i / 1000.0;
-    EXPECT_EQ(land_colour(share), mixed(ramps["land"], share)) << share;
-    EXPECT_EQ(sea_colour(share), mixed(ramps["sea"], share)) << share;
-    EXPECT_EQ(slope_colour(60 * share), mixed(ramps["slope"], 60 * share)) << share;
+    EXPECT_EQ(land_colour(share), interpolate(ramps["land"], share)) << share;
+    EXPECT_EQ(sea_colour(share), interpolate(ramps["sea"], share)) << share;
+    EXPECT_EQ(slope_colour(60 * share), interpolate(ramps["slope"], 60 * share)) << share;
   }
   for (unsigned level = 0; level <= 8; ++level) {
-    EXPECT_EQ(store_level_colour(level, 8), mixed(ramps["levels"], 1 - level / 8.0)) << level;
+    EXPECT_EQ(store_level_colour(level, 8), interpolate(ramps["levels"], 1 - level / 8.0)) << level;
   }
-  EXPECT_EQ(store_level_colour(0, 0), mixed(ramps["levels"], 1));
+  EXPECT_EQ(store_level_colour(0, 0), interpolate(ramps["levels"], 1));
   const Json& categories = ramps["categories"];
   for (std::size_t i = 0; i < 3 * categories.size(); ++i) {
     EXPECT_EQ(Json(category_colour(static_cast<std::int64_t>(i))),
@@ -88,15 +88,15 @@ TEST(Ramps, ClassesHaveCustomaryColours) {
 }
 
 TEST(Ramps, ViewerLightMatchesTheCommand) {
-  const Json light = shared()["light"];
+  const Json light = viewer_ramps()["light"];
   const double radians = std::acos(-1.0) / 180;
   std::mt19937 random(16);
   std::uniform_real_distribution<double> slope(-2, 2);
-  // The viewer's azimuth is its direction of view, the command's is the position of the viewer.
-  for (const double looking : {0.0, 30.0, 135.0, 270.0}) {
-    const ViewDirection view{.azimuth = looking + 180, .elevation = 40};
+  // In the viewer, an azimuth is the direction of view. In the command, it is where the viewer is.
+  for (const double azimuth : {0.0, 30.0, 135.0, 270.0}) {
+    const ViewDirection view{.azimuth = azimuth + 180, .elevation = 40};
     const Camera camera(view);
-    const double turn = (looking + light["turn"].get<double>()) * radians;
+    const double turn = (azimuth + light["turn"].get<double>()) * radians;
     const double elevation = light["elevation"].get<double>() * radians;
     const stream::Point3 sun{std::sin(turn) * std::cos(elevation),
                              std::cos(turn) * std::cos(elevation), std::sin(elevation)};
@@ -110,7 +110,7 @@ TEST(Ramps, ViewerLightMatchesTheCommand) {
       const double ambient = light["ambient"], strength = light["strength"];
       EXPECT_NEAR(Light::for_terrain(view, 1).shade(normal, camera.toward),
                   ambient + (1 - ambient) * strength * std::max(lit, 0.0) / sun[2], 1e-6)
-          << looking << ": " << x << ", " << y;
+          << azimuth << ": " << x << ", " << y;
     }
   }
 }

@@ -82,18 +82,18 @@ TEST(Clouds, StayWithinTheirBounds) {
   for (const double m : mean) EXPECT_NEAR(m, 0.5, 0.02);
 }
 
-// A block of a swath is compact: successive points are adjacent.
-TEST(Surface, ComesInSwaths) {
+// Successive points of a swath are adjacent.
+TEST(SurfaceCloud, RunsInSwaths) {
   const auto surface = surface_cloud(100000, 1);
-  double near = 0;
+  double adjacent = 0;
   for (std::uint64_t n = 20000; n < 21000; ++n) {
     const stream::Point3 a = surface(n), b = surface(n + 1);
-    near += std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) < 4 ? 1 : 0;
+    adjacent += std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) < 4 ? 1 : 0;
   }
-  EXPECT_GT(near, 900);
+  EXPECT_GT(adjacent, 900);
 }
 
-// Golden: the same bytes on every machine and compiler.
+// The points must have the same bytes on every machine and with every compiler.
 TEST(Clouds, BytesAreFixed) {
   std::uint64_t hash = 14695981039346656037u;  // FNV-1a
   for (const auto& cloud : {surface_cloud(1000, 1), uniform_cloud(1), cluster_cloud(1000, 1)}) {
