@@ -15,10 +15,9 @@ import os
 import re
 import sys
 
-# Acceptable reasons to skip: things that no installation can provide (hardware, privileges, data
-# that a machine may lack), Emscripten and QGIS, which take half a gigabyte or more, and packages of
-# a registry that cannot be reached.
-MAY_LACK = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|QGIS|cannot be downloaded|TERRACE_DATA', re.IGNORECASE)
+# Acceptable reasons to skip a case. No installation can provide hardware, privileges, the data or an
+# unreachable registry. Emscripten and QGIS take half a gigabyte or more.
+ACCEPTED_REASONS = re.compile(r'AVX|GPU|CUDA|nvidia|driver|privileges|sanitizer|Emscripten|QGIS|cannot be downloaded|TERRACE_DATA', re.IGNORECASE)
 
 GTEST = re.compile(r'^\[ +(OK|FAILED|SKIPPED) +\] ([\w/.]+)(?:, where .*)? \(\d+ ms\)', re.MULTILINE)
 GTEST_REASON = re.compile(r': Skipped\n(.*)\n')
@@ -32,12 +31,12 @@ class Tally:
 
     def __init__(self):
         self.passed = self.failed = self.skipped = 0
-        self.left_out = collections.defaultdict(list)
+        self.skipped_by_reason = collections.defaultdict(list)
         self.failures = []
 
     def skip(self, reason, name):
         self.skipped += 1
-        self.left_out[reason].append(name)
+        self.skipped_by_reason[reason].append(name)
 
     def add(self, row):
         """Adds one line of testlog.json: a program and its output."""
@@ -48,12 +47,14 @@ class Tally:
         if kind == 'SKIP':
             self.skip((text.strip().splitlines() or ['no reason given'])[-1], row['name'])
         elif kind not in ('OK', 'EXPECTEDFAIL'):
-            # It may have stopped before it named a case.
+            # Count the program as one case if it stopped before it named one.
             self.failed += self.failed == failed
             cases = [case[2] for case in GTEST.finditer(text) if case[1] == 'FAILED']
             self.failures.append((row['name'], kind, cases, text.strip().splitlines()[-30:]))
         elif not known:
             self.passed += 1
+
+    # Each of the following adds the cases that one test framework reports and returns true if there are any.
 
     def gtest(self, text):
         at = 0
@@ -70,8 +71,8 @@ class Tally:
 
     def unittest(self, text, name):
         runs = UNITTEST.findall(text)
-        for ran, rest in runs:
-            count = collections.Counter({k: int(v) for k, v in re.findall(r'([a-z ]+)=(\d+)', rest or '')})
+        for ran, counts in runs:
+            count = collections.Counter({k: int(v) for k, v in re.findall(r'([a-z ]+)=(\d+)', counts or '')})
             failed = count['failures'] + count['errors'] + count['unexpected successes']
             failed += count[' errors'] + count[' unexpected successes']
             skipped = count['skipped'] + count[' skipped']
@@ -100,10 +101,10 @@ def main(logs):
             for line in file:
                 tally.add(json.loads(line))
     missing = 0
-    for reason, names in sorted(tally.left_out.items()):
-        shown = ', '.join(names[:4]) + (f' and {len(names) - 4} more' if len(names) > 4 else '')
-        print(f'left out: {len(names)}: {reason} ({shown})')
-        missing += 0 if MAY_LACK.search(reason) else len(names)
+    for reason, names in sorted(tally.skipped_by_reason.items()):
+        listed = ', '.join(names[:4]) + (f' and {len(names) - 4} more' if len(names) > 4 else '')
+        print(f'left out: {len(names)}: {reason} ({listed})')
+        missing += 0 if ACCEPTED_REASONS.search(reason) else len(names)
     for name, kind, cases, lines in tally.failures:
         print(f'{kind}: {name}', *cases)
         print(*('    ' + line for line in lines), sep='\n')

@@ -4,8 +4,8 @@
 
 TERRACE=path/to/terrace docs_guides_test.py [-v] [PageTest.test_docs_guides_python ...]
 
-BUILD names a build whose libraries are installed for pages that compile programs. PYTHON names an interpreter that finds
-the module `terrace` (by PYTHONPATH); without it blocks of Python are left out, and the test says so.
+BUILD is the build whose libraries are installed for pages that compile programs. PYTHON is an interpreter that finds the
+module `terrace` (by PYTHONPATH). Without it, blocks of Python are skipped and the output lists them.
 """
 
 import glob
@@ -34,7 +34,7 @@ def install(folder):
 
 
 class PageTest(unittest.TestCase):
-    """One case a page."""
+    """Has one case for each page."""
 
     @classmethod
     def setUpClass(cls):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Reads a page of Markdown, runs its blocks of code in order, and compares the output it shows.
 
-Every fenced block of a page is tested; a comment before it says how, unless its language does:
+Every fenced block of a page is tested. A comment before it determines how, unless its language does:
 
 | block | what happens |
 |---|---|
@@ -15,8 +15,8 @@ Every fenced block of a page is tested; a comment before it says how, unless its
 | `<!-- test: needs PROGRAM -->` | runs only where PROGRAM is installed |
 | `<!-- test: skip REASON -->` | is not run; at most MOST_SKIPPED of a page |
 
-Output may be shortened: a line `...` stands for any lines, and `...` within a line for any text. What differs between
-runs (times, rates, the peak of memory, ports) must be shown in this way.
+Output may be shortened: a line `...` stands for any lines, and `...` within a line for any text. Values that differ
+between runs (times, rates, peak memory, ports) must be shortened.
 """
 
 import difflib
@@ -40,7 +40,7 @@ WITHOUT_ARGUMENT = {'serves'}
 
 
 class Fault(Exception):
-    """A page differs from what it does, or a block does not say how it is tested."""
+    """A block fails, prints other output than the page shows, or does not say how it is tested."""
 
 
 class Block:
@@ -94,7 +94,7 @@ def pattern_of(shown):
         if line.strip() == '...':
             parts.append(r'(?:[^\n]*\n)*?')
         else:
-            parts.append(r'[^\n]*'.join(re.escape(piece) for piece in line.rstrip().split('...')) + r'[ ]*\n')
+            parts.append(r'[^\n]*'.join(re.escape(chunk) for chunk in line.rstrip().split('...')) + r'[ ]*\n')
     return re.compile(''.join(parts))
 
 
@@ -172,10 +172,10 @@ def run_server(code, folder, environment):
         while b'http://' not in output or not output.endswith(b'\n'):
             if not select.select([server.stdout], [], [], max(0.0, until - time.monotonic()))[0]:
                 raise Fault('no address was printed')
-            piece = os.read(server.stdout.fileno(), 65536)
-            if not piece:
+            chunk = os.read(server.stdout.fileno(), 65536)
+            if not chunk:
                 raise Fault('the command ended without an address:\n' + output.decode())
-            output += piece
+            output += chunk
         os.killpg(server.pid, signal.SIGINT)
         output += server.stdout.read()
         server.wait(timeout=60)
@@ -191,20 +191,20 @@ def without_indent(lines):
 
 
 def check_excerpt(block, path):
-    """A line `...` stands for lines that the excerpt leaves out."""
+    """Raises Fault if the excerpt differs from the file. A line `...` stands for omitted lines."""
     with open(os.path.join(ROOT, path), encoding='utf-8') as file:
         source = without_indent(file.read().splitlines())
     at = 0
-    for piece in re.split(r'(?m)^ *(?:// )?\.\.\.$', block.text):
-        wanted = without_indent(piece.splitlines())
-        found = next((i for i in range(at, len(source) - len(wanted) + 1) if source[i:i + len(wanted)] == wanted), None)
-        if found is None or not wanted:
-            raise Fault(f'the excerpt is not in {path} (from "{wanted[0] if wanted else ""}")')
-        at = found + len(wanted)
+    for chunk in re.split(r'(?m)^ *(?:// )?\.\.\.$', block.text):
+        expected = without_indent(chunk.splitlines())
+        found = next((i for i in range(at, len(source) - len(expected) + 1) if source[i:i + len(expected)] == expected), None)
+        if found is None or not expected:
+            raise Fault(f'the excerpt is not in {path} (from "{expected[0] if expected else ""}")')
+        at = found + len(expected)
 
 
 class Page:
-    """Runs one page. `run` returns a line that says what was done."""
+    """One page. run() runs its blocks and returns a line with their number and the reasons for skipped ones."""
 
     def __init__(self, text, folder, environment, python=None):
         self.blocks, self.folder, self.environment, self.python = blocks_of(text), folder, environment, python
@@ -224,11 +224,11 @@ class Page:
                 self.session.close()
         if len(self.skipped) > MOST_SKIPPED:
             raise Fault(f'{len(self.skipped)} blocks are skipped; at most {MOST_SKIPPED} may be')
-        left_out = [f'skipped: {reason}' for reason in self.skipped] + sorted(set(self.unavailable))
-        return f'{self.ran} blocks ran, {self.compared} outputs compared' + ''.join(f'; {reason}' for reason in left_out)
+        remarks = [f'skipped: {reason}' for reason in self.skipped] + sorted(set(self.unavailable))
+        return f'{self.ran} blocks ran, {self.compared} outputs compared' + ''.join(f'; {reason}' for reason in remarks)
 
     def run_block(self, block):
-        before, self.output = self.output, None
+        previous_output, self.output = self.output, None
         if 'skip' in block.marks:
             self.skipped.append(block.marks['skip'])
             self.output = False  # unknown
@@ -241,10 +241,10 @@ class Page:
             check_excerpt(block, block.marks['excerpt'])
             self.ran += 1
         elif block.language == 'text':
-            if before is None:
+            if previous_output is None:
                 raise Fault('output without a block before it')
-            if before is not False:
-                compare(block.text, before)
+            if previous_output is not False:
+                compare(block.text, previous_output)
                 self.compared += 1
         elif 'needs' in block.marks and not shutil.which(block.marks['needs'], path=self.environment['PATH']):
             self.unavailable.append(f"{block.marks['needs']} is not installed")

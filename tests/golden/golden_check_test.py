@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""golden_test.py finds every kind of difference and names the command and the output.
+"""Tests that golden_test.py finds every kind of difference and names the command and the output.
 
 TERRACE=path/to/terrace golden_check_test.py
 """
@@ -15,7 +15,7 @@ import unittest
 
 import golden_test
 
-LIST = '''# Kept as it is.
+LIST = '''# A comment stays unchanged.
 $ inputs
 
 $ terrace build twice.xyz -o twice.terrace --block 300
@@ -60,7 +60,7 @@ class GoldenCheckTest(unittest.TestCase):
             code = golden_test.main(['--list', self.list, *options])
         return code, out.getvalue()
 
-    def differs(self, *words):
+    def assert_differs(self, *words):
         code, out = self.check()
         self.assertEqual(code, 1, out)
         for word in words:
@@ -83,20 +83,20 @@ class GoldenCheckTest(unittest.TestCase):
         self.check('--update')
         text = self.read()
         self.write(re.sub(r'[0-9a-f]{64} some\.csv', '0' * 64 + ' some.csv', text))
-        self.differs(': terrace points', '0' * 64 + ' some.csv', '--update', '1 of 4 commands')
+        self.assert_differs(': terrace points', '0' * 64 + ' some.csv', '--update', '1 of 4 commands')
         self.write(text.replace('"points": ', '"points": 1'))
-        self.differs('terrace build', '"points": 1')
+        self.assert_differs('terrace build', '"points": 1')
         self.write(re.sub(r'  [0-9a-f]{64} -\n', '', text))
-        self.differs('terrace convert', 'new: ')
+        self.assert_differs('terrace convert', 'new: ')
         self.write(re.sub(r'( [0-9a-f]{64} -\n)', r'\1  ' + 'f' * 64 + ' more\n', text))
-        self.differs('terrace convert', 'missing now: ' + 'f' * 64)
+        self.assert_differs('terrace convert', 'missing now: ' + 'f' * 64)
         self.write(re.sub(r'[0-9a-f]{64} ring\.ply', '0' * 64 + ' ring.ply', text))
-        self.differs('inputs', 'ring.ply')
+        self.assert_differs('inputs', 'ring.ply')
 
     def test_checks_options_that_must_not_change_the_output(self):
         self.write(LIST.replace('= --threads 1', '= --seed 2'))
         self.assertEqual(self.check('--update')[0], 1)
-        self.differs('terrace build', 'with --seed 2')
+        self.assert_differs('terrace build', 'with --seed 2')
 
     def test_rejects_a_failing_command(self):
         self.write(LIST.replace('--level 1', '--level 99'))

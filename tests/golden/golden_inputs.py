@@ -12,10 +12,10 @@ import struct
 from small_tiff import GEOGRAPHIC, utm, write_tiff
 
 
-def chance(*place):
-    """A pseudo-random number from 0 to 2^32 - 1 that depends only on the place."""
+def pseudo_random(*key):
+    """Returns a pseudo-random number from 0 to 2^32 - 1 that depends only on the integers of the key."""
     value = 0x9E3779B9
-    for part in place:
+    for part in key:
         value = (value ^ (part & 0xFFFFFFFF)) * 0x85EBCA6B & 0xFFFFFFFF
         value = (value ^ value >> 13) * 0xC2B2AE35 & 0xFFFFFFFF
         value ^= value >> 16
@@ -23,12 +23,12 @@ def chance(*place):
 
 
 def hills(seed, column, row):
-    """Heights in sixteenths, from 0 to about 19000: lattices of 48, 16 and 5 cells, and noise."""
-    height = chance(seed, 0, column, row) % 40
+    """Returns the height of a cell in sixteenths, from 0 to about 19000: lattices of 48, 16 and 5 cells, and noise."""
+    height = pseudo_random(seed, 0, column, row) % 40
     for step, amplitude in ((48, 12000), (16, 5000), (5, 1800)):
         i, u = divmod(column, step)
         k, v = divmod(row, step)
-        corners = [chance(seed, step, i + x, k + y) % amplitude for y in (0, 1) for x in (0, 1)]
+        corners = [pseudo_random(seed, step, i + x, k + y) % amplitude for y in (0, 1) for x in (0, 1)]
         west = corners[0] * (step - v) + corners[2] * v
         east = corners[1] * (step - v) + corners[3] * v
         height += (west * (step - u) + east * u) // (step * step)
@@ -40,9 +40,9 @@ def table(seed, columns, rows, height=lambda sixteenths, column, row: sixteenths
 
 
 def without_data(column, row):
-    """True in a lake, in a corner and in single cells."""
+    """Returns true for the cells of a lake, of a corner and for single ones."""
     return ((column - 60) ** 2 + (row - 30) ** 2 < 90 or column + row < 14 or
-            chance(5, column, row) % 500 == 0)
+            pseudo_random(5, column, row) % 500 == 0)
 
 
 def make_rasters():
@@ -54,8 +54,8 @@ def make_rasters():
     write_tiff('coast.tif', 90, 70, coast, (8.4, 46.42), 0.0009765625, GEOGRAPHIC, kind='h',
                nodata='-32768')
     # Rows from south to north.
-    up = [20.0, 0.0, 0.0, 400000.0, 0.0, 20.0, 0.0, 300000.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    write_tiff('south-up.tif', 70, 60, table(3, 70, 60), matrix=up, keys=utm(33))
+    transform = [20.0, 0.0, 0.0, 400000.0, 0.0, 20.0, 0.0, 300000.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    write_tiff('south-up.tif', 70, 60, table(3, 70, 60), matrix=transform, keys=utm(33))
     # Two sheets of one map; the second is ten rows lower.
     sheet = [hills(4, c, r) // 16 for r in range(60) for c in range(100)]
     cell = 0.00390625
@@ -77,13 +77,13 @@ def make_rasters():
 
 
 def laser_points():
-    """Points of a laser scan strip: x, y, z in centimetres, intensity, class, time."""
+    """Yields the points of a laser scan strip: x, y, z in centimetres, intensity, class, time."""
     for i in range(2600):
-        x = 40000 * (i % 65) // 64 + chance(8, i) % 500
-        y = 30000 * (i // 65) // 40 + chance(9, i) % 700
-        tree = chance(10, i) % 5 == 0
-        z = 40000 + hills(8, x // 400, y // 400) // 4 + (chance(11, i) % 1500 if tree else 0)
-        yield x, y, z, chance(12, i) % 4096, 5 if tree else 2, i * 25
+        x = 40000 * (i % 65) // 64 + pseudo_random(8, i) % 500
+        y = 30000 * (i // 65) // 40 + pseudo_random(9, i) % 700
+        tree = pseudo_random(10, i) % 5 == 0
+        z = 40000 + hills(8, x // 400, y // 400) // 4 + (pseudo_random(11, i) % 1500 if tree else 0)
+        yield x, y, z, pseudo_random(12, i) % 4096, 5 if tree else 2, i * 25
 
 
 def decimal(hundredths):
@@ -110,7 +110,7 @@ def make_clouds():
     # Three samples at every seventh place, two at every fifth; heights differ by at most 4 cm.
     with open('twice.xyz', 'w', encoding='ascii') as file:
         for i in range(900):
-            x, y = i % 30 * 100 + chance(13, i) % 60, i // 30 * 100 + chance(14, i) % 60
+            x, y = i % 30 * 100 + pseudo_random(13, i) % 60, i // 30 * 100 + pseudo_random(14, i) % 60
             z = hills(9, x // 80, y // 80)
             for copy in range(3 if i % 7 == 0 else 2 if i % 5 == 0 else 1):
                 file.write(f'{decimal(x)} {decimal(y)} {decimal(z + 2 * copy)}\n')
@@ -119,20 +119,20 @@ def make_clouds():
         file.write(b'ply\nformat binary_little_endian 1.0\nelement vertex 1200\n'
                    b'property float x\nproperty float y\nproperty float z\nend_header\n')
         for i in range(1200):
-            a, b = around(i // 24, 50, chance(15, i)), around(i % 24, 24, chance(16, i))
+            a, b = circle_point(i // 24, 50, pseudo_random(15, i)), circle_point(i % 24, 24, pseudo_random(16, i))
             radius = 3.0 + b[0]
             file.write(struct.pack('<3f', radius * a[0], radius * a[1], b[1]))
     with open('places.csv', 'w', encoding='ascii') as file:
         file.write('x,y,z,weight\n')
         for i in range(240):
             town = i % 6
-            x = 10000 * (town % 3) + chance(17, i) % 4000
-            y = 9000 * (town // 3) + chance(18, i) % 4000
-            file.write(f'{decimal(x)},{decimal(y)},{decimal(chance(19, i) % 2000)},{1 + i % 4}\n')
+            x = 10000 * (town % 3) + pseudo_random(17, i) % 4000
+            y = 9000 * (town // 3) + pseudo_random(18, i) % 4000
+            file.write(f'{decimal(x)},{decimal(y)},{decimal(pseudo_random(19, i) % 2000)},{1 + i % 4}\n')
 
 
-def around(i, count, jitter):
-    """The i-th of `count` nearly evenly spaced points of the unit circle, slightly displaced."""
+def circle_point(i, count, jitter):
+    """Returns the i-th of `count` points of the unit circle, evenly spaced except for the jitter."""
     quarter, t = divmod(4 * i, count)
     t = (t + (jitter % 1000) / 1250) / count
     x, y = (1 - t * t) / (1 + t * t), 2 * t / (1 + t * t)
@@ -161,20 +161,20 @@ def make_other_files():
     with open('ask.csv', 'w', encoding='ascii') as file:
         file.write('name,x,y\n')
         for i in range(200):
-            file.write(f'p{i},{decimal(69000000 + chance(20, i) % 240000)},'
-                       f'{decimal(520000000 + chance(21, i) % 200000)}\n')
+            file.write(f'p{i},{decimal(69000000 + pseudo_random(20, i) % 240000)},'
+                       f'{decimal(520000000 + pseudo_random(21, i) % 200000)}\n')
     with open('ask-lonlat.csv', 'w', encoding='ascii') as file:
         file.write('lon;lat\n')
         for i in range(60):
-            file.write(f'11.{4980 + chance(22, i) % 280:04};46.{9270 + chance(23, i) % 160:04}\n')
+            file.write(f'11.{4980 + pseudo_random(22, i) % 280:04};46.{9270 + pseudo_random(23, i) % 160:04}\n')
     with open('ask-laser.csv', 'w', encoding='ascii') as file:
         for i in range(150):
-            file.write(f'{decimal(69000000 + chance(24, i) % 40000)},'
-                       f'{decimal(519000000 + chance(25, i) % 30000)}\n')
+            file.write(f'{decimal(69000000 + pseudo_random(24, i) % 40000)},'
+                       f'{decimal(519000000 + pseudo_random(25, i) % 30000)}\n')
     with open('ask-britain.csv', 'w', encoding='ascii') as file:
         file.write('longitude,latitude\n')
         for i in range(40):
-            file.write(f'-1.{9820 + chance(26, i) % 180:04},52.{5985 + chance(27, i) % 90:04}\n')
+            file.write(f'-1.{9820 + pseudo_random(26, i) % 180:04},52.{5985 + pseudo_random(27, i) % 90:04}\n')
     # A geoid of 30 to 60 m in GeographicLib's format, five degrees apart.
     with open('geoid.pgm', 'wb') as file:
         file.write(b'P5\n# Description made for tests\n# DateTime 2020-01-01 00:00:00\n'
@@ -191,7 +191,7 @@ def make_other_files():
 
 
 def make_inputs(folder):
-    """Writes all inputs; returns their names."""
+    """Writes all inputs into the folder. Returns their names."""
     here = os.getcwd()
     os.chdir(folder)
     try:

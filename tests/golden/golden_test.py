@@ -12,9 +12,8 @@ The list, golden.txt, has commands, each followed by its results:
       5b1f... hills.terrace
       09ac... hills.terrace/manifest.json
 
-A line with $ is run. Commands run in the order of the list as far as one needs the output of another;
-`< FILE` at the end redirects standard input. A line with = gives options with which the same command must
-write the same bytes.
+A line with $ is run; `< FILE` at its end redirects standard input. Commands run in parallel, but after those
+whose output they need. A line with = gives options with which the same command must write the same bytes.
 
 Hashes are SHA-256: of a file's bytes, and of a folder's list of the lines below it. Of pictures, GeoTIFFs
 and compressed tiles, the decompressed content is hashed, because the compressed bytes depend on system
@@ -47,7 +46,7 @@ from cli_test import png_pixels  # noqa: E402
 from golden_inputs import make_inputs  # noqa: E402
 from small_tiff import tiff_content  # noqa: E402
 
-# Commands that run in another folder.
+# Absolute, because the commands run in another folder.
 TERRACE = os.path.abspath(shutil.which(os.environ.get('TERRACE', 'terrace')) or 'terrace')
 JOURNAL = '.terrace-tiles'
 
@@ -74,18 +73,18 @@ class Step:
         options = {'-o', '--save-overlay', '--dendrogram'}
         if self.arguments[0] == 'cluster':
             options.add('--labels')
-        self.output_places = [i + 1 for i, word in enumerate(self.arguments[:-1]) if word in options]
-        self.outputs = [self.arguments[i] for i in self.output_places]
+        self.output_positions = [i + 1 for i, word in enumerate(self.arguments[:-1]) if word in options]
+        self.outputs = [self.arguments[i] for i in self.output_positions]
 
     def reads(self):
-        """Words that may be file names, also after a colon (elliptical:FILE)."""
-        words = [w for i, w in enumerate(self.arguments) if i not in self.output_places]
+        """Returns the words that may be names of input files, also after a colon (elliptical:FILE)."""
+        words = [w for i, w in enumerate(self.arguments) if i not in self.output_positions]
         return {self.input, *words, *(w.split(':', 1)[-1] for w in words)}
 
     def run(self, folder, options, prefix):
         """Runs the command with prefixed output names. Returns the lines for the list."""
         arguments = list(self.arguments)
-        for i in self.output_places:
+        for i in self.output_positions:
             if arguments[i] != '-':
                 arguments[i] = prefix + arguments[i]
         to_stdout = '-' in self.outputs
@@ -129,7 +128,7 @@ def rounded_numbers(text):
 
 
 def content_of(path):
-    """The reproducible content of a file, without the compression by a library."""
+    """Returns the reproducible content of a file: decompressed, because compressed bytes depend on a library."""
     if path.endswith('.png'):
         width, height, rows = png_pixels(path)
         return struct.pack('<II', width, height) + b''.join(rows)
@@ -145,7 +144,7 @@ def content_of(path):
 
 
 def hash_lines(folder, prefix, name, rounded):
-    """The lines for an output, which is a file or a folder."""
+    """Returns the lines for an output, which is a file or a folder."""
     path = os.path.join(folder, prefix + name)
     if os.path.isfile(path):
         mark = '~' if name.endswith('.png') else ''
@@ -167,13 +166,13 @@ def hash_lines(folder, prefix, name, rounded):
             continue  # contains the sizes and checksums of the compressed tiles
         mark = '~' if file == JOURNAL else ''
         lines.append(f'{mark}{hash_of(content_of(os.path.join(path, file)))} {name}/{file}')
-    promised = [line for line in lines if not line.startswith('~')]
-    return [f'{hash_of(chr(10).join(promised).encode())} {name}'] + lines
+    stable = [line for line in lines if not line.startswith('~')]
+    return [f'{hash_of(chr(10).join(stable).encode())} {name}'] + lines
 
 
 class Inputs:
-    """The line `$ inputs`, which stands for the files that golden_inputs.py makes. If these differ, Python is
-    the cause, not terrace."""
+    """The line `$ inputs`, which stands for the files that golden_inputs.py writes. If these differ, the cause
+    is Python, not terrace."""
 
     outputs = ()
 
@@ -211,32 +210,32 @@ def read_list(path):
 
 
 def write_list(path, layout, results):
-    out = []
+    text_lines = []
     for part in layout:
         if isinstance(part, str):
-            out.append(part)
+            text_lines.append(part)
             continue
-        out.append('$ ' + part.command)
-        out += ['= ' + shlex.join(options) for options in part.variants]
-        out += ['  ' + line for line in results[part][0][1]]
-    text = '\n'.join(out) + '\n'
+        text_lines.append('$ ' + part.command)
+        text_lines += ['= ' + shlex.join(options) for options in part.variants]
+        text_lines += ['  ' + line for line in results[part][0][1]]
+    text = '\n'.join(text_lines) + '\n'
     with open(path, 'w', encoding='utf-8') as file:
         file.write(text)
 
 
 def run_all(steps, folder, jobs):
     """Returns {step: [(options, lines), ...]}, starting with the command as written."""
-    makers = {}
+    producers = {}
     for step in steps:
         for name in step.outputs:
-            assert name not in makers, f'line {step.number}: {name} is made already'
+            assert name not in producers, f'line {step.number}: {name} is written by an earlier command'
             if name != '-':
-                makers[name] = step
+                producers[name] = step
     running = {}
 
     def work(step):
-        # The steps it needs were submitted earlier, so waiting for them ends.
-        for needed in {makers[name] for name in step.reads() if name in makers}:
+        # The needed steps were submitted earlier, so this cannot wait forever.
+        for needed in {producers[name] for name in step.reads() if name in producers}:
             running[needed].result()
         results = [('', step.run(folder, [], ''))]
         for i, options in enumerate(step.variants):
@@ -248,8 +247,8 @@ def run_all(steps, folder, jobs):
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         for step in steps:
             for name in step.reads():
-                assert name not in makers or makers[name] in running, (
-                    f'line {step.number}: {name} is made below')
+                assert name not in producers or producers[name] in running, (
+                    f'line {step.number}: {name} is written by a later command')
             running[step] = pool.submit(work, step)
         return {step: running[step].result() for step in steps}
 
@@ -264,17 +263,17 @@ def first_difference(expected, found):
 
 
 def complaints(steps, results):
-    """One text per command with different results, in the order of the list."""
+    """Yields one text per command with different results, in the order of the list."""
     for step in steps:
-        plain = results[step][0][1]
-        if plain != step.expected:
+        expected_lines = results[step][0][1]
+        if expected_lines != step.expected:
             yield (f'  line {step.number}: {step.command}\n      '
-                   + first_difference(step.expected, plain))
+                   + first_difference(step.expected, expected_lines))
             continue
         for options, lines in results[step][1:]:
-            if lines != plain:
+            if lines != expected_lines:
                 yield (f'  line {step.number}: {step.command}\n      with {options} it differs: '
-                       + first_difference(plain, lines))
+                       + first_difference(expected_lines, lines))
 
 
 def main(arguments):
@@ -298,8 +297,8 @@ def main(arguments):
             print(f'line {step.number}: {step.command}\n  {results[step][0][1][0]}')
         if failed:
             return 1
-        before = {step: step.expected for step in steps}
-        changed = sum(before[step] != results[step][0][1] for step in steps)
+        previous = {step: step.expected for step in steps}
+        changed = sum(previous[step] != results[step][0][1] for step in steps)
         write_list(options.list, layout, results)
         for step in steps:
             step.expected = results[step][0][1]

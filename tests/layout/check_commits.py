@@ -18,7 +18,7 @@ NO_IMPERATIVE = re.compile(r': (?:The|A|An|It|What|Some|All|Now|Fixed|Fixes|Adds
 
 
 def faults_of(message):
-    """The faults of a commit message, in words."""
+    """Yields the faults of a commit message, in words."""
     title, _, body = message.partition('\n')
     if title.startswith(('Merge ', 'Revert ')):
         return
@@ -32,16 +32,16 @@ def faults_of(message):
         yield 'has no body that says why'
 
 
-def commits(root, chosen):
-    """(hash, message) of each commit of a range, or of those since this script was added."""
+def commits(root, revisions):
+    """Yields (hash, message) of the commits of a range, or of those since this script was added."""
     def git(*arguments):
         return subprocess.run(['git', '-C', root, *arguments], check=True, capture_output=True, text=True).stdout
-    if not chosen:
+    if not revisions:
         added = git('log', '--diff-filter=A', '--format=%H', '--', 'tests/layout/check_commits.py').split()
         if not added:
             return
-        chosen = f'{added[-1]}..HEAD'
-    for entry in git('log', '--no-merges', '--format=%h%x01%B%x02', chosen).split('\x02'):
+        revisions = f'{added[-1]}..HEAD'
+    for entry in git('log', '--no-merges', '--format=%h%x01%B%x02', revisions).split('\x02'):
         if entry.strip():
             name, message = entry.strip().split('\x01', 1)
             yield name, message.strip()

@@ -17,7 +17,7 @@ import tokenize
 ROOMS = ['libbase', 'libstream', 'libcluster', 'libmatching', 'libtri', 'libterrain', 'python', 'tools', 'viewer', 'research', 'tests', 'cmake', 'docs', '.ci/run', 'dev',
          'meson.build', 'meson_options.txt', 'README.md', 'ARCHITECTURE.md', 'CONTRIBUTING.md', 'CHANGELOG.md', 'SECURITY.md']
 
-# What to avoid and what to write instead. Verbs and nouns that have correct uses are narrowed by what follows.
+# Patterns to avoid, and better words. Patterns of words with correct uses exclude these by the words that follow.
 PATTERNS = [
     (r'(?<!there )\b(?:is|are|was|were) no\b(?! (?:longer|more|less|fewer|better|worse|larger|smaller|later|earlier|further|farther|nearer|wider|narrower|higher|lower|deeper|finer|coarser|shorter|longer|greater|tighter)\b)',
      'is not a ..., has no ...'),
@@ -60,7 +60,7 @@ TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|R"(\w*)\(.*?\)\1"|"(?:[^"\\\n]|\\.)*"|\'
 
 
 def lines_of_cpp(text, script):
-    """(line number, prose) of comments and strings; lines of one comment are joined into sentences."""
+    """Yields (line number, prose) of comments and strings. Joins the lines of a comment."""
     joined, start, last = '', 0, -1
     for match in TOKEN.finditer(text):
         token, number = match.group(0), text.count('\n', 0, match.start()) + 1
@@ -84,6 +84,7 @@ def lines_of_cpp(text, script):
 
 
 def lines_of_python(text):
+    """Yields (line number, prose) of comments and strings. Joins the lines of a comment."""
     joined, start, last = '', 0, -1
     try:
         for token in tokenize.generate_tokens(io.StringIO(text).readline):
@@ -104,7 +105,7 @@ def lines_of_python(text):
 
 
 def lines_of_paragraphs(text, comment):
-    """Paragraphs of Markdown, or comments that begin with a hash."""
+    """Yields (line number, prose) of the paragraphs of Markdown or, if `comment` is true, of comments after a hash."""
     joined, start, fenced = '', 0, False
     for number, line in enumerate(text.split('\n') + [''], 1):
         if comment:
@@ -158,6 +159,7 @@ def allowed_uses(root):
 
 
 def hits(root, paths, uses, used=None):
+    """Yields a line per hit that is not in `uses`, {path: [words]}. Adds the uses that occur to the set `used`."""
     for path in (p for room in paths for p in files_of(root, room)):
         if SKIPPED.search(path) or os.path.islink(os.path.join(root, path)):
             continue
@@ -170,10 +172,10 @@ def hits(root, paths, uses, used=None):
             for pattern, advice in COMPILED:
                 for match in pattern.finditer(prose):
                     around = prose[max(0, match.start() - 60):match.end() + 60]
-                    fitting = [words for words in uses.get(path, []) if words in around]
-                    if fitting:
+                    allowed = [words for words in uses.get(path, []) if words in around]
+                    if allowed:
                         if used is not None:
-                            used.update((path, words) for words in fitting)
+                            used.update((path, words) for words in allowed)
                         continue
                     yield f'{path}:{number}: "{match.group(0).strip(" .;:")}" in "...{around}..."; write: {advice}'
 

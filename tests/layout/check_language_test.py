@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The checks of language and of commit messages find what they should, and nothing in plain text."""
+"""Tests that the checks of language and of commit messages find each fault, and nothing in plain text."""
 
 import os
 import tempfile

@@ -13,27 +13,27 @@ import re
 import sys
 
 LIBRARIES = ['base', 'stream', 'cluster', 'matching', 'tri', 'terrain']
-# Whom each may use besides libbase, which all may use and which uses none.
+# The libraries that each may use besides libbase. All may use libbase, and it uses none.
 SIBLINGS = {'terrain': ['stream', 'cluster', 'tri']}
-# The rooms that use the libraries and that no library knows.
+# The rooms that use the libraries. No library uses them.
 PROGRAMS = ['python', 'tools', 'viewer']
-# The thesis's algorithms and experiments that are not part of the product. It may use all libraries and their private headers.
+# Algorithms and experiments of the thesis that are not part of the product. They may use all libraries and their private headers.
 RESEARCH = 'research'
-# What names the version besides the projects of the libraries.
+# The files that contain the version, besides the meson.build of each library.
 VERSIONED = ['CITATION.cff', 'python/terrace/__init__.py', 'python/qgis/terrace_processing/metadata.txt', 'viewer/package.json',
              'viewer/package-lock.json']
-# The rooms of libterrain, in ranks: a room knows those of lower rank only.
+# The rooms of libterrain by rank: a room uses only those of lower rank.
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
-# The same in libstream; a room in a room (`store/read`) belongs to it.
+# The rooms of libstream by rank. A room within a room (`store/read`) has its rank.
 STREAM_ROOMS = {'io': 0, 'laz': 0, 'order': 1, 'raster': 1, 'store': 1, 'format': 2}
-# The most sources that a newcomer can take in at a glance.
+# The largest number of sources in a folder that a newcomer can grasp at a glance.
 MOST_SOURCES = 40
-# As in meson.build.
+# The value of the option in meson.build.
 UNITY_SIZE = 30
-# A file with fewer lines, or a private header that one file includes, is usually part of another concept.
+# Files with fewer lines, and private headers that a single file includes, are usually part of another concept.
 FEWEST_LINES = 25
-# The most such files a room may have besides those with a reason below. Lower a number when a merge allows it; never raise one.
+# The largest number of such files in a room, besides those with a reason below. Lower it after a merge. Never raise it.
 MOST_SHORT_FILES = {'libterrain': 15}
 MOST_SINGLE_USER_HEADERS = {'libterrain': 34}
 NVCC = 'joins a source that nvcc compiles to one that it does not'
@@ -151,13 +151,13 @@ LICENCES = {
     'tests': 'GPL-3.0-or-later',
 }
 
-# What may be included where: a pattern of the name, and the folders and files that may name it. Public headers
-# are stricter still, see check_public_header().
+# Headers that only some places may include: a pattern of the name, and the folders and files that may include it.
+# check_include() has stricter rules for public headers.
 TESTS = ['tests', 'libbase/tests', 'libstream/tests', 'libcluster/tests', 'libmatching/tests', 'libtri/tests', 'libterrain/tests',
          RESEARCH]
 BENCHES = ['tests/bench', 'libbase/bench', 'libstream/bench', 'libcluster/bench', 'libmatching/bench', 'libtri/bench',
            'libterrain/bench']
-# Where CGAL is: what computes on integers must compile without it.
+# The places that use CGAL. All code that computes on integers must compile without it.
 IN_CGAL = ['libtri/src/delaunay2/double_kernel.cpp', 'libtri/src/delaunay2/elliptical_kernel.cpp', 'libtri/src/delaunay3',
            'libtri/src/interpolation', 'libtri/src/shape', 'libtri/tests', 'libtri/bench', 'tools/src/scan', 'tests/bench', RESEARCH]
 IN_STREAM = ['libstream/src', 'libstream/tests', 'libstream/bench', 'libstream/fuzz']
@@ -180,22 +180,22 @@ RESTRICTED = [
     (r'benchmark/', BENCHES),
 ]
 
-# These folders build texts with {fmt}, except in the sources that the Makefile of the browser's core also compiles, which
-# have only the standard library, and in headers, which every source would pay for.
+# The folders that build texts with {fmt}. Exceptions are headers, which would slow down every source, and the sources that
+# the Makefile of the browser's core also compiles, because they have only the standard library.
 FORMATTED = ['libstream/src', 'libterrain/src', 'tools/src']
 CORE_MAKEFILE = 'viewer/core/Makefile'
 # The list of the command's tests. It runs long files class by class.
 CLI_TESTS = 'tests/cli/meson.build'
 
-# Functions of the C library whose last bit differs from release to release and from processor to
-# processor. Where bytes depend on them the same input gives other bytes elsewhere, so sources use
-# <terrace/base/portable_math.hpp> instead (sqrt, fma, fmod, remquo, frexp and ldexp are exact).
+# Functions of the C library whose last bit differs between releases and processors. If bytes depended on them, the same
+# input would give different bytes elsewhere. Sources use <terrace/base/portable_math.hpp> instead. The functions sqrt,
+# fma, fmod, remquo, frexp and ldexp are exact.
 INEXACT = (r'(?:acosh?|asinh?|atan[2h]?|cbrt|cosh?|erfc?|exp(?:2|m1)?|hypot|[lt]gamma|'
            r'log(?:10|1p|2)?|pow|sincos|sinh?|tanh?)')
 INEXACT_USE = re.compile(rf'\bstd::{INEXACT}[fl]?\b|(?<![\w.>:]){INEXACT}[fl]?\(')
-# The files that may, and why. GeographicLib, which libterrain alone uses, is made of such functions too.
-CAMERA = 'the camera: which clusters a view asks for, never what a file holds'
-EARTH = 'places on the earth, by formulas of such functions: ARCHITECTURE.md says what depends on them'
+# The files that may use these functions, and why. GeographicLib, which only libterrain uses, consists of such functions too.
+CAMERA = 'the camera: affects which clusters a view requests, never the bytes of a file'
+EARTH = 'positions on the earth, whose formulas consist of such functions: ARCHITECTURE.md says what depends on them'
 MAY_DIFFER = {
     'libbase/include/terrace/base/portable_math.hpp': 'defines functions of these names',
     'libtri/src/view/columns.cpp': CAMERA,
@@ -204,16 +204,16 @@ MAY_DIFFER = {
     'libterrain/src/base/units.cpp': 'summaries for people, rounded; files have all digits',
 }
 
-# The parts of CGAL under the LGPL. All others count as GPL: libraries, which are Apache-2.0, do not use them,
-# and a test or benchmark that compares with one is GPL itself.
+# The parts of CGAL under the LGPL. All others count as GPL. Libraries, which are Apache-2.0, do not use those, and a
+# test or benchmark that compares with one is GPL itself.
 CGAL_LGPL = re.compile(r'CGAL/(Exact_(predicates|rational)|Gmpq|Mpzf|Simple_cartesian|hilbert_sort)')
 COMPARES = re.compile(r'lib[a-z]+/(tests|bench)/')
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 USING_NAMESPACE = re.compile(r'\s*using\s+namespace\b')
 SOURCE_ENDINGS = ('.cpp', '.hpp', '.h', '.cu', '.cpp.in', '.py', '.sh')
-# CUDA kernels and such aside, these folders hold what a Meson list must name, with the ending that
-# the list leaves out.
+# Folders whose files must be in a Meson list: folder, ending of the files, the file with the list, and the ending that the
+# list omits.
 LISTED = [('include/terrace/{}', '.hpp', 'src/meson.build', ''),
           ('tests', '_test.cpp', 'tests/meson.build', ''),
           ('bench', '_bench.cpp', 'bench/meson.build', '_bench.cpp'),
@@ -251,7 +251,7 @@ def is_gpl(name):
 
 
 def check_include(path, bracket, name):
-    """The breaches of one #include line."""
+    """Yields the breaches of one #include line."""
     library = library_of(path)
     if library:
         for other in LIBRARIES:
@@ -308,7 +308,7 @@ def check_sources(root):
 
 
 def check_inexact(root):
-    """Functions of the C library that are not exact, where they are not allowed."""
+    """Yields uses of inexact functions of the C library outside the files of MAY_DIFFER."""
     used = set()
     for folder in [f'lib{library}/{part}' for library in LIBRARIES for part in ('include', 'src')] + ['tools/src']:
         for path in files_below(root, folder):
@@ -317,10 +317,10 @@ def check_inexact(root):
                 if found and path in MAY_DIFFER:
                     used.add(path)
                 elif found:
-                    yield (f'{path}:{number}: {found.group(0).rstrip("(")} gives other last bits elsewhere; '
+                    yield (f'{path}:{number}: {found.group(0).rstrip("(")} has other last bits on other machines; '
                            'use portable_math.hpp, or say in MAY_DIFFER why no output depends on it')
     for path in sorted(set(MAY_DIFFER) - used):
-        yield f'{path}: is in MAY_DIFFER and uses nothing of the kind'
+        yield f'{path}: is in MAY_DIFFER but uses no such function; delete the entry'
 
 
 def core_sources(root):
@@ -333,11 +333,11 @@ def core_sources(root):
 
 
 def check_texts(root):
-    """Texts are built in one way: with {fmt}, or with std::to_string where that is not available."""
+    """Texts are built with {fmt}, or with std::to_string where {fmt} is not available."""
     core = core_sources(root)
     for path in sorted(core):
         if not os.path.isfile(os.path.join(root, path)):
-            yield f'{path}: is in {CORE_MAKEFILE} and does not exist'
+            yield f'{path}: is in {CORE_MAKEFILE} but does not exist'
     for folder in FORMATTED:
         for path in files_below(root, folder):
             if not path.endswith(('.cpp', '.hpp')):
@@ -442,7 +442,7 @@ def check_research(root):
 
 
 def check_versions(root):
-    """These files name the version that the file VERSION has; all others read that file."""
+    """These files contain the version of the file VERSION. All other files read that one."""
     version = read(root, 'VERSION').strip()
     for path in [f'lib{library}/meson.build' for library in LIBRARIES] + VERSIONED:
         # In a lock file the first version is that of the project.
@@ -484,7 +484,7 @@ def users_of_headers(texts):
             if not included:
                 continue
             name = included.group(2)
-            # Besides its own room, a file may name the private headers of a library, as research and the viewer's core do.
+            # A file may include headers of its own room, and, in research and the viewer's core, private headers of a library.
             folders = [os.path.dirname(path), f'{room}/src', room] + [f'lib{library}/src' for library in LIBRARIES] + ['']
             for target in (os.path.normpath(os.path.join(folder, name)) for folder in folders):
                 if target in texts:
@@ -495,7 +495,7 @@ def users_of_headers(texts):
 
 
 def check_sizes(root):
-    """Short files and private headers with one user, which are counted in each room. Tests are not users."""
+    """Yields rooms with too many short files or private headers with one user. Tests do not count as users."""
     texts = {path: read(root, path) for room in LICENCES for path in files_below(root, room) if is_production(path)}
     users = users_of_headers(texts)
     short = {path for path, text in texts.items() if text.count('\n') < FEWEST_LINES}
@@ -503,7 +503,7 @@ def check_sizes(root):
     for found, reasons, most, what in ((short, SHORT_FILES, MOST_SHORT_FILES, f'files under {FEWEST_LINES} lines'),
                                        (single, SINGLE_USER_HEADERS, MOST_SINGLE_USER_HEADERS, 'private headers with one user')):
         for path in sorted(set(reasons) - found):
-            yield f'{path}: is in the list of {what} and does not belong there'
+            yield f'{path}: is in the list of {what} but is not one; delete the entry'
         counts = collections.Counter(path.split('/')[0] for path in found - set(reasons))
         for room, count in sorted(counts.items()):
             if count > most.get(room, 0):
@@ -512,8 +512,8 @@ def check_sizes(root):
 
 
 def check_unity(build):
-    """Meson 1.0 looks for one object too many if a unity build joins a multiple of unity_size sources and another target
-    takes their objects."""
+    """Meson 1.0 expects one object too many if a unity build joins a multiple of unity_size sources and another target
+    uses their objects."""
     for target in json.loads(read(build, 'meson-info/intro-targets.json')):
         for group in target['target_sources']:
             count = len(group.get('sources', []))

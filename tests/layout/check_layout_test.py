@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The layout check finds every kind of breach, each in a small tree that is sound without it."""
+"""Tests that the layout check finds every kind of breach, each in a small tree that is otherwise sound."""
 
 import json
 import os
@@ -72,7 +72,7 @@ class CheckLayout(unittest.TestCase):
             found = list(check_layout.check_unity(build))
         self.assertEqual([breach.split()[1] for breach in found], ['library30', 'library60'])
 
-    def test_sound_tree_has_none(self):
+    def test_a_sound_tree_has_no_breaches(self):
         self.assertEqual(self.breaches(lambda root: None), [])
         # Build folders and their contents are not sources.
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/build-x/a.cpp', '')), [])
@@ -110,7 +110,7 @@ class CheckLayout(unittest.TestCase):
                 self.assertEqual(found(path, line), [f'{path}:2: uses {{fmt}}, which neither headers nor the sources in '
                                                      f'{check_layout.CORE_MAKEFILE} may'])
         self.assertEqual(found('libstream/src/b.cpp', '', listed=['io/core']),
-                         [f'libstream/src/io/more.cpp: is in {check_layout.CORE_MAKEFILE} and does not exist'])
+                         [f'libstream/src/io/more.cpp: is in {check_layout.CORE_MAKEFILE} but does not exist'])
 
     def test_headers_have_no_using_namespace(self):
         directive = 'namespace terrace::tri {\n  using  namespace base;\nusing base::Box3;  // not: using namespace base\n}\n'
@@ -191,7 +191,7 @@ class CheckLayout(unittest.TestCase):
         self.assertEqual(self.breaches(fill), ['libtri/src/b: has 41 sources, more than 40'])
 
     def sizes(self, files, short=(), single=(), short_reasons=(), single_reasons=()):
-        """The breaches of check_sizes() in a tree of these files, with the allowed numbers and the reasons."""
+        """Returns the breaches of check_sizes() in a tree of these files, with these limits and reasons."""
         with tempfile.TemporaryDirectory() as root:
             for path, text in files.items():
                 write(root, path, text)
@@ -209,7 +209,7 @@ class CheckLayout(unittest.TestCase):
         self.assertIn('libtri: has 2 files under 25 lines, more than 1', found[0])
         self.assertEqual(self.sizes(files, short={'libtri': 1}, short_reasons={'libtri/src/a.cpp': 'a reason'}), [])
         found = self.sizes(files, short={'libtri': 2}, short_reasons={'libbase/src/a.cpp': 'a reason'})
-        self.assertEqual(found, ['libbase/src/a.cpp: is in the list of files under 25 lines and does not belong there'])
+        self.assertEqual(found, ['libbase/src/a.cpp: is in the list of files under 25 lines but is not one; delete the entry'])
 
     def test_private_headers_with_one_user_are_counted(self):
         long = '\n' * 30
@@ -218,7 +218,7 @@ class CheckLayout(unittest.TestCase):
             files = {'libtri/src/b/a.hpp': long} | {path: line + long for path, line in includes.items()}
             return self.sizes(files, **allowed)
 
-        # Its own source, tests and a second include line of the same file are no further users.
+        # The source of the same name, tests, and a second include in the same file do not count.
         own = {'libtri/src/b/a.cpp': '#include "b/a.hpp"\n', 'libtri/src/c.cpp': '#include "b/a.hpp"\n#include "b/a.hpp"\n',
                'libtri/tests/d.cpp': '#include "b/a.hpp"\n'}
         self.assertEqual(len(found(own)), 1)
@@ -234,7 +234,7 @@ class CheckLayout(unittest.TestCase):
         # A public header may have any number of users.
         self.assertEqual(self.sizes({'libtri/include/terrace/tri/a.hpp': long}), [])
 
-    def test_tests_may_compare_with_what_is_gpl(self):
+    def test_tests_may_compare_with_gpl_libraries(self):
         gpl = '// SPDX-License-Identifier: GPL-3.0-or-later\n'
         for path in ('libtri/tests/b.cpp', 'libtri/bench/b.hpp', 'tools/src/scan/b.cpp'):
             for include in ('#include <CGAL/Surface_mesh.h>\n', '#include <CGAL/alpha_wrap_3.h>\n'):
@@ -244,7 +244,7 @@ class CheckLayout(unittest.TestCase):
         for path in ('libtri/src/shape/b.cpp', 'libtri/src/delaunay2/double_kernel.cpp', 'libtri/tests/b.cpp'):
             self.assertEqual(self.breaches(lambda root: write(root, path, lgpl)), [])
 
-    def test_functions_that_are_not_exact_need_a_reason(self):
+    def test_inexact_functions_need_a_reason(self):
         for line in ('double s = std::sin(x);', 'return 2 * pow(x, 3);', 'f(std::atan2, y, x);', 'std::log1pf(x);',
                      'double d = std::hypot(x, y, z);  // fast'):
             with self.subTest(line=line):
@@ -258,7 +258,7 @@ class CheckLayout(unittest.TestCase):
                      'std::fmod(x, 360.0); std::remquo(x, y, &n); std::frexp(x, &e);'):
             with self.subTest(line=line):
                 self.assertEqual(self.breaches(lambda root: write(root, 'libtri/src/b.cpp', head('libtri') + line + '\n')), [])
-        # Tests and benchmarks may use what they like; an unused permission is a breach.
+        # Tests and benchmarks may use all functions. An unused permission is a breach.
         self.assertEqual(self.breaches(lambda root: write(root, 'libtri/tests/b.cpp', head('libtri') + 'std::sin(x);\n')), [])
         self.assertEqual(len(self.breaches(lambda root: None, {'tools/src/main.cpp': 'a reason'})), 1)
 
