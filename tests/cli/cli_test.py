@@ -1,12 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Tests the rules of the command line for all verbs, and the verbs that need no store.
+"""Tests the rules of the command line for all verbs: help, errors, --force, signals, numbers in texts.
 
 TERRACE=path/to/terrace cli_test.py [CLASS...]
 """
 
-import array
-import fcntl
 import json
 import math
 import os
@@ -20,14 +18,13 @@ import struct
 import subprocess
 import sys
 import tempfile
-import termios
 import time
 import unittest
 import zlib
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 
-# Every verb of the contract; verbs that may be unavailable are still known by name.
+# All verbs, in the order of --help.
 VERBS = ['build', 'info', 'verify', 'points', 'mesh', 'surface', 'tile', 'sample', 'raster',
          'profile', 'contour', 'cluster', 'match', 'render', 'view', 'publish', 'synth', 'convert']
 
@@ -39,8 +36,8 @@ def terrace(*args, **kwargs):
 
 
 def png_pixels(path):
-    """Width, height and rows of an 8-bit RGB PNG without interlacing. Written here, so that the test
-    does not share a library with the writer."""
+    """Returns width, height and rows of an 8-bit RGB PNG without interlacing. Uses no library that the writer
+    uses too."""
     data = open(path, 'rb').read()
     assert data[:8] == b'\x89PNG\r\n\x1a\n'
     place, packed = 8, b''
@@ -159,8 +156,8 @@ class FrameTest(CommandTest):
         self.assert_one_line_error(result, 1)
 
     def progress_of(self, *options):
-        """Returns the standard error of a run that reads points until it has reported something or has
-        got a million points."""
+        """Returns the standard error of a run that receives points until it has printed something, at most a
+        million."""
         command = subprocess.Popen([TERRACE, 'convert', '-', '-o', self.path('a.ply'), '--force', *options],
                                    stdin=subprocess.PIPE, stderr=subprocess.PIPE)
         points = b'1 2 3\n' * 10000
@@ -256,7 +253,9 @@ class ErrorTest(CommandTest):
         os.mkfifo(self.path('pipe.xyz'))
         self.assertIn('- is standard output', terrace('synth', 'uniform', '--points', '9', '-o', self.path('pipe.xyz')).stderr)
 
-    def test_every_output_can_be_replaced_with_force(self):
+    def commands_by_output(self):
+        """Makes inputs. Returns {output: (option, command)}, where command(0) and command(1) return arguments that
+        write different bytes to the output that follows the option."""
         dem, hills = self.path('in.tif'), self.path('in.terrace')
         self.run_ok('synth', 'dem', '--size', '40x30', '--crs', 'EPSG:32632', '-o', dem)
         self.run_ok('build', dem, '-o', hills, '--block', '200')
@@ -277,7 +276,6 @@ class ErrorTest(CommandTest):
         west, south, _ = bounds['min']
         east, north, _ = bounds['max']
         lines = (f'{west},{south},{east},{north}', f'{west},{north},{east},{south}')
-        # Commands that write -o FILE, with different bytes for 0 and 1.
         outputs = {
             'raster.tif': lambda n: ['synth', 'dem', '--size', f'{20 + n}x20'],
             'numbers.xyz': lambda n: ['convert', clouds[n]],
@@ -310,9 +308,18 @@ class ErrorTest(CommandTest):
                    'smooth.overlay': ('--save-overlay', lambda n: [
                        'mesh', hills, '--smooth', f'taubin:{2 + n}', '-o',
                        self.path(f'smooth{n}.ply'), '--force'])}
-        cases = [(name, '-o', command) for name, command in outputs.items()]
-        cases += [(name, option, command) for name, (option, command) in options.items()]
-        for name, option, command in cases:
+        return {**{name: ('-o', command) for name, command in outputs.items()}, **options}
+
+    def assert_not_replaced(self, command, option, out):
+        """Asserts that --force does not replace a file that terrace did not write."""
+        before = self.bytes_of(out)
+        result = terrace(*command(1), option, out, '--force')
+        self.assert_one_line_error(result, 1)
+        self.assertIn('not written by terrace', result.stderr)
+        self.assertEqual(self.bytes_of(out), before)
+
+    def test_every_output_can_be_replaced_with_force(self):
+        for name, (option, command) in self.commands_by_output().items():
             with self.subTest(name):
                 out, fresh = self.path(name), self.path('fresh-' + name)
                 self.run_ok(*command(1), option, fresh)
@@ -331,17 +338,10 @@ class ErrorTest(CommandTest):
                     os.remove(out)
                     with open(out, 'wb') as file:
                         file.write(old)
-                    result = terrace(*command(1), option, out, '--force')
-                    self.assert_one_line_error(result, 1)
-                    self.assertIn('not written by terrace', result.stderr)
-                    self.assertEqual(self.bytes_of(out), old)
+                    self.assert_not_replaced(command, option, out)
                 with open(out, 'w') as file:
                     file.write('A terrace, written by terrace and by hand.\n')
-                letter = self.bytes_of(out)
-                result = terrace(*command(1), option, out, '--force')
-                self.assert_one_line_error(result, 1)
-                self.assertIn('not written by terrace', result.stderr)
-                self.assertEqual(self.bytes_of(out), letter)
+                self.assert_not_replaced(command, option, out)
 
     @staticmethod
     def is_marked(path):
@@ -470,108 +470,6 @@ class InterruptTest(CommandTest):
         self.assertEqual(error.count('\n'), 1, error)
 
 
-class DemTest(CommandTest):
-    def test_the_rms_step_matches_the_roughness_at_every_size(self):
-        for size in ('40x30', '300x200', '1000x1000', '3000x2000'):
-            for roughness in (1.5, 2.65, 6):
-                with self.subTest(size=size, roughness=roughness):
-                    summary = self.json_of('synth', 'dem', '--size', size, '--roughness', roughness,
-                                           '-o', self.path('a.tif'), '--force')
-                    self.assertAlmostEqual(summary['rms_step'] / roughness, 1, delta=0.03)
-                    self.assertGreater(summary['height']['min'], -1000)
-                    self.assertLess(summary['height']['max'], 9000)
-
-    def test_same_bytes_for_any_threads_and_memory(self):
-        contents = set()
-        for i, options in enumerate((['--threads', '1'], ['--threads', '5'],
-                                     ['--threads', '2', '--memory', '64M'])):
-            out = self.path(f'{i}.tif')
-            self.run_ok('synth', 'dem', '--size', '2500x1100', '-o', out, *options)
-            contents.add(open(out, 'rb').read())
-        self.assertEqual(len(contents), 1)
-        self.run_ok('synth', 'dem', '--size', '2500x1100', '-o', self.path('s.tif'), '--seed', '2')
-        self.assertNotIn(open(self.path('s.tif'), 'rb').read(), contents)
-
-    def test_the_raster_has_the_requested_properties(self):
-        out = self.path('a.tif')
-        self.run_ok('synth', 'dem', '--size', '300x200', '--cell', '10', '--type', 'float32',
-                    '--crs', 'EPSG:25832', '--compress', 'deflate', '-o', out)
-        info = self.json_of('info', out)
-        self.assertEqual((info['columns'], info['rows'], info['points']), (300, 200, 60000))
-        self.assertEqual(info['crs']['epsg'], 25832)
-        self.assertEqual(info['channels'][2]['type'], 'float32')
-        self.assertAlmostEqual(info['bounds']['max'][0] - info['bounds']['min'][0], 2990)
-        self.assertEqual(info['format'], 'geotiff')
-
-    def test_gdal_reads_it_the_same(self):
-        gdalinfo = shutil.which('gdalinfo')
-        if gdalinfo is None:
-            self.skipTest('gdalinfo is not installed')
-        out = self.path('a.tif')
-        self.run_ok('synth', 'dem', '--size', '700x300', '-o', out)
-        told = json.loads(subprocess.run([gdalinfo, '-json', '-stats', out], check=True,
-                                         capture_output=True, text=True).stdout)
-        height = self.json_of('info', out)['height']
-        band = told['bands'][0]
-        self.assertEqual(told['size'], [700, 300])
-        self.assertEqual(band['type'], 'Int16')
-        self.assertEqual((band['minimum'], band['maximum']), (height['min'], height['max']))
-        self.assertAlmostEqual(band['mean'], height['mean'], places=3)
-
-    def test_rejects_heights_that_do_not_fit(self):
-        result = terrace('synth', 'dem', '--size', '64x64', '--roughness', '50', '-o', self.path('a.tif'))
-        self.assert_one_line_error(result, 2)
-        self.assertIn('float32', result.stderr)
-
-
-class CloudTest(CommandTest):
-    def points(self, *args):
-        return self.run_ok('synth', *args, '-o', '-').stdout.splitlines()
-
-    def test_every_kind_has_the_requested_number_of_points(self):
-        for kind in ('surface', 'uniform', 'clusters'):
-            for count in (1, 7, 2000):
-                lines = self.points(kind, '--points', count)
-                self.assertEqual(len(lines), count)
-                for line in lines[:50]:
-                    self.assertEqual(len(line.split()), 3)
-
-    def test_shuffling_only_permutes_points(self):
-        for kind in ('surface', 'uniform', 'clusters'):
-            plain = self.points(kind, '--points', '3000')
-            for how in ('all', 'pieces:1-1', 'pieces:10-50', 'pieces:5000-5000'):
-                with self.subTest(kind=kind, how=how):
-                    shuffled = self.points(kind, '--points', '3000', '--shuffle', how)
-                    self.assertEqual(sorted(shuffled), sorted(plain))
-                    self.assertEqual(shuffled == plain, how == 'pieces:5000-5000')
-
-    def test_same_bytes_for_any_threads(self):
-        self.assertEqual(self.points('surface', '--points', '70k', '--threads', '1'),
-                         self.points('surface', '--points', '70k', '--threads', '7'))
-
-    def test_surface_is_closed_and_dense(self):
-        # Every direction has a point near it.
-        points = [tuple(map(float, p.split())) for p in self.points('surface', '--points', '5000')]
-        for axis in range(3):
-            values = [p[axis] for p in points]
-            self.assertLess(min(values), -60)
-            self.assertGreater(max(values), 60)
-
-    def test_formats_keep_every_bit(self):
-        first = self.path('a.ply')
-        self.run_ok('synth', 'surface', '--points', '500', '-o', first)
-        self.run_ok('convert', first, '-o', self.path('b.csv'))
-        self.run_ok('convert', self.path('b.csv'), '-o', self.path('c.xyz'))
-        summary = self.json_of('convert', self.path('c.xyz'), '-o', self.path('d.ply'))
-        self.assertEqual(summary['points'], 500)
-        self.assertEqual(open(first, 'rb').read(), open(self.path('d.ply'), 'rb').read())
-
-    def test_standard_input_and_output(self):
-        result = self.run_ok('convert', '-', '-o', '-', input='1 2 3\n4 5 6.5\n')
-        self.assertEqual(result.stdout, '1 2 3\n4 5 6.5\n')
-        self.assert_one_line_error(terrace('convert', '-', '-o', '-', '--json', input='1 2 3\n'), 2)
-
-
 class InfoTest(CommandTest):
     KEYS = ['format', 'version', 'points', 'levels', 'bounds', 'crs', 'vertical', 'channels',
             'parameters', 'bytes']
@@ -597,7 +495,8 @@ class InfoTest(CommandTest):
 
 
 class NumbersTest(CommandTest):
-    def test_text_is_rounded_and_json_is_not(self):
+    def runs(self, store, cloud):
+        """Makes inputs. Returns the arguments of commands; they write a raster's store and a cloud's store to these paths."""
         noise = random.Random(2)
         with open(self.path('cloud.xyz'), 'w') as file:
             for _ in range(3000):
@@ -607,8 +506,8 @@ class NumbersTest(CommandTest):
             file.write('x,y,z\n')
             file.writelines(f'{noise.uniform(5, 60)!r},{noise.uniform(5, 60)!r},0\n'
                             for _ in range(40))
-        dem, store, cloud = self.path('dem.tif'), self.path('dem.store'), self.path('cloud.store')
-        runs = [
+        dem = self.path('dem.tif')
+        return [
             ('synth', 'dem', '--size', '700x300', '--type', 'float32', '-o', dem),
             ('synth', 'uniform', '--points', 500, '-o', self.path('some.ply')),
             ('build', dem, '-o', store), ('build', self.path('cloud.xyz'), '-o', cloud),
@@ -640,8 +539,11 @@ class NumbersTest(CommandTest):
              self.path('tree.png'), '--size', '90x60'),
             ('convert', self.path('cloud.xyz'), '-o', self.path('cloud.csv')),
         ]
+
+    def test_text_is_rounded_and_json_is_not(self):
+        store, cloud = self.path('dem.store'), self.path('cloud.store')
         digits = re.compile(r'(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?')
-        for args in runs:
+        for args in self.runs(store, cloud):
             with self.subTest(args[:3]):
                 result = self.run_ok(*args, '--force')
                 text = (result.stdout + result.stderr).replace(self.folder, '')
@@ -649,159 +551,19 @@ class NumbersTest(CommandTest):
                 self.assertNotRegex(text, r'\d[eE][+-]?\d')
                 for number in digits.findall(text):
                     significant = number.replace(',', '').replace('.', '').lstrip('-0')
-                    whole = number.split('.')[0]
+                    integer_part = number.split('.')[0]
                     # Coordinates have ten digits, heights and totals six, all others four.
-                    most = 10 if args[0] == 'info' else 6
+                    max_digits = 10 if args[0] == 'info' else 6
                     if '.' in number:
-                        self.assertLessEqual(len(significant), most, f'{number} in: {text}')
-                    elif args[0] != 'info' and len(whole.replace(',', '')) > 4:
-                        self.assertIn(',', whole, text)
+                        self.assertLessEqual(len(significant), max_digits, f'{number} in: {text}')
+                    elif args[0] != 'info' and len(integer_part.replace(',', '')) > 4:
+                        self.assertIn(',', integer_part, text)
         exact = self.json_of('mesh', cloud, '--max-error', 0.123456, '-o', self.path('b.ply'))
         self.assertGreater(len(repr(exact['max_error'])), 10)
         shown = self.run_ok('mesh', cloud, '--max-error', 0.123456, '-o', self.path('c.ply')).stderr
         bound = float(re.search(r'within ([\d.]+) m', shown)[1])
         self.assertLessEqual(exact['max_error'], bound)
         self.assertLess(bound, exact['max_error'] + 0.001)
-
-
-class RenderTest(CommandTest):
-    def test_mesh_colours_use_heights_by_area(self):
-        """A mesh that is fine in one place has the same colours as the surface without the fine part."""
-        def write(path, fine):
-            vertices, faces = [], []
-
-            def grid(x0, y0, x1, y1, cells, height):
-                first = len(vertices)
-                for row in range(cells + 1):
-                    for column in range(cells + 1):
-                        x, y = x0 + (x1 - x0) * column / cells, y0 + (y1 - y0) * row / cells
-                        vertices.append((x, y, height(x, y)))
-                for row in range(cells):
-                    for column in range(cells):
-                        a = first + row * (cells + 1) + column + 1
-                        b = a + cells + 1
-                        faces.extend(((a, a + 1, b + 1), (a, b + 1, b)))
-
-            # A long slope whose upper end is fine.
-            grid(0, 0, 90, 100, 10, lambda x, y: x)
-            grid(90, 0, 100, 100, fine, lambda x, y: x)
-            with open(path, 'w') as file:
-                file.writelines('v %r %r %r\n' % v for v in vertices)
-                file.writelines('f %d %d %d\n' % f for f in faces)
-
-        pictures = []
-        for fine in (1, 150):
-            write(self.path('slope.obj'), fine)
-            self.run_ok('render', self.path('slope.obj'), '-o', self.path('a.png'), '--size',
-                        '100x100', '--color', 'height', '--force', '--exaggerate', 0.001)
-            pictures.append(png_pixels(self.path('a.png'))[2])
-        even, dense = ([rows[50][3 * x:3 * x + 3] for x in (10, 30, 50, 70, 85)]
-                       for rows in pictures)
-        for a, b in zip(even, dense):
-            self.assertLess(max(abs(p - q) for p, q in zip(a, b)), 12, (even, dense))
-        # From the green of the valley to the grey of the mountains.
-        self.assertGreater(max(abs(p - q) for p, q in zip(even[0], even[-1])), 30)
-
-    def test_cloud_colours_use_heights_by_area(self):
-        noise = random.Random(3)
-        with open(self.path('cloud.xyz'), 'w') as file:
-            for _ in range(60000):
-                x, y = noise.uniform(0, 100), noise.uniform(0, 100)
-                file.write(f'{x!r} {y!r} {x!r}\n')
-        store = self.path('cloud.store')
-        self.run_ok('build', self.path('cloud.xyz'), '-o', store, '--block', 1000, '--z-weight', 0,
-                    '--facility-cost', 1)
-        pictures = []
-        for options in ([], ['--focus', '90,0,100,100:0']):
-            self.run_ok('render', store, '-o', self.path('a.png'), '--size', '100x100', '--color',
-                        'height', '--force', '--exaggerate', 0.001, *options)
-            pictures.append(png_pixels(self.path('a.png'))[2])
-        even, dense = ([sum(rows[y][3 * x] for y in range(20, 80)) / 60 for x in (20, 40, 60, 80)]
-                       for rows in pictures)
-        for a, b in zip(even, dense):
-            self.assertLess(abs(a - b), 30, (even, dense))
-
-    def test_slopes_facing_the_light_are_brighter(self):
-        # A roof: its north-western side is lit, the other one is in shadow.
-        with open(self.path('roof.obj'), 'w') as file:
-            file.write('v -10 -10 0\nv 10 10 0\nv -10 10 -5\nv 10 -10 -5\n')
-            file.write('f 1 2 3\nf 1 4 2\n')
-        self.run_ok('render', self.path('roof.obj'), '-o', self.path('a.png'), '--size', '100x100',
-                    '--color', 'grey')
-        width, height, rows = png_pixels(self.path('a.png'))
-        self.assertEqual((width, height), (100, 100))
-        north_west, south_east = rows[25][3 * 25], rows[75][3 * 75]
-        self.assertGreater(north_west, south_east + 20)
-
-    def test_wire_draws_the_edges(self):
-        with open(self.path('square.obj'), 'w') as file:
-            file.write('v 0 0 0\nv 8 0 0\nv 8 8 0\nv 0 8 0\nf 1 2 3 4\n')
-        for name, options in (('plain.png', []), ('wire.png', ['--wire'])):
-            self.run_ok('render', self.path('square.obj'), '-o', self.path(name), '--size', '80x80',
-                        '--color', 'grey', *options)
-        plain, wire = (png_pixels(self.path(n))[2] for n in ('plain.png', 'wire.png'))
-        diagonal, face = 3 * 40, 3 * 25
-        self.assertLess(wire[39][diagonal], plain[39][diagonal] - 40)
-        self.assertEqual(wire[20][face + 3 * 5], plain[20][face + 3 * 5])
-
-    def test_a_cloud_has_no_gaps(self):
-        self.run_ok('synth', 'uniform', '--points', '4000', '-o', self.path('a.ply'))
-        self.run_ok('render', self.path('a.ply'), '-o', self.path('a.png'), '--size', '200x200')
-        _, _, rows = png_pixels(self.path('a.png'))
-        background = rows[0][:3]
-        empty = sum(rows[y][3 * x:3 * x + 3] == background for y in range(20, 180) for x in range(20, 180))
-        self.assertLess(empty, 0.08 * 160 * 160)
-        self.assertEqual(rows[199][-3:], background)
-
-    def test_heights_are_exaggerated_on_request(self):
-        # A pyramid seen from the south at eye level: stretched twice, it is half as high as it is
-        # wide.
-        with open(self.path('pyramid.obj'), 'w') as file:
-            file.write('v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nv 0 0 10\n')
-            file.write('f 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n')
-        for factor in (0.5, 1, 2, 4):
-            out = self.path('a.png')
-            summary = self.json_of('render', self.path('pyramid.obj'), '-o', out, '--force', '--size',
-                                   '200x200', '--view', '180,0', '--exaggerate', factor)
-            self.assertEqual(summary['exaggeration'], factor)
-            _, _, rows = png_pixels(out)
-            background = rows[0][:3]
-            drawn = [[x for x in range(200) if row[3 * x:3 * x + 3] != background] for row in rows]
-            height = sum(1 for row in drawn if row)
-            width = max(max(row) for row in drawn if row) - min(min(row) for row in drawn if row) + 1
-            self.assertAlmostEqual(height / width, factor / 4, delta=0.04)
-
-    def test_same_picture_for_any_threads(self):
-        self.run_ok('synth', 'dem', '--size', '300x300', '-o', self.path('a.tif'))
-        pictures = set()
-        for threads in (1, 4):
-            out = self.path(f'{threads}.png')
-            self.run_ok('render', self.path('a.tif'), '-o', out, '--size', '160x120', '--view',
-                        '200,40', '--threads', threads)
-            pictures.add(open(out, 'rb').read())
-        self.assertEqual(len(pictures), 1)
-
-    def test_empty_colours_are_not_shown(self):
-        noise = random.Random(5)
-        with open(self.path('black.csv'), 'w') as file:
-            file.write('x,y,z,red,green,blue\n')
-            for _ in range(2000):
-                file.write(f'{noise.random() * 50:.2f},{noise.random() * 50:.2f},{noise.random():.2f},0,0,0\n')
-        self.run_ok('build', self.path('black.csv'), '-o', self.path('black.store'), '--crs', 'EPSG:32632')
-        pictures = []
-        for options in ([], ['--color', 'height'], ['--color', 'rgb']):
-            self.run_ok('render', self.path('black.store'), '-o', self.path('a.png'), '--size', '100x80',
-                        '--force', *options)
-            pictures.append(png_pixels(self.path('a.png'))[2])
-        self.assertEqual(pictures[0], pictures[1])
-        self.assertNotEqual(pictures[0], pictures[2])
-
-    def test_rejects_missing_colours(self):
-        self.run_ok('synth', 'uniform', '--points', '50', '-o', self.path('a.ply'))
-        for what in ('rgb', 'level', 'class', 'slope'):
-            result = terrace('render', self.path('a.ply'), '-o', self.path('a.png'), '--color', what)
-            self.assert_one_line_error(result, 2)
-            self.assertIn(what, result.stderr)
 
 
 if __name__ == '__main__':
