@@ -337,8 +337,9 @@ class BoundedMeshTest(unittest.TestCase):
         self.assertEqual(summary['uncovered'], len(inside) - summary['covered'])
         self.assertGreater(summary['uncovered'], 100)
 
-    def test_several_samples_at_one_position(self):
-        """As in laser data: each sample is within the bound, or the error names a remedy."""
+    @staticmethod
+    def pulses():
+        """Returns points as in laser data: some positions have several samples, up to 0.7 m apart."""
         noise = random.Random(7)
         points = []
         for _ in range(3000):
@@ -347,32 +348,34 @@ class BoundedMeshTest(unittest.TestCase):
             points.append((x, y, z))
             if noise.random() < 0.3:
                 points.extend((x, y, z + noise.uniform(0, 0.7)) for _ in range(noise.randrange(3)))
+        return points
 
-        def build(name, points):
-            with open(self.path(name + '.xyz'), 'w') as file:
-                file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
-            return self.build(name + '.xyz')
+    def build_points(self, name, points):
+        with open(self.path(name + '.xyz'), 'w') as file:
+            file.writelines(f'{x!r} {y!r} {z!r}\n' for x, y, z in points)
+        return self.build(name + '.xyz')
 
-        def largest_error(vertices, faces):
-            largest, covered = 0.0, 0
-            for x, y, z in points:
-                found = None
-                for a, b, c in faces:
-                    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vertices[a], vertices[b], vertices[c]
-                    u = (bx - x) * (cy - y) - (cx - x) * (by - y)
-                    v = (cx - x) * (ay - y) - (ax - x) * (cy - y)
-                    w = (ax - x) * (by - y) - (bx - x) * (ay - y)
-                    if u >= -1e-9 and v >= -1e-9 and w >= -1e-9:
-                        found = (u * az + v * bz + w * cz) / (u + v + w)
-                        break
-                if found is not None:
+    @staticmethod
+    def largest_error(points, vertices, faces):
+        """Returns the largest vertical distance of points from a mesh, and the number of points on it."""
+        largest, covered = 0.0, 0
+        for x, y, z in points:
+            for a, b, c in faces:
+                (ax, ay, az), (bx, by, bz), (cx, cy, cz) = vertices[a], vertices[b], vertices[c]
+                u = (bx - x) * (cy - y) - (cx - x) * (by - y)
+                v = (cx - x) * (ay - y) - (ax - x) * (cy - y)
+                w = (ax - x) * (by - y) - (bx - x) * (ay - y)
+                if u >= -1e-9 and v >= -1e-9 and w >= -1e-9:
                     covered += 1
-                    largest = max(largest, abs(found - z))
-            return largest, covered
+                    largest = max(largest, abs((u * az + v * bz + w * cz) / (u + v + w) - z))
+                    break
+        return largest, covered
 
-        store = build('pulses', points)
+    def test_each_of_several_samples_at_one_position_is_within_the_bound(self):
+        points = self.pulses()
+        store = self.build_points('pulses', points)
         summary, out = self.mesh(store, 'pulses.obj', '--max-error', 1)
-        largest, covered = largest_error(*read_obj(out))
+        largest, covered = self.largest_error(points, *read_obj(out))
         self.assertEqual((summary['samples'], covered), (len(points), len(points)))
         self.assertEqual((summary['covered'], summary['uncovered']), (covered, 0))
         self.assertEqual(summary['duplicates'], len(points) - len({p[:2] for p in points}))
@@ -392,28 +395,30 @@ class BoundedMeshTest(unittest.TestCase):
         self.refuse(2, '--max-error', 'mesh', store, '-o', out, '--force', '--max-points', 200,
                     '--duplicates', 'all')
 
-        # A tree and the ground below it.
+    def test_samples_at_one_position_farther_apart_than_the_bound_need_a_rule(self):
+        """The top of a tree and the ground below it."""
+        points = self.pulses()
         x, y, z = points[0]
-        store = build('tree', points + [(x, y, z + 17.25)])
+        points.append((x, y, z + 17.25))
+        store = self.build_points('tree', points)
         result = terrace('mesh', store, '-o', self.path('tree.obj'), '--max-error', 1)
         self.assertEqual(result.returncode, 1, result.stderr)
-        places = collections.Counter(p[:2] for p in points + [(x, y, z)])
-        count = sum(1 for times in places.values() if times > 1)
+        heights = collections.defaultdict(list)
+        for *place, height in points:
+            heights[tuple(place)].append(height)
+        count = sum(1 for values in heights.values() if len(values) > 1)
         self.assertIn(f'{count} places have several samples', result.stderr)
         self.assertRegex(result.stderr, r'differ by up to 1[78]\.?\d* m \(at ')
         self.assertIn('set --duplicates to min, max, mean or first', result.stderr)
         self.assertFalse(os.path.exists(self.path('tree.obj')))
 
         # The error is measured on the file as readers see it, at the samples that the rule selects.
-        heights = collections.defaultdict(list)
-        for *place, height in points + [(x, y, z + 17.25)]:
-            heights[tuple(place)].append(height)
-        for rule, counts in (('max', max), ('min', min)):
+        for rule, select in (('max', max), ('min', min)):
             summary, out = self.mesh(store, 'tree.glb', '--max-error', 1, '--duplicates', rule)
-            points[:] = [(*place, counts(all_of_it)) for place, all_of_it in heights.items()]
-            largest, covered = largest_error(*read_glb(out))
+            selected = [(*place, select(values)) for place, values in heights.items()]
+            largest, covered = self.largest_error(selected, *read_glb(out))
             self.assertEqual(covered, summary['covered'] - summary['duplicates'], rule)
-            self.assertGreater(covered, 0.98 * len(points))
+            self.assertGreater(covered, 0.98 * len(selected))
             self.assertLessEqual(largest, 1 + 1e-9)
             self.assertAlmostEqual(summary['max_error'], largest, places=6)
 

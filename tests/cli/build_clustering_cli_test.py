@@ -53,10 +53,10 @@ class ClusteringOptionsTest(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stdout
 
-    def expect_error(self, wanted, *args):
+    def expect_error(self, expected, *args):
         result = self.terrace(*args)
         self.assertIn(result.returncode, (1, 2))
-        self.assertIn(wanted, result.stderr)
+        self.assertIn(expected, result.stderr)
         self.assertLessEqual(len(result.stderr.splitlines()), 2, result.stderr)
 
     def build(self, name, *options):

@@ -419,7 +419,7 @@ class ClusterTest(unittest.TestCase):
         self.assertLess(bounds[1], bounds[2])
         self.assertLessEqual(bounds[2], summary['cost'])
 
-    def test_a_bound_that_would_take_minutes_is_left_out_and_said(self):
+    def test_a_bound_that_would_take_minutes_is_omitted_with_a_note(self):
         """One cluster of many points: a step of the bound examines all pairs of points."""
         source = self.even(30000)
         result = terrace('cluster', source, '--facility-cost', 1e6, '--labels', self.path('one.txt'), '--force')

@@ -19,8 +19,8 @@ SHIM = os.environ['FAULT_SHIM']
 ENDLESS = 2000  # more steps than any command here has
 
 
-def everything(folder):
-    """The bytes of every file below a folder, by name."""
+def files_below(folder):
+    """Returns {name: bytes} of all files below a folder."""
     found = {}
     for path, _, names in os.walk(folder):
         for name in names:
@@ -93,7 +93,7 @@ class CrashCase(unittest.TestCase):
 class StoreCrashTest(CrashCase):
     BLOCK = ('--block', '100', '--threads', '1')
 
-    def built(self, dem):
+    def folder_after_build(self, dem):
         folder = self.start()
         self.run_ok('build', self.input(dem), '-o', os.path.join(folder, 's'), *self.BLOCK)
         return folder
@@ -102,16 +102,16 @@ class StoreCrashTest(CrashCase):
         return ('build', self.input('b.tif'), '-o', 's', *self.BLOCK, *options)
 
     def test_a_killed_build_leaves_a_complete_store_or_none(self):
-        new = everything(self.built('b.tif'))
+        new = files_below(self.folder_after_build('b.tif'))
 
         def check(_):
             there = os.path.exists(self.path('s'))
             if there:
-                self.assertEqual(everything(self.path('s')),
+                self.assertEqual(files_below(self.path('s')),
                                  {name[2:]: data for name, data in new.items()})
             result = terrace(*self.build(*(['--force'] if there else [])), cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertEqual(everything(self.folder), new)
+            self.assertEqual(files_below(self.folder), new)
             self.assertEqual(os.listdir(self.folder), ['s'])
 
         self.die_everywhere(self.start(), self.build(), check)
@@ -135,8 +135,8 @@ class StoreCrashTest(CrashCase):
     def replace(self, exchange):
         """With `exchange`, the name always refers to a store. Without it, opening the store or starting the
         next writer, even one that fails, restores the old store under its name."""
-        start = self.built('a.tif')
-        old, new = everything(start), everything(self.built('b.tif'))
+        start = self.folder_after_build('a.tif')
+        old, new = files_below(start), files_below(self.folder_after_build('b.tif'))
         missing = []
 
         def check(step):
@@ -155,12 +155,12 @@ class StoreCrashTest(CrashCase):
                                  cwd=self.folder)
                 self.assertEqual(result.returncode, 1)
                 self.assertIn('not one point', result.stderr)
-            found = {name: data for name, data in everything(self.folder).items()
+            found = {name: data for name, data in files_below(self.folder).items()
                      if name.startswith('s/')}
             self.assertIn(found, (old, new))
             result = terrace(*self.build('--force'), cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertEqual(everything(self.folder), new)
+            self.assertEqual(files_below(self.folder), new)
             self.assertEqual(os.listdir(self.folder), ['s'])
 
         self.die_everywhere(start, self.build('--force'), check, exchange)
@@ -173,8 +173,8 @@ class StoreCrashTest(CrashCase):
         self.replace(exchange=False)
 
     def test_force_on_a_link_replaces_the_linked_store(self):
-        start = self.built('a.tif')
-        new = everything(self.built('b.tif'))
+        start = self.folder_after_build('a.tif')
+        new = files_below(self.folder_after_build('b.tif'))
         os.mkdir(self.path('elsewhere'))
         shutil.move(os.path.join(start, 's'), self.path('elsewhere/s'))
         os.symlink('elsewhere/s', self.path('s'))
@@ -184,14 +184,14 @@ class StoreCrashTest(CrashCase):
         result = terrace(*self.build('--force'), cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue(os.path.islink(self.path('s')))
-        self.assertEqual(everything(self.path('elsewhere')), new)
+        self.assertEqual(files_below(self.path('elsewhere')), new)
         self.assertEqual(os.listdir(self.path('elsewhere')), ['s'])
         # If the target of a link does not exist, the store is created there.
         shutil.rmtree(self.path('elsewhere/s'))
         result = terrace(*self.build(), cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertTrue(os.path.islink(self.path('s')))
-        self.assertEqual(everything(self.path('elsewhere')), new)
+        self.assertEqual(files_below(self.path('elsewhere')), new)
 
     def test_a_manifest_that_only_names_the_format_is_not_a_store(self):
         os.mkdir(self.path('s'))
@@ -214,7 +214,7 @@ class FileCrashTest(CrashCase):
             result = terrace(*arguments, cwd=folder)
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertEqual(os.listdir(folder), [name])
-            both.append(everything(folder))
+            both.append(files_below(folder))
         old, new = both
         self.assertNotEqual(old, new)
         start = self.start()
@@ -238,7 +238,7 @@ class FileCrashTest(CrashCase):
     def next_run(self, command, new):
         result = terrace(*command, '--force', cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertEqual(everything(self.folder), new)
+        self.assertEqual(files_below(self.folder), new)
 
     def test_points(self):
         self.one_file('p.ply', ('synth', 'uniform', '--points', '50', '-o', 'p.ply'),
@@ -266,7 +266,7 @@ class FileCrashTest(CrashCase):
         for steps, folder in ((2, old), (3, new)):
             result = terrace(*smooth(steps), cwd=folder)
             self.assertEqual(result.returncode, 0, result.stderr)
-        before, after = everything(old), everything(new)
+        before, after = files_below(old), files_below(new)
         self.assertNotEqual(before, after)
 
         def check(_):
@@ -274,7 +274,7 @@ class FileCrashTest(CrashCase):
                 self.assertIn(file.read(), (before['o.overlay'], after['o.overlay']))
             result = terrace(*smooth(3), cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertEqual(everything(self.folder), after)
+            self.assertEqual(files_below(self.folder), after)
 
         self.die_everywhere(old, smooth(3), check, least=6)
 
@@ -311,14 +311,14 @@ class TogetherTest(CrashCase):
         return {**self.COMMANDS, 'cluster': (self.cluster('1.1'), self.cluster('3')),
                 'mesh': (self.mesh(2), self.mesh(3)), 'build': (self.build('a.tif'), self.build('b.tif'))}
 
-    def made(self, command):
+    def folder_after(self, command):
         folder = self.start()
         result = terrace(*command, cwd=folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         return folder
 
     def fail_everywhere(self, start, command, new, exchange=True):
-        before = everything(start)
+        before = files_below(start)
         failed = 0
         for step in range(1, ENDLESS):
             shutil.rmtree(self.folder)
@@ -335,35 +335,35 @@ class TogetherTest(CrashCase):
                     self.assertNotEqual(result.returncode, 0)
                     self.assertIn('Input/output error', result.stderr)
                 if result.returncode == 0:
-                    self.assertEqual(everything(self.folder), new)
+                    self.assertEqual(files_below(self.folder), new)
                 else:
                     failed += 1
                     self.assertEqual(result.returncode, 1, result.stderr)
-                    self.assertEqual(everything(self.folder), before)
+                    self.assertEqual(files_below(self.folder), before)
         self.assertGreater(failed, 2)
 
     def test_a_failed_sync_or_rename_changes_nothing(self):
         for name, (old, command) in self.commands().items():
-            new = everything(self.made(command))
+            new = files_below(self.folder_after(command))
             with self.subTest(name):
                 self.fail_everywhere(self.start(), command, new)
             with self.subTest(name + ' --force'):
-                self.fail_everywhere(self.made(old), (*command, '--force'), new)
+                self.fail_everywhere(self.folder_after(old), (*command, '--force'), new)
 
     def test_the_next_run_cleans_up_after_a_killed_one(self):
         for name in ('cluster', 'mesh'):
             old, command = self.commands()[name]
-            start = self.made(old)
-            before, new = everything(start), everything(self.made(command))
+            start = self.folder_after(old)
+            before, new = files_below(start), files_below(self.folder_after(command))
 
             def check(_):
-                for output, data in everything(self.folder).items():
+                for output, data in files_below(self.folder).items():
                     if not output.startswith('.'):
                         self.assertIn(data, (before[output], new[output]))
-                self.assertLessEqual(set(before), set(everything(self.folder)))
+                self.assertLessEqual(set(before), set(files_below(self.folder)))
                 result = terrace(*command, '--force', cwd=self.folder)
                 self.assertEqual(result.returncode, 0, result.stderr)
-                self.assertEqual(everything(self.folder), new)
+                self.assertEqual(files_below(self.folder), new)
 
             with self.subTest(name):
                 self.die_everywhere(start, (*command, '--force'), check, least=6)
@@ -449,7 +449,7 @@ class StrangerTest(CrashCase):
                     code, error = self.run_while((*command, '--force'), change)
                     self.assertEqual(code, 1, error)
                     self.assertIn('was not written by terrace', error)
-                    found = everything(self.folder)
+                    found = files_below(self.folder)
                     self.assertEqual(found.pop(name + '/photo' if kind == 'folder' else name), b'precious')
                     self.assertLessEqual(set(found), {'kept'})
                 shutil.rmtree(self.folder)
@@ -473,12 +473,12 @@ class StrangerTest(CrashCase):
         self.assertEqual(code, 1, error)
         self.assertIn('was not written by terrace', error)
         self.assertEqual(sorted(os.listdir(self.folder)), ['old', 's'])
-        self.assertEqual(everything(self.path('s')), {'photos/1': b'precious'})
+        self.assertEqual(files_below(self.path('s')), {'photos/1': b'precious'})
 
     def test_a_store_with_a_foreign_file_is_kept(self):
         command = ('build', self.input('b.tif'), '-o', 's', '--block', '100', '--threads', '1')
         self.assertEqual(terrace(*command, cwd=self.folder).returncode, 0)
-        before = everything(self.folder)
+        before = files_below(self.folder)
 
         def change():
             for name in ('s/notes.txt', 's/letter.txt'):
@@ -492,7 +492,7 @@ class StrangerTest(CrashCase):
             self.assertEqual(code, 1, error)
             self.assertIn('contains letter.txt, which terrace did not write', error)
             self.assertIn('move it away', error)
-            self.assertEqual(everything(self.folder), before)
+            self.assertEqual(files_below(self.folder), before)
         for name in ('s/notes.txt', 's/letter.txt'):
             os.remove(self.path(name))
         self.assertEqual(terrace(*command, '--force', cwd=self.folder).returncode, 0)
@@ -558,48 +558,48 @@ class TileCrashTest(CrashCase):
     def tile(self, store, *options):
         return ('tile', store, '-o', 't', '--name', 'set', *self.OPTIONS, *options)
 
-    def made(self, store):
+    def folder_after(self, store):
         folder = self.start()
         result = terrace(*self.tile(store), cwd=folder)
         self.assertEqual(result.returncode, 0, result.stderr)
         return folder
 
     @staticmethod
-    def served(folder):
-        """The files that a web server would serve."""
-        return {name: data for name, data in everything(folder).items()
+    def served_files(folder):
+        """Returns {name: bytes} of the files that a web server would serve."""
+        return {name: data for name, data in files_below(folder).items()
                 if not os.path.basename(name).startswith('.')}
 
-    def check_set(self, wholes, new):
-        """A published set is complete; an unpublished one can be resumed until it is complete."""
+    def check_set(self, complete_sets, new):
+        """Asserts that a published set is complete, and that an unpublished one can be completed by resuming."""
         result = terrace('verify', 't', cwd=self.folder)
         if os.path.exists(self.path('t/layer.json')):
             self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
-            self.assertIn(self.served(self.folder), wholes)
-            go_on = '--force'
+            self.assertIn(self.served_files(self.folder), complete_sets)
+            option = '--force'
         else:
             self.assertEqual(result.returncode, 1)
-            go_on = '--resume'
-        result = terrace(*self.tile(self.stores[1], go_on), cwd=self.folder)
+            option = '--resume'
+        result = terrace(*self.tile(self.stores[1], option), cwd=self.folder)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertEqual(everything(self.folder), new)
+        self.assertEqual(files_below(self.folder), new)
 
     def test_a_set_is_published_as_a_whole(self):
-        new = everything(self.made(self.stores[1]))
+        new = files_below(self.folder_after(self.stores[1]))
         self.assertGreater(len(new), 8)
-        whole = {name: data for name, data in new.items() if '/.' not in name}
+        complete_set = {name: data for name, data in new.items() if '/.' not in name}
         self.die_everywhere(self.start(), self.tile(self.stores[1]),
-                            lambda _: self.check_set((whole,), new), least=30)
+                            lambda _: self.check_set((complete_set,), new), least=30)
 
     def test_a_changed_set_is_complete_or_not_published(self):
-        old, new = self.made(self.stores[0]), everything(self.made(self.stores[1]))
-        wholes = self.served(old), {name: data for name, data in new.items() if '/.' not in name}
-        self.assertNotEqual(*wholes)
+        old, new = self.folder_after(self.stores[0]), files_below(self.folder_after(self.stores[1]))
+        complete_sets = self.served_files(old), {name: data for name, data in new.items() if '/.' not in name}
+        self.assertNotEqual(*complete_sets)
         self.die_everywhere(old, self.tile(self.stores[1], '--force'),
-                            lambda _: self.check_set(wholes, new), least=10)
+                            lambda _: self.check_set(complete_sets, new), least=10)
 
     def test_a_second_run_is_refused_while_the_first_is_running(self):
-        new = everything(self.made(self.stores[0]))
+        new = files_below(self.folder_after(self.stores[0]))
         steps = 0
         for step in range(1, ENDLESS, 7):
             shutil.rmtree(self.folder)
@@ -620,12 +620,12 @@ class TileCrashTest(CrashCase):
             first.send_signal(signal.SIGCONT)
             _, error = first.communicate()
             self.assertEqual(first.returncode, 0, error)
-            self.assertEqual(everything(self.folder), new)
+            self.assertEqual(files_below(self.folder), new)
         self.assertGreater(steps, 5)
 
     def test_leftovers_of_killed_runs_are_not_damage_and_are_removed(self):
-        start = self.made(self.stores[0])
-        new = everything(start)
+        start = self.folder_after(self.stores[0])
+        new = files_below(start)
         shutil.rmtree(self.folder)
         shutil.copytree(start, self.folder)
         tile = next(name for name in new if name.endswith('.terrain'))
@@ -643,15 +643,15 @@ class TileCrashTest(CrashCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         for left in strangers:
             os.remove(self.path(left))
-        self.assertEqual(everything(self.folder), new)
+        self.assertEqual(files_below(self.folder), new)
 
     def test_tiles_are_written_to_the_target_of_a_link(self):
-        new = everything(os.path.join(self.made(self.stores[0]), 't'))
+        new = files_below(os.path.join(self.folder_after(self.stores[0]), 't'))
         os.symlink('real', self.path('t'))
         for options in ((), ('--force',)):
             result = terrace(*self.tile(self.stores[0], *options), cwd=self.folder)
             self.assertEqual(result.returncode, 0, result.stderr)
-            self.assertEqual(everything(self.path('real')), new)
+            self.assertEqual(files_below(self.path('real')), new)
             self.assertTrue(os.path.islink(self.path('t')))
 
     def test_a_failed_run_leaves_no_folder(self):

@@ -51,10 +51,10 @@ class EntitiesCase(unittest.TestCase):
         assert result.returncode == 0, result.stderr
         return result.stdout
 
-    def expect_error(self, wanted, *args):
+    def expect_error(self, expected, *args):
         result = self.terrace(*args)
         self.assertIn(result.returncode, (1, 2))
-        self.assertIn(wanted, result.stderr)
+        self.assertIn(expected, result.stderr)
         self.assertLessEqual(len(result.stderr.splitlines()), 2, result.stderr)
 
     @staticmethod
@@ -257,18 +257,18 @@ class LinesTest(EntitiesCase):
         box = (2603000, 1203000, 2607000, 1206000)
         lines, _ = self.lines_of(self.run_ok('points', self.stores['segments'], '-o', '-', '--format', 'geojson',
                                              '--region', ','.join(map(str, box))))
-        wanted = []
+        expected = []
         for line in self.lines:
             run = []
             for a, b in zip(line, line[1:]):
                 if box[0] <= a[0] <= box[2] and box[1] <= a[1] <= box[3]:
                     run = run + [b] if run else [a, b]
                 elif run:
-                    wanted.append(repr([list(map(float, p)) for p in run]))
+                    expected.append(repr([list(map(float, p)) for p in run]))
                     run = []
             if run:
-                wanted.append(repr([list(map(float, p)) for p in run]))
-        self.assertTrue(lines == wanted)
+                expected.append(repr([list(map(float, p)) for p in run]))
+        self.assertTrue(lines == expected)
         self.assertGreater(len(lines), 50)
 
     def test_pictures_show_the_lines(self):

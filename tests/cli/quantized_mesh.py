@@ -13,7 +13,7 @@ A, B = 6378137.0, 6356752.3142451793
 
 
 def box_of(zoom, x, y):
-    """West, south, east and north of a tile in degrees."""
+    """Returns west, south, east and north of a tile in degrees."""
     width = 180 / 2 ** zoom
     return -180 + x * width, -90 + y * width, -180 + (x + 1) * width, -90 + (y + 1) * width
 
@@ -48,6 +48,8 @@ def oct_decode(a, b):
 
 
 class Tile:
+    """A tile: the fields of the format, with decoded vertices and triangles."""
+
     def __init__(self, data, zoom, x, y):
         self.zoom, self.x, self.y = zoom, x, y
         if data[:3] == b'\x1f\x8b\x08':
@@ -101,7 +103,7 @@ class Tile:
         return [oct_decode(a, b) for a, b in zip(codes[::2], codes[1::2])]
 
     def side(self, name):
-        """Sorted positions along a side, with their heights."""
+        """Returns the vertices of a side as sorted pairs (position along the side, height in metres)."""
         along, across, at = {'west': (self.v, self.u, 0), 'east': (self.v, self.u, UNITS),
                              'south': (self.u, self.v, 0), 'north': (self.u, self.v, UNITS)}[name]
         return sorted((along[i], self.metres(i)) for i in range(len(along)) if across[i] == at)
@@ -125,12 +127,12 @@ class Tile:
         for a, b in edges:
             if (b, a) not in edges:
                 assert any(c[a] == c[b] and c[a] in (0, UNITS) for c in (self.u, self.v)), 'a hole'
-        for given, along, across, at in zip(self.edges, (self.v, self.u, self.v, self.u),
+        for listed, along, across, at in zip(self.edges, (self.v, self.u, self.v, self.u),
                                             (self.u, self.v, self.u, self.v),
                                             (0, 0, UNITS, UNITS)):
-            right = [i for i in range(n) if across[i] == at]
-            assert given == sorted(right, key=lambda i: along[i])
-            assert {0, UNITS} <= {along[i] for i in right}
+            expected = [i for i in range(n) if across[i] == at]
+            assert listed == sorted(expected, key=lambda i: along[i])
+            assert {0, UNITS} <= {along[i] for i in expected}
         points = [geocentric(*self.place(i), self.metres(i)) for i in range(n)]
         assert all(math.dist(p, self.sphere) <= self.radius + 1e-3 for p in points)
         assert math.dist(self.centre, self.sphere) <= self.radius + 1e-3
@@ -138,8 +140,8 @@ class Tile:
             self.check_horizon(p)
 
     def check_horizon(self, point):
-        """Asserts that an observer at the horizon point sees no vertex above the horizon. From the point and
-        from each vertex, the ellipsoid is touched along a cone; one cone must contain the other."""
+        """Asserts that an observer at the horizon point sees no vertex above the horizon. The rays from the horizon
+        point that touch the ellipsoid form a cone, and so do those from a vertex. One cone must contain the other."""
         p = (point[0] / A, point[1] / A, point[2] / B)
         far, near = math.sqrt(dot(self.horizon, self.horizon)), math.sqrt(dot(p, p))
         angle = math.acos(max(-1.0, min(1.0, dot(p, self.horizon) / far / near)))
@@ -148,6 +150,8 @@ class Tile:
 
 
 class TileSet:
+    """A folder of tiles with its layer.json."""
+
     def __init__(self, folder):
         self.folder = folder
         with open(os.path.join(folder, 'layer.json')) as file:
@@ -168,7 +172,7 @@ class TileSet:
             return file.read()
 
     def files(self):
-        """The bytes of every file in the folder except layer.json and the journal, by name."""
+        """Returns {name: bytes} of all files in the folder except layer.json and the journal."""
         found = {}
         for folder, _, names in os.walk(self.folder):
             for name in names:
@@ -213,7 +217,7 @@ class TileSet:
         number of samples that no tile covers."""
         result = {}
         for zoom in range(self.layer['minzoom'], self.layer['maxzoom'] + 1):
-            by_tile, missed, largest = {}, 0, 0.0
+            by_tile, uncovered_count, largest = {}, 0, 0.0
             width = 180 / 2 ** zoom
             for lon, lat, height in samples:
                 x, y = (lon + 180) / width, (lat + 90) / width
@@ -222,16 +226,17 @@ class TileSet:
                     by_tile.setdefault(key, []).append(
                         ((x - key[1]) * UNITS, (y - key[2]) * UNITS, height))
                 else:
-                    missed += 1
+                    uncovered_count += 1
             for key, places in by_tile.items():
-                error, out = measure(self.tiles[key], places)
-                largest, missed = max(largest, error), missed + out
-            result[zoom] = largest, missed
+                error, uncovered = measure(self.tiles[key], places)
+                largest, uncovered_count = max(largest, error), uncovered_count + uncovered
+            result[zoom] = largest, uncovered_count
         return result
 
 
 def measure(tile, places):
-    """Returns the largest error of (u, v, height) on a tile's triangles, and the number on no triangle."""
+    """Returns the largest vertical distance of (u, v, height) from a tile's triangles, in metres, and the number
+    of places on no triangle."""
     cells = {}
     for i, (u, v, _) in enumerate(places):
         cells.setdefault((int(u) >> 10, int(v) >> 10), []).append(i)

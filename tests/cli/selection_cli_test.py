@@ -73,11 +73,11 @@ class SelectionTest(unittest.TestCase):
             reader = csv.DictReader(file)
             return reader.fieldnames, sorted(tuple(map(float, row.values())) for row in reader)
 
-    def expect(self, name, wanted, columns):
+    def expect(self, name, selected, columns):
         names, rows = self.rows(name)
         self.assertEqual(names, columns)
         self.assertEqual(rows, sorted(tuple(float(p[c]) for c in columns)
-                                      for p in self.points if wanted(p)))
+                                      for p in self.points if selected(p)))
 
     def test_points_with_nan_are_skipped_and_counted(self):
         def write(name, text):
@@ -193,23 +193,23 @@ class SelectionTest(unittest.TestCase):
             'convert', self.file, '-o', self.path('c.csv'), '--json',
             '--where', 'not (z < 12.5 or x >= 300) and red > 1.5 * green', '--keep', 'red,green',
             '--drop', 'green'))
-        wanted = lambda p: not (p['z'] < 12.5 or p['x'] >= 300) and p['red'] > 1.5 * p['green']
-        self.expect('c.csv', wanted, ['x', 'y', 'z', 'red'])
-        self.assertEqual(summary['excluded'], 20000 - sum(map(wanted, self.points)))
+        selected = lambda p: not (p['z'] < 12.5 or p['x'] >= 300) and p['red'] > 1.5 * p['green']
+        self.expect('c.csv', selected, ['x', 'y', 'z', 'red'])
+        self.assertEqual(summary['excluded'], 20000 - sum(map(selected, self.points)))
         self.run_ok('convert', self.file, '-o', self.path('none.csv'), '--keep', 'none', '-q')
         self.expect('none.csv', lambda p: True, ['x', 'y', 'z'])
 
     def test_region_selects_points_of_files(self):
-        wanted = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and 5 <= p['z'] <= 25
+        selected = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and 5 <= p['z'] <= 25
         summary = json.loads(self.run_ok('convert', self.file, '-o', self.path('r.csv'), '--json',
                                          '--region', '100,100,5,400,500.5,25'))
-        self.expect('r.csv', wanted, NAMES)
-        self.assertEqual(summary['excluded'], 20000 - sum(map(wanted, self.points)))
-        wanted = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and p['red'] > 100
+        self.expect('r.csv', selected, NAMES)
+        self.assertEqual(summary['excluded'], 20000 - sum(map(selected, self.points)))
+        selected = lambda p: 100 <= p['x'] <= 400 and 100 <= p['y'] <= 500.5 and p['red'] > 100
         self.run_ok('build', self.file, '-o', self.path('r.st'), '-q', '--region', '100,100,400,500.5',
                     '--where', 'red > 100', '--drop', 'green')
         self.run_ok('points', self.path('r.st'), '-o', self.path('r2.csv'), '-q')
-        self.expect('r2.csv', wanted, NAMES[:-1])
+        self.expect('r2.csv', selected, NAMES[:-1])
 
     def raster(self, name, side=10, prj=None):
         """Writes 40 x 30 cells from the origin, one row void; returns the cells by their centres."""
@@ -231,10 +231,10 @@ class SelectionTest(unittest.TestCase):
 
     def test_region_of_a_raster_selects_the_cells_with_centres_inside(self):
         centres = self.raster('r.asc')
-        wanted = sorted(c for c in centres if 95 <= c[0] <= 201 and 50 <= c[1] <= 165)
+        selected = sorted(c for c in centres if 95 <= c[0] <= 201 and 50 <= c[1] <= 165)
         summary = json.loads(self.run_ok('convert', self.path('r.asc'), '-o', self.path('cells.csv'), '--json',
                                          '--region', '95,50,201,165'))
-        self.assertEqual(self.rows('cells.csv')[1], wanted)
+        self.assertEqual(self.rows('cells.csv')[1], selected)
         # Whether cells that are not read have data is unknown.
         self.assertEqual(summary['points'] + summary['nodata'] + summary['excluded'], 40 * 30)
         self.assertTrue(11 <= summary['nodata'] <= 15, summary)
@@ -243,13 +243,13 @@ class SelectionTest(unittest.TestCase):
                                          '--region', '95,50,201,165'))
         self.assertEqual(summary['points'] + summary['nodata'] + summary['excluded'], 40 * 30)
         self.run_ok('points', self.path('cropped.st'), '-o', self.path('cropped.csv'), '-q')
-        self.assertEqual(self.rows('cropped.csv')[1], wanted)
+        self.assertEqual(self.rows('cropped.csv')[1], selected)
         summary = json.loads(self.run_ok('raster', self.path('cropped.st'), '-o', self.path('cropped.tif'), '--json'))
         self.assertTrue(11 <= summary['columns'] <= 15 and 12 <= summary['rows'] <= 16, summary)
-        self.assertEqual(summary['cells'] - summary['nodata'], len(wanted))
+        self.assertEqual(summary['cells'] - summary['nodata'], len(selected))
         trial = json.loads(self.run_ok('build', self.path('r.asc'), '-o', self.path('trial.st'), '--json',
                                        '--dry-run', '--region', '95,50,201,165'))
-        self.assertEqual(trial['points'], len(wanted))
+        self.assertEqual(trial['points'], len(selected))
 
     def test_region_of_polygons(self):
         """Regions are closed, as for stores: points on a ring are inside, also on the ring of a hole."""
@@ -267,17 +267,17 @@ class SelectionTest(unittest.TestCase):
         for name, among in (('polygons.asc', [(c, inside(*c[:2])) for c in centres]),
                             ('all.csv', [(tuple(map(float, p.values())), inside(p['x'], p['y'])) for p in self.points])):
             with self.subTest(name=name):
-                wanted = sorted(c for c, chosen in among if chosen)
-                self.assertTrue(100 < len(wanted) < len(among) / 2)
+                selected = sorted(c for c, chosen in among if chosen)
+                self.assertTrue(100 < len(selected) < len(among) / 2)
                 self.run_ok('convert', self.path(name), '-o', self.path('c.csv'), '--force', '-q', '--region', region)
-                self.assertEqual(self.rows('c.csv')[1], wanted)
+                self.assertEqual(self.rows('c.csv')[1], selected)
                 self.run_ok('build', self.path(name), '-o', self.path('p.st'), '--force', '-q', '--region', region)
                 self.run_ok('points', self.path('p.st'), '-o', self.path('p.csv'), '--force', '-q')
-                self.assertEqual(self.rows('p.csv')[1], wanted)
+                self.assertEqual(self.rows('p.csv')[1], selected)
                 # The same region of a store of everything.
                 self.run_ok('build', self.path(name), '-o', self.path('w.st'), '--force', '-q')
                 self.run_ok('points', self.path('w.st'), '-o', self.path('p.csv'), '--force', '-q', '--region', region)
-                self.assertEqual(self.rows('p.csv')[1], wanted)
+                self.assertEqual(self.rows('p.csv')[1], selected)
 
     def test_region_in_another_crs(self):
         """A region selects the same points of a file and of its store."""
@@ -293,15 +293,15 @@ class SelectionTest(unittest.TestCase):
                 with self.subTest(file=file, region=region):
                     args = ['--region', region, '--region-crs', 'EPSG:4326', '-q', '--force', '-o']
                     self.run_ok('points', self.path('utm.st'), *args, self.path('wanted.csv'))
-                    wanted = self.rows('wanted.csv')[1]
-                    self.assertGreater(len(wanted), 100)
+                    selected = self.rows('wanted.csv')[1]
+                    self.assertGreater(len(selected), 100)
                     self.run_ok('build', self.path(file), *crs, *args, self.path('part.st'))
                     self.run_ok('points', self.path('part.st'), '-o', self.path('found.csv'), '-q', '--force')
-                    self.assertEqual(self.rows('found.csv')[1], wanted)
+                    self.assertEqual(self.rows('found.csv')[1], selected)
                     if not crs:
                         self.run_ok('convert', self.path(file), '-o', self.path('found.csv'), '-q', '--force',
                                     '--region', region, '--region-crs', 'EPSG:4326')
-                        self.assertEqual(self.rows('found.csv')[1], wanted)
+                        self.assertEqual(self.rows('found.csv')[1], selected)
 
     def test_border_cells_are_selected_for_longitudes_in_any_turn(self):
         """A box whose sides run through rows and columns of cells includes them, for each verb, in files and stores."""
@@ -331,13 +331,13 @@ class SelectionTest(unittest.TestCase):
             file.write('lon,lat,height\n' + ''.join(f'{lon},{lat},{lon + lat}\n' for lon, lat in places))
         self.run_ok('build', self.path('globe.csv'), '-o', self.path('globe.st'), '-q')
         for west, east in ((-10, 10), (350, 370), (-180, 180), (-180, -100), (100, 200)):
-            wanted = sorted((x, y, x + y) for x, y in places
+            selected = sorted((x, y, x + y) for x, y in places
                             if abs(y) <= 30 and any(west <= x + turn <= east for turn in (-360, 0, 360)))
-            self.assertGreater(len(wanted), 10)
+            self.assertGreater(len(selected), 10)
             box = f'--region={west},-30,{east},30'
             for command in (['convert', self.path('globe.csv')], ['points', self.path('globe.st')]):
                 self.run_ok(*command, box, '-o', self.path('lon.csv'), '-q', '--force')
-                self.assertEqual(sorted(self.rows('lon.csv')[1]), wanted, (command, box))
+                self.assertEqual(sorted(self.rows('lon.csv')[1]), selected, (command, box))
 
     def test_points_of_a_store_are_selected(self):
         self.run_ok('points', self.path('all.st'), '-o', self.path('p.csv'), '-q',
@@ -352,9 +352,9 @@ class SelectionTest(unittest.TestCase):
             for store, more in (('n.st', []), ('all.st', ['--where', 'classification == 2'])):
                 self.run_ok('points', self.path(store), '-o', self.path(f'near-{store}.csv'), '-q', '--force',
                             '--near', '300,400', *how, *more)
-            wanted = self.rows('near-n.st.csv')
-            self.assertGreaterEqual(len(wanted[1]), 5)
-            self.assertEqual(self.rows('near-all.st.csv'), wanted)
+            selected = self.rows('near-n.st.csv')
+            self.assertGreaterEqual(len(selected[1]), 5)
+            self.assertEqual(self.rows('near-all.st.csv'), selected)
 
     def test_mesh_of_a_part_equals_the_mesh_of_its_store(self):
         """Points that do not meet the condition have no influence."""

@@ -38,7 +38,7 @@ def names_of(point_format):
 
 
 def unpack_record(point_format, record):
-    """{name: value} of a record, with bit fields separated and without extra bytes."""
+    """Returns {name: value} of a record, with bit fields separated and without extra bytes."""
     size = struct.calcsize(record_format(point_format))
     values = list(struct.unpack(record_format(point_format), record[:size]))
     out = dict(zip('XYZ', values[:3]))
@@ -53,7 +53,7 @@ def unpack_record(point_format, record):
 
 
 def random_records(point_format, count, seed=1):
-    """Random records; floats have few digits."""
+    """Returns random records, whose floats have few digits."""
     source = random.Random(seed * 100 + point_format)
 
     def record():
@@ -77,7 +77,7 @@ def evlr(user, number, data):
 
 
 def geo_keys(keys):
-    """The VLR of GeoKeys {key: number}."""
+    """Returns the VLR of GeoKeys, {key: number}."""
     shorts = [1, 1, 0, len(keys)]
     for key, value in sorted(keys.items()):
         shorts += [key, 0, 1, value]
@@ -89,7 +89,7 @@ def wkt(text):
 
 
 def extra_bytes(rows):
-    """The VLR of extra bytes [(name, type, options, scale, offset)], with the specification's type numbers."""
+    """Returns the VLR of extra bytes, [(name, type, options, scale, offset)], with types as in the specification."""
     data = b''
     for name, kind, options, scale, offset in rows:
         data += struct.pack('<2xBB32s4x24x24x24xd16xd16x32s', kind, options, name.encode(), scale,
@@ -100,27 +100,27 @@ def extra_bytes(rows):
 
 def las(point_format, records, minor=None, scale=(0.01, 0.01, 0.01), offset=(0.0, 0.0, 0.0), vlrs=(),
         evlrs=(), encoding=0, points=None, record_bytes=None):
-    """The bytes of a file; the parts are written unchanged, even if they contradict each other."""
+    """Returns the bytes of a file. All parts are used unchanged, even if they contradict each other."""
     if minor is None:
         minor = 4 if point_format >= 6 else 2
     header_bytes = 375 if minor == 4 else 235 if minor == 3 else 227
-    head = b''.join(vlrs)
-    body = b''.join(records)
+    vlr_bytes = b''.join(vlrs)
+    record_data = b''.join(records)
     count = len(records) if points is None else points
     if record_bytes is None:
         record_bytes = len(records[0]) if records else struct.calcsize(record_format(point_format))
     old_count = count if point_format < 6 else 0
     header = struct.pack('<4sHH16xBB32s32sHHHIIBHI20x', b'LASF', 0, encoding, 1, minor, b'', b'', 1, 2026,
-                         header_bytes, header_bytes + len(head), len(vlrs), point_format, record_bytes,
+                         header_bytes, header_bytes + len(vlr_bytes), len(vlrs), point_format, record_bytes,
                          old_count)
     header += struct.pack('<6d48x', *scale, *offset)
     if minor >= 3:
         header += bytes(8)
     if minor == 4:
-        header += struct.pack('<QIQ120x', header_bytes + len(head) + len(body) if evlrs else 0,
+        header += struct.pack('<QIQ120x', header_bytes + len(vlr_bytes) + len(record_data) if evlrs else 0,
                               len(evlrs), count)
     assert len(header) == header_bytes
-    return header + head + body + b''.join(evlrs)
+    return header + vlr_bytes + record_data + b''.join(evlrs)
 
 
 class Las:
@@ -156,7 +156,7 @@ class Las:
         assert len(data) >= first + count * self.record_bytes
 
     def places(self):
-        """The positions of the records in the CRS, rounded to a millionth and sorted."""
+        """Returns the positions of the records in the CRS, rounded to a millionth and sorted."""
         return sorted(tuple(round(step * scale + offset, 6) for step, scale, offset
                             in zip(struct.unpack_from('<iii', record), self.scale, self.offset))
                       for record in self.records)

@@ -9,11 +9,11 @@ import zlib
 # GeoKeys of WGS 84 in degrees, with samples at the centres of cells.
 GEOGRAPHIC = {1024: 2, 1025: 1, 2048: 4326, 2054: 9102}
 
-# By array's type code: the bits of a sample and TIFF's number for the kind.
-KINDS = {'B': (8, 1), 'H': (16, 1), 'h': (16, 2), 'i': (32, 2), 'f': (32, 3), 'd': (64, 3)}
-# Bytes of a value, by TIFF's number for its type.
-WIDTHS = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 12: 8}
-PLACES_OF_PIECES = (273, 279, 324, 325)
+# By type code of `array`: the bits of a sample and TIFF's number of the sample format.
+SAMPLE_FORMATS = {'B': (8, 1), 'H': (16, 1), 'h': (16, 2), 'i': (32, 2), 'f': (32, 3), 'd': (64, 3)}
+# By TIFF's number of a type: the bytes of a value.
+VALUE_BYTES = {1: 1, 2: 1, 3: 2, 4: 4, 5: 8, 12: 8}
+STRIP_AND_TILE_TAGS = (273, 279, 324, 325)
 
 
 def utm(zone):
@@ -25,12 +25,12 @@ def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=
                matrix=None, kind='f', bands=1, nodata=None):
     """Writes a raster in one strip.
 
-    samples: by rows, with interleaved bands. corner: the upper left one, cell: its side; or
-    matrix: the sixteen numbers of a transformation. keys: {GeoKey: integer, float or text}.
-    nodata: as text.
+    samples: by rows, with interleaved bands. corner: the upper left corner of the raster; cell: side of
+    a cell. matrix: the sixteen numbers of a transformation, instead of both. keys: {GeoKey: integer, float
+    or text}. kind: type code of `array`. nodata: the value as text.
     """
     pixels = array.array(kind, samples).tobytes()
-    bits, form = KINDS[kind]
+    bits, sample_format = SAMPLE_FORMATS[kind]
     assert len(pixels) == columns * rows * bands * bits // 8
     shorts, doubles, text = [], [], ''
     for key, value in sorted((keys or {}).items()):
@@ -44,7 +44,7 @@ def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=
             shorts += [key, 0, 1, value]
     entries = [(256, 4, [columns]), (257, 4, [rows]), (258, 3, [bits] * bands), (259, 3, [1]),
                (262, 3, [1]), (273, 4, [8]), (277, 3, [bands]), (278, 4, [rows]),
-               (279, 4, [len(pixels)]), (339, 3, [form] * bands)]
+               (279, 4, [len(pixels)]), (339, 3, [sample_format] * bands)]
     if matrix:
         entries.append((34264, 12, matrix))
     else:
@@ -60,17 +60,17 @@ def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=
         entries.append((42113, 2, nodata))
     directory, extra = b'', b''
     start = 8 + len(pixels) + len(pixels) % 2
-    behind = start + 2 + 12 * len(entries) + 4
+    extra_start = start + 2 + 12 * len(entries) + 4
     for tag, number, values in sorted(entries):
         if number == 2:
             data = values.encode() + b'\0'
         else:
             data = struct.pack(f'<{len(values)}' + {3: 'H', 4: 'I', 12: 'd'}[number], *values)
-        count = len(data) // WIDTHS[number]
+        count = len(data) // VALUE_BYTES[number]
         if len(data) <= 4:
             value = data.ljust(4, b'\0')
         else:
-            value = struct.pack('<I', behind + len(extra))
+            value = struct.pack('<I', extra_start + len(extra))
             extra += data + b'\0' * (len(data) % 2)
         directory += struct.pack('<HHI', tag, number, count) + value
     with open(path, 'wb') as file:
@@ -79,21 +79,21 @@ def write_tiff(path, columns, rows, samples, corner=(500000.0, 5200000.0), cell=
 
 
 def read_directory(data):
-    """{tag: (type, bytes of its values)} of the first directory of a little-endian TIFF."""
+    """Returns {tag: (type, bytes of its values)} of the first directory of a little-endian TIFF."""
     mark, magic, at = struct.unpack('<2sHI', data[:8])
-    assert (mark, magic) == (b'II', 42), 'no little-endian TIFF'
+    assert (mark, magic) == (b'II', 42), 'not a little-endian TIFF'
     tags = {}
     for i in range(struct.unpack_from('<H', data, at)[0]):
         tag, number, count = struct.unpack_from('<HHI', data, at + 2 + 12 * i)
-        size, place = count * WIDTHS[number], at + 10 + 12 * i
+        size, position = count * VALUE_BYTES[number], at + 10 + 12 * i
         if size > 4:
-            place = struct.unpack_from('<I', data, place)[0]
-        tags[tag] = (number, data[place:place + size])
+            position = struct.unpack_from('<I', data, position)[0]
+        tags[tag] = (number, data[position:position + size])
     return tags
 
 
 def tiff_content(path):
-    """The content of a GeoTIFF: its tags except the offsets and sizes of strips and tiles, then the
+    """Returns the content of a GeoTIFF: its tags except the offsets and sizes of strips and tiles, then the
     decompressed bytes of each strip or tile."""
     with open(path, 'rb') as file:
         data = file.read()
@@ -101,11 +101,11 @@ def tiff_content(path):
 
     def numbers(tag):
         kind, values = tags[tag]
-        return struct.unpack(f'<{len(values) // WIDTHS[kind]}' + {3: 'H', 4: 'I'}[kind], values)
+        return struct.unpack(f'<{len(values) // VALUE_BYTES[kind]}' + {3: 'H', 4: 'I'}[kind], values)
 
     content = b''.join(struct.pack('<HHI', tag, kind, len(values)) + values
-                       for tag, (kind, values) in sorted(tags.items()) if tag not in PLACES_OF_PIECES)
-    places, sizes = (324, 325) if 324 in tags else (273, 279)
+                       for tag, (kind, values) in sorted(tags.items()) if tag not in STRIP_AND_TILE_TAGS)
+    offsets, sizes = (324, 325) if 324 in tags else (273, 279)
     unpack = {1: bytes, 8: zlib.decompress, 32946: zlib.decompress}[numbers(259)[0]]
     return content + b''.join(unpack(data[at:at + size])
-                              for at, size in zip(numbers(places), numbers(sizes)))
+                              for at, size in zip(numbers(offsets), numbers(sizes)))

@@ -7,6 +7,7 @@ TERRACE=path/to/terrace store_cli_test.py
 
 import filecmp
 import itertools
+import collections
 import json
 import math
 import os
@@ -317,6 +318,29 @@ class StoreTest(unittest.TestCase):
         self.assertGreater(east(changed), east(plain - slanted) + 0.3)
         self.expect_error(2, 'mesh', self.store, '-o', self.path('none.ply'), '--metric', 'squared')
 
+    @staticmethod
+    def count_by_side(points, middle, half):
+        """Returns the numbers of points in strips along the four sides of a box, {(side, 'in' or 'out'): number}."""
+        count = collections.Counter()
+        for x, y in points:
+            offset = [(x - middle[0]) / half, (y - middle[1]) / half]
+            distance = max(map(abs, offset))
+            axis = 0 if abs(offset[0]) == distance else 1
+            side = (axis, offset[axis] > 0)
+            if 0.81 < distance < 0.99:
+                count[side, 'in'] += 1
+            elif 1.08 < distance < 1.25:
+                count[side, 'out'] += 1
+        return count
+
+    def level_1(self, name, metric):
+        """Builds a store of the raster `name` with a metric. Returns the positions of level 1."""
+        store = self.path(f'{name}.terrace')
+        self.run_ok('build', self.path(f'{name}.tif'), '-o', store, '--force', '--metric', metric,
+                    '--facility-cost', 0.1, '--z-weight', 0)
+        text = self.run_ok('points', store, '--level', 1, '-o', '-')
+        return {tuple(map(float, line.split()[:2])) for line in text.splitlines()}
+
     def test_a_metric_affects_clusters_only_in_its_boxes_of_the_crs(self):
         """For a projection whose scale depends on the direction, and for a rotated raster."""
         columns, rows, cell = 500, 500, 2048.0
@@ -325,51 +349,27 @@ class StoreTest(unittest.TestCase):
         # Lambert's equal-area projection of Europe, 3,000 km off its centre. Lengths that are true
         # along x and y are 3 % longer along one diagonal than along the other.
         laea = {1024: 1, 1025: 1, 3072: 3035}
-        turned = [0.6 * cell, 0.8 * cell, 0, 6.5e6, 0.8 * cell, -0.6 * cell, 0, 2.2e6,
-                  0, 0, 0, 0, 0, 0, 0, 1]
+        rotated = [0.6 * cell, 0.8 * cell, 0, 6.5e6, 0.8 * cell, -0.6 * cell, 0, 2.2e6,
+                   0, 0, 0, 0, 0, 0, 0, 1]
         for name, keys, west, north, matrix in (('utm', utm(32), 0, 5.2e6, None),
                                                 ('laea', laea, 6.5e6, 2.2e6, None),
-                                                ('turned', laea, 6.5e6, 2.2e6, turned)):
+                                                ('rotated', laea, 6.5e6, 2.2e6, rotated)):
             with self.subTest(name):
                 dem, regions = self.path(f'{name}.tif'), self.path(f'{name}.json')
                 if matrix:
                     write_tiff(dem, columns, rows, heights, keys=keys, matrix=matrix)
                 else:
                     write_tiff(dem, columns, rows, heights, (west, north), cell, keys)
-                m = matrix or [cell, 0, 0, west, 0, -cell, 0, north]
-
-                def place(column, row):
-                    column, row = column + 0.5, row + 0.5
-                    return (m[0] * column + m[1] * row + m[3], m[4] * column + m[5] * row + m[7])
-
                 # A box in the CRS about a point far from the raster's corner, 160 cells wide.
-                middle = place(380.3, 380.3)
+                m = matrix or [cell, 0, 0, west, 0, -cell, 0, north]
+                column = row = 380.8
+                middle = (m[0] * column + m[1] * row + m[3], m[4] * column + m[5] * row + m[7])
                 half = 80 * cell
                 box = [middle[0] - half, middle[1] - half, middle[0] + half, middle[1] + half]
                 with open(regions, 'w') as file:
                     json.dump({'regions': [{'box': box, 'semi_axes': [3, 3, 3]}]}, file)
-                counts = []
-                levels = []
-                for metric in ('euclidean', f'elliptical:{regions}'):
-                    store = self.path(f'{name}.terrace')
-                    self.run_ok('build', dem, '-o', store, '--force', '--metric', metric,
-                                '--facility-cost', 0.1, '--z-weight', 0)
-                    text = self.run_ok('points', store, '--level', 1, '-o', '-')
-                    points = {tuple(map(float, line.split()[:2])) for line in text.splitlines()}
-                    levels.append(points)
-                    # Inside and outside, in strips along the four sides.
-                    count = {}
-                    for x, y in points:
-                        off = [(x - middle[0]) / half, (y - middle[1]) / half]
-                        far = max(map(abs, off))
-                        axis = 0 if abs(off[0]) == far else 1
-                        side = (axis, off[axis] > 0)
-                        if 0.81 < far < 0.99:
-                            count[side, 'in'] = count.get((side, 'in'), 0) + 1
-                        elif 1.08 < far < 1.25:
-                            count[side, 'out'] = count.get((side, 'out'), 0) + 1
-                    counts.append(count)
-                plain, wider = counts
+                levels = [self.level_1(name, metric) for metric in ('euclidean', f'elliptical:{regions}')]
+                plain, wider = (self.count_by_side(points, middle, half) for points in levels)
                 self.assertEqual(len(plain), 8)
                 for side, where in plain:
                     share = wider[side, where] / plain[side, where]
@@ -381,11 +381,11 @@ class StoreTest(unittest.TestCase):
                         self.assertGreater(share, 0.75, side)
                 # Blocks that do not meet the box are unchanged.
                 far = 225 * cell
-                apart = [{p for p in points
-                          if max(abs(p[0] - middle[0]), abs(p[1] - middle[1])) > far}
-                         for points in levels]
-                self.assertGreater(len(apart[0]), 3000)
-                self.assertEqual(*apart)
+                outside = [{p for p in points
+                            if max(abs(p[0] - middle[0]), abs(p[1] - middle[1])) > far}
+                           for points in levels]
+                self.assertGreater(len(outside[0]), 3000)
+                self.assertEqual(*outside)
 
     def test_missing_levels_are_usage_errors(self):
         self.assertIn('top', self.expect_error(2, 'mesh', self.store, '--level', 9, '-o',

@@ -283,11 +283,26 @@ class ViewTest(Stores):
 
 
 class ReplacedTest(Stores):
-    def test_a_replaced_store_is_served(self):
-        """The new store is served, also to open connections; a running download continues with the old one."""
-        def build(*args):
-            done = terrace('build', ALPS, '-o', self.store, '-q', '--force', *args)
-            self.assertEqual(done.returncode, 0, done.stderr)
+    def build(self, *args):
+        result = terrace('build', ALPS, '-o', self.store, '-q', '--force', *args)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def file(self, name):
+        with open(os.path.join(self.store, name), 'rb') as data:
+            return data.read()
+
+    def connections_of(self, count):
+        """Starts a server of the store. Returns connections to it and a function that sends a request to one:
+        ask(connection, path, lines) returns the status and the header fields, without reading the body."""
+        server, port, query = view(self.store)
+
+        def stop():
+            server.send_signal(signal.SIGINT)
+            code = server.wait(10)
+            server.stderr.close()
+            self.assertEqual(code, 0)
+
+        self.addCleanup(stop)
 
         def ask(connection, path, lines=''):
             connection.sendall(f'GET {path}{query} HTTP/1.1\r\nHost: localhost:{port}\r\n{lines}\r\n'.encode())
@@ -297,70 +312,75 @@ class ReplacedTest(Stores):
             status, *fields = head.decode().strip().split('\r\n')
             return int(status.split()[1]), dict(field.split(': ', 1) for field in fields)
 
-        def receive(connection, size):
-            data = b''
-            while len(data) < size:
-                piece = connection.recv(size - len(data))
-                self.assertTrue(piece)
-                data += piece
-            return data
+        connections = [socket.create_connection(('127.0.0.1', port), timeout=20) for _ in range(count)]
+        for connection in connections:
+            self.addCleanup(connection.close)
+        return connections, ask
 
-        def file(name):
-            with open(os.path.join(self.store, name), 'rb') as data:
-                return data.read()
+    def receive(self, connection, size):
+        data = b''
+        while len(data) < size:
+            chunk = connection.recv(size - len(data))
+            self.assertTrue(chunk)
+            data += chunk
+        return data
 
-        build('--block', '1000')
-        server, port, query = view(self.store)
-        try:
-            first, second = (socket.create_connection(('127.0.0.1', port), timeout=20) for _ in range(2))
-            self.addCleanup(first.close)
-            self.addCleanup(second.close)
-            url, name = '/stores/alps/', 'level-0.0.clusters'
-            old = file(name)
-            _, fields = ask(first, url + name)
-            self.assertEqual(int(fields['Content-Length']), len(old))
-            build('--block', '2000')
-            new = file(name)
-            self.assertNotEqual(new, old)
-            status, fresh = ask(second, url + name, f'Range: bytes=0-99\r\nIf-None-Match: {fields["ETag"]}\r\n')
-            self.assertEqual((status, fresh['Content-Range']), (206, f'bytes 0-99/{len(new)}'))
-            self.assertNotEqual(fresh['ETag'], fields['ETag'])
-            self.assertEqual(receive(second, 100), new[:100])
-            self.assertEqual(receive(first, len(old)), old)
-            for path, expected in [('manifest.json', file('manifest.json')), (name, new)]:
-                _, head = ask(first, url + path)
-                self.assertEqual(receive(first, int(head['Content-Length'])), expected)
-            _, head = ask(first, '/stores.json')
-            checksum = json.loads(receive(first, int(head['Content-Length'])))['stores'][0]['checksum']
-            self.assertTrue(fresh['ETag'].startswith(f'"{checksum}-'))
-            # While the store is missing or damaged the last one is served, and then the next one.
-            os.rename(self.store, self.path('away'))
-            self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fresh['ETag'])
-            self.assertEqual(receive(second, 100), new[:100])
-            os.mkdir(self.store)
-            with open(os.path.join(self.store, 'manifest.json'), 'w') as manifest:
-                manifest.write('{')
-            self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fresh['ETag'])
-            self.assertEqual(receive(second, 100), new[:100])
-            shutil.rmtree(self.store)
-            build('--block', '1000')
-            self.assertEqual(ask(second, url + name, 'Range: bytes=0-99\r\n')[1]['ETag'], fields['ETag'])
-            self.assertEqual(receive(second, 100), old[:100])
-        finally:
-            server.send_signal(signal.SIGINT)
-            code = server.wait(10)
-            server.stderr.close()
-        self.assertEqual(code, 0)
+    URL, NAME = '/stores/alps/', 'level-0.0.clusters'
 
+    def test_a_replaced_store_is_served(self):
+        """Open connections get the new store too, while a running download continues with the old one."""
+        self.build('--block', '1000')
+        (first, second), ask = self.connections_of(2)
+        old = self.file(self.NAME)
+        _, fields = ask(first, self.URL + self.NAME)
+        self.assertEqual(int(fields['Content-Length']), len(old))
+        self.build('--block', '2000')
+        new = self.file(self.NAME)
+        self.assertNotEqual(new, old)
+        status, fresh = ask(second, self.URL + self.NAME,
+                            f'Range: bytes=0-99\r\nIf-None-Match: {fields["ETag"]}\r\n')
+        self.assertEqual((status, fresh['Content-Range']), (206, f'bytes 0-99/{len(new)}'))
+        self.assertNotEqual(fresh['ETag'], fields['ETag'])
+        self.assertEqual(self.receive(second, 100), new[:100])
+        self.assertEqual(self.receive(first, len(old)), old)
+        for path, expected in [('manifest.json', self.file('manifest.json')), (self.NAME, new)]:
+            _, head = ask(first, self.URL + path)
+            self.assertEqual(self.receive(first, int(head['Content-Length'])), expected)
+        _, head = ask(first, '/stores.json')
+        checksum = json.loads(self.receive(first, int(head['Content-Length'])))['stores'][0]['checksum']
+        self.assertTrue(fresh['ETag'].startswith(f'"{checksum}-'))
+
+    def test_the_last_store_is_served_while_there_is_none(self):
+        self.build('--block', '2000')
+        (connection,), ask = self.connections_of(1)
+        old = self.file(self.NAME)
+
+        def tag():
+            _, fields = ask(connection, self.URL + self.NAME, 'Range: bytes=0-99\r\n')
+            self.assertEqual(self.receive(connection, 100), expected[:100])
+            return fields['ETag']
+
+        expected = old
+        old_tag = tag()
+        os.rename(self.store, self.path('away'))
+        self.assertEqual(tag(), old_tag)
+        os.mkdir(self.store)
+        with open(os.path.join(self.store, 'manifest.json'), 'w') as manifest:
+            manifest.write('{')
+        self.assertEqual(tag(), old_tag)
+        shutil.rmtree(self.store)
+        self.build('--block', '1000')
+        expected = self.file(self.NAME)
+        self.assertNotEqual(tag(), old_tag)
 
     def test_a_store_overwritten_in_place_is_served_once_complete(self):
-        """Its files are overwritten one by one in any order; the new store is served once it is complete."""
-        def made(name, *args):
+        """The files are overwritten one by one, in any order."""
+        def build_store(name, *args):
             done = terrace('build', ALPS, '-o', self.path(name), '-q', *args)
             self.assertEqual(done.returncode, 0, done.stderr)
             return {file: self.read(name, file) for file in os.listdir(self.path(name))}
 
-        shown, other = made('shown.store', '--block', '1000'), made('other.store', '--seed', '7', '--block', '2000')
+        shown, other = build_store('shown.store', '--block', '1000'), build_store('other.store', '--seed', '7', '--block', '2000')
         server, port, query = view(self.path('shown.store'))
         address = f'http://127.0.0.1:{port}/'
 
