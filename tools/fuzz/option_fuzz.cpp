@@ -2,6 +2,8 @@
 // Option values. The first line names the parser, the second is the value.
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <vector>
 
 #include "base/units.hpp"
 #include "cli/option_values.hpp"
@@ -24,10 +26,11 @@ using namespace tools;
 
 namespace {
 
-bool parse(std::string_view name, const std::string& value) {
-  constexpr std::uint64_t kMost = std::uint64_t{1} << 63;
+/// Parses an option whose value is a number or several. Returns nullopt if `name` is not one.
+std::optional<bool> parse_numeric(std::string_view name, const std::string& value) {
+  constexpr std::uint64_t kMaxMemory = std::uint64_t{1} << 63;
   if (name == "memory") {
-    require(parse_memory(value) <= kMost, "no more than 2^63 bytes");
+    require(parse_memory(value) <= kMaxMemory, "no more than 2^63 bytes");
   } else if (name == "count") {
     static_cast<void>(with_commas(parse_count(value)));
   } else if (name == "size") {
@@ -42,22 +45,25 @@ bool parse(std::string_view name, const std::string& value) {
     require(numbers.size() == 1 + static_cast<std::size_t>(std::ranges::count(value, ',')),
             "a number between any two commas");
     for (const double number : numbers) require(std::isfinite(number), "numbers are finite");
-  } else if (name == "level") {
+  } else {
+    return std::nullopt;
+  }
+  return true;
+}
+
+/// Parses an option that selects a part of a store. Returns nullopt if `name` is not one.
+std::optional<bool> parse_selection(std::string_view name, const std::string& value) {
+  if (name == "level") {
     const auto level = parse_level(value);
     require(!level || *level <= 255, "a level");
   } else if (name == "focus") {
-    // Not the name of a file of this machine.
+    // Reject values that may be the name of a file of this machine.
     if (value.find_first_not_of("0123456789+-.,eE :top") != std::string::npos) return false;
     const Focus focus = parse_focus(value);
     require(!focus.region.box().empty(), "the box of a focus is not empty");
     require(!focus.level || *focus.level <= 255, "a level");
-  } else if (name == "smooth") {
-    const auto smoothing = parse_smoothing(value);
-    require(!smoothing || (smoothing->iterations >= 1 && smoothing->iterations <= 10000), "steps");
-  } else if (name == "view") {
-    static_cast<void>(parse_view(value));
   } else if (name == "line") {
-    // Not the name of a file of this machine.
+    // Reject values that may be the name of a file of this machine.
     if (value.find_first_not_of("0123456789+-.,;eE ") != std::string::npos) return false;
     for (const Point2& p : parse_line(value).places) {
       require(std::isfinite(p[0]) && std::isfinite(p[1]), "a line has places");
@@ -65,6 +71,41 @@ bool parse(std::string_view name, const std::string& value) {
   } else if (name == "line-file") {
     const MemoryFile file(value);
     require(parse_line(file.name()).places.size() >= 2, "a line has two places");
+  } else if (name == "tile") {
+    const auto tile = parse_tile_path(value);
+    if (!tile) return false;
+    require(tile_path(*tile) == value, "a tile has one path");
+  } else {
+    return std::nullopt;
+  }
+  return true;
+}
+
+/// Parses an option that takes one of a few words. Returns whether any of them accepts the value.
+bool parse_word(const std::string& value) {
+  const auto accepts_value = [&](auto parser) {
+    try {
+      static_cast<void>(parser(value));
+      return 1;
+    } catch (const UsageError&) {
+      return 0;
+    }
+  };
+  return accepts_value(parse_fill) + accepts_value(parse_quality) +
+             accepts_value(parse_duplicates) + accepts_value(parse_raster_value) +
+             accepts_value(parse_height_reference) + accepts_value(parse_interpolation) >
+         0;
+}
+
+bool parse(std::string_view name, const std::string& value) {
+  if (const auto result = parse_numeric(name, value)) return *result;
+  if (const auto result = parse_selection(name, value)) return *result;
+  if (name == "names") return parse_word(value);
+  if (name == "smooth") {
+    const auto smoothing = parse_smoothing(value);
+    require(!smoothing || (smoothing->iterations >= 1 && smoothing->iterations <= 10000), "steps");
+  } else if (name == "view") {
+    static_cast<void>(parse_view(value));
   } else if (name == "criterion") {
     static_cast<void>(parse_criterion(value));
   } else if (name == "channel") {
@@ -79,27 +120,6 @@ bool parse(std::string_view name, const std::string& value) {
       require(point < kPoints && !seen[point], "each point once");
       seen[point] = true;
     }
-  } else if (name == "tile") {
-    const auto tile = parse_tile_path(value);
-    if (!tile) return false;
-    require(tile_path(*tile) == value, "a tile has one path");
-  } else if (name == "names") {
-    // Options that accept one of a few words.
-    const auto known = [&](auto parser) {
-      try {
-        static_cast<void>(parser(value));
-        return true;
-      } catch (const UsageError&) {
-        return false;
-      }
-    };
-    const bool any = static_cast<int>(known(parse_fill)) + static_cast<int>(known(parse_quality)) +
-                         static_cast<int>(known(parse_duplicates)) +
-                         static_cast<int>(known(parse_raster_value)) +
-                         static_cast<int>(known(parse_height_reference)) +
-                         static_cast<int>(known(parse_interpolation)) >
-                     0;
-    return any;
   } else {
     return false;
   }

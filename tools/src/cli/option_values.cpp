@@ -135,7 +135,8 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
     const std::string name = "--focus " + text;
     try {
       Focus focus = parse_focus(text);
-      detail.focuses.push_back({conversion(std::move(focus.region)), level_in_store(focus.level, store)});
+      detail.focuses.push_back(
+          {conversion(std::move(focus.region)), level_in_store(focus.level, store)});
     } catch (const UsageError& error) {
       throw UsageError(stream::message("{}: {}", name, error.message()));
     } catch (const stream::Error& error) {

@@ -41,10 +41,10 @@ class CrsOptions {
       const stream::Store& store, const CommonOptions& common) const;
   /// Returns the conversion of regions and focuses to the store's CRS.
   [[nodiscard]] terrain::RegionConversion regions(const stream::Store& store,
-                                         const CommonOptions& common) const;
+                                                  const CommonOptions& common) const;
   /// Returns the conversion of positions from the store's CRS to --to-crs.
   [[nodiscard]] terrain::PlaceConversion places(const stream::Store& store,
-                                       const CommonOptions& common) const;
+                                                const CommonOptions& common) const;
   /// Returns the transformation to --to-crs, from the CRS of the request if `input` is given and
   /// otherwise from the store's CRS. Returns nullopt without --to-crs.
   [[nodiscard]] std::optional<terrain::Transformation> from_input_to_output(

@@ -187,7 +187,7 @@ class MeshCommand final : public Command {
     }
     options.quality = parse_quality(quality_);
     options.duplicates = parse_duplicates(duplicates_choice());
-    if (options.duplicates == tri::PointDuplicates::kAll && !max_points_.empty()) {
+    if (options.duplicates == tri::PointDuplicates::all && !max_points_.empty()) {
       throw UsageError("--duplicates all needs the bound of --max-error");
     }
     options.fill = parse_fill(fill_);
