@@ -41,9 +41,9 @@ Tables even_tables(const Layout& layout, ColumnKind kind, bool guided) {
   Tables tables;
   if (guided) tables.guide.attribute = 0;
   for (unsigned c = 0; c < layout.columns(); ++c) {
-    const bool possible = c == tables.guide.attribute
-                              ? kind == ColumnKind::recent
-                              : along_line(kind) != ColumnKind::beside || layout.may_lie_beside(c);
+    const bool possible = c == tables.guide.attribute ? kind == ColumnKind::recent
+                                                      : along_line(kind) != ColumnKind::preceding ||
+                                                            layout.may_use_preceding(c);
     tables.kinds.push_back(possible ? kind : ColumnKind::plain);
   }
   std::array<std::uint32_t, kSymbols> counts{};
@@ -69,7 +69,7 @@ void decode_cluster(ByteReader in, bool grid, unsigned level, ColumnKind kind, b
     entry.low[axis] = static_cast<std::int64_t>(in.get<std::uint64_t>());
     entry.size[axis] = 1 + (in.get<std::uint64_t>() >> bits) / 2;
   }
-  const ByteView rest = in.take(in.left());
+  const ByteView rest = in.take(in.remaining());
   Bytes bytes(kPadding, 0xa5);
   bytes.insert(bytes.end(), rest.begin(), rest.end());
   bytes.resize(bytes.size() + kPadding, 0x5a);
@@ -88,7 +88,7 @@ void decode_page(ByteReader in, bool grid) {
   const DecodingTables& tables = tables_of(ColumnKind::plain, false);
   const auto clusters =
       static_cast<std::uint32_t>(1 + in.get<std::uint8_t>() % layout.page_clusters());
-  const ByteView rest = in.take(in.left());
+  const ByteView rest = in.take(in.remaining());
   Bytes bytes(rest.begin(), rest.end());
   // Sets the checksum, which a fuzzer cannot guess, to test the parser after it.
   put(bytes, crc16(bytes));
@@ -118,7 +118,7 @@ void decode_page(ByteReader in, bool grid) {
 
 void read_tables(ByteReader in) {
   const Layout layout(schema_for(true), 0);
-  const Tables tables = Tables::read(in.take(in.left()), layout);
+  const Tables tables = Tables::read(in.take(in.remaining()), layout);
   const DecodingTables decoding(tables);
   Bytes again;
   tables.write(again);
@@ -158,7 +158,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, false, 1, ColumnKind::recent, false);
         break;
       case 4:
-        decode_cluster(rest, false, 0, ColumnKind::beside, false);
+        decode_cluster(rest, false, 0, ColumnKind::preceding, false);
         break;
       case 6:
         decode_cluster(rest, false, 0, ColumnKind::plain, true);
@@ -167,7 +167,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         decode_cluster(rest, false, 0, ColumnKind::line_recent, true);
         break;
       case 8:
-        decode_cluster(rest, false, 1, ColumnKind::line_beside, true);
+        decode_cluster(rest, false, 1, ColumnKind::line_preceding, true);
         break;
       case 9:
         decode_cluster(rest, false, 0, ColumnKind::line_trend, true);

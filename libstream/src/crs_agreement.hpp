@@ -20,12 +20,12 @@ class CrsAgreement {
   bool agrees(const Crs& other) {
     if (std::find(known_.begin(), known_.end(), other) != known_.end()) return true;
     if (!same_ || !same_(known_.front(), other)) return false;
-    if (known_.size() < kMostKnown) known_.push_back(other);
+    if (known_.size() < kMaxKnown) known_.push_back(other);
     return true;
   }
 
  private:
-  static constexpr std::size_t kMostKnown = 64;
+  static constexpr std::size_t kMaxKnown = 64;
 
   std::vector<Crs> known_;  ///< the first file's, and others that mean the same
   SameCrs same_;

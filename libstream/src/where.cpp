@@ -52,9 +52,9 @@ class Where::Parser {
       : where_(&where), schema_(&schema), text_(where.text_) {}
 
   void parse() {
-    constexpr std::size_t kMostCharacters = 4096;
-    if (text_.size() > kMostCharacters) {
-      throw fault("is longer than " + counted(kMostCharacters, "character"));
+    constexpr std::size_t kMaxCharacters = 4096;
+    if (text_.size() > kMaxCharacters) {
+      throw fault("is longer than " + counted(kMaxCharacters, "character"));
     }
     expression(0);
     if (at_ < text_.size()) {
@@ -84,7 +84,7 @@ class Where::Parser {
                                                    {"-", Operation::subtract, 5},
                                                    {"*", Operation::multiply, 6},
                                                    {"/", Operation::divide, 6}}};
-  static constexpr unsigned kMostNested = 64;
+  static constexpr unsigned kMaxNested = 64;
 
   [[nodiscard]] Error fault(std::string cause) const {
     return Error("the condition " + in_quotes(text_), std::move(cause))
@@ -139,7 +139,7 @@ class Where::Parser {
   }
 
   void operand() {
-    if (++nested_ > kMostNested)
+    if (++nested_ > kMaxNested)
       throw fault("is nested too deeply").remedy("write it with fewer parentheses");
     skip_blanks();
     if (at_ == text_.size()) throw fault("ends where a number or a name is expected");

@@ -97,7 +97,7 @@ TEST(CopcHierarchy, PagesContainAllNodesAndAreBounded) {
   constexpr std::uint64_t kSeed = 3;
   std::cout << "seed " << kSeed << '\n';
   std::mt19937_64 random(kSeed);
-  std::size_t most_pages = 0;
+  std::size_t max_pages = 0;
   for (int round = 0; round < 40 / TERRACE_TEST_SHARE; ++round) {
     SCOPED_TRACE(round);
     Octree octree{.centre = {}, .half_size = 8, .spacing = 1, .nodes = {}};
@@ -139,9 +139,9 @@ TEST(CopcHierarchy, PagesContainAllNodesAndAreBounded) {
     EXPECT_EQ(next, offset + written.bytes.size());
     EXPECT_EQ(pages == 0, octree.nodes.size() <= page_nodes);
     EXPECT_EQ(written.bytes.size(), 32 * (octree.nodes.size() + pages));
-    most_pages = std::max(most_pages, pages);
+    max_pages = std::max(max_pages, pages);
   }
-  EXPECT_GT(most_pages, 100u);
+  EXPECT_GT(max_pages, 100u);
 }
 
 TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {

@@ -174,9 +174,9 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
 }
 
 TEST(OctreeBuilder, RejectsTooManyPointsInOnePlace) {
-  constexpr std::uint64_t kMost = 50'000;
+  constexpr std::uint64_t kMax = 50'000;
   const auto build = [](std::uint64_t points) {
-    OctreeBuilder builder("made", {}, 12, 1, kMost);
+    OctreeBuilder builder("made", {}, 12, 1, kMax);
     builder.add(std::vector<std::byte>(12 * points));
     const Octree octree{.centre = {1, 1, 1}, .half_size = 1, .spacing = 1, .nodes = {}};
     std::uint64_t written = 0;
@@ -185,8 +185,8 @@ TEST(OctreeBuilder, RejectsTooManyPointsInOnePlace) {
     });
     return written;
   };
-  EXPECT_EQ(build(kMost), kMost);
-  EXPECT_NE(error_of([&] { build(kMost + 1); }).find("50001 points are in one place"),
+  EXPECT_EQ(build(kMax), kMax);
+  EXPECT_NE(error_of([&] { build(kMax + 1); }).find("50001 points are in one place"),
             std::string::npos);
 }
 
@@ -204,7 +204,7 @@ TEST(OctreeBuilder, BoundsNodesOfCloudsThatFillSpace) {
   std::size_t found = 0;
   for (const BuiltNode& node : nodes) found += node.points.size();
   EXPECT_EQ(found, places.size());
-  EXPECT_EQ(nodes.back().points.size(), 8 * OctreeBuilder::kMostPromoted);
+  EXPECT_EQ(nodes.back().points.size(), 8 * OctreeBuilder::kMaxPromoted);
 }
 
 /// All points of a source, written as COPC.

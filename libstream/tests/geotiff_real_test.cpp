@@ -45,15 +45,15 @@ int checksum(const WholeRaster& raster, double without_data) {
   static constexpr int kPrimes[11] = {7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43};
   const bool is_float =
       raster.info.sample.type == ScalarType::f32 || raster.info.sample.type == ScalarType::f64;
-  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+  constexpr double kMax = std::numeric_limits<std::int32_t>::max();
   int sum = 0;
   for (std::size_t i = 0; i < raster.cells(); ++i) {
     double value = raster.valid[i] != 0 ? raster.value(i) : without_data;
     std::int32_t whole = std::numeric_limits<std::int32_t>::min();
     if (std::isfinite(value)) {
       if (is_float) value = std::floor(value + 0.5);
-      whole = static_cast<std::int32_t>(
-          std::min(std::max(value, is_float ? -kMost : -kMost - 1), kMost));
+      whole =
+          static_cast<std::int32_t>(std::min(std::max(value, is_float ? -kMax : -kMax - 1), kMax));
     }
     sum = (sum + whole % kPrimes[i % 11]) & 0xffff;
   }

@@ -39,22 +39,22 @@ std::string some_text(std::size_t size, std::mt19937_64& random) {
   return text;
 }
 
-// Decompresses `bytes`, given in pieces of random lengths up to most_in and requested in pieces of
-// up to most_out.
-std::string unpacked(const std::string& bytes, std::size_t most_in, std::size_t most_out,
+// Decompresses `bytes`, given in pieces of random lengths up to max_in and requested in pieces of
+// up to max_out.
+std::string unpacked(const std::string& bytes, std::size_t max_in, std::size_t max_out,
                      std::mt19937_64& random) {
   std::size_t given = std::min<std::size_t>(bytes.size(), random() % 30);
   GzipStream stream("x.gz", std::string_view(bytes).substr(0, given));
   const auto more = [&](char* to, std::size_t most) {
-    const std::size_t count = std::min({most, bytes.size() - given, 1 + random() % most_in});
+    const std::size_t count = std::min({most, bytes.size() - given, 1 + random() % max_in});
     std::memcpy(to, bytes.data() + given, count);
     given += count;
     return count;
   };
   std::string out;
-  std::vector<char> room(most_out);
+  std::vector<char> room(max_out);
   for (;;) {
-    const std::size_t got = stream.read(room.data(), 1 + random() % most_out, more);
+    const std::size_t got = stream.read(room.data(), 1 + random() % max_out, more);
     if (got == 0) return out;
     out.append(room.data(), got);
   }
@@ -72,9 +72,9 @@ TEST(GzipStream, DecompressesInAnyPieces) {
       text += part;
       bytes += packed(part, 1 + static_cast<int>(random() % 12));
     }
-    const std::size_t most_in = random() % 2 == 0 ? 7 : 100'000;
-    const std::size_t most_out = random() % 2 == 0 ? 50 : 300'000;
-    EXPECT_EQ(unpacked(bytes, most_in, most_out, random), text);
+    const std::size_t max_in = random() % 2 == 0 ? 7 : 100'000;
+    const std::size_t max_out = random() % 2 == 0 ? 50 : 300'000;
+    EXPECT_EQ(unpacked(bytes, max_in, max_out, random), text);
   }
 }
 

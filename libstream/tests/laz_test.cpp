@@ -77,13 +77,13 @@ TEST(LazCoder, ModelsEqualLaszips) {
               unsigned at = 0;
               for (const unsigned symbol : {0u, 1u, 2u, 3u, 3u, 3u, 3u, 0u, 1u, 2u, 3u, 3u}) {
                 if (at == 5) {
-                  EXPECT_EQ(small.from[1], 7281);
-                  EXPECT_EQ(small.from[2], 14563);
-                  EXPECT_EQ(small.from[3], 21845);
-                  EXPECT_EQ(small.until, 6u);
+                  EXPECT_EQ(small.start[1], 7281);
+                  EXPECT_EQ(small.start[2], 14563);
+                  EXPECT_EQ(small.start[3], 21845);
+                  EXPECT_EQ(small.countdown, 6u);
                 }
                 if (at == 11) {
-                  EXPECT_EQ(small.from[3], 19660);
+                  EXPECT_EQ(small.start[3], 19660);
                 }
                 coder.reserve();
                 EXPECT_EQ(coder.symbol(small, symbol), symbol);
@@ -115,7 +115,7 @@ TEST(LazCoder, ModelsEqualLaszips) {
       ASSERT_EQ(coder.symbol(large, symbol), symbol);
     }
     EXPECT_EQ(large.total, 31612u);
-    EXPECT_EQ(large.from[128], 30363);
+    EXPECT_EQ(large.start[128], 30363);
   });
   EXPECT_EQ(bytes.size(), 46434u);
   EXPECT_EQ(fnv1a(std::as_bytes(std::span(bytes))), 0x5f5c744f7ff7807bu);

@@ -32,9 +32,9 @@ namespace {
 
 using Random = std::mt19937_64;
 
-/// Returns a number of up to most_bits bits; every number of bits is equally likely.
-std::uint64_t any_number(Random& random, unsigned most_bits) {
-  const auto bits = static_cast<unsigned>(random() % (most_bits + 1));
+/// Returns a number of up to max_bits bits; every number of bits is equally likely.
+std::uint64_t any_number(Random& random, unsigned max_bits) {
+  const auto bits = static_cast<unsigned>(random() % (max_bits + 1));
   return bits == 0 ? 0 : random() >> (64 - bits);
 }
 
@@ -96,7 +96,7 @@ TEST(StoreCodec, RoundTripsSymbolsOfSeveralClustersTogetherAndAlone) {
       std::uint64_t value;
       unsigned bits;
     };
-    const std::size_t n = 1 + random() % SymbolEncoder::kTogether;
+    const std::size_t n = 1 + random() % SymbolEncoder::kBatch;
     std::vector<std::vector<Item>> items(n);
     std::vector<SymbolEncoder> coders(n, SymbolEncoder(tables.encode));
     std::vector<std::uint32_t> last(n);
@@ -150,13 +150,13 @@ TEST(StoreCodec, NumbersAtOnceEqualNumbersOneByOne) {
     constexpr unsigned kContexts = 6, kFirst = 2;
     const BothTables tables(some_frequencies(random, kContexts));
     const auto n = static_cast<std::uint32_t>(1 + random() % 200);
-    const unsigned most_bits = round % 3 == 0 ? 3 : round % 3 == 1 ? 20 : 64;
+    const unsigned max_bits = round % 3 == 0 ? 3 : round % 3 == 1 ? 20 : 64;
     std::vector<std::int64_t> differences(n);
     std::vector<std::uint64_t> numbers(n);
     std::vector<std::uint8_t> classes(n);
     std::vector<std::uint32_t> slots(n);
     for (std::int64_t& difference : differences) {
-      difference = static_cast<std::int64_t>(any_number(random, most_bits));
+      difference = static_cast<std::int64_t>(any_number(random, max_bits));
       if (random() % 2 == 0) difference = wrapped_difference(0, difference);
     }
     classify(differences.data(), numbers.data(), classes.data(), n);
@@ -191,10 +191,10 @@ TEST(StoreCodec, RoundTripsPointsInBoxesOfAllSizes) {
     SCOPED_TRACE(round);
     // Boxes up to 2^16 wide are coded by other code than larger ones.
     std::array<std::uint64_t, 3> size{};
-    const unsigned most_bits = round % 3 == 0 ? 63 : round % 3 == 1 ? 16 : 4;
+    const unsigned max_bits = round % 3 == 0 ? 63 : round % 3 == 1 ? 16 : 4;
     for (std::uint64_t& side : size) {
       side =
-          round % 5 == 0 ? std::uint64_t{65535} + random() % 3 : 1 + any_number(random, most_bits);
+          round % 5 == 0 ? std::uint64_t{65535} + random() % 3 : 1 + any_number(random, max_bits);
     }
     const auto n = static_cast<std::uint32_t>(1 + any_number(random, 9));
     std::array<std::vector<std::uint64_t>, 3> at;
@@ -318,7 +318,7 @@ TEST(StoreCodec, RoundTripsIndexPages) {
     const std::uint64_t offset = any_number(random, 50);
     PageContent{offset, PageColumns(entries), RangeColumns(ranges, layout.attributes)}.write(
         layout, EncodingTables(tables), bytes);
-    ASSERT_LE(bytes.size(), most_page_bytes(layout.attributes.size()));
+    ASSERT_LE(bytes.size(), max_page_bytes(layout.attributes.size()));
     const DecodingTables decoding(tables);
     const auto n = static_cast<std::uint32_t>(entries.size());
     const IndexPage page(bytes, n, layout, decoding);
@@ -359,10 +359,10 @@ TEST(StoreCodec, RoundTripsIndexPages) {
 template <class Box>
 void check_stored_boxes() {
   Random random(11);
-  constexpr double kMost = std::numeric_limits<double>::max();
+  constexpr double kMax = std::numeric_limits<double>::max();
   for (int round = 0; round < 3000; ++round) {
     SCOPED_TRACE(round);
-    const double scale = round % 4 == 0 ? kMost : round % 4 == 1 ? 1e-300 : 6000;
+    const double scale = round % 4 == 0 ? kMax : round % 4 == 1 ? 1e-300 : 6000;
     const auto any = [&] { return (static_cast<double>(random() >> 11) * 0x1p-52 - 1) * scale; };
     Box3 bounds, box;
     for (int i = 0; i < (round % 7 == 0 ? 1 : 2); ++i) bounds.include(Point3{any(), any(), any()});
@@ -375,7 +375,7 @@ void check_stored_boxes() {
     EXPECT_TRUE(found.contains(box.min) && found.contains(box.max));
     EXPECT_TRUE(bounds.contains(found.min) && bounds.contains(found.max));
     for (std::size_t a = 0; a < 3; ++a) {
-      const double step = (bounds.max[a] / Box::kMost - bounds.min[a] / Box::kMost) * 1.001;
+      const double step = (bounds.max[a] / Box::kMax - bounds.min[a] / Box::kMax) * 1.001;
       EXPECT_LE(box.min[a] - found.min[a], step);
       EXPECT_LE(found.max[a] - box.max[a], step);
     }

@@ -195,9 +195,9 @@ TEST(StoreInvariants, RefusesManifestsWithInvalidCounts) {
 
 TEST(StoreInvariants, RefusesManifestsWithInvalidPlaces) {
   const std::vector<ManifestCase> cases{
-      {"the bounds do not fit", [](auto& m) { m["bounds"] = nullptr; }},
-      {"the bounds do not fit", [](auto& m) { m["bounds"]["min"][2] = "nan"; }},
-      {"the bounds do not fit", [](auto& m) { m["bounds"]["min"][2] = 1e9; }},
+      {"the bounds are missing or empty", [](auto& m) { m["bounds"] = nullptr; }},
+      {"the bounds are missing or empty", [](auto& m) { m["bounds"]["min"][2] = "nan"; }},
+      {"the bounds are missing or empty", [](auto& m) { m["bounds"]["min"][2] = 1e9; }},
       {"the bounds are not finite", [](auto& m) { m["bounds"]["max"][2] = "inf"; }},
       {"not finite in the CRS", [](auto& m) { m["coordinates"][2]["scale"] = 1e308; }},
       {"on the raster's columns", [](auto& m) { m["columns"] = 20; }},
@@ -463,7 +463,7 @@ TEST(StoreInvariants, RefusesInvalidDirectories) {
       {"the contents of a chapter have an impossible size", put(kContents, '\x0a')},
       {"the level has no tables", parts([](auto& index) { index.sets.clear(); })},
       {"the data end too early", put(kSets, '\x02')},
-      {"the tables do not follow one another", put(kOrdinal, '\x01')},
+      {"the tables are not in the order of their clusters", put(kOrdinal, '\x01')},
       {"the tables do not end where the directory begins",
        [](auto& level) { level.index.insert(0, "more"); }},
       {"bytes follow the directory", more(1)},
@@ -481,7 +481,7 @@ TEST(StoreInvariants, RefusesInvalidContentsOfChapters) {
       char& size_of_first = level.index[level.contents[0].begin];
       size_of_first = static_cast<char>(size_of_first + more);
     });
-    expect_unreadable(files, "the pages of a chapter do not");
+    expect_unreadable(files, "the sizes of a chapter's pages do not add up");
   }
 }
 
@@ -497,7 +497,7 @@ TEST(StoreInvariants, ReadsClustersWithTheirSetOfTables) {
   const TemporaryFolder folder;
   testing::write_files(folder.path(), with_second_tables(100, false));
   EXPECT_EQ(problems_of(Store::open(folder.path())), "");
-  expect_refused(with_second_tables(0, false), "the tables do not follow one another");
+  expect_refused(with_second_tables(0, false), "the tables are not in the order of their clusters");
   expect_refused(with_second_tables(1000, false), "clusters that do not exist");
   expect_unreadable(with_second_tables(100, true), "table");
 }
@@ -702,7 +702,7 @@ TEST(StoreInvariants, RefusesUnknownKindsOfColumns) {
   const store::Layout layout(schema, 0);
   for (std::size_t column = 0; column < layout.columns(); ++column) {
     store::Tables tables = even_tables(layout, store::ColumnKind::plain);
-    tables.kinds[column] = store::ColumnKind::beside;
+    tables.kinds[column] = store::ColumnKind::preceding;
     store::Bytes bytes;
     tables.write(bytes);
     if (column == 3) {
@@ -736,7 +736,7 @@ TEST(StoreInvariants, RefusesClustersThatTakeMuchMemory) {
   for (int i = 0; i < 4096; ++i) {
     schema.attributes.push_back(testing::channel(std::to_string(i)));
   }
-  const std::uint64_t most = store::Layout(schema, 0).most_points();
+  const std::uint64_t most = store::Layout(schema, 0).max_points();
   EXPECT_LE(most * schema.payload_size(), std::uint64_t{1} << 28);
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", schema);

@@ -159,7 +159,7 @@ struct IndexParts {
       chapter_boxes.emplace_back(level.index, level.directory() + in.offset(), 12);
       in.take(12);
       store::ByteReader of(level.bytes(chapter));
-      while (of.left() > 4) {
+      while (of.remaining() > 4) {
         of.varint();
         const std::string box(level.index, chapter.begin + of.offset(), 6);
         of.take(6);

@@ -90,7 +90,7 @@ class Chain final : public PointSource {
         check_agreement(info_, info, *crs_);
         info_.files.push_back(part.file);
         const std::size_t room =
-            kMostComments - std::min<std::size_t>(kMostComments, info_.comments.size());
+            kMaxComments - std::min<std::size_t>(kMaxComments, info_.comments.size());
         info_.comments.insert(info_.comments.end(), info.comments.begin(),
                               info.comments.begin() + static_cast<std::ptrdiff_t>(
                                                           std::min(room, info.comments.size())));
@@ -210,7 +210,7 @@ class Chain final : public PointSource {
   }
 
   /// The limit for all files together: there may be thousands, each with many comments.
-  static constexpr std::size_t kMostComments = 1000;
+  static constexpr std::size_t kMaxComments = 1000;
 
   SourceOptions options_;
   OpenOne open_one_;

@@ -19,14 +19,14 @@ namespace {
 constexpr double kSameRatio = 1e-14;
 constexpr double kSameStep = 1e-4;
 /// Upper limit of the parts that a step is divided into.
-constexpr std::uint64_t kMostParts = 10'000;
+constexpr std::uint64_t kMaxParts = 10'000;
 
 bool is_whole(double steps) { return std::abs(steps - std::round(steps)) <= kSameStep; }
 
-/// The smallest number of parts for which near(steps * parts) holds; nullopt beyond kMostParts.
+/// The smallest number of parts for which near(steps * parts) holds; nullopt beyond kMaxParts.
 template <class Near>
 std::optional<std::uint64_t> parts_of(double steps, const Near& near) {
-  for (std::uint64_t parts = 1; parts <= kMostParts; ++parts) {
+  for (std::uint64_t parts = 1; parts <= kMaxParts; ++parts) {
     if (near(steps * static_cast<double>(parts))) return parts;
   }
   return std::nullopt;
@@ -38,13 +38,13 @@ struct Axis {
 };
 
 /// The number of parts into which to divide the first scale so that the values of all axes are
-/// multiples of the result, counted from the first offset; nullopt if more than kMostParts.
+/// multiples of the result, counted from the first offset; nullopt if more than kMaxParts.
 std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
   const Axis& first = axes.front();
   std::uint64_t parts = 1;
   const auto cut = [&](std::optional<std::uint64_t> more) {
     if (more) parts *= *more;
-    return more && parts <= kMostParts;
+    return more && parts <= kMaxParts;
   };
   for (const Axis& axis : axes) {
     const auto step = [&] { return first.scale / static_cast<double>(parts); };
@@ -72,9 +72,9 @@ Axis cut(std::span<const Axis> axes, std::uint64_t parts) {
 /// Moves the offset by whole steps, if necessary, so that 32 bits cover `low` to `high`. Returns
 /// false if they cannot.
 bool reach(double low, double high, Axis& axis) {
-  constexpr double kMost = std::numeric_limits<std::int32_t>::max();
+  constexpr double kMax = std::numeric_limits<std::int32_t>::max();
   const auto reaches = [&] {
-    return (low - axis.offset) / axis.scale >= -kMost && (high - axis.offset) / axis.scale <= kMost;
+    return (low - axis.offset) / axis.scale >= -kMax && (high - axis.offset) / axis.scale <= kMax;
   };
   if (!(low <= high) || reaches()) return true;
   axis.offset += std::round((0.5 * low + 0.5 * high - axis.offset) / axis.scale) * axis.scale;

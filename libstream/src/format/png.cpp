@@ -87,10 +87,10 @@ bool write_image(const Image& image, Output& output) {
 
 void write_file(const std::filesystem::path& path, const Image& image, const Naming& replace,
                 const std::stop_token& stop) {
-  constexpr std::size_t kMost = std::numeric_limits<std::int32_t>::max();
+  constexpr std::size_t kMax = std::numeric_limits<std::int32_t>::max();
   if (image.width == 0 || image.height == 0)
     throw Error(path.string(), "a PNG image cannot be empty");
-  if (image.width > kMost || image.height > kMost)
+  if (image.width > kMax || image.height > kMax)
     throw Error(path.string(), "a PNG side has at most 2147483647 pixels");
   Sink file(path.string(), replace, stop);
   Output output{.file = &file, .error = nullptr, .message = ""};

@@ -127,13 +127,13 @@ struct Ahead {
   std::size_t readers = 0, slots = 0;
 };
 Ahead ahead_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigned threads) {
-  constexpr std::uint64_t kReaderBytes = 4u << 20, kMostBytes = 64u << 20;
-  memory_bytes = std::min(memory_bytes, kMostBytes);
-  std::uint64_t largest = 1, most_points = 1, points = 1;
+  constexpr std::uint64_t kReaderBytes = 4u << 20, kMaxBytes = 64u << 20;
+  memory_bytes = std::min(memory_bytes, kMaxBytes);
+  std::uint64_t largest = 1, max_points = 1, points = 1;
   for (const RecordPart& part : parts.parts) {
-    if (part.points > kMostBytes / parts.record_bytes) return {};
+    if (part.points > kMaxBytes / parts.record_bytes) return {};
     largest = std::max(largest, part.bytes + part.points * parts.record_bytes);
-    most_points = std::max(most_points, part.points);
+    max_points = std::max(max_points, part.points);
     points += part.points;
   }
   const std::uint64_t readers = std::min<std::uint64_t>(
@@ -141,7 +141,7 @@ Ahead ahead_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigne
   // If all parts are equal, one slot for each reader and two for waiting parts are enough. While
   // one reader has the largest part, the others read as many points in a larger number of parts.
   const std::uint64_t wanted =
-      readers * std::max<std::uint64_t>(1, most_points * parts.parts.size() / points) + 2;
+      readers * std::max<std::uint64_t>(1, max_points * parts.parts.size() / points) + 2;
   return {static_cast<std::size_t>(readers),
           static_cast<std::size_t>(
               std::min(wanted, (memory_bytes - readers * kReaderBytes) / largest))};

@@ -85,9 +85,9 @@ struct AtomicFile::Impl {
         throw failed("cannot be created", errno);
       }
       // Work continues on file systems without locks (some network disks).
-      const bool taken = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+      const bool is_locked = ::flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK;
       struct stat status {};
-      if (!taken && ::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
+      if (!is_locked && ::fstat(descriptor, &status) == 0 && status.st_nlink > 0) return;
       ::close(std::exchange(descriptor, -1));
     }
   }
@@ -175,16 +175,16 @@ void AtomicFile::write_at(std::uint64_t offset, std::span<const std::byte> bytes
 std::size_t AtomicFile::read_at(std::uint64_t offset, std::span<std::byte> bytes) {
   assert(impl_->descriptor >= 0);
   impl_->flush();
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t n = ::pread(impl_->descriptor, bytes.data() + done, bytes.size() - done,
-                              static_cast<off_t>(offset + done));
+  std::size_t bytes_read = 0;
+  while (bytes_read < bytes.size()) {
+    const ssize_t n = ::pread(impl_->descriptor, bytes.data() + bytes_read,
+                              bytes.size() - bytes_read, static_cast<off_t>(offset + bytes_read));
     if (n < 0 && errno == EINTR) continue;
     if (n < 0) throw impl_->failed("cannot be read back", errno);
     if (n == 0) break;
-    done += static_cast<std::size_t>(n);
+    bytes_read += static_cast<std::size_t>(n);
   }
-  return done;
+  return bytes_read;
 }
 
 std::uint64_t AtomicFile::size() const { return impl_->flushed + impl_->buffer.size(); }
@@ -196,8 +196,8 @@ void AtomicFile::commit() {
     impl_->naming.group->files_.push_back(impl_);
     return;
   }
-  const std::array<OutputPlacement*, 1> alone{&impl_->placement};
-  put_together(alone);
+  const std::array<OutputPlacement*, 1> outputs{&impl_->placement};
+  publish_all(outputs);
   impl_->finish();
 }
 
@@ -209,7 +209,7 @@ OutputGroup::~OutputGroup() = default;
 void OutputGroup::commit() {
   std::vector<OutputPlacement*> outputs;
   for (const auto& file : files_) outputs.push_back(&file->placement);
-  put_together(outputs);
+  publish_all(outputs);
   for (const auto& file : files_) file->finish();
   files_.clear();
 }

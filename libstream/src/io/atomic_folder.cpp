@@ -38,12 +38,12 @@ struct AtomicFolder::Impl {
     const fs::path parent = folder_of(target);
     // One process may have two writers of the same folder; the first to finish wins.
     for (int attempt = 0;; ++attempt) {
-      const fs::path wanted = parent / temporary_name(target, attempt);
-      lock = FileLock(fs::path(wanted).concat(kLockEnding));
+      const fs::path path = parent / temporary_name(target, attempt);
+      lock = FileLock(fs::path(path).concat(kLockEnding));
       if (!lock.held()) continue;
-      if (lock.exclusive()) remove_marked_folder(wanted, mark);
-      if (::mkdir(wanted.c_str(), 0777) == 0) {
-        folder = wanted;
+      if (lock.exclusive()) remove_marked_folder(path, mark);
+      if (::mkdir(path.c_str(), 0777) == 0) {
+        folder = path;
         break;
       }
       if (errno != EEXIST || attempt >= 1000) {
@@ -93,8 +93,8 @@ void AtomicFolder::commit() {
   if (error) throw system_error(impl.target.string(), "cannot be listed", error.value());
   sync_folder(impl.folder);
   OutputPlacement placement(impl.target, impl.target, impl.folder, impl.naming);
-  const std::array<OutputPlacement*, 1> alone{&placement};
-  put_together(alone);
+  const std::array<OutputPlacement*, 1> outputs{&placement};
+  publish_all(outputs);
   impl.folder.clear();
   if (const fs::path old = placement.replaced(); !old.empty()) impl.remove(old);
   impl.lock.release();

@@ -41,17 +41,17 @@ class FileSource final : public ByteSource {
 
   void read(std::uint64_t offset, std::span<std::byte> out) const override {
     assert(offset + out.size() <= size_);
-    for (std::size_t done = 0; done < out.size();) {
-      const ssize_t got = ::pread(descriptor_, out.data() + done, out.size() - done,
-                                  static_cast<off_t>(offset + done));
-      if (got < 0 && errno == EINTR) continue;
-      if (got < 0) throw system_error(name_, "cannot read", errno, {});
-      if (got == 0) {
+    for (std::size_t position = 0; position < out.size();) {
+      const ssize_t count = ::pread(descriptor_, out.data() + position, out.size() - position,
+                                    static_cast<off_t>(offset + position));
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) throw system_error(name_, "cannot read", errno, {});
+      if (count == 0) {
         throw Error(name_, "the file ends too early")
-            .at_byte(offset + done)
+            .at_byte(offset + position)
             .remedy("it was truncated while being read: restore it");
       }
-      done += static_cast<std::size_t>(got);
+      position += static_cast<std::size_t>(count);
     }
   }
 

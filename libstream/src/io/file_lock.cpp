@@ -27,8 +27,8 @@ FileLock::FileLock(const std::filesystem::path& path) : path_(path) {
   for (;;) {
     constexpr int kFlags = O_RDWR | O_CLOEXEC | O_NOFOLLOW;
     descriptor_ = ::open(path.c_str(), kFlags | O_CREAT | O_EXCL, 0666);
-    made_ = descriptor_ >= 0;
-    if (!made_ && errno == EEXIST) {
+    created_ = descriptor_ >= 0;
+    if (!created_ && errno == EEXIST) {
       descriptor_ = ::open(path.c_str(), kFlags);
       if (descriptor_ < 0 && errno == ENOENT) continue;  // removed meanwhile
     }
@@ -52,7 +52,7 @@ FileLock::FileLock(FileLock&& other) noexcept
     : path_(std::move(other.path_)),
       descriptor_(std::exchange(other.descriptor_, -1)),
       exclusive_(other.exclusive_),
-      made_(other.made_) {}
+      created_(other.created_) {}
 
 FileLock& FileLock::operator=(FileLock&& other) noexcept {
   if (this != &other) {
@@ -60,7 +60,7 @@ FileLock& FileLock::operator=(FileLock&& other) noexcept {
     path_ = std::move(other.path_);
     descriptor_ = std::exchange(other.descriptor_, -1);
     exclusive_ = other.exclusive_;
-    made_ = other.made_;
+    created_ = other.created_;
   }
   return *this;
 }
@@ -77,7 +77,7 @@ void FileLock::release() noexcept {
   // The name is removed first, so that other processes that open it from now on create a new file.
   // Without working locks the file may belong to another process, so it is removed only if created
   // here.
-  if (exclusive_ || made_) ::unlink(path_.c_str());
+  if (exclusive_ || created_) ::unlink(path_.c_str());
   ::close(std::exchange(descriptor_, -1));
 }
 

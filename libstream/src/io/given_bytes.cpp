@@ -20,7 +20,7 @@ std::string text_of(const std::vector<ByteRange>& ranges) {
          " on have not been given";
 }
 
-Error impossible(const std::string& file, const std::string& cause) { return Error(file, cause); }
+Error fault(const std::string& file, const std::string& cause) { return Error(file, cause); }
 
 }  // namespace
 
@@ -52,22 +52,22 @@ struct GivenBytes::Impl {
     uses.erase(part);
   }
   /// Returns the part that contains this byte, or the next part, or the end.
-  static auto from(File& file, std::uint64_t offset) {
+  static auto part_at(File& file, std::uint64_t offset) {
     auto at = file.parts.upper_bound(offset);
     if (at != file.parts.begin() && std::prev(at)->second->end() > offset) --at;
     return at;
   }
-  void give(File& file, std::uint64_t offset, std::span<const std::byte> given) {
-    const std::uint64_t end = offset + given.size();
+  void give(File& file, std::uint64_t offset, std::span<const std::byte> source) {
+    const std::uint64_t end = offset + source.size();
     for (std::uint64_t next = offset; next < end;) {
-      const auto at = from(file, next);
+      const auto at = part_at(file, next);
       if (at != file.parts.end() && at->first <= next) {
         next = at->second->end();
         continue;
       }
       const std::uint64_t stop = at == file.parts.end() ? end : std::min(end, at->first);
-      const auto piece = given.subspan(static_cast<std::size_t>(next - offset),
-                                       static_cast<std::size_t>(stop - next));
+      const auto piece = source.subspan(static_cast<std::size_t>(next - offset),
+                                        static_cast<std::size_t>(stop - next));
       uses.push_back({&file, next, {piece.begin(), piece.end()}});
       file.parts.emplace(next, std::prev(uses.end()));
       bytes += piece.size();
@@ -76,9 +76,9 @@ struct GivenBytes::Impl {
     while (bytes > max_bytes && uses.size() > 1) drop(uses.begin());
   }
   void read(const std::string& name, File& file, std::uint64_t offset, std::span<std::byte> out) {
-    for (std::size_t done = 0; done < out.size();) {
-      const std::uint64_t next = offset + done;
-      const auto at = from(file, next);
+    for (std::size_t position = 0; position < out.size();) {
+      const std::uint64_t next = offset + position;
+      const auto at = part_at(file, next);
       // Requests all of the range: parts of it that are held may be dropped before the rest
       // arrives.
       if (at == file.parts.end() || at->first > next) {
@@ -86,10 +86,10 @@ struct GivenBytes::Impl {
       }
       Part& part = *at->second;
       const std::size_t skip = static_cast<std::size_t>(next - part.offset);
-      const std::size_t size = std::min(part.bytes.size() - skip, out.size() - done);
-      std::memcpy(out.data() + done, part.bytes.data() + skip, size);
+      const std::size_t size = std::min(part.bytes.size() - skip, out.size() - position);
+      std::memcpy(out.data() + position, part.bytes.data() + skip, size);
       uses.splice(uses.end(), uses, at->second);
-      done += size;
+      position += size;
     }
   }
 };
@@ -106,17 +106,17 @@ void GivenBytes::add_file(const std::string& name, std::uint64_t size) {
   if (added) {
     at->second.size = size;
   } else if (at->second.size != size) {
-    throw impossible(name, "was added with " + counted(at->second.size, "byte") + " and now has " +
-                               std::to_string(size));
+    throw fault(name, "was added with " + counted(at->second.size, "byte") + " and now has " +
+                          std::to_string(size));
   }
 }
 
 void GivenBytes::give(const std::string& name, std::uint64_t offset,
                       std::span<const std::byte> bytes) {
   const auto at = impl_->files.find(name);
-  if (at == impl_->files.end()) throw impossible(name, "there is no such file");
+  if (at == impl_->files.end()) throw fault(name, "there is no such file");
   if (offset > at->second.size || bytes.size() > at->second.size - offset) {
-    throw impossible(name, "bytes beyond its end were given");
+    throw fault(name, "bytes beyond its end were given");
   }
   impl_->give(at->second, offset, bytes);
 }
@@ -130,7 +130,7 @@ void GivenBytes::forget(const std::string& name) {
 OpenByName GivenBytes::open() const {
   return [impl = impl_](const std::string& name) {
     const auto at = impl->files.find(name);
-    if (at == impl->files.end()) throw impossible(name, "there is no such file");
+    if (at == impl->files.end()) throw fault(name, "there is no such file");
     Impl::File& file = at->second;
     return bytes_by_function(name, file.size,
                              [impl, name, &file](std::uint64_t offset, std::span<std::byte> out) {
@@ -143,7 +143,7 @@ bool GivenBytes::has(const ByteRange& range) const {
   const auto file = impl_->files.find(range.file);
   if (file == impl_->files.end()) return false;
   for (std::uint64_t next = range.offset; next < range.offset + range.bytes;) {
-    const auto at = Impl::from(file->second, next);
+    const auto at = Impl::part_at(file->second, next);
     if (at == file->second.parts.end() || at->first > next) return false;
     next = at->second->end();
   }

@@ -33,7 +33,7 @@ std::uint64_t stated_size(std::span<const std::byte> bytes) {
 }
 
 // The header has at least 10 bytes, the trailer 8.
-constexpr std::size_t kLeast = 18;
+constexpr std::size_t kMinBytes = 18;
 
 }  // namespace
 
@@ -53,22 +53,22 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
   return out;
 }
 
-std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t most,
+std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t max_bytes,
                               const std::string& name) {
-  if (!is_gzip(bytes) || bytes.size() < kLeast) throw fault(name, "not gzip, or truncated");
+  if (!is_gzip(bytes) || bytes.size() < kMinBytes) throw fault(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
-  if (size > most) {
-    throw fault(name,
-                fmt::format("states {}, more than the limit of {}", counted(size, "byte"), most));
+  if (size > max_bytes) {
+    throw fault(name, fmt::format("states {}, more than the limit of {}", counted(size, "byte"),
+                                  max_bytes));
   }
   const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
       libdeflate_alloc_decompressor());
   if (!decompressor) throw std::bad_alloc();
   std::vector<std::byte> out(size);
-  std::size_t used = 0, made = 0;
+  std::size_t consumed = 0, produced = 0;
   const libdeflate_result result = libdeflate_gzip_decompress_ex(
-      decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &used, &made);
-  if (result != LIBDEFLATE_SUCCESS || made != size || used != bytes.size()) {
+      decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &consumed, &produced);
+  if (result != LIBDEFLATE_SUCCESS || produced != size || consumed != bytes.size()) {
     throw fault(name, "damaged: the contents do not match their checksum and size");
   }
   return out;

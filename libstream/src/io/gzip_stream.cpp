@@ -57,8 +57,8 @@ bool GzipStream::refill(const Read& read) {
   return got > 0;
 }
 
-std::size_t GzipStream::read(char* to, std::size_t most, const Read& read) {
-  assert(most > 0);
+std::size_t GzipStream::read(char* out, std::size_t max_bytes, const Read& read) {
+  assert(max_bytes > 0);
   z_stream& stream = inflater_->stream;
   for (;;) {
     if (!in_member_) {
@@ -69,14 +69,14 @@ std::size_t GzipStream::read(char* to, std::size_t most, const Read& read) {
     if (begin_ == end_ && !refill(read)) throw fault("the data ends within a gzip member");
     stream.next_in = reinterpret_cast<Bytef*>(packed_.data() + begin_);
     stream.avail_in = static_cast<uInt>(end_ - begin_);
-    stream.next_out = reinterpret_cast<Bytef*>(to);
+    stream.next_out = reinterpret_cast<Bytef*>(out);
     const auto room =
-        static_cast<uInt>(std::min<std::size_t>(most, std::numeric_limits<uInt>::max()));
+        static_cast<uInt>(std::min<std::size_t>(max_bytes, std::numeric_limits<uInt>::max()));
     stream.avail_out = room;
     const int result = inflate(&stream, Z_NO_FLUSH);
-    const std::size_t taken = end_ - begin_ - stream.avail_in;
-    begin_ += taken;
-    used_ += taken;
+    const std::size_t consumed = end_ - begin_ - stream.avail_in;
+    begin_ += consumed;
+    used_ += consumed;
     if (result == Z_MEM_ERROR) throw std::bad_alloc();
     if (result == Z_STREAM_END) {
       in_member_ = false;

@@ -17,8 +17,8 @@ namespace terrace::stream {
 /// and `cat a.gz b.gz`). Holds 128 KiB.
 class GzipStream {
  public:
-  /// Reads at most `most` compressed bytes; returns 0 at their end.
-  using Read = std::function<std::size_t(char* to, std::size_t most)>;
+  /// Reads at most `max_bytes` compressed bytes; returns 0 at their end.
+  using Read = std::function<std::size_t(char* out, std::size_t max_bytes)>;
 
   /// name: of the input, for messages. first: compressed bytes that have already been read.
   explicit GzipStream(std::string name, std::string_view first = {});
@@ -26,10 +26,11 @@ class GzipStream {
   GzipStream(const GzipStream&) = delete;
   GzipStream& operator=(const GzipStream&) = delete;
 
-  /// Returns how many decompressed bytes it wrote to `to`: at least one, or 0 at the end. Requires
-  /// most > 0. Throws: Error, naming the position in the compressed bytes, if they are damaged, end
-  /// within a member, or are followed by anything but a member; whatever `read` throws.
-  std::size_t read(char* to, std::size_t most, const Read& read);
+  /// Returns how many decompressed bytes it wrote to `out`: at least one, or 0 at the end. Requires
+  /// max_bytes > 0. Throws: Error, naming the position in the compressed bytes, if they are
+  /// damaged, end within a member, or are followed by anything but a member; whatever `read`
+  /// throws.
+  std::size_t read(char* out, std::size_t max_bytes, const Read& read);
 
  private:
   struct Inflater;

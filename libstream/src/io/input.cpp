@@ -24,12 +24,12 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kLeastBuffer = 4096;
+constexpr std::size_t kMinBuffer = 4096;
 
 /// Pipes whose first bytes have been read; reopening them would lose these bytes.
 std::map<std::string, std::unique_ptr<Input>>& heads() {
-  thread_local std::map<std::string, std::unique_ptr<Input>> kept;
-  return kept;
+  thread_local std::map<std::string, std::unique_ptr<Input>> pipe;
+  return pipe;
 }
 
 int open_for_reading(const std::string& file) {
@@ -77,10 +77,10 @@ class Input::Descriptor {
 
   /// Returns the number of bytes read, 0 at the end. Throws: Error with the name of the input,
   /// Stopped.
-  [[nodiscard]] std::size_t read(char* to, std::size_t most, const std::string& name) const {
+  [[nodiscard]] std::size_t read(char* out, std::size_t max_bytes, const std::string& name) const {
     for (;;) {
       if (waiter_) waiter_->wait(fd_, POLLIN);
-      const ssize_t got = ::read(fd_, to, most);
+      const ssize_t got = ::read(fd_, out, max_bytes);
       if (got >= 0) return static_cast<std::size_t>(got);
       if (errno == EISDIR) {
         throw Error(name, "is a folder, not a file").remedy("name the files in it");
@@ -113,10 +113,10 @@ class Input::Descriptor {
 
 Input::Input(const std::string& file, const std::stop_token& stop, std::size_t at_once,
              Packed packed) {
-  const auto kept = heads().find(file);
-  if (kept != heads().end()) {
-    *this = std::move(*kept->second);
-    heads().erase(kept);
+  const auto pipe = heads().find(file);
+  if (pipe != heads().end()) {
+    *this = std::move(*pipe->second);
+    heads().erase(pipe);
     buffer_.resize(std::max(buffer_.size(), at_once));
     return;
   }
@@ -124,10 +124,10 @@ Input::Input(const std::string& file, const std::stop_token& stop, std::size_t a
   descriptor_ = std::make_unique<Descriptor>(file, stop);
   size_ = descriptor_->size();
   buffer_.resize(at_once);
-  looked_at_ = packed == Packed::as_it_is;
-  if (looked_at_ || !size_)
+  gzip_checked_ = packed == Packed::as_it_is;
+  if (gzip_checked_ || !size_)
     return;  // checked at the first read, because a pipe may have no writer yet
-  looked_at_ = true;
+  gzip_checked_ = true;
   if (descriptor_->begins_as_gzip()) {
     size_.reset();
     gzip_ = std::make_unique<GzipStream>(name_);
@@ -138,11 +138,11 @@ Input::~Input() = default;
 Input& Input::operator=(Input&&) noexcept = default;
 
 bool Input::read_more() {
-  const auto read = [this](char* to, std::size_t most) {
-    return descriptor_->read(to, most, name_);
+  const auto read = [this](char* out, std::size_t max_bytes) {
+    return descriptor_->read(out, max_bytes, name_);
   };
-  if (!looked_at_) {
-    looked_at_ = true;
+  if (!gzip_checked_) {
+    gzip_checked_ = true;
     constexpr std::size_t kMarkBytes = 2;
     buffer_.resize(std::max(buffer_.size(), kMarkBytes));
     for (std::size_t got = 1; end_ < kMarkBytes && got > 0; end_ += got) {
@@ -156,25 +156,25 @@ bool Input::read_more() {
     gzip_ = std::make_unique<GzipStream>(name_, head);
     end_ = 0;
   }
-  char* const to = buffer_.data() + end_;
+  char* const out = buffer_.data() + end_;
   const std::size_t room = buffer_.size() - end_;
-  const std::size_t got = gzip_ ? gzip_->read(to, room, read) : read(to, room);
+  const std::size_t got = gzip_ ? gzip_->read(out, room, read) : read(out, room);
   end_ += got;
   ended_ = got == 0;
   return !ended_;
 }
 
-std::string_view Input::fill(std::size_t wanted) {
-  if (end_ - begin_ >= wanted || ended_) return window();
-  if (begin_ > 0 && (begin_ == end_ || begin_ + wanted > buffer_.size())) {
+std::string_view Input::fill(std::size_t min_bytes) {
+  if (end_ - begin_ >= min_bytes || ended_) return window();
+  if (begin_ > 0 && (begin_ == end_ || begin_ + min_bytes > buffer_.size())) {
     std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
     end_ -= begin_;
     begin_ = 0;
   }
-  while (end_ - begin_ < wanted) {
+  while (end_ - begin_ < min_bytes) {
     // Grows with the bytes read, because most inputs are shorter than callers may request.
     if (end_ == buffer_.size()) {
-      buffer_.resize(std::min(begin_ + wanted, std::max(2 * end_, kLeastBuffer)));
+      buffer_.resize(std::min(begin_ + min_bytes, std::max(2 * end_, kMinBuffer)));
     }
     if (!read_more()) break;
   }
@@ -225,18 +225,18 @@ bool is_seekable(const std::string& file) {
   return !is_gzip(head);
 }
 
-std::vector<char> peek_head(const std::string& file, std::size_t most,
+std::vector<char> peek_head(const std::string& file, std::size_t max_bytes,
                             const std::stop_token& stop) {
-  auto kept = heads().find(file);
-  if (kept == heads().end()) {
-    auto input = std::make_unique<Input>(file, stop, most);
+  auto pipe = heads().find(file);
+  if (pipe == heads().end()) {
+    auto input = std::make_unique<Input>(file, stop, max_bytes);
     if (is_rereadable(file)) {
-      const std::string_view head = input->fill(most).substr(0, most);
+      const std::string_view head = input->fill(max_bytes).substr(0, max_bytes);
       return {head.begin(), head.end()};
     }
-    kept = heads().emplace(file, std::move(input)).first;
+    pipe = heads().emplace(file, std::move(input)).first;
   }
-  const std::string_view head = kept->second->fill(most).substr(0, most);
+  const std::string_view head = pipe->second->fill(max_bytes).substr(0, max_bytes);
   return {head.begin(), head.end()};
 }
 

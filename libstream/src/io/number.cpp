@@ -26,11 +26,11 @@ bool is_underflow(std::string_view text) {
     ++i;
     const bool negative = text[i] == '-';
     if (negative || text[i] == '+') ++i;
-    std::int64_t shown = 0;
-    for (; i < text.size() && shown < (std::int64_t{1} << 40); ++i) {
-      shown = shown * 10 + (text[i] - '0');
+    std::int64_t written = 0;
+    for (; i < text.size() && written < (std::int64_t{1} << 40); ++i) {
+      written = written * 10 + (text[i] - '0');
     }
-    exponent += negative ? -shown : shown;
+    exponent += negative ? -written : written;
   }
   return exponent < 0;
 }

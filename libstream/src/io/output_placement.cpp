@@ -77,11 +77,13 @@ OutputPlacement::OutputPlacement(fs::path shown, fs::path place, fs::path tempor
       temporary_(std::move(temporary)),
       naming_(std::move(naming)) {}
 
-fs::path OutputPlacement::aside() const { return fs::path(temporary_).concat(kReplacedEnding); }
+fs::path OutputPlacement::backup_path() const {
+  return fs::path(temporary_).concat(kReplacedEnding);
+}
 
 fs::path OutputPlacement::replaced() const {
   if (state_ == State::exchanged) return temporary_;
-  return state_ == State::aside ? aside() : fs::path();
+  return state_ == State::backed_up ? backup_path() : fs::path();
 }
 
 Ownership OutputPlacement::ownership_of(const fs::path& old) const noexcept {
@@ -103,13 +105,13 @@ Error OutputPlacement::failed(int error_number) const {
 }
 
 /// False if the name is free by now. Throws: Error.
-bool OutputPlacement::put_by_exchange() {
+bool OutputPlacement::publish_by_exchange() {
   const int number = exchange(temporary_, place_);
   if (number == ENOENT) return false;
-  if (number == EINVAL || number == ENOSYS) return put_by_steps();
+  if (number == EINVAL || number == ENOSYS) return publish_by_renames();
   if (number != 0) throw failed(number);
   state_ = State::exchanged;
-  // Something else may have taken the name since it was looked at.
+  // Another process may have taken the name since it was checked.
   const Ownership found = ownership_of(temporary_);
   if (found.ours) return true;
   undo();
@@ -117,19 +119,19 @@ bool OutputPlacement::put_by_exchange() {
 }
 
 /// For file systems that cannot exchange names.
-bool OutputPlacement::put_by_steps() {
-  const fs::path old = aside();
+bool OutputPlacement::publish_by_renames() {
+  const fs::path old = backup_path();
   if (!is_folder(temporary_)) {
     // A file is replaced by one rename. A second name keeps the old one until all has gone well.
-    const bool kept = ::link(place_.c_str(), old.c_str()) == 0;
-    const Ownership found = ownership_of(kept ? old : place_);
+    const bool has_backup = ::link(place_.c_str(), old.c_str()) == 0;
+    const Ownership found = ownership_of(has_backup ? old : place_);
     if (!found.ours || ::rename(temporary_.c_str(), place_.c_str()) != 0) {
-      const int why = errno;
-      if (kept) ::unlink(old.c_str());
+      const int error = errno;
+      if (has_backup) ::unlink(old.c_str());
       if (!found.ours) throw not_replaced(shown_.string(), found);
-      throw failed(why);
+      throw failed(error);
     }
-    state_ = kept ? State::aside : State::gone;
+    state_ = has_backup ? State::backed_up : State::lost;
     return true;
   }
   if (::rename(place_.c_str(), old.c_str()) != 0) {
@@ -143,16 +145,16 @@ bool OutputPlacement::put_by_steps() {
     if (!found.ours) throw not_replaced(shown_.string(), found);
     throw failed(number);
   }
-  state_ = State::aside;
+  state_ = State::backed_up;
   return true;
 }
 
-void OutputPlacement::put() {
+void OutputPlacement::publish() {
   // The name may be taken or become free between two steps.
   for (int attempt = 0; attempt < 1000; ++attempt) {
     const int number = rename_exclusively(temporary_, place_);
     if (number == 0) {
-      state_ = State::alone;
+      state_ = State::created;
       return;
     }
     if (number != EEXIST && number != ENOTEMPTY && number != ENOTDIR && number != EISDIR) {
@@ -165,28 +167,28 @@ void OutputPlacement::put() {
       if (!fs::exists(fs::symlink_status(place_, ignored))) continue;
       throw not_replaced(shown_.string(), found);
     }
-    if (put_by_exchange()) return;
+    if (publish_by_exchange()) return;
   }
   throw failed(EBUSY);
 }
 
 void OutputPlacement::undo() noexcept {
   switch (state_) {
-    case State::alone:
+    case State::created:
       rename_exclusively(place_, temporary_);
       break;
     case State::exchanged:
       exchange(temporary_, place_);
       break;
-    case State::aside:
+    case State::backed_up:
       if (is_folder(place_)) ::rename(place_.c_str(), temporary_.c_str());
-      ::rename(aside().c_str(), place_.c_str());
+      ::rename(backup_path().c_str(), place_.c_str());
       break;
-    case State::waiting:
-    case State::gone:
+    case State::pending:
+    case State::lost:
       break;
   }
-  state_ = State::waiting;
+  state_ = State::pending;
 }
 
 std::string remedy_for(int error_number) {
@@ -207,17 +209,17 @@ std::string remedy_for(int error_number) {
   }
 }
 
-void put_together(std::span<OutputPlacement* const> outputs) {
-  std::size_t put = 0;
+void publish_all(std::span<OutputPlacement* const> outputs) {
+  std::size_t count = 0;
   try {
     std::set<fs::path> folders;
-    for (; put < outputs.size(); ++put) {
-      outputs[put]->put();
-      folders.insert(folder_of(outputs[put]->place()));
+    for (; count < outputs.size(); ++count) {
+      outputs[count]->publish();
+      folders.insert(folder_of(outputs[count]->place()));
     }
     for (const fs::path& folder : folders) sync_folder(folder);
   } catch (...) {
-    while (put > 0) outputs[--put]->undo();
+    while (count > 0) outputs[--count]->undo();
     throw;
   }
 }
@@ -229,12 +231,12 @@ void sync_folder(const fs::path& folder) {
     if (::fsync(descriptor) != 0) number = errno;
     ::close(descriptor);
   }
-  // One that may be written but not read cannot be opened.
+  // A folder that may be written but not read cannot be opened.
   if (number == 0 || (descriptor < 0 ? number == EACCES : number == EINVAL || number == ENOTSUP)) {
     return;
   }
   throw system_error(folder.string(), "this folder cannot be synced", number,
-                     "check the disk; the output keeps what it had before");
+                     "check the disk; the previous output is kept");
 }
 
 }  // namespace terrace::stream

@@ -12,8 +12,8 @@
 
 namespace terrace::stream {
 
-/// A complete and synced output, file or folder, under a temporary name in the folder of the name
-/// that it is to get.
+/// A complete and synced output, file or folder. It has a temporary name in the folder of its final
+/// name.
 class OutputPlacement {
  public:
   OutputPlacement() = default;
@@ -26,44 +26,44 @@ class OutputPlacement {
   [[nodiscard]] const std::filesystem::path& temporary() const { return temporary_; }
 
   /// Renames and keeps the replaced output. Throws: Error, and then nothing has changed.
-  void put();
+  void publish();
   /// Restores the replaced output; the new one has its temporary name again.
   void undo() noexcept;
-  /// Where the old output is after put(); empty if there was none.
+  /// Where the old output is after publish(); empty if there was none.
   [[nodiscard]] std::filesystem::path replaced() const;
-  [[nodiscard]] bool done() const { return state_ != State::waiting; }
+  [[nodiscard]] bool done() const { return state_ != State::pending; }
 
  private:
   enum class State : std::uint8_t {
-    waiting,
-    alone,      ///< nothing has been replaced
+    pending,
+    created,    ///< nothing has been replaced
     exchanged,  ///< the old output has the temporary name
-    aside,      ///< the old output has the temporary name with kReplacedEnding
-    gone,       ///< the old output could not be kept
+    backed_up,  ///< the old output has the temporary name with kReplacedEnding
+    lost,       ///< the old output could not be kept
   };
 
-  [[nodiscard]] std::filesystem::path aside() const;
+  [[nodiscard]] std::filesystem::path backup_path() const;
   [[nodiscard]] Ownership ownership_of(const std::filesystem::path& old) const noexcept;
-  bool put_by_exchange();
-  bool put_by_steps();
+  bool publish_by_exchange();
+  bool publish_by_renames();
   [[nodiscard]] Error failed(int error_number) const;
   std::filesystem::path shown_, place_, temporary_;
   Naming naming_;
-  State state_ = State::waiting;
+  State state_ = State::pending;
 };
 
-/// Gives all of them their names and syncs their folders. Throws: Error; then all names have what
-/// they had before.
-void put_together(std::span<OutputPlacement* const> outputs);
+/// Publishes all outputs and syncs their folders. Throws: Error; every name then refers to what it
+/// did before.
+void publish_all(std::span<OutputPlacement* const> outputs);
 
-/// Returns the Error for an output that may not replace what has its name.
+/// Returns the Error for an output that may not replace the existing file or folder of its name.
 Error already_exists(std::string file);
 
 /// The remedy for an error of a system call that creates or writes a file; empty if none is known.
 std::string remedy_for(int error_number);
 
-/// fsync of a folder that may be read; one that cannot be synced by its file system counts as
-/// synced. Throws: Error.
+/// Syncs a folder. Does nothing if the folder cannot be read, or if its file system does not
+/// support the sync. Throws: Error.
 void sync_folder(const std::filesystem::path& folder);
 
 }  // namespace terrace::stream

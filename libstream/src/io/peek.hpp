@@ -17,10 +17,11 @@ bool is_rereadable(const std::string& file);
 /// True for a rereadable file with random access, that is, not gzip.
 bool is_seekable(const std::string& file);
 
-/// Returns the first bytes of a file, at most `most`, decompressed if it is gzip (see Input). Bytes
-/// read from a pipe are kept for the next Input of that name on this thread, or until drop_heads().
-/// Throws: Error if the file cannot be opened or read, Stopped.
-std::vector<char> peek_head(const std::string& file, std::size_t most, const std::stop_token& stop);
+/// Returns the first bytes of a file, at most `max_bytes`, decompressed if it is gzip (see Input).
+/// Bytes read from a pipe are kept for the next Input of that name on this thread, or until
+/// drop_heads(). Throws: Error if the file cannot be opened or read, Stopped.
+std::vector<char> peek_head(const std::string& file, std::size_t max_bytes,
+                            const std::stop_token& stop);
 /// Forgets unused bytes kept by peek_head().
 void drop_heads();
 

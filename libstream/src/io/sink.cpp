@@ -60,12 +60,12 @@ void Sink::write_at(std::uint64_t offset, std::string_view text) {
 }
 
 void Sink::flush() {
-  for (std::string_view left = pending_; !left.empty();) {
+  for (std::string_view rest = pending_; !rest.empty();) {
     // A pipe that is ready accepts this many bytes at once; a larger write could block.
-    const std::size_t most = waiter_ ? PIPE_BUF : left.size();
+    const std::size_t max_bytes = waiter_ ? PIPE_BUF : rest.size();
     if (waiter_) waiter_->wait(STDOUT_FILENO, POLLOUT);
-    const ssize_t written = ::write(STDOUT_FILENO, left.data(), std::min(left.size(), most));
-    if (written > 0) left.remove_prefix(static_cast<std::size_t>(written));
+    const ssize_t written = ::write(STDOUT_FILENO, rest.data(), std::min(rest.size(), max_bytes));
+    if (written > 0) rest.remove_prefix(static_cast<std::size_t>(written));
     if (written >= 0 || errno == EINTR || errno == EAGAIN) continue;
     if (errno == EPIPE) throw ClosedPipe();
     if (errno == EBADF) {

@@ -48,15 +48,15 @@ Spool::~Spool() { ::close(descriptor_); }
 
 void Spool::write(std::uint64_t offset, std::span<const std::byte> bytes) {
   const FileSizeSignalBlock no_signal;
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t put = ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done,
-                                 static_cast<off_t>(offset + done));
-    if (put < 0 && errno == EINTR) continue;
-    if (put < 0) {
+  for (std::size_t position = 0; position < bytes.size();) {
+    const ssize_t written = ::pwrite(descriptor_, bytes.data() + position, bytes.size() - position,
+                                     static_cast<off_t>(offset + position));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) {
       throw system_error(name_, "cannot write a temporary file", errno,
                          errno == EFBIG ? remedy_for(EFBIG) : remedy_);
     }
-    done += static_cast<std::size_t>(put);
+    position += static_cast<std::size_t>(written);
   }
   const std::uint64_t end = offset + bytes.size();
   std::uint64_t size = size_;
@@ -66,12 +66,13 @@ void Spool::write(std::uint64_t offset, std::span<const std::byte> bytes) {
 
 void Spool::read(std::uint64_t offset, std::span<std::byte> out) const {
   assert(offset + out.size() <= size_);
-  for (std::size_t done = 0; done < out.size();) {
-    const ssize_t got = ::pread(descriptor_, out.data() + done, out.size() - done,
-                                static_cast<off_t>(offset + done));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) throw system_error(name_, "cannot read a temporary file", got < 0 ? errno : EIO);
-    done += static_cast<std::size_t>(got);
+  for (std::size_t position = 0; position < out.size();) {
+    const ssize_t count = ::pread(descriptor_, out.data() + position, out.size() - position,
+                                  static_cast<off_t>(offset + position));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0)
+      throw system_error(name_, "cannot read a temporary file", count < 0 ? errno : EIO);
+    position += static_cast<std::size_t>(count);
   }
 }
 

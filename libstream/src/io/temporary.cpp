@@ -25,9 +25,9 @@ namespace {
 
 /// File systems limit names to 255 bytes: a hash (64-bit FNV-1a) replaces a long name.
 std::string prefix_of(const fs::path& target) {
-  constexpr std::size_t kMostNamed = 200;
+  constexpr std::size_t kMaxName = 200;
   std::string name = target.filename().string();
-  if (name.size() > kMostNamed) {
+  if (name.size() > kMaxName) {
     std::uint64_t hash = 0xcbf29ce484222325;
     for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
     name = fmt::format("terrace-{}", hash);
@@ -92,7 +92,7 @@ bool has_mark(const fs::path& folder, const std::string& mark) {
   return fs::is_regular_file(folder / mark, ignored);
 }
 
-bool put_back(const fs::path& replaced, const fs::path& target, const std::string& mark) {
+bool restore(const fs::path& replaced, const fs::path& target, const std::string& mark) {
   if (!nothing_at(target) || !has_mark(replaced, mark)) return false;
   return rename_exclusively(replaced, target) == 0;
 }
@@ -114,8 +114,8 @@ void remove_tree(const fs::path& path) {
 }  // namespace
 
 fs::path follow_links(fs::path path) {
-  constexpr int kMostLinks = 40;  // the same as Linux
-  for (int links = 0; links <= kMostLinks; ++links) {
+  constexpr int kMaxLinks = 40;  // the same as Linux
+  for (int links = 0; links <= kMaxLinks; ++links) {
     std::error_code error;
     const fs::path next = fs::read_symlink(path, error);
     if (error) return path;
@@ -139,8 +139,8 @@ void sweep_temporaries(const fs::path& target, const std::string& mark) {
     const FileLock lock = lock_of_dead(temporary);
     if (!lock.exclusive()) continue;
     const fs::path replaced = with_ending(temporary, kReplacedEnding);
-    put_back(replaced, target, mark);
-    // Unless no other file has the name and restoring it has failed.
+    restore(replaced, target, mark);
+    // Keeps the old output if restoring it failed and the name is still free.
     if (!nothing_at(target) || !has_mark(replaced, mark)) remove_marked_folder(replaced, mark);
     // A file is removed with its lock.
     std::error_code ignored;
@@ -150,7 +150,7 @@ void sweep_temporaries(const fs::path& target, const std::string& mark) {
   }
 }
 
-bool put_back_replaced(fs::path target) {
+bool restore_replaced(fs::path target) {
   if (!target.has_filename()) target = target.parent_path();
   if (!nothing_at(target)) return false;
   for (const std::string& name : temporaries_of(target)) {
@@ -158,7 +158,7 @@ bool put_back_replaced(fs::path target) {
     const fs::path replaced = with_ending(temporary, kReplacedEnding);
     if (nothing_at(replaced)) continue;
     const FileLock lock = lock_of_dead(temporary);
-    if (lock.exclusive() && put_back(replaced, target, kManifestName)) return true;
+    if (lock.exclusive() && restore(replaced, target, kManifestName)) return true;
   }
   return false;
 }

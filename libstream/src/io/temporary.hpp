@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <string>
 
-/// Where files and folders are written before they have their names, and how they are cleaned up if
-/// the writer is killed. A file being written is `.NAME.tmp-PID` and is itself locked; a folder has
+/// Temporary names of files and folders that are being written, and the removal of those of killed
+/// writers. A file being written is `.NAME.tmp-PID` and is itself locked; a folder has
 /// that name and the lock file `.NAME.tmp-PID.lock` next to it. The replaced output gets the
 /// temporary name in exchange, or is briefly `.NAME.tmp-PID-old` under the same lock.
 
@@ -26,8 +26,9 @@ std::string temporary_name(const std::filesystem::path& target, int attempt);
 /// stay. mark: the file that makes a folder complete.
 void sweep_temporaries(const std::filesystem::path& target,
                        const std::string& mark = kManifestName);
-/// Only the first part, for stores. Returns whether `target` has its store back.
-bool put_back_replaced(std::filesystem::path target);
+/// Restores the name of a store that a dead writer moved aside, and removes nothing. Returns
+/// whether it did.
+bool restore_replaced(std::filesystem::path target);
 
 /// rename() that refuses an existing target; returns errno.
 int rename_exclusively(const std::filesystem::path& from, const std::filesystem::path& to);

@@ -26,14 +26,14 @@ std::vector<std::string_view> split_fields(std::string_view line, char separator
       while (!line.empty() && is_blank(line.front()) && line.front() != separator) {
         line.remove_prefix(1);
       }
-      std::size_t from = 0;
+      std::size_t start = 0;
       if (line.starts_with('"')) {
         // A doubled quote does not end the quoted text.
-        from = line.find('"', 1);
-        while (from != line.npos && line.substr(from + 1).starts_with('"'))
-          from = line.find('"', from + 2);
+        start = line.find('"', 1);
+        while (start != line.npos && line.substr(start + 1).starts_with('"'))
+          start = line.find('"', start + 2);
       }
-      const std::size_t end = from == line.npos ? line.npos : line.find(separator, from);
+      const std::size_t end = start == line.npos ? line.npos : line.find(separator, start);
       fields.push_back(trim(line.substr(0, end)));
       if (end == std::string_view::npos) return fields;
       line.remove_prefix(end + 1);
@@ -56,13 +56,13 @@ std::string_view unquoted(std::string_view field) {
 }
 
 std::string in_quotes(std::string_view text) {
-  constexpr std::size_t kMostShown = 40;
+  constexpr std::size_t kMaxShown = 40;
   std::string out = "'";
-  for (const char c : text.substr(0, kMostShown)) {
+  for (const char c : text.substr(0, kMaxShown)) {
     const bool control = static_cast<unsigned char>(c) < 0x20 || c == 0x7f;
     out += control ? '?' : c;
   }
-  out += text.size() > kMostShown ? "...'" : "'";
+  out += text.size() > kMaxShown ? "...'" : "'";
   return out;
 }
 

@@ -9,11 +9,11 @@
 #if defined(__GNUC__) && !defined(TERRACE_LAZ_SANITIZED)
 #define TERRACE_LAZ_INLINE [[gnu::always_inline]] inline
 #define TERRACE_LAZ_INLINE_LAMBDA __attribute__((always_inline))
-#define TERRACE_LAZ_APART [[gnu::noinline]]
+#define TERRACE_LAZ_NOINLINE [[gnu::noinline]]
 #else
 #define TERRACE_LAZ_INLINE inline
 #define TERRACE_LAZ_INLINE_LAMBDA
-#define TERRACE_LAZ_APART
+#define TERRACE_LAZ_NOINLINE
 #endif
 
 namespace terrace::stream::laz {

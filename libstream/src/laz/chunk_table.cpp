@@ -14,14 +14,14 @@ namespace terrace::stream::laz {
 namespace {
 
 constexpr std::size_t kTableHead = 8;  // version, number of chunks
-constexpr std::uint64_t kMost = 0xffffffff;
+constexpr std::uint64_t kMax = 0xffffffff;
 
 /// Codes a number of a table, given the previous one. Context 0: points, 1: bytes.
 template <class Coder>
-std::uint32_t code_entry(Coder& coder, IntegerModels<32, 2>& models, std::uint32_t before,
+std::uint32_t code_entry(Coder& coder, IntegerModels<32, 2>& models, std::uint32_t previous,
                          std::uint64_t value, unsigned context) {
   coder.reserve();
-  return static_cast<std::uint32_t>(models.code(coder, static_cast<std::int32_t>(before),
+  return static_cast<std::uint32_t>(models.code(coder, static_cast<std::int32_t>(previous),
                                                 static_cast<std::int32_t>(value), context));
 }
 
@@ -51,8 +51,9 @@ std::vector<Chunk> read_chunk_table(std::span<const std::byte> table, const Vlr&
       if (variable) {
         chunk_points = code_entry(coder, models[0], chunk_points, 0, 0);
       } else {
-        const std::uint64_t left = points - points_so_far;
-        chunk_points = static_cast<std::uint32_t>(std::min<std::uint64_t>(vlr.chunk_size, left));
+        const std::uint64_t remaining = points - points_so_far;
+        chunk_points =
+            static_cast<std::uint32_t>(std::min<std::uint64_t>(vlr.chunk_size, remaining));
       }
       chunk_bytes = code_entry(coder, models[0], chunk_bytes, 0, 1);
       if (chunk_points > points - points_so_far || chunk_bytes > bytes - offset) {
@@ -75,26 +76,26 @@ std::vector<Chunk> read_chunk_table(std::span<const std::byte> table, const Vlr&
 
 std::vector<std::byte> write_chunk_table(std::span<const Chunk> chunks, const Vlr& vlr) {
   const bool variable = vlr.chunk_size == Vlr::kVariable;
-  if (chunks.size() > kMost) throw std::invalid_argument("a chunk table holds 2^32 - 1 chunks");
+  if (chunks.size() > kMax) throw std::invalid_argument("a chunk table holds 2^32 - 1 chunks");
   std::vector<std::uint8_t> coded;
   if (!chunks.empty()) {
     const auto models = make_zeroed<IntegerModels<32, 2>>(1);
     SymbolEncoder coder;
     coder.begin(coded, 1);
-    Chunk before;
+    Chunk previous;
     for (const Chunk& chunk : chunks) {
       const bool is_last = &chunk == &chunks.back();
-      if (chunk.points > kMost || chunk.bytes > kMost ||
+      if (chunk.points > kMax || chunk.bytes > kMax ||
           (!variable &&
            (chunk.points > vlr.chunk_size || (!is_last && chunk.points != vlr.chunk_size)))) {
         throw std::invalid_argument(
             "a chunk has more points or bytes than a chunk table can store");
       }
       if (variable) {
-        code_entry(coder, models[0], static_cast<std::uint32_t>(before.points), chunk.points, 0);
+        code_entry(coder, models[0], static_cast<std::uint32_t>(previous.points), chunk.points, 0);
       }
-      code_entry(coder, models[0], static_cast<std::uint32_t>(before.bytes), chunk.bytes, 1);
-      before = chunk;
+      code_entry(coder, models[0], static_cast<std::uint32_t>(previous.bytes), chunk.bytes, 1);
+      previous = chunk;
     }
     coder.finish();
   }

@@ -17,11 +17,11 @@ void SymbolDecoder::begin(CodedBytes& bytes, std::span<const std::uint8_t> strea
                           std::uint64_t origin, ChunkNumber chunk) {
   if (stream.size() < kStreamEnds) throw Corrupt(kTooShort, origin + stream.size());
   chunk_ = chunk;
-  length_ = kMostLength;
+  length_ = kMaxLength;
   value_ = 0;
   for (std::size_t i = 0; i < kStreamEnds; ++i) value_ = value_ << 8 | stream[i];
   // The value is outside the interval.
-  if (value_ == kMostLength) throw Corrupt(kNotEncoded, origin);
+  if (value_ == kMaxLength) throw Corrupt(kNotEncoded, origin);
   resume(bytes, stream, origin);
   next_ += kStreamEnds;
 }
@@ -67,7 +67,7 @@ void SymbolDecoder::check_used(bool open) const {
 void SymbolEncoder::begin(std::vector<std::uint8_t>& bytes, ChunkNumber chunk) {
   chunk_ = chunk;
   base_ = 0;
-  length_ = kMostLength;
+  length_ = kMaxLength;
   bytes_ = &bytes;
   if (bytes.size() < 2 * kReserve) bytes.resize(2 * kReserve);
   next_ = bytes.data();
@@ -84,8 +84,8 @@ SymbolEncoder::Window SymbolEncoder::grow(std::vector<std::uint8_t>& bytes,
 void SymbolEncoder::finish() {
   reserve();
   // Writes the shortest number in the interval, and zeros for the bytes that a decoder reads ahead.
-  const bool wide = length_ > 2 * kLeastLength;
-  narrow(wide ? kLeastLength : kLeastLength >> 1, wide ? kLeastLength >> 1 : kLeastLength >> 9);
+  const bool wide = length_ > 2 * kMinLength;
+  narrow(wide ? kMinLength : kMinLength >> 1, wide ? kMinLength >> 1 : kMinLength >> 9);
   for (int i = 0; i < (wide ? 3 : 2); ++i) *next_++ = 0;
   bytes_->resize(static_cast<std::size_t>(next_ - bytes_->data()));
 }

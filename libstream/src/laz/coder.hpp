@@ -23,8 +23,8 @@ inline constexpr std::size_t kReserve = 64;
 /// Bytes added at the end of a stream, as many as a decoder reads ahead.
 inline constexpr std::size_t kStreamEnds = 4;
 
-inline constexpr std::uint32_t kMostLength = 0xffffffff;
-inline constexpr std::uint32_t kLeastLength = 1u << 24;
+inline constexpr std::uint32_t kMaxLength = 0xffffffff;
+inline constexpr std::uint32_t kMinLength = 1u << 24;
 
 /// The bytes read by a decoder. Its inner loop does not check for their end. Near the end,
 /// reserve() switches to a copy of the last bytes followed by zeros.
@@ -65,30 +65,30 @@ class SymbolDecoder {
   template <unsigned Capacity>
   TERRACE_LAZ_INLINE unsigned symbol(SymbolModel<Capacity>& model, unsigned /*value*/,
                                      unsigned symbols = Capacity) {
-    if (model.born != chunk_) [[unlikely]]
+    if (model.initialised_in != chunk_) [[unlikely]]
       model.begin(chunk_, symbols);
     const std::uint32_t unit = length_ >> kSymbolBits;
     // Many values hardly ever change, so the likeliest symbol is tried first, without a division
     // and with a branch that the processor predicts well.
-    unsigned symbol = model.likely;
-    std::uint32_t begin = model.from[symbol] * unit;
-    std::uint32_t end = symbol + 1 == symbols ? length_ : model.from[symbol + 1] * unit;
+    unsigned symbol = model.most_frequent;
+    std::uint32_t begin = model.start[symbol] * unit;
+    std::uint32_t end = symbol + 1 == symbols ? length_ : model.start[symbol + 1] * unit;
     if (value_ - begin >= end - begin) {
       symbol = model.find(value_ / unit);
-      begin = model.from[symbol] * unit;
-      end = symbol + 1 == symbols ? length_ : model.from[symbol + 1] * unit;
+      begin = model.start[symbol] * unit;
+      end = symbol + 1 == symbols ? length_ : model.start[symbol + 1] * unit;
     }
     value_ -= begin;
     length_ = end - begin;
     refill();
     ++model.count[symbol];
-    if (--model.until == 0) [[unlikely]]
+    if (--model.countdown == 0) [[unlikely]]
       model.update(symbols);
     return symbol;
   }
 
   TERRACE_LAZ_INLINE unsigned bit(BitModel& model, unsigned /*value*/) {
-    if (model.born != chunk_) [[unlikely]]
+    if (model.initialised_in != chunk_) [[unlikely]]
       model.begin(chunk_);
     const std::uint32_t middle = model.zero * (length_ >> kBitBits);
     const bool bit = value_ >= middle;
@@ -96,7 +96,7 @@ class SymbolDecoder {
     length_ = bit ? length_ - middle : middle;
     refill();
     model.zeros += bit ? 0 : 1;
-    if (--model.until == 0) [[unlikely]]
+    if (--model.countdown == 0) [[unlikely]]
       model.update();
     return bit ? 1 : 0;
   }
@@ -138,7 +138,7 @@ class SymbolDecoder {
     return value;
   }
   TERRACE_LAZ_INLINE void refill() {
-    while (length_ < kLeastLength) {
+    while (length_ < kMinLength) {
       value_ = value_ << 8 | *next_++;
       length_ <<= 8;
     }
@@ -173,25 +173,25 @@ class SymbolEncoder {
   template <unsigned Capacity>
   TERRACE_LAZ_INLINE unsigned symbol(SymbolModel<Capacity>& model, unsigned symbol,
                                      unsigned symbols = Capacity) {
-    if (model.born != chunk_) [[unlikely]]
+    if (model.initialised_in != chunk_) [[unlikely]]
       model.begin(chunk_, symbols);
     const std::uint32_t unit = length_ >> kSymbolBits;
-    const std::uint32_t begin = model.from[symbol] * unit;
-    const std::uint32_t end = symbol + 1 == symbols ? length_ : model.from[symbol + 1] * unit;
+    const std::uint32_t begin = model.start[symbol] * unit;
+    const std::uint32_t end = symbol + 1 == symbols ? length_ : model.start[symbol + 1] * unit;
     narrow(begin, end - begin);
     ++model.count[symbol];
-    if (--model.until == 0) [[unlikely]]
+    if (--model.countdown == 0) [[unlikely]]
       model.update(symbols);
     return symbol;
   }
 
   TERRACE_LAZ_INLINE unsigned bit(BitModel& model, unsigned bit) {
-    if (model.born != chunk_) [[unlikely]]
+    if (model.initialised_in != chunk_) [[unlikely]]
       model.begin(chunk_);
     const std::uint32_t middle = model.zero * (length_ >> kBitBits);
     narrow(bit != 0 ? middle : 0, bit != 0 ? length_ - middle : middle);
     model.zeros += 1 - bit;
-    if (--model.until == 0) [[unlikely]]
+    if (--model.countdown == 0) [[unlikely]]
       model.update();
     return bit;
   }
@@ -220,7 +220,7 @@ class SymbolEncoder {
     base_ += begin;
     if (base_ < begin) carry(next_);
     length_ = length;
-    while (length_ < kLeastLength) {
+    while (length_ < kMinLength) {
       *next_++ = static_cast<std::uint8_t>(base_ >> 24);
       base_ <<= 8;
       length_ <<= 8;

@@ -27,10 +27,10 @@ Bytes bytes_of(std::span<const std::byte> bytes) {
 
 /// Returns the attribute in a layer; the first layer is always decoded.
 std::uint32_t attribute_of(std::size_t layer, const RecordLayout& layout) {
-  constexpr std::uint32_t kOfPoint[kItemLayers] = {kAllAttributes, kZ,           kClassification,
-                                                   kFlags,         kIntensity,   kScanAngle,
-                                                   kUserData,      kPointSource, kGpsTime};
-  if (layer < kItemLayers) return kOfPoint[layer];
+  constexpr std::uint32_t kPointAttributes[kItemLayers] = {
+      kAllAttributes, kZ,        kClassification, kFlags,  kIntensity,
+      kScanAngle,     kUserData, kPointSource,    kGpsTime};
+  if (layer < kItemLayers) return kPointAttributes[layer];
   layer -= kItemLayers;
   if (layout.rgb != 0 && layer-- == 0) return kRgb;
   if (layout.nir != 0 && layer-- == 0) return kNir;
@@ -62,7 +62,8 @@ Chunk layered_chunk(const Vlr& vlr, std::span<const std::byte> head) {
 }
 
 struct Decoder::Impl {
-  Impl(const Vlr& vlr, std::uint32_t wanted) : layout(layout_of(vlr)), attributes(wanted) {
+  Impl(const Vlr& vlr, std::uint32_t attribute_mask)
+      : layout(layout_of(vlr)), attributes(attribute_mask) {
     if (vlr.compressor == Compressor::layered) {
       layered = std::make_unique<Layered<SymbolDecoder>>(layout);
       coded.resize(layered->coders.size());
@@ -78,9 +79,9 @@ struct Decoder::Impl {
   std::unique_ptr<Layered<SymbolDecoder>> layered;
   std::vector<CodedBytes> coded;  ///< of the layers, or of the one stream
   ChunkNumber chunk = 0;
-  std::uint64_t points = 0, left = 0;  ///< of the chunk
-  std::uint64_t consumed = 0;          ///< bytes of it in earlier steps
-  std::size_t chunk_bytes = 0;         ///< of a layered chunk
+  std::uint64_t points = 0, remaining = 0;  ///< of the chunk
+  std::uint64_t consumed = 0;               ///< bytes of it in earlier steps
+  std::size_t chunk_bytes = 0;              ///< of a layered chunk
 
   Step step_pointwise(Bytes bytes, bool last, std::uint8_t* records, std::size_t room);
   Step step_layered(Bytes bytes, bool last, std::uint8_t* records, std::size_t room);
@@ -94,7 +95,7 @@ Decoder::Decoder(Decoder&&) noexcept = default;
 Decoder& Decoder::operator=(Decoder&&) noexcept = default;
 
 void Decoder::start(std::uint64_t points) {
-  impl_->points = impl_->left = points;
+  impl_->points = impl_->remaining = points;
   impl_->consumed = 0;
   ++impl_->chunk;
 }
@@ -103,12 +104,12 @@ Decoder::Step Decoder::step(std::span<const std::byte> bytes, bool last,
                             std::span<std::byte> records) {
   Impl& impl = *impl_;
   const auto room = static_cast<std::size_t>(
-      std::min<std::uint64_t>(records.size() / impl.layout.length, impl.left));
+      std::min<std::uint64_t>(records.size() / impl.layout.length, impl.remaining));
   if (room == 0) return {};
   auto* out = reinterpret_cast<std::uint8_t*>(records.data());
   const Step step = impl.layered != nullptr ? impl.step_layered(bytes_of(bytes), last, out, room)
                                             : impl.step_pointwise(bytes_of(bytes), last, out, room);
-  impl.left -= step.points;
+  impl.remaining -= step.points;
   impl.consumed += step.bytes;
   return step;
 }
@@ -123,7 +124,7 @@ Decoder::Step Decoder::Impl::step_pointwise(Bytes bytes, bool last, std::uint8_t
                                             std::size_t room) {
   SymbolDecoder& coder = pointwise->coder;
   Step step;
-  if (left == points) {
+  if (remaining == points) {
     if (bytes.size() < layout.length + kStreamEnds) {
       if (last) throw Corrupt("the chunk is too short", bytes.size());
       return {};
@@ -146,8 +147,8 @@ void Decoder::Impl::begin_layers(Bytes bytes) {
   for (std::size_t i = 0; i < layered->coders.size(); ++i) {
     const auto size = load<std::uint32_t>(bytes.data() + layout.length + 4 + 4 * i);
     auto& layer = layered->coders[i];
-    const bool wanted = i == kXyLayer || (attributes & attribute_of(i, layout)) != 0;
-    layer.used = size > 0 && wanted;
+    const bool selected = i == kXyLayer || (attributes & attribute_of(i, layout)) != 0;
+    layer.used = size > 0 && selected;
     if (layer.used) layer.coder.begin(coded[i], bytes.subspan(begin, size), begin, chunk);
     begin += size;
   }
@@ -160,7 +161,7 @@ void Decoder::Impl::begin_layers(Bytes bytes) {
 Decoder::Step Decoder::Impl::step_layered(Bytes bytes, bool last, std::uint8_t* records,
                                           std::size_t room) {
   Step step;
-  if (left == points) {
+  if (remaining == points) {
     if (!last && bytes.size() < head_size(layout)) return {};
     const Chunk head = chunk_of(layout, bytes);
     if (head.bytes > bytes.size()) {
@@ -178,7 +179,7 @@ Decoder::Step Decoder::Impl::step_layered(Bytes bytes, bool last, std::uint8_t* 
   }
   layered->code(records + step.points * layout.length, room - step.points);
   step.points = room;
-  if (room == left) {
+  if (room == remaining) {
     for (const auto& layer : layered->coders) {
       if (layer.used) layer.coder.check_used(false);
     }

@@ -50,9 +50,9 @@ struct IntegerModels {
     } else if (k == 32) {
       correction = 0x80000000;
     } else {
-      const std::uint32_t half = 1u << (k - 1), below = 2 * half - 1;
+      const std::uint32_t half = 1u << (k - 1), offset = 2 * half - 1;
       std::uint32_t index =
-          static_cast<std::int32_t>(correction) > 0 ? correction - 1 : correction + below;
+          static_cast<std::int32_t>(correction) > 0 ? correction - 1 : correction + offset;
       SymbolModel<256>& upper = corrections[k - 1];
       if (k <= 8) {
         index = coder.symbol(upper, index, 2 * half);
@@ -61,7 +61,7 @@ struct IntegerModels {
         const std::uint32_t high = coder.symbol(upper, index >> rest) << rest;
         index = high | coder.raw(rest, index & ((1u << rest) - 1));
       }
-      correction = index >= half ? index + 1 : index - below;
+      correction = index >= half ? index + 1 : index - offset;
     }
     std::uint32_t sum = static_cast<std::uint32_t>(predicted) + correction;
     if constexpr (Bits < 32) sum %= kRange;

@@ -18,7 +18,7 @@ namespace terrace::stream::laz {
 
 /// Loads a value of the record to encode; 0 in decoding.
 template <class Coder, class T>
-TERRACE_LAZ_INLINE T given(typename Coder::Record at) {
+TERRACE_LAZ_INLINE T input_value(typename Coder::Record at) {
   if constexpr (Coder::kDecoding) {
     return T{};
   } else {
@@ -48,8 +48,8 @@ struct Median5 {
   }
   [[nodiscard]] std::int32_t value() const { return sorted[2]; }
   TERRACE_LAZ_INLINE void add(std::int32_t x) {
-    const std::int32_t* kept = sorted.data() + (drop_highest ? 0 : 1);
-    const std::int32_t a = kept[0], b = kept[1], c = kept[2], d = kept[3];
+    const std::int32_t* rest = sorted.data() + (drop_highest ? 0 : 1);
+    const std::int32_t a = rest[0], b = rest[1], c = rest[2], d = rest[3];
     drop_highest = drop_highest ? x < sorted[2] : x <= sorted[2];
     sorted = {std::min(a, x), std::max(a, std::min(b, x)), std::max(b, std::min(c, x)),
               std::max(c, std::min(d, x)), std::max(d, x)};
@@ -68,12 +68,12 @@ TERRACE_LAZ_INLINE unsigned z_context(unsigned k, bool single) {
 /// Codes a coordinate, predicted by the median of the previous steps.
 template <class Coder, class Models, class Median>
 TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, unsigned context,
-                                  const std::uint8_t* last, typename Coder::Record now) {
-  const auto before = load<std::uint32_t>(last);
-  const std::uint32_t ahead = given<Coder, std::uint32_t>(now) - before;
+                                  const std::uint8_t* last, typename Coder::Record record) {
+  const auto previous = load<std::uint32_t>(last);
+  const std::uint32_t delta = input_value<Coder, std::uint32_t>(record) - previous;
   const std::int32_t step =
-      models.code(coder, steps.value(), static_cast<std::int32_t>(ahead), context);
-  put<Coder>(now, before + static_cast<std::uint32_t>(step));
+      models.code(coder, steps.value(), static_cast<std::int32_t>(delta), context);
+  put<Coder>(record, previous + static_cast<std::uint32_t>(step));
   steps.add(step);
 }
 
@@ -83,8 +83,8 @@ TERRACE_LAZ_INLINE void code_step(Coder& coder, Models& models, Median& steps, u
 template <bool kLayered>
 struct GpsTime {
   static constexpr unsigned kUnchanged = kLayered ? 0 : 1;  ///< symbols for an unchanged time
-  static constexpr int kMostMultiple = 500, kLeastMultiple = -10;
-  static constexpr unsigned kMultiples = kMostMultiple - kLeastMultiple + 1;
+  static constexpr int kMaxMultiple = 500, kMinMultiple = -10;
+  static constexpr unsigned kMultiples = kMaxMultiple - kMinMultiple + 1;
   /// The symbols after the multiples and "unchanged": a complete time, then the sequences 1 to 3
   /// places ahead.
   static constexpr unsigned kFull = kMultiples + kUnchanged;
@@ -106,49 +106,49 @@ struct GpsTime {
 
   template <class Coder>
   TERRACE_LAZ_INLINE std::uint64_t code(Coder& coder, std::uint64_t value) {
-    // How many places ahead the sequence is that `value` continues; 4: none of them.
-    unsigned turns = 0;
+    // Distance in places to the sequence that `value` continues; 4: none of the sequences.
+    unsigned places = 0;
     if constexpr (!Coder::kDecoding) {
-      while (turns < 4 && !fits(value - time[(current + turns) & 3])) ++turns;
+      while (places < 4 && !fits(value - time[(current + places) & 3])) ++places;
     }
-    for (bool turned = false;; turned = true) {
+    for (bool switched = false;; switched = true) {
       coder.reserve();
       const std::int32_t step = difference[current];
-      const auto ahead = static_cast<std::int32_t>(value - time[current]);
+      const auto delta = static_cast<std::int32_t>(value - time[current]);
       const bool same = kUnchanged > 0 && value == time[current];
-      unsigned further = 0;
+      unsigned skip = 0;
       if (step == 0) {
-        const unsigned chosen = turns == 4  ? kUnchanged + 1
-                                : turns > 0 ? kUnchanged + 1 + turns
-                                : same      ? 0
-                                            : kUnchanged;
+        const unsigned chosen = places == 4  ? kUnchanged + 1
+                                : places > 0 ? kUnchanged + 1 + places
+                                : same       ? 0
+                                             : kUnchanged;
         const unsigned symbol = coder.symbol(first, chosen);
         if (symbol < kUnchanged) return time[current];
         if (symbol == kUnchanged) {
-          difference[current] = integers.code(coder, 0, ahead, 0);
+          difference[current] = integers.code(coder, 0, delta, 0);
           extremes[current] = 0;
           return advance(difference[current]);
         }
-        further = symbol - kUnchanged - 1;
+        skip = symbol - kUnchanged - 1;
       } else {
         unsigned chosen = 0;
         if constexpr (!Coder::kDecoding) {
-          chosen = turns == 4  ? kFull
-                   : turns > 0 ? kFull + turns
-                   : same      ? kMultiples
-                               : multiple_symbol(ahead, step);
+          chosen = places == 4  ? kFull
+                   : places > 0 ? kFull + places
+                   : same       ? kMultiples
+                                : multiple_symbol(delta, step);
         }
         const unsigned symbol = coder.symbol(multiple, chosen);
-        if (symbol < kMultiples) return code_multiple(coder, symbol, step, ahead);
+        if (symbol < kMultiples) return code_multiple(coder, symbol, step, delta);
         if (symbol < kFull) return time[current];
-        further = symbol - kFull;
+        skip = symbol - kFull;
       }
-      if (further == 0) return code_full(coder, value);
+      if (skip == 0) return code_full(coder, value);
       if constexpr (Coder::kDecoding) {
-        if (turned) coder.refuse();
+        if (switched) coder.refuse();
       }
-      current = (current + further) & 3;
-      turns = 0;
+      current = (current + skip) & 3;
+      places = 0;
     }
   }
 
@@ -157,35 +157,35 @@ struct GpsTime {
     const auto value = static_cast<std::int64_t>(difference);
     return value == static_cast<std::int32_t>(value);
   }
-  std::uint64_t advance(std::int32_t by) {
-    return time[current] += static_cast<std::uint64_t>(static_cast<std::int64_t>(by));
+  std::uint64_t advance(std::int32_t delta) {
+    return time[current] += static_cast<std::uint64_t>(static_cast<std::int64_t>(delta));
   }
   /// The nearest multiple, rounded as in LASzip, so that the bytes are the same.
-  static unsigned multiple_symbol(std::int32_t ahead, std::int32_t step) {
-    const double ratio = static_cast<float>(ahead) / static_cast<float>(step);
-    const double bounded = std::clamp(ratio, kLeastMultiple - 1.0, kMostMultiple + 1.0);
+  static unsigned multiple_symbol(std::int32_t delta, std::int32_t step) {
+    const double ratio = static_cast<float>(delta) / static_cast<float>(step);
+    const double bounded = std::clamp(ratio, kMinMultiple - 1.0, kMaxMultiple + 1.0);
     const int nearest = static_cast<int>(bounded >= 0 ? bounded + 0.5 : bounded - 0.5);
-    const int symbol = std::clamp(nearest, kLeastMultiple, kMostMultiple);
-    return static_cast<unsigned>(symbol >= 0 ? symbol : kMostMultiple - symbol);
+    const int symbol = std::clamp(nearest, kMinMultiple, kMaxMultiple);
+    return static_cast<unsigned>(symbol >= 0 ? symbol : kMaxMultiple - symbol);
   }
   template <class Coder>
   TERRACE_LAZ_INLINE std::uint64_t code_multiple(Coder& coder, unsigned symbol, std::int32_t step,
-                                                 std::int32_t ahead) {
-    const int times = symbol <= kMostMultiple ? static_cast<int>(symbol)
-                                              : kMostMultiple - static_cast<int>(symbol);
-    const unsigned context = times == 1                ? 1
-                             : times == 0              ? 7
-                             : times == kMostMultiple  ? 4
-                             : times == kLeastMultiple ? 6
-                             : times < 0               ? 5
-                             : times < 10              ? 2
-                                                       : 3;
+                                                 std::int32_t delta) {
+    const int times =
+        symbol <= kMaxMultiple ? static_cast<int>(symbol) : kMaxMultiple - static_cast<int>(symbol);
+    const unsigned context = times == 1              ? 1
+                             : times == 0            ? 7
+                             : times == kMaxMultiple ? 4
+                             : times == kMinMultiple ? 6
+                             : times < 0             ? 5
+                             : times < 10            ? 2
+                                                     : 3;
     const auto predicted = static_cast<std::int32_t>(static_cast<std::uint32_t>(times) *
                                                      static_cast<std::uint32_t>(step));
-    const std::int32_t coded = integers.code(coder, predicted, ahead, context);
+    const std::int32_t coded = integers.code(coder, predicted, delta, context);
     if (times == 1) {
       extremes[current] = 0;
-    } else if (times == 0 || times == kMostMultiple || times == kLeastMultiple) {
+    } else if (times == 0 || times == kMaxMultiple || times == kMinMultiple) {
       if (++extremes[current] > 3) {
         difference[current] = coded;
         extremes[current] = 0;
@@ -233,7 +233,7 @@ struct Rgb {
     const int last_high[3] = {last[0] >> 8, last[1] >> 8, last[2] >> 8};
     const int red_low = code_byte(coder, mask, 0, last_low[0], 0, value[0] & 0xff);
     const int red_high = code_byte(coder, mask, 1, last_high[0], 0, value[0] >> 8);
-    const std::uint16_t red = joined(red_high, red_low);
+    const std::uint16_t red = join_bytes(red_high, red_low);
     if ((mask & kColoured) == 0) return {red, red, red};
     const int low = red_low - last_low[0], high = red_high - last_high[0];
     const int green_low = code_byte(coder, mask, 2, last_low[1], low, value[1] & 0xff);
@@ -242,19 +242,19 @@ struct Rgb {
     const int green_high = code_byte(coder, mask, 3, last_high[1], high, value[1] >> 8);
     const int blue_high = code_byte(coder, mask, 5, last_high[2],
                                     (high + green_high - last_high[1]) / 2, value[2] >> 8);
-    return {red, joined(green_high, green_low), joined(blue_high, blue_low)};
+    return {red, join_bytes(green_high, green_low), join_bytes(blue_high, blue_low)};
   }
 
  private:
-  TERRACE_LAZ_INLINE static std::uint16_t joined(int high, int low) {
+  TERRACE_LAZ_INLINE static std::uint16_t join_bytes(int high, int low) {
     return static_cast<std::uint16_t>(high << 8 | low);
   }
-  /// Codes a byte whose bit in the mask is set, as the change of `before` beyond `moved`.
+  /// Codes a byte whose bit in the mask is set, as the difference from `previous` + `movement`.
   template <class Coder>
-  TERRACE_LAZ_INLINE int code_byte(Coder& coder, unsigned mask, unsigned bit, int before, int moved,
-                                   int byte) {
-    if ((mask >> bit & 1) == 0) return before;
-    const int predicted = std::clamp(before + moved, 0, 255);
+  TERRACE_LAZ_INLINE int code_byte(Coder& coder, unsigned mask, unsigned bit, int previous,
+                                   int movement, int byte) {
+    if ((mask >> bit & 1) == 0) return previous;
+    const int predicted = std::clamp(previous + movement, 0, 255);
     const unsigned change =
         coder.symbol(changes[bit], low_byte(static_cast<unsigned>(byte - predicted)));
     return (predicted + static_cast<int>(change)) & 0xff;
@@ -267,55 +267,56 @@ struct WavePacket {
   static constexpr std::size_t kSize = 29;
 
   SymbolModel<256> index;
-  std::array<SymbolModel<4>, 4> ways;  ///< by the previous point's
+  std::array<SymbolModel<4>, 4> modes;  ///< by the previous point's
   IntegerModels<32, 1> offset_change, packet_size, return_place;
   IntegerModels<32, 3> direction;
   std::int32_t last_change;
-  unsigned way;
+  unsigned mode;
 
   void begin() {
     last_change = 0;
-    way = 0;
+    mode = 0;
   }
 
   template <class Coder>
-  TERRACE_LAZ_INLINE void code(Coder& coder, const std::uint8_t* last, typename Coder::Record now) {
+  TERRACE_LAZ_INLINE void code(Coder& coder, const std::uint8_t* last,
+                               typename Coder::Record record) {
     coder.reserve();
-    put<Coder>(now, low_byte(coder.symbol(index, given<Coder, std::uint8_t>(now))));
-    const auto before = load<std::uint64_t>(last + 1);
+    put<Coder>(record, low_byte(coder.symbol(index, input_value<Coder, std::uint8_t>(record))));
+    const auto previous = load<std::uint64_t>(last + 1);
     const auto size = load<std::uint32_t>(last + 9);
-    const auto offset = given<Coder, std::uint64_t>(now + 1);
-    const auto change = static_cast<std::int64_t>(offset - before);
+    const auto offset = input_value<Coder, std::uint64_t>(record + 1);
+    const auto change = static_cast<std::int64_t>(offset - previous);
     const auto change32 = static_cast<std::int32_t>(change);
     unsigned chosen = 0;
     if constexpr (!Coder::kDecoding) {
       chosen = change == 0 ? 0 : change != change32 ? 3 : change == size ? 1 : 2;
     }
-    way = coder.symbol(ways[way], chosen);
-    std::uint64_t coded = before;
-    if (way == 1) {
+    mode = coder.symbol(modes[mode], chosen);
+    std::uint64_t coded = previous;
+    if (mode == 1) {
       coded += size;
-    } else if (way == 2) {
+    } else if (mode == 2) {
       last_change = offset_change.code(coder, last_change, change32, 0);
       coded += static_cast<std::uint64_t>(static_cast<std::int64_t>(last_change));
-    } else if (way == 3) {
+    } else if (mode == 3) {
       const std::uint32_t low = coder.raw(32, static_cast<std::uint32_t>(offset));
       coded = low | std::uint64_t{coder.raw(32, static_cast<std::uint32_t>(offset >> 32))} << 32;
     }
-    put<Coder>(now + 1, coded);
-    code_part(coder, packet_size, last + 9, now + 9, 0);
-    code_part(coder, return_place, last + 13, now + 13, 0);
+    put<Coder>(record + 1, coded);
+    code_part(coder, packet_size, last + 9, record + 9, 0);
+    code_part(coder, return_place, last + 13, record + 13, 0);
     for (unsigned i = 0; i < 3; ++i) {
-      code_part(coder, direction, last + 17 + 4 * i, now + 17 + 4 * i, i);
+      code_part(coder, direction, last + 17 + 4 * i, record + 17 + 4 * i, i);
     }
   }
 
  private:
   template <class Coder, class Models>
   TERRACE_LAZ_INLINE static void code_part(Coder& coder, Models& models, const std::uint8_t* last,
-                                           typename Coder::Record now, unsigned context) {
-    put<Coder>(now, models.code(coder, load<std::int32_t>(last), given<Coder, std::int32_t>(now),
-                                context));
+                                           typename Coder::Record record, unsigned context) {
+    put<Coder>(record, models.code(coder, load<std::int32_t>(last),
+                                   input_value<Coder, std::int32_t>(record), context));
   }
 };
 

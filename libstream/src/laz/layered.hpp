@@ -154,10 +154,10 @@ class Layered {
     }
     // The caller's records may not exist until the next call.
     for (std::size_t i = 0; i < kChannels; ++i) {
-      std::uint8_t* kept = last_.data() + i * layout_.length;
-      if (known_[i] && predecessors_[i] != kept)
-        std::memcpy(kept, predecessors_[i], layout_.length);
-      predecessors_[i] = kept;
+      std::uint8_t* stored = last_.data() + i * layout_.length;
+      if (known_[i] && predecessors_[i] != stored)
+        std::memcpy(stored, predecessors_[i], layout_.length);
+      predecessors_[i] = stored;
     }
   }
 
@@ -263,36 +263,37 @@ class Layered {
   void code_xy(Record records, std::size_t count) {
     Coder coder = coders[kXyLayer].coder;
     for (std::size_t i = 0; i < count; ++i) {
-      const Record now = records + i * layout_.length;
+      const Record record = records + i * layout_.length;
       Point& point = run_[i];
       const std::uint8_t* last = predecessors_[current_];
       Channel14* models = &channels_[current_];
       coder.reserve();
       const unsigned mask =
-          coder.symbol(models->changed[change_context(*models, last)], given_changes(now, last));
+          coder.symbol(models->changed[change_context(*models, last)], input_changes(record, last));
       point.new_channel = false;
       if ((mask & kChannelBit) != 0) {
-        last = change_channel(coder, now, last, point);
+        last = change_channel(coder, record, last, point);
         models = &channels_[current_];
       }
       if constexpr (Coder::kDecoding) {
-        std::memcpy(now, last, kSize);
-        if (layout_.length > kSize) std::memcpy(now + kSize, last + kSize, layout_.length - kSize);
+        std::memcpy(record, last, kSize);
+        if (layout_.length > kSize)
+          std::memcpy(record + kSize, last + kSize, layout_.length - kSize);
       }
-      const unsigned both = code_returns(coder, *models, mask, last, now);
-      const unsigned returns = both >> 4, number = both & 15;
+      const unsigned returns_byte = code_returns(coder, *models, mask, last, record);
+      const unsigned returns = returns_byte >> 4, number = returns_byte & 15;
       const bool single = returns == 1, time_changed = (mask & kTimeBit) != 0;
-      put<Coder>(now + kReturns, low_byte(both));
-      put<Coder>(now + kFlags, low_byte((last[kFlags] & 0xcfu) | current_ << 4));
-      const unsigned steps = 2u * kReturns14.map[both] + (time_changed ? 1 : 0);
-      code_step(coder, models->x, models->x_steps[steps], single ? 1 : 0, last + kX, now + kX);
+      put<Coder>(record + kReturns, low_byte(returns_byte));
+      put<Coder>(record + kFlags, low_byte((last[kFlags] & 0xcfu) | current_ << 4));
+      const unsigned steps = 2u * kReturns14.map[returns_byte] + (time_changed ? 1 : 0);
+      code_step(coder, models->x, models->x_steps[steps], single ? 1 : 0, last + kX, record + kX);
       code_step(coder, models->y, models->y_steps[steps], y_context(models->x.magnitude, single),
-                last + kY, now + kY);
+                last + kY, record + kY);
       models->time_changed = time_changed;
 
       point.last = last;
       point.channel = static_cast<std::uint8_t>(current_);
-      point.level = kReturns14.level[both];
+      point.level = kReturns14.level[returns_byte];
       point.z_context =
           low_byte(z_context((models->x.magnitude + models->y.magnitude) / 2, single));
       point.place = low_byte((number == 1 ? 2u : 0u) + (number >= returns ? 1u : 0u));
@@ -300,28 +301,28 @@ class Layered {
       point.angle_changed = (mask & kScanAngleBit) != 0;
       point.source_changed = (mask & kSourceBit) != 0;
       place_items(point, (mask & kChannelBit) != 0);
-      predecessors_[current_] = now;
+      predecessors_[current_] = record;
     }
     coders[kXyLayer].coder = coder;
   }
 
   static unsigned change_context(const Channel14& models, const std::uint8_t* last) {
-    const unsigned number = last[kReturns] & 15, of = last[kReturns] >> 4;
-    return (number == 1 ? 1 : 0) + (number >= of ? 2 : 0) + (models.time_changed ? 4 : 0);
+    const unsigned number = last[kReturns] & 15, returns = last[kReturns] >> 4;
+    return (number == 1 ? 1 : 0) + (number >= returns ? 2 : 0) + (models.time_changed ? 4 : 0);
   }
 
   /// The changes of a record to encode; 0 in decoding. last: the previous record of any channel.
-  TERRACE_LAZ_INLINE unsigned given_changes(Record now, const std::uint8_t* last) const {
+  TERRACE_LAZ_INLINE unsigned input_changes(Record record, const std::uint8_t* last) const {
     if constexpr (Coder::kDecoding) return 0;
     unsigned mask = 0;
-    const unsigned channel = channel_of(now);
+    const unsigned channel = channel_of(record);
     if (channel != current_) mask |= kChannelBit;
-    const std::uint8_t* before = known_[channel] ? predecessors_[channel] : last;
-    const unsigned step = (now[kReturns] - before[kReturns]) & 15;
+    const std::uint8_t* previous = known_[channel] ? predecessors_[channel] : last;
+    const unsigned step = (record[kReturns] - previous[kReturns]) & 15;
     mask |= step == 0 ? 0 : step == 1 ? 1 : step == 15 ? 2 : 3;
-    if (now[kReturns] >> 4 != before[kReturns] >> 4) mask |= kReturnCountBit;
+    if (record[kReturns] >> 4 != previous[kReturns] >> 4) mask |= kReturnCountBit;
     const auto differs = [&](std::size_t at, std::size_t size) {
-      return std::memcmp(now + at, before + at, size) != 0;
+      return std::memcmp(record + at, previous + at, size) != 0;
     };
     if (differs(kScanAngle, 2)) mask |= kScanAngleBit;
     if (differs(kTime, 8)) mask |= kTimeBit;
@@ -331,10 +332,10 @@ class Layered {
 
   /// Codes the number of the point's channel, which becomes current. Returns the record from which
   /// the point is predicted: `last` if the channel is new.
-  TERRACE_LAZ_INLINE const std::uint8_t* change_channel(Coder& coder, Record now,
+  TERRACE_LAZ_INLINE const std::uint8_t* change_channel(Coder& coder, Record record,
                                                         const std::uint8_t* last, Point& point) {
-    const unsigned further = given_channel(now) - current_ - 1;
-    current_ = (current_ + coder.symbol(channels_[current_].channel, further & 3) + 1) & 3;
+    const unsigned skip = input_channel(record) - current_ - 1;
+    current_ = (current_ + coder.symbol(channels_[current_].channel, skip & 3) + 1) & 3;
     if (!known_[current_]) {
       point.new_channel = true;
       predecessors_[current_] = last;
@@ -345,11 +346,11 @@ class Layered {
 
   /// Codes number and count of returns. Returns them as one byte, like the record.
   TERRACE_LAZ_INLINE static unsigned code_returns(Coder& coder, Channel14& models, unsigned mask,
-                                                  const std::uint8_t* last, Record now) {
-    const unsigned given = given_returns(now);
+                                                  const std::uint8_t* last, Record record) {
+    const unsigned input = input_returns(record);
     unsigned returns = last[kReturns] >> 4, number = last[kReturns] & 15;
     if ((mask & kReturnCountBit) != 0) {
-      returns = coder.symbol(models.return_count[returns], given >> 4);
+      returns = coder.symbol(models.return_count[returns], input >> 4);
     }
     switch (mask & kReturnBits) {
       case 0:
@@ -362,9 +363,9 @@ class Layered {
         break;
       default:
         if ((mask & kTimeBit) != 0) {
-          number = coder.symbol(models.return_number[number], given & 15);
+          number = coder.symbol(models.return_number[number], input & 15);
         } else {
-          const unsigned step = (given - number) & 15;
+          const unsigned step = (input - number) & 15;
           number = (number + coder.symbol(models.return_step, step - 2) + 2) & 15;
         }
     }
@@ -372,18 +373,18 @@ class Layered {
   }
 
   /// Fields of a record to encode; 0 in decoding.
-  static unsigned given_returns(Record now) {
+  static unsigned input_returns(Record record) {
     if constexpr (Coder::kDecoding) {
       return 0;
     } else {
-      return now[kReturns];
+      return record[kReturns];
     }
   }
-  static unsigned given_channel(Record now) {
+  static unsigned input_channel(Record record) {
     if constexpr (Coder::kDecoding) {
       return 0;
     } else {
-      return channel_of(now);
+      return channel_of(record);
     }
   }
 
@@ -391,130 +392,136 @@ class Layered {
   /// keeps two errors of the original software: if the channel does not change, it uses channel 0's
   /// models; if it changes, it reads and replaces the last value of the previous channel.
   void place_items(Point& point, bool channel_changed) {
-    const bool mended = layout_.version >= 4;
-    const auto wanted = static_cast<std::uint8_t>(mended || channel_changed ? current_ : 0);
-    point.item_models = point.item_last = point.item_origin = wanted;
-    if (wanted == item_current_) return;
-    const auto before = static_cast<std::uint8_t>(item_current_);
-    if (!item_known_[wanted]) {
-      point.item_origin = before;
-    } else if (!mended) {
-      point.item_last = before;
+    const bool is_fixed = layout_.version >= 4;
+    const auto model_channel =
+        static_cast<std::uint8_t>(is_fixed || channel_changed ? current_ : 0);
+    point.item_models = point.item_last = point.item_origin = model_channel;
+    if (model_channel == item_current_) return;
+    const auto previous = static_cast<std::uint8_t>(item_current_);
+    if (!item_known_[model_channel]) {
+      point.item_origin = previous;
+    } else if (!is_fixed) {
+      point.item_last = previous;
     }
-    item_known_[wanted] = true;
-    item_current_ = wanted;
+    item_known_[model_channel] = true;
+    item_current_ = model_channel;
   }
 
   void code_z(Record records, std::size_t count) {
     for_each(records, count, kZLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                Channel14& models = channels_[point.channel];
                if (point.new_channel) begin_z(models, point.last);
                std::int32_t& z = models.last_z[point.level];
-               z = models.z.code(coder, z, given<Coder, std::int32_t>(now + kZ), point.z_context);
-               put<Coder>(now + kZ, z);
+               z = models.z.code(coder, z, input_value<Coder, std::int32_t>(record + kZ),
+                                 point.z_context);
+               put<Coder>(record + kZ, z);
                return true;
              });
   }
   void code_classification(Record records, std::size_t count) {
     for_each(records, count, kClassificationLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
-               const std::uint8_t before = point.last[kClassification];
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
+               const std::uint8_t previous = point.last[kClassification];
                auto& model = channels_[point.channel]
-                                 .classification[2u * (before & 31) + (point.place == 3 ? 1 : 0)];
+                                 .classification[2u * (previous & 31) + (point.place == 3 ? 1 : 0)];
                const unsigned value =
-                   coder.symbol(model, given<Coder, std::uint8_t>(now + kClassification));
-               put<Coder>(now + kClassification, low_byte(value));
-               return value != before;
+                   coder.symbol(model, input_value<Coder, std::uint8_t>(record + kClassification));
+               put<Coder>(record + kClassification, low_byte(value));
+               return value != previous;
              });
   }
   void code_flags(Record records, std::size_t count) {
     // Classification flags, scan direction, edge of flight line, without the scanner channel
     // between them.
-    const auto joined = [](unsigned byte) { return (byte & 15) | (byte >> 2 & 0x30); };
-    for_each(
-        records, count, kFlagsLayer,
-        [this, joined](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
-          const unsigned before = joined(point.last[kFlags]);
-          const unsigned flags = coder.symbol(channels_[point.channel].flags[before],
-                                              joined(given<Coder, std::uint8_t>(now + kFlags)));
-          put<Coder>(now + kFlags,
-                     low_byte((flags & 15) | (flags & 0x30) << 2 | (now[kFlags] & 0x30u)));
-          return flags != before;
-        });
+    const auto flag_bits = [](unsigned byte) { return (byte & 15) | (byte >> 2 & 0x30); };
+    for_each(records, count, kFlagsLayer,
+             [this, flag_bits](Coder& coder, const Point& point, Record record)
+                 TERRACE_LAZ_INLINE_LAMBDA {
+                   const unsigned previous = flag_bits(point.last[kFlags]);
+                   const unsigned flags =
+                       coder.symbol(channels_[point.channel].flags[previous],
+                                    flag_bits(input_value<Coder, std::uint8_t>(record + kFlags)));
+                   put<Coder>(record + kFlags, low_byte((flags & 15) | (flags & 0x30) << 2 |
+                                                        (record[kFlags] & 0x30u)));
+                   return flags != previous;
+                 });
   }
   void code_intensity(Record records, std::size_t count) {
     for_each(records, count, kIntensityLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                Channel14& models = channels_[point.channel];
                if (point.new_channel) begin_intensity(models, point.last);
                std::uint16_t& intensity =
                    models.last_intensity[2u * point.place + (point.time_changed ? 1 : 0)];
-               const std::uint16_t before = intensity;
+               const std::uint16_t previous = intensity;
                intensity = static_cast<std::uint16_t>(models.intensity.code(
-                   coder, before, given<Coder, std::uint16_t>(now + kIntensity), point.place));
-               put<Coder>(now + kIntensity, intensity);
-               return intensity != before;
+                   coder, previous, input_value<Coder, std::uint16_t>(record + kIntensity),
+                   point.place));
+               put<Coder>(record + kIntensity, intensity);
+               return intensity != previous;
              });
   }
   void code_scan_angle(Record records, std::size_t count) {
-    for_each(records, count, kScanAngleLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
-               auto angle = load<std::uint16_t>(point.last + kScanAngle);
-               if (point.angle_changed) {
-                 angle = static_cast<std::uint16_t>(channels_[point.channel].scan_angle.code(
-                     coder, load<std::int16_t>(point.last + kScanAngle),
-                     given<Coder, std::int16_t>(now + kScanAngle), point.time_changed ? 1 : 0));
-               }
-               put<Coder>(now + kScanAngle, angle);
-               return point.angle_changed;
-             });
+    for_each(
+        records, count, kScanAngleLayer,
+        [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
+          auto angle = load<std::uint16_t>(point.last + kScanAngle);
+          if (point.angle_changed) {
+            angle = static_cast<std::uint16_t>(channels_[point.channel].scan_angle.code(
+                coder, load<std::int16_t>(point.last + kScanAngle),
+                input_value<Coder, std::int16_t>(record + kScanAngle), point.time_changed ? 1 : 0));
+          }
+          put<Coder>(record + kScanAngle, angle);
+          return point.angle_changed;
+        });
   }
   void code_user_data(Record records, std::size_t count) {
     for_each(records, count, kUserDataLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
-               const std::uint8_t before = point.last[kUserData];
-               const unsigned value = coder.symbol(channels_[point.channel].user_data[before >> 2],
-                                                   given<Coder, std::uint8_t>(now + kUserData));
-               put<Coder>(now + kUserData, low_byte(value));
-               return value != before;
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
+               const std::uint8_t previous = point.last[kUserData];
+               const unsigned value =
+                   coder.symbol(channels_[point.channel].user_data[previous >> 2],
+                                input_value<Coder, std::uint8_t>(record + kUserData));
+               put<Coder>(record + kUserData, low_byte(value));
+               return value != previous;
              });
   }
   void code_source(Record records, std::size_t count) {
     for_each(records, count, kSourceLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                auto source = load<std::uint16_t>(point.last + kSource);
                if (point.source_changed) {
                  source = static_cast<std::uint16_t>(channels_[point.channel].source.code(
-                     coder, source, given<Coder, std::uint16_t>(now + kSource), 0));
+                     coder, source, input_value<Coder, std::uint16_t>(record + kSource), 0));
                }
-               put<Coder>(now + kSource, source);
+               put<Coder>(record + kSource, source);
                return point.source_changed;
              });
   }
   void code_time(Record records, std::size_t count) {
     for_each(records, count, kTimeLayer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                GpsTime<true>& models = channels_[point.channel].time;
                if (point.new_channel) models.begin(load<std::uint64_t>(point.last + kTime));
                auto time = load<std::uint64_t>(point.last + kTime);
                if (point.time_changed) {
-                 time = models.code(coder, given<Coder, std::uint64_t>(now + kTime));
+                 time = models.code(coder, input_value<Coder, std::uint64_t>(record + kTime));
                }
-               put<Coder>(now + kTime, time);
+               put<Coder>(record + kTime, time);
                return point.time_changed;
              });
   }
 
   void code_rgb(Record records, std::size_t count, std::size_t layer) {
     for_each(records, count, layer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                Channel14& models = channels_[point.item_models];
                models.last_rgb = channels_[point.item_origin].last_rgb;
                Rgb::Value& last = channels_[point.item_last].last_rgb;
-               const Rgb::Value value =
-                   models.rgb.code(coder, last, given<Coder, Rgb::Value>(now + layout_.rgb));
-               put<Coder>(now + layout_.rgb, value);
+               const Rgb::Value value = models.rgb.code(
+                   coder, last, input_value<Coder, Rgb::Value>(record + layout_.rgb));
+               put<Coder>(record + layout_.rgb, value);
                const bool changed = value != last;
                last = value;
                return changed;
@@ -522,52 +529,53 @@ class Layered {
   }
   void code_nir(Record records, std::size_t count, std::size_t layer) {
     for_each(records, count, layer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                Channel14& models = channels_[point.item_models];
                models.last_nir = channels_[point.item_origin].last_nir;
                std::uint16_t& last = channels_[point.item_last].last_nir;
-               const unsigned before = last, value = given<Coder, std::uint16_t>(now + layout_.nir);
-               const unsigned differs = before ^ value;
+               const unsigned previous = last,
+                              value = input_value<Coder, std::uint16_t>(record + layout_.nir);
+               const unsigned differs = previous ^ value;
                unsigned mask = ((differs & 0xff) != 0 ? 1u : 0u) | (differs > 0xff ? 2u : 0u);
                mask = coder.symbol(models.nir_changed, mask);
-               unsigned low = before, high = before >> 8;
-               if ((mask & 1) != 0) low += coder.symbol(models.nir[0], low_byte(value - before));
+               unsigned low = previous, high = previous >> 8;
+               if ((mask & 1) != 0) low += coder.symbol(models.nir[0], low_byte(value - previous));
                if ((mask & 2) != 0) {
                  high += coder.symbol(models.nir[1], low_byte((value >> 8) - high));
                }
                last = static_cast<std::uint16_t>(low_byte(low) | low_byte(high) << 8);
-               put<Coder>(now + layout_.nir, last);
+               put<Coder>(record + layout_.nir, last);
                return mask != 0;
              });
   }
   void code_wave_packet(Record records, std::size_t count, std::size_t layer) {
     for_each(records, count, layer,
-             [this](Coder& coder, const Point& point, Record now) TERRACE_LAZ_INLINE_LAMBDA {
+             [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                Channel14& models = channels_[point.item_models];
                if (point.item_origin != point.item_models) {
                  models.last_wave_packet = channels_[point.item_origin].last_wave_packet;
                  models.wave_packet.begin();
                }
                auto& last = channels_[point.item_last].last_wave_packet;
-               models.wave_packet.code(coder, last.data(), now + layout_.wave_packet);
+               models.wave_packet.code(coder, last.data(), record + layout_.wave_packet);
                const bool changed =
-                   std::memcmp(last.data(), now + layout_.wave_packet, last.size()) != 0;
-               std::memcpy(last.data(), now + layout_.wave_packet, last.size());
+                   std::memcmp(last.data(), record + layout_.wave_packet, last.size()) != 0;
+               std::memcpy(last.data(), record + layout_.wave_packet, last.size());
                return changed;
              });
   }
   void code_extra_byte(Record records, std::size_t count, std::size_t layer, std::size_t index) {
     const std::size_t at = layout_.extra + index;
     for_each(records, count, layer,
-             [this, at, index](Coder& coder, const Point& point, Record now)
+             [this, at, index](Coder& coder, const Point& point, Record record)
                  TERRACE_LAZ_INLINE_LAMBDA {
                    last_extra(point.item_models)[index] = last_extra(point.item_origin)[index];
                    std::uint8_t& last = last_extra(point.item_last)[index];
-                   const unsigned change = given<Coder, std::uint8_t>(now + at) - last;
+                   const unsigned change = input_value<Coder, std::uint8_t>(record + at) - last;
                    const unsigned coded = coder.symbol(
                        extra_[point.item_models * layout_.extra_bytes + index], low_byte(change));
                    last = low_byte(last + coded);
-                   put<Coder>(now + at, last);
+                   put<Coder>(record + at, last);
                    return coded != 0;
                  });
   }

@@ -55,30 +55,30 @@ struct SymbolModel {
   static constexpr unsigned kBucketBits = Capacity <= kLanes ? 0 : std::bit_width(Capacity - 1) - 1;
   using Candidate = std::conditional_t<(Capacity > 256), std::uint16_t, std::uint8_t>;
 
-  ChunkNumber born;
-  std::uint32_t until;  ///< symbols until the next update
+  ChunkNumber initialised_in;
+  std::uint32_t countdown;  ///< symbols until the next update
   std::uint32_t cycle;
   std::uint32_t total;
-  std::uint32_t likely;                                  ///< a symbol with the highest count
+  std::uint32_t most_frequent;                           ///< a symbol with the highest count
   std::array<Candidate, (1u << kBucketBits) + 1> first;  ///< candidates
-  std::array<std::uint16_t, Capacity + kLanes> from;     ///< start of each symbol's interval
+  std::array<std::uint16_t, Capacity + kLanes> start;    ///< start of each symbol's interval
   std::array<std::uint16_t, Capacity> count;
 
-  TERRACE_LAZ_APART void begin(ChunkNumber chunk, unsigned symbols);
+  TERRACE_LAZ_NOINLINE void begin(ChunkNumber chunk, unsigned symbols);
 
   /// Returns a model before its first symbol.
-  static constexpr SymbolModel fresh(unsigned symbols) {
+  static constexpr SymbolModel initial(unsigned symbols) {
     SymbolModel model{};
     model.cycle = symbols;
     std::fill_n(model.count.begin(), symbols, std::uint16_t{1});
     // Greater than all values.
-    std::fill_n(model.from.begin() + symbols, kLanes, std::uint16_t{0xffff});
+    std::fill_n(model.start.begin() + symbols, kLanes, std::uint16_t{0xffff});
     model.update(symbols);
-    model.cycle = model.until = (symbols + 6) >> 1;
+    model.cycle = model.countdown = (symbols + 6) >> 1;
     return model;
   }
 
-  TERRACE_LAZ_APART constexpr void update(unsigned symbols) {
+  TERRACE_LAZ_NOINLINE constexpr void update(unsigned symbols) {
     total += cycle;
     if (total > 1u << kSymbolBits) {
       total = 0;
@@ -88,38 +88,38 @@ struct SymbolModel {
       }
     }
     const std::uint32_t scale = 0x80000000u / total;
-    std::uint32_t sum = 0, most = 0;
+    std::uint32_t sum = 0, highest = 0;
     for (unsigned i = 0; i < symbols; ++i) {
-      likely = count[i] > most ? i : likely;
-      most = std::max(most, std::uint32_t{count[i]});
-      from[i] = static_cast<std::uint16_t>((scale * sum) >> 16);
+      most_frequent = count[i] > highest ? i : most_frequent;
+      highest = std::max(highest, std::uint32_t{count[i]});
+      start[i] = static_cast<std::uint16_t>((scale * sum) >> 16);
       sum += count[i];
     }
     if constexpr (kBucketBits > 0) {
       constexpr unsigned kShift = kSymbolBits - kBucketBits;
       unsigned bucket = 0;
       for (unsigned i = 1; i < symbols; ++i) {
-        for (; bucket << kShift < from[i]; ++bucket) first[bucket] = static_cast<Candidate>(i - 1);
+        for (; bucket << kShift < start[i]; ++bucket) first[bucket] = static_cast<Candidate>(i - 1);
       }
       std::fill(first.begin() + bucket, first.end(), static_cast<Candidate>(symbols - 1));
     }
     cycle = std::min((5 * cycle) >> 2, (symbols + 6) << 3);
-    until = cycle;
+    countdown = cycle;
   }
 
   /// Returns the last symbol whose interval begins at or before `value`.
   [[nodiscard]] TERRACE_LAZ_INLINE unsigned find(std::uint32_t value) const {
     unsigned symbol = kBucketBits == 0 ? 0 : first[value >> (kSymbolBits - kBucketBits)];
     for (;; symbol += kLanes) {
-      const unsigned begun = lanes_begun(from.data() + symbol, value);
-      if (begun < kLanes) [[likely]]
-        return symbol + begun - 1;
+      const unsigned lanes = count_lanes(start.data() + symbol, value);
+      if (lanes < kLanes) [[likely]]
+        return symbol + lanes - 1;
     }
   }
 
  private:
   /// Returns how many of eight ascending numbers are at most `value`.
-  [[nodiscard]] TERRACE_LAZ_INLINE static unsigned lanes_begun(const std::uint16_t* at,
+  [[nodiscard]] TERRACE_LAZ_INLINE static unsigned count_lanes(const std::uint16_t* at,
                                                                std::uint32_t value) {
 #if defined(__SSE2__)
     const __m128i begins = _mm_loadu_si128(reinterpret_cast<const __m128i*>(at));
@@ -128,44 +128,44 @@ struct SymbolModel {
     // The bit after the lanes is always clear.
     return static_cast<unsigned>(std::countr_zero(~static_cast<std::uint32_t>(mask) | 0x10000)) / 2;
 #else
-    unsigned begun = 0;
-    for (unsigned lane = 0; lane < kLanes; ++lane) begun += at[lane] <= value ? 1 : 0;
-    return begun;
+    unsigned lanes = 0;
+    for (unsigned lane = 0; lane < kLanes; ++lane) lanes += at[lane] <= value ? 1 : 0;
+    return lanes;
 #endif
   }
 };
 
 /// Initialised models to copy, of all symbols or of 2, 4, ..., 256.
 template <unsigned Capacity>
-inline constexpr std::array<SymbolModel<Capacity>, 1> kFresh{
-    SymbolModel<Capacity>::fresh(Capacity)};
+inline constexpr std::array<SymbolModel<Capacity>, 1> kInitial{
+    SymbolModel<Capacity>::initial(Capacity)};
 template <>
-inline constexpr std::array<SymbolModel<256>, 8> kFresh<256>{
-    SymbolModel<256>::fresh(2),   SymbolModel<256>::fresh(4),  SymbolModel<256>::fresh(8),
-    SymbolModel<256>::fresh(16),  SymbolModel<256>::fresh(32), SymbolModel<256>::fresh(64),
-    SymbolModel<256>::fresh(128), SymbolModel<256>::fresh(256)};
+inline constexpr std::array<SymbolModel<256>, 8> kInitial<256>{
+    SymbolModel<256>::initial(2),   SymbolModel<256>::initial(4),  SymbolModel<256>::initial(8),
+    SymbolModel<256>::initial(16),  SymbolModel<256>::initial(32), SymbolModel<256>::initial(64),
+    SymbolModel<256>::initial(128), SymbolModel<256>::initial(256)};
 
 template <unsigned Capacity>
 void SymbolModel<Capacity>::begin(ChunkNumber chunk, unsigned symbols) {
-  *this = kFresh<Capacity>[Capacity == 256 ? std::bit_width(symbols) - 2 : 0];
-  born = chunk;
+  *this = kInitial<Capacity>[Capacity == 256 ? std::bit_width(symbols) - 2 : 0];
+  initialised_in = chunk;
 }
 
 inline constexpr unsigned kBitBits = 13;
 
 /// A model of bits.
 struct BitModel {
-  ChunkNumber born;
-  std::uint32_t until, cycle;
+  ChunkNumber initialised_in;
+  std::uint32_t countdown, cycle;
   std::uint32_t zeros, total;
   std::uint32_t zero;  ///< share of the interval for 0, in units of 2^-kBitBits
 
   void begin(ChunkNumber chunk) {
-    born = chunk;
+    initialised_in = chunk;
     zeros = 1;
     total = 2;
     zero = 1u << (kBitBits - 1);
-    cycle = until = 4;
+    cycle = countdown = 4;
   }
 
   void update() {
@@ -177,7 +177,7 @@ struct BitModel {
     }
     zero = (zeros * (0x80000000u / total)) >> 18;
     cycle = std::min((5 * cycle) >> 2, 64u);
-    until = cycle;
+    countdown = cycle;
   }
 };
 

@@ -50,23 +50,23 @@ struct Point10 {
   template <class Coder, class Models>
   TERRACE_LAZ_INLINE static unsigned code_byte(Coder& coder, bool changed, Models& models,
                                                std::size_t at, const std::uint8_t* last,
-                                               typename Coder::Record now) {
+                                               typename Coder::Record record) {
     unsigned byte = last[at];
-    if (changed) byte = coder.symbol(models[byte], given<Coder, std::uint8_t>(now + at));
-    put<Coder>(now + at, low_byte(byte));
+    if (changed) byte = coder.symbol(models[byte], input_value<Coder, std::uint8_t>(record + at));
+    put<Coder>(record + at, low_byte(byte));
     return byte;
   }
   /// Codes the 16 bits at `at` if they changed.
   template <class Coder, class Models>
   TERRACE_LAZ_INLINE static void code_short(Coder& coder, bool changed, Models& models,
                                             std::size_t at, const std::uint8_t* last,
-                                            typename Coder::Record now) {
+                                            typename Coder::Record record) {
     auto value = load<std::uint16_t>(last + at);
     if (changed) {
       value = static_cast<std::uint16_t>(
-          models.code(coder, value, given<Coder, std::uint16_t>(now + at), 0));
+          models.code(coder, value, input_value<Coder, std::uint16_t>(record + at), 0));
     }
-    put<Coder>(now + at, value);
+    put<Coder>(record + at, value);
   }
 };
 
@@ -88,7 +88,8 @@ struct Point10V2 : Point10 {
   }
 
   template <class Coder>
-  TERRACE_LAZ_INLINE void code(Coder& coder, const std::uint8_t* last, typename Coder::Record now) {
+  TERRACE_LAZ_INLINE void code(Coder& coder, const std::uint8_t* last,
+                               typename Coder::Record record) {
     enum : unsigned {
       kSourceBit = 1,
       kUserDataBit = 2,
@@ -101,40 +102,42 @@ struct Point10V2 : Point10 {
     unsigned mask = 0;
     if constexpr (!Coder::kDecoding) {
       const auto differs = [&](std::size_t at, unsigned bit) {
-        return now[at] != last[at] ? bit : 0;
+        return record[at] != last[at] ? bit : 0;
       };
       mask = differs(kReturns, kReturnsBit) | differs(kClassification, kClassificationBit) |
              differs(kScanAngle, kScanAngleBit) | differs(kUserData, kUserDataBit) |
              differs(kSource, kSourceBit) | differs(kSource + 1, kSourceBit);
-      const std::uint16_t before = last_intensity[kReturns10.map[now[kReturns] & 63]];
-      if (load<std::uint16_t>(now + kIntensity) != before) mask |= kIntensityBit;
+      const std::uint16_t previous = last_intensity[kReturns10.map[record[kReturns] & 63]];
+      if (load<std::uint16_t>(record + kIntensity) != previous) mask |= kIntensityBit;
     }
     mask = coder.symbol(changed, mask);
 
-    const unsigned bits = code_byte(coder, (mask & kReturnsBit) != 0, returns, kReturns, last, now);
+    const unsigned bits =
+        code_byte(coder, (mask & kReturnsBit) != 0, returns, kReturns, last, record);
     const unsigned map = kReturns10.map[bits & 63], level = kReturns10.level[bits & 63];
     const bool single = (bits >> 3 & 7) == 1;
     if ((mask & kIntensityBit) != 0) {
-      last_intensity[map] = static_cast<std::uint16_t>(
-          intensity.code(coder, last_intensity[map], given<Coder, std::uint16_t>(now + kIntensity),
-                         std::min(map, 3u)));
+      last_intensity[map] = static_cast<std::uint16_t>(intensity.code(
+          coder, last_intensity[map], input_value<Coder, std::uint16_t>(record + kIntensity),
+          std::min(map, 3u)));
     }
-    put<Coder>(now + kIntensity, last_intensity[map]);
-    code_byte(coder, (mask & kClassificationBit) != 0, classification, kClassification, last, now);
+    put<Coder>(record + kIntensity, last_intensity[map]);
+    code_byte(coder, (mask & kClassificationBit) != 0, classification, kClassification, last,
+              record);
     unsigned angle = last[kScanAngle];
     if ((mask & kScanAngleBit) != 0) {
-      const unsigned change = given<Coder, std::uint8_t>(now + kScanAngle) - angle;
+      const unsigned change = input_value<Coder, std::uint8_t>(record + kScanAngle) - angle;
       angle += coder.symbol(scan_angle[bits >> 6 & 1], low_byte(change));
     }
-    put<Coder>(now + kScanAngle, low_byte(angle));
-    code_byte(coder, (mask & kUserDataBit) != 0, user_data, kUserData, last, now);
-    code_short(coder, (mask & kSourceBit) != 0, source, kSource, last, now);
+    put<Coder>(record + kScanAngle, low_byte(angle));
+    code_byte(coder, (mask & kUserDataBit) != 0, user_data, kUserData, last, record);
+    code_short(coder, (mask & kSourceBit) != 0, source, kSource, last, record);
 
-    code_step(coder, x, x_steps[map], single ? 1 : 0, last + kX, now + kX);
-    code_step(coder, y, y_steps[map], y_context(x.magnitude, single), last + kY, now + kY);
-    last_z[level] = z.code(coder, last_z[level], given<Coder, std::int32_t>(now + kZ),
+    code_step(coder, x, x_steps[map], single ? 1 : 0, last + kX, record + kX);
+    code_step(coder, y, y_steps[map], y_context(x.magnitude, single), last + kY, record + kY);
+    last_z[level] = z.code(coder, last_z[level], input_value<Coder, std::int32_t>(record + kZ),
                            z_context((x.magnitude + y.magnitude) / 2, single));
-    put<Coder>(now + kZ, last_z[level]);
+    put<Coder>(record + kZ, last_z[level]);
   }
 };
 
@@ -155,23 +158,23 @@ struct PointwiseV2 {
   /// Codes a record relative to the previous one.
   template <class Coder>
   TERRACE_LAZ_INLINE void code(Coder& coder, const RecordLayout& layout, SymbolModel<256>* extra,
-                               const std::uint8_t* last, typename Coder::Record now) {
-    point.code(coder, last, now);
+                               const std::uint8_t* last, typename Coder::Record record) {
+    point.code(coder, last, record);
     if (const std::size_t at = layout.gps_time; at != 0) {
-      put<Coder>(now + at, gps_time.code(coder, given<Coder, std::uint64_t>(now + at)));
+      put<Coder>(record + at, gps_time.code(coder, input_value<Coder, std::uint64_t>(record + at)));
     }
     if (const std::size_t at = layout.rgb; at != 0) {
-      put<Coder>(now + at,
-                 rgb.code(coder, load<Rgb::Value>(last + at), given<Coder, Rgb::Value>(now + at)));
+      put<Coder>(record + at, rgb.code(coder, load<Rgb::Value>(last + at),
+                                       input_value<Coder, Rgb::Value>(record + at)));
     }
     if (const std::size_t at = layout.wave_packet; at != 0) {
-      wave_packet.code(coder, last + at, now + at);
+      wave_packet.code(coder, last + at, record + at);
     }
     for (std::size_t i = 0; i < layout.extra_bytes; ++i) {
       const std::size_t at = layout.extra + i;
       if (i % 16 == 0) coder.reserve();
-      const unsigned change = given<Coder, std::uint8_t>(now + at) - last[at];
-      put<Coder>(now + at, low_byte(last[at] + coder.symbol(extra[i], low_byte(change))));
+      const unsigned change = input_value<Coder, std::uint8_t>(record + at) - last[at];
+      put<Coder>(record + at, low_byte(last[at] + coder.symbol(extra[i], low_byte(change))));
     }
   }
 };

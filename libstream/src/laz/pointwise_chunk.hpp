@@ -32,7 +32,7 @@ class Pointwise {
   Coder coder;
 
   /// Maximum coded bytes per record.
-  [[nodiscard]] std::size_t most_bytes() const { return 512 + 4 * layout_.extra_bytes; }
+  [[nodiscard]] std::size_t max_bytes() const { return 512 + 4 * layout_.extra_bytes; }
 
   /// Begins a chunk with its first record. The caller must begin the coder.
   void begin(const std::uint8_t* first) {
@@ -41,7 +41,7 @@ class Pointwise {
     if (v2_ != nullptr) v2_[0].begin(layout_, first);
   }
 
-  /// Codes the next `count` records; if `open`, only as long as most_bytes() bytes are left to
+  /// Codes the next `count` records; if `open`, only as long as max_bytes() bytes are left to
   /// decode. Returns the number coded.
   std::size_t code(Record records, std::size_t count, bool open) {
     return v2_ != nullptr ? code(v2_[0], extra_v2_.get(), records, count, open)
@@ -54,19 +54,19 @@ class Pointwise {
     const RecordLayout layout = layout_;
     Coder local = coder;
     const std::uint8_t* last = last_.data();
-    std::size_t done = 0;
-    for (; done < count; ++done) {
+    std::size_t coded = 0;
+    for (; coded < count; ++coded) {
       if constexpr (Coder::kDecoding) {
-        if (open && !local.has(most_bytes())) break;
+        if (open && !local.has(max_bytes())) break;
       }
       models.code(local, layout, extra, last, records);
       last = records;
       records += layout.length;
     }
     // The caller's records may not exist until the next call.
-    if (done > 0) std::memcpy(last_.data(), last, last_.size());
+    if (coded > 0) std::memcpy(last_.data(), last, last_.size());
     coder = local;
-    return done;
+    return coded;
   }
 
   RecordLayout layout_;

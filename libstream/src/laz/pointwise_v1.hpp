@@ -46,7 +46,7 @@ struct Point10V1 : Point10 {
   }
 
   template <class Coder>
-  void code(Coder& coder, const std::uint8_t* last, typename Coder::Record now) {
+  void code(Coder& coder, const std::uint8_t* last, typename Coder::Record record) {
     enum : unsigned {
       kSourceBit = 1,
       kUserDataBit = 2,
@@ -57,15 +57,16 @@ struct Point10V1 : Point10 {
     };
     constexpr unsigned kLast = 19;  // last context of y and z
     coder.reserve();
-    code_step(coder, x, x_steps, 0, last + kX, now + kX);
-    code_step(coder, y, y_steps, std::min(x.magnitude, kLast), last + kY, now + kY);
+    code_step(coder, x, x_steps, 0, last + kX, record + kX);
+    code_step(coder, y, y_steps, std::min(x.magnitude, kLast), last + kY, record + kY);
     const unsigned k = (x.magnitude + y.magnitude) / 2;
-    put<Coder>(now + kZ, z.code(coder, load<std::int32_t>(last + kZ),
-                                given<Coder, std::int32_t>(now + kZ), std::min(k, kLast)));
+    put<Coder>(record + kZ,
+               z.code(coder, load<std::int32_t>(last + kZ),
+                      input_value<Coder, std::int32_t>(record + kZ), std::min(k, kLast)));
     unsigned mask = 0;
     if constexpr (!Coder::kDecoding) {
       const auto differs = [&](std::size_t at, unsigned bit) {
-        return now[at] != last[at] ? bit : 0;
+        return record[at] != last[at] ? bit : 0;
       };
       mask = differs(kIntensity, kIntensityBit) | differs(kIntensity + 1, kIntensityBit) |
              differs(kReturns, kReturnsBit) | differs(kClassification, kClassificationBit) |
@@ -73,23 +74,24 @@ struct Point10V1 : Point10 {
              differs(kSource, kSourceBit) | differs(kSource + 1, kSourceBit);
     }
     mask = coder.symbol(changed, mask);
-    code_short(coder, (mask & kIntensityBit) != 0, intensity, kIntensity, last, now);
-    code_byte(coder, (mask & kReturnsBit) != 0, returns, kReturns, last, now);
-    code_byte(coder, (mask & kClassificationBit) != 0, classification, kClassification, last, now);
+    code_short(coder, (mask & kIntensityBit) != 0, intensity, kIntensity, last, record);
+    code_byte(coder, (mask & kReturnsBit) != 0, returns, kReturns, last, record);
+    code_byte(coder, (mask & kClassificationBit) != 0, classification, kClassification, last,
+              record);
     std::uint8_t angle = last[kScanAngle];
     if ((mask & kScanAngleBit) != 0) {
       angle = static_cast<std::uint8_t>(scan_angle.code(
-          coder, angle, given<Coder, std::uint8_t>(now + kScanAngle), k < 3 ? 1 : 0));
+          coder, angle, input_value<Coder, std::uint8_t>(record + kScanAngle), k < 3 ? 1 : 0));
     }
-    put<Coder>(now + kScanAngle, angle);
-    code_byte(coder, (mask & kUserDataBit) != 0, user_data, kUserData, last, now);
-    code_short(coder, (mask & kSourceBit) != 0, source, kSource, last, now);
+    put<Coder>(record + kScanAngle, angle);
+    code_byte(coder, (mask & kUserDataBit) != 0, user_data, kUserData, last, record);
+    code_short(coder, (mask & kSourceBit) != 0, source, kSource, last, record);
   }
 };
 
 /// Codes GPS times as one sequence of multiples of a difference.
 struct GpsTimeV1 {
-  static constexpr unsigned kMost = 509, kFull = 510, kSame = 511;
+  static constexpr unsigned kMax = 509, kFull = 510, kSame = 511;
 
   SymbolModel<3> first;  ///< before the first difference: same, difference, complete time
   SymbolModel<512> multiple;
@@ -107,18 +109,18 @@ struct GpsTimeV1 {
   template <class Coder>
   std::uint64_t code(Coder& coder, std::uint64_t value) {
     coder.reserve();
-    const auto ahead64 = static_cast<std::int64_t>(value - time);
-    const auto ahead = static_cast<std::int32_t>(ahead64);
-    const bool fits = ahead == ahead64;
+    const auto delta64 = static_cast<std::int64_t>(value - time);
+    const auto delta = static_cast<std::int32_t>(delta64);
+    const bool fits = delta == delta64;
     if (difference == 0) {
-      const unsigned symbol = coder.symbol(first, !fits ? 2 : ahead == 0 ? 0 : 1);
+      const unsigned symbol = coder.symbol(first, !fits ? 2 : delta == 0 ? 0 : 1);
       if (symbol == 2) return code_full(coder, value);
-      if (symbol == 1) advance(difference = integers.code(coder, 0, ahead, 0));
+      if (symbol == 1) advance(difference = integers.code(coder, 0, delta, 0));
       return time;
     }
     unsigned symbol = 0;
     if constexpr (!Coder::kDecoding) {
-      symbol = !fits ? kFull : ahead == 0 ? kSame : multiple_symbol(ahead);
+      symbol = !fits ? kFull : delta == 0 ? kSame : multiple_symbol(delta);
     }
     symbol = coder.symbol(multiple, symbol);
     if (symbol == kFull) return code_full(coder, value);
@@ -131,11 +133,11 @@ struct GpsTimeV1 {
     const auto predicted =
         symbol == 0 ? difference / 4
                     : static_cast<std::int32_t>(symbol * static_cast<std::uint32_t>(difference));
-    const std::int32_t coded = integers.code(coder, predicted, ahead, context);
+    const std::int32_t coded = integers.code(coder, predicted, delta, context);
     if (symbol == 1) {
       difference = coded;
       extremes = 0;
-    } else if ((symbol == 0 || symbol == kMost) && ++extremes > 3) {
+    } else if ((symbol == 0 || symbol == kMax) && ++extremes > 3) {
       difference = coded;
       extremes = 0;
     }
@@ -144,10 +146,10 @@ struct GpsTimeV1 {
   }
 
  private:
-  void advance(std::int32_t by) { time += static_cast<std::uint64_t>(std::int64_t{by}); }
-  [[nodiscard]] unsigned multiple_symbol(std::int32_t ahead) const {
-    const double ratio = static_cast<float>(ahead) / static_cast<float>(difference);
-    return static_cast<unsigned>(std::clamp(ratio, 0.0, double{kMost}) + 0.5);
+  void advance(std::int32_t delta) { time += static_cast<std::uint64_t>(std::int64_t{delta}); }
+  [[nodiscard]] unsigned multiple_symbol(std::int32_t delta) const {
+    const double ratio = static_cast<float>(delta) / static_cast<float>(difference);
+    return static_cast<unsigned>(std::clamp(ratio, 0.0, double{kMax}) + 0.5);
   }
   template <class Coder>
   std::uint64_t code_full(Coder& coder, std::uint64_t value) {
@@ -173,34 +175,36 @@ struct PointwiseV1 {
 
   template <class Coder>
   void code(Coder& coder, const RecordLayout& layout, SymbolModel<9>* extra,
-            const std::uint8_t* last, typename Coder::Record now) {
-    point.code(coder, last, now);
+            const std::uint8_t* last, typename Coder::Record record) {
+    point.code(coder, last, record);
     if (const std::size_t at = layout.gps_time; at != 0) {
-      put<Coder>(now + at, gps_time.code(coder, given<Coder, std::uint64_t>(now + at)));
+      put<Coder>(record + at, gps_time.code(coder, input_value<Coder, std::uint64_t>(record + at)));
     }
     if (const std::size_t at = layout.rgb; at != 0) {
       coder.reserve();
       unsigned mask = 0;
       for (unsigned i = 0; i < 6; ++i) {
-        if (given<Coder, std::uint8_t>(now + at + i) != last[at + i]) mask |= 1u << i;
+        if (input_value<Coder, std::uint8_t>(record + at + i) != last[at + i]) mask |= 1u << i;
       }
       mask = coder.symbol(rgb_changed, mask);
       for (unsigned i = 0; i < 6; ++i) {
-        const std::uint8_t before = last[at + i], value = given<Coder, std::uint8_t>(now + at + i);
-        put<Coder>(now + at + i,
+        const std::uint8_t previous = last[at + i],
+                           value = input_value<Coder, std::uint8_t>(record + at + i);
+        put<Coder>(record + at + i,
                    (mask >> i & 1) != 0
-                       ? low_byte(static_cast<unsigned>(rgb.code(coder, before, value, i)))
-                       : before);
+                       ? low_byte(static_cast<unsigned>(rgb.code(coder, previous, value, i)))
+                       : previous);
       }
     }
     if (const std::size_t at = layout.wave_packet; at != 0) {
-      wave_packet.code(coder, last + at, now + at);
+      wave_packet.code(coder, last + at, record + at);
     }
     for (std::size_t i = 0; i < layout.extra_bytes; ++i) {
       const std::size_t at = layout.extra + i;
       if (i % 8 == 0) coder.reserve();
-      put<Coder>(now + at, low_byte(static_cast<unsigned>(extra_bytes.code(
-                               coder, last[at], given<Coder, std::uint8_t>(now + at), extra[i]))));
+      put<Coder>(record + at,
+                 low_byte(static_cast<unsigned>(extra_bytes.code(
+                     coder, last[at], input_value<Coder, std::uint8_t>(record + at), extra[i]))));
     }
   }
 };

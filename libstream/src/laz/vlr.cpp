@@ -53,7 +53,7 @@ std::vector<Item> standard_items(unsigned point_format) {
 }
 
 /// Whether these are the items of a point format, with or without extra bytes, in any version.
-bool are_of(const std::vector<Item>& items, unsigned point_format) {
+bool match_format(const std::vector<Item>& items, unsigned point_format) {
   const std::vector<Item> standard = standard_items(point_format);
   const std::size_t count = standard.size();
   if (items.size() != count && items.size() != count + 1) return false;
@@ -115,7 +115,7 @@ Vlr Vlr::parse(std::span<const std::byte> payload, unsigned point_format,
     vlr.items.push_back({static_cast<ItemType>(load<std::uint16_t>(at)),
                          load<std::uint16_t>(at + 2), load<std::uint16_t>(at + 4)});
   }
-  if (point_format > 10 || !are_of(vlr.items, point_format) ||
+  if (point_format > 10 || !match_format(vlr.items, point_format) ||
       vlr.record_length() != record_length) {
     throw Corrupt("LASzip's items are not those of the point format and record length",
                   kItemCountAt);
@@ -164,7 +164,7 @@ RecordLayout layout_of(const Vlr& vlr) {
   require(vlr.compressor != Compressor::none, "the records are not compressed");
   unsigned point_format = layered ? 6 : 0;
   const unsigned last_format = layered ? 10 : 5;
-  while (point_format <= last_format && !are_of(vlr.items, point_format)) ++point_format;
+  while (point_format <= last_format && !match_format(vlr.items, point_format)) ++point_format;
   require(point_format <= last_format, "LASzip's items are not those of its compressor");
 
   RecordLayout layout;

@@ -74,7 +74,7 @@ bool comes_before(const Point& a, const Point& b, std::size_t axis) {
 
 /// Moves the points for which `is_before` holds before the others; returns their number.
 template <class Point, class IsBefore>
-std::size_t part(std::span<Point> points, const IsBefore& is_before) {
+std::size_t partition(std::span<Point> points, const IsBefore& is_before) {
   std::size_t before = 0;
   for (Point& point : points) {
     // Always exchanged, because a branch would be unpredictable.
@@ -95,11 +95,11 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
   base::Box<3, Coordinate> box;
   for (const Point& point : points) box.include(point.place);
   std::size_t axis = 0;
-  double most = -1;
+  double longest = -1;
   for (std::size_t a = 0; a < 3; ++a) {
     const double length = width(box, a) * lengths[a];
-    if (length > most) {
-      most = length;
+    if (length > longest) {
+      longest = length;
       axis = a;
     }
   }
@@ -124,14 +124,14 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
       if (bins.of(point.place[axis]) == middle) in_middle.push_back(point);
     }
     const Point at_plane = select(in_middle);
-    part(points, [&](const Point& point, std::size_t) { return order(point, at_plane); });
+    partition(points, [&](const Point& point, std::size_t) { return order(point, at_plane); });
     return {axis, at_plane.place[axis]};
   } else {
     // Saves a pass: first moves all points up to the bin before the others, then those in the bin
     // to the end of these.
     std::vector<std::size_t> in_middle(counts[middle] + 1);
     std::size_t found = 0;
-    std::size_t end = part(points, [&](const Point& point, std::size_t at) {
+    std::size_t end = partition(points, [&](const Point& point, std::size_t at) {
       const std::size_t bin = bins.of(point.place[axis]);
       in_middle[found] = at;
       found += bin == middle ? 1 : 0;
@@ -157,13 +157,13 @@ void cut(std::span<Numbered<Coordinate>> points, std::size_t pieces,
   cut(points.subspan(first), pieces - left, lengths, begins, begin + first);
 }
 
-void plant(std::span<NumberedPoint> points, std::size_t node, const std::array<double, 3>& lengths,
-           std::vector<KdPlane>& planes) {
+void build_planes(std::span<NumberedPoint> points, std::size_t node,
+                  const std::array<double, 3>& lengths, std::vector<KdPlane>& planes) {
   if (node >= planes.size() || points.empty()) return;
   const std::size_t first = points.size() / 2;
   planes[node] = divide(points, first, lengths);
-  plant(points.first(first), 2 * node + 1, lengths, planes);
-  plant(points.subspan(first), 2 * node + 2, lengths, planes);
+  build_planes(points.first(first), 2 * node + 1, lengths, planes);
+  build_planes(points.subspan(first), 2 * node + 2, lengths, planes);
 }
 
 }  // namespace
@@ -186,7 +186,7 @@ template std::vector<std::size_t> cut_in_pieces(std::span<NumberedIntegers>, std
 std::vector<KdPlane> kd_planes(std::span<NumberedPoint> points, unsigned depth,
                                const std::array<double, 3>& lengths) {
   std::vector<KdPlane> planes((std::size_t{1} << depth) - 1);
-  plant(points, 0, lengths, planes);
+  build_planes(points, 0, lengths, planes);
   return planes;
 }
 

@@ -26,7 +26,7 @@ struct KdPlane {
   std::size_t axis = 0;
   double value = 0;
 
-  [[nodiscard]] bool beyond(const Point3& p) const { return p[axis] >= value; }
+  [[nodiscard]] bool is_above(const Point3& p) const { return p[axis] >= value; }
 };
 
 /// Cuts points into `pieces` of sizes that differ by at most one, always across the axis of
@@ -49,20 +49,20 @@ void kd_leaves(std::span<const KdPlane> planes, std::size_t count, const PlaceOf
                const Take& take) {
   // Several places go down the tree in parallel, because each step of one place waits for the step
   // before it.
-  constexpr std::size_t kSideBySide = 8;
+  constexpr std::size_t kBatch = 8;
   const auto walk = [&](std::size_t first, auto places) {
     std::array<std::size_t, places> nodes{};
     for (std::size_t levels = planes.size(); levels > 0; levels /= 2) {
       for (std::size_t i = 0; i < places; ++i) {
         const KdPlane& plane = planes[nodes[i]];
-        nodes[i] = 2 * nodes[i] + 1 + (plane.beyond(place_of(first + i)) ? 1 : 0);
+        nodes[i] = 2 * nodes[i] + 1 + (plane.is_above(place_of(first + i)) ? 1 : 0);
       }
     }
     for (std::size_t i = 0; i < places; ++i) take(first + i, nodes[i] - planes.size());
   };
   std::size_t i = 0;
-  for (; i + kSideBySide <= count; i += kSideBySide) {
-    walk(i, std::integral_constant<std::size_t, kSideBySide>{});
+  for (; i + kBatch <= count; i += kBatch) {
+    walk(i, std::integral_constant<std::size_t, kBatch>{});
   }
   for (; i < count; ++i) walk(i, std::integral_constant<std::size_t, 1>{});
 }

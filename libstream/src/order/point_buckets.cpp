@@ -15,16 +15,16 @@ namespace terrace::stream {
 namespace {
 
 /// Copies a few bytes by words. Inlined, unlike memcpy() with a variable size.
-inline void copy_short(const std::byte* from, std::byte* to, std::size_t bytes) {
+inline void copy_short(const std::byte* source, std::byte* target, std::size_t bytes) {
   using Word = std::uint64_t;
   if (bytes < sizeof(Word)) {
-    for (std::size_t i = 0; i < bytes; ++i) to[i] = from[i];
+    for (std::size_t i = 0; i < bytes; ++i) target[i] = source[i];
     return;
   }
   const auto copy_at = [&](std::size_t at) {
     Word word;
-    std::memcpy(&word, from + at, sizeof word);
-    std::memcpy(to + at, &word, sizeof word);
+    std::memcpy(&word, source + at, sizeof word);
+    std::memcpy(target + at, &word, sizeof word);
   };
   for (std::size_t at = 0; at + sizeof(Word) < bytes; at += sizeof(Word)) copy_at(at);
   copy_at(bytes - sizeof(Word));
@@ -51,29 +51,29 @@ template <class Write>
 void PackedPoints::with_packing(const PointBlock& block, const Write& write) const {
   const std::size_t payload = payload_bytes();
   const auto with_coordinates = [&](const auto& pack_coordinates) {
-    write([&](std::size_t i, std::byte* to) {
-      pack_coordinates(block.positions[i], to);
-      copy_short(block.payload.data() + i * payload, to + payload_offset_, payload);
+    write([&](std::size_t i, std::byte* target) {
+      pack_coordinates(block.positions[i], target);
+      copy_short(block.payload.data() + i * payload, target + payload_offset_, payload);
     });
   };
-  const auto pack_coordinate = [](double coordinate, std::byte* to, auto type) {
+  const auto pack_coordinate = [](double coordinate, std::byte* target, auto type) {
     type = static_cast<decltype(type)>(coordinate);
     assert(static_cast<double>(type) == coordinate);
-    std::memcpy(to, &type, sizeof type);
+    std::memcpy(target, &type, sizeof type);
   };
   if (types_[0] == types_[1] && types_[1] == types_[2]) {
     with_type(types_[0], [&](auto type) {
-      with_coordinates([&](const Point3& p, std::byte* to) {
+      with_coordinates([&](const Point3& p, std::byte* target) {
         for (std::size_t axis = 0; axis < 3; ++axis) {
-          pack_coordinate(p[axis], to + axis * sizeof type, type);
+          pack_coordinate(p[axis], target + axis * sizeof type, type);
         }
       });
     });
   } else {
-    with_coordinates([&](const Point3& p, std::byte* to) {
+    with_coordinates([&](const Point3& p, std::byte* target) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         with_type(types_[axis],
-                  [&](auto type) { pack_coordinate(p[axis], to + offsets_[axis], type); });
+                  [&](auto type) { pack_coordinate(p[axis], target + offsets_[axis], type); });
       }
     });
   }
@@ -81,24 +81,24 @@ void PackedPoints::with_packing(const PointBlock& block, const Write& write) con
 
 template <class Coordinate, class Read>
 void PackedPoints::with_unpacking(const Read& read) const {
-  const auto unpack_coordinate = [](const std::byte* from, auto type) {
-    std::memcpy(&type, from, sizeof type);
+  const auto unpack_coordinate = [](const std::byte* source, auto type) {
+    std::memcpy(&type, source, sizeof type);
     return static_cast<Coordinate>(type);
   };
   if (types_[0] == types_[1] && types_[1] == types_[2]) {
     with_type(types_[0], [&](auto type) {
-      read([&](const std::byte* from) {
-        return std::array{unpack_coordinate(from, type),
-                          unpack_coordinate(from + sizeof type, type),
-                          unpack_coordinate(from + 2 * sizeof type, type)};
+      read([&](const std::byte* source) {
+        return std::array{unpack_coordinate(source, type),
+                          unpack_coordinate(source + sizeof type, type),
+                          unpack_coordinate(source + 2 * sizeof type, type)};
       });
     });
   } else {
-    read([&](const std::byte* from) {
+    read([&](const std::byte* source) {
       std::array<Coordinate, 3> place;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         place[axis] = with_type(types_[axis], [&](auto type) {
-          return unpack_coordinate(from + offsets_[axis], type);
+          return unpack_coordinate(source + offsets_[axis], type);
         });
       }
       return place;
@@ -109,8 +109,8 @@ void PackedPoints::with_unpacking(const Read& read) const {
 void PackedPoints::pack(const PointBlock& block, std::vector<std::byte>& records) const {
   records.resize(block.size() * record_bytes_);
   with_packing(block, [&](const auto& pack) {
-    std::byte* to = records.data();
-    for (std::size_t i = 0; i < block.size(); ++i, to += record_bytes_) pack(i, to);
+    std::byte* target = records.data();
+    for (std::size_t i = 0; i < block.size(); ++i, target += record_bytes_) pack(i, target);
   });
 }
 
@@ -119,12 +119,12 @@ void PackedPoints::unpack(std::span<const std::byte> records,
                           std::vector<Numbered<Coordinate>>& points) const {
   points.resize(records.size() / record_bytes_);
   with_unpacking<Coordinate>([&](const auto& unpack) {
-    const std::byte* from = records.data();
+    const std::byte* source = records.data();
     std::uint32_t number = 0;
     for (Numbered<Coordinate>& point : points) {
-      point.place = unpack(from);
+      point.place = unpack(source);
       point.number = number++;
-      from += record_bytes_;
+      source += record_bytes_;
     }
   });
 }
@@ -141,14 +141,14 @@ void PackedPoints::unpack(std::span<const std::byte> records,
   block.positions.resize(numbers.size());
   block.payload.resize(numbers.size() * payload);
   with_unpacking<double>([&](const auto& unpack) {
-    std::byte* to = block.payload.data();
-    for (std::size_t i = 0; i < numbers.size(); ++i, to += payload) {
+    std::byte* target = block.payload.data();
+    for (std::size_t i = 0; i < numbers.size(); ++i, target += payload) {
       const std::size_t ahead = numbers[std::min(i + kRecordsAhead, numbers.size() - 1)];
       __builtin_prefetch(records.data() + ahead * record_bytes_);
       __builtin_prefetch(records.data() + (ahead + 1) * record_bytes_ - 1);
-      const std::byte* const from = records.data() + numbers[i] * record_bytes_;
-      block.positions[i] = unpack(from);
-      copy_short(from + payload_offset_, to, payload);
+      const std::byte* const source = records.data() + numbers[i] * record_bytes_;
+      block.positions[i] = unpack(source);
+      copy_short(source + payload_offset_, target, payload);
     }
   });
 }
@@ -170,8 +170,8 @@ void PackedPoints::sort_by(std::span<const std::uint16_t> keys, std::size_t keys
 void PackedPoints::sort(std::span<const std::byte> records, std::span<const std::uint16_t> keys,
                         std::size_t keys_end, std::vector<std::byte>& sorted,
                         std::vector<std::size_t>& begins) const {
-  sort_by(keys, keys_end, sorted, begins, [&](std::size_t i, std::byte* to) {
-    copy_short(records.data() + i * record_bytes_, to, record_bytes_);
+  sort_by(keys, keys_end, sorted, begins, [&](std::size_t i, std::byte* target) {
+    copy_short(records.data() + i * record_bytes_, target, record_bytes_);
   });
 }
 
@@ -213,16 +213,16 @@ void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
   std::vector<std::byte> full;
   std::unique_lock lock(mutex_);
   const std::uint64_t end = pages_;
-  const Bucket::Chunk chunk = room_for(bytes.size());
+  const Bucket::Chunk chunk = allocate(bytes.size());
   std::uint64_t page = chunk.page;
   if (page == end) {
-    coming_.insert(coming_.end(), bytes.begin(), bytes.end());
-    coming_.resize((pages_ - coming_page_) * kPageBytes);
+    unwritten_.insert(unwritten_.end(), bytes.begin(), bytes.end());
+    unwritten_.resize((pages_ - unwritten_page_) * kPageBytes);
     bytes = {};
-    if (coming_.size() >= kWrittenBytes) {
+    if (unwritten_.size() >= kMinWriteBytes) {
       full.swap(spare_);
-      full.swap(coming_);
-      page = std::exchange(coming_page_, pages_);
+      full.swap(unwritten_);
+      page = std::exchange(unwritten_page_, pages_);
       bytes = full;
     }
   }
@@ -238,7 +238,7 @@ void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
 }
 
 /// Returns the smallest free position that is large enough, or one at the end of the file.
-Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
+Bucket::Chunk BucketFile::allocate(std::size_t bytes) {
   const auto pages = static_cast<std::uint32_t>((bytes + kPageBytes - 1) / kPageBytes);
   Bucket::Chunk chunk{.page = pages_, .pages = pages, .bytes = static_cast<std::uint32_t>(bytes)};
   const auto place = free_.lower_bound(pages);
@@ -258,10 +258,10 @@ Bucket::Chunk BucketFile::room_for(std::size_t bytes) {
 }
 
 void BucketFile::read(const Bucket::Chunk& chunk, std::span<std::byte> records) {
-  if (chunk.page >= coming_page_) {
-    file_.write(coming_page_ * kPageBytes, coming_);
-    coming_page_ = pages_;
-    coming_.clear();
+  if (chunk.page >= unwritten_page_) {
+    file_.write(unwritten_page_ * kPageBytes, unwritten_);
+    unwritten_page_ = pages_;
+    unwritten_.clear();
   }
   const bool packed = chunk.bytes < chunk_bytes_;
   packed_.resize(packed ? chunk.bytes : 0);
@@ -273,11 +273,12 @@ std::uint64_t BucketFile::records(const Bucket& bucket) const {
   return (bucket.chunks.size() * chunk_bytes_ + bucket.tail.size()) / record_bytes_;
 }
 
-void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
-  const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
-  const std::size_t chunks = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
+void BucketFile::take(Bucket& bucket, std::uint64_t max_records, std::vector<std::byte>& out) {
+  const std::uint64_t max_chunks =
+      std::max<std::uint64_t>(max_records * record_bytes_ / chunk_bytes_, 1);
+  const std::size_t chunks = std::min<std::uint64_t>(bucket.chunks.size(), max_chunks);
   // Reserves the maximum, because `out` is reused.
-  out.reserve(at_once * chunk_bytes_ + bucket.tail.size());
+  out.reserve(max_chunks * chunk_bytes_ + bucket.tail.size());
   out.resize(chunks * chunk_bytes_);
   for (std::size_t i = 0; i < chunks; ++i) {
     const Bucket::Chunk& chunk = bucket.chunks[i];
@@ -286,15 +287,17 @@ void BucketFile::take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>
   }
   bucket.chunks.erase(bucket.chunks.begin(),
                       bucket.chunks.begin() + static_cast<std::ptrdiff_t>(chunks));
-  if (bucket.chunks.empty() && (out.size() + bucket.tail.size()) / record_bytes_ <= most) {
+  if (bucket.chunks.empty() && (out.size() + bucket.tail.size()) / record_bytes_ <= max_records) {
     out.insert(out.end(), bucket.tail.begin(), bucket.tail.end());
     bucket.tail = {};
   }
 }
 
-void BucketFile::sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out) {
-  const std::uint64_t at_once = std::max<std::uint64_t>(most * record_bytes_ / chunk_bytes_, 1);
-  const std::size_t count = std::min<std::uint64_t>(bucket.chunks.size(), at_once);
+void BucketFile::sample(const Bucket& bucket, std::uint64_t max_records,
+                        std::vector<std::byte>& out) {
+  const std::uint64_t max_chunks =
+      std::max<std::uint64_t>(max_records * record_bytes_ / chunk_bytes_, 1);
+  const std::size_t count = std::min<std::uint64_t>(bucket.chunks.size(), max_chunks);
   out.resize(count * chunk_bytes_);
   for (std::size_t i = 0; i < count; ++i) {
     read(bucket.chunks[i * bucket.chunks.size() / count],

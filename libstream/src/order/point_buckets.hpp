@@ -99,11 +99,11 @@ class BucketFile {
     append(bucket, records, packer_);
   }
   [[nodiscard]] std::uint64_t records(const Bucket& bucket) const;
-  /// Moves the first records of the bucket, complete chunks of about `most` records, to `out`,
-  /// replacing its contents.
-  void take(Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
-  /// Copies at most `most` records, from chunks throughout the bucket, to `out`.
-  void sample(const Bucket& bucket, std::uint64_t most, std::vector<std::byte>& out);
+  /// Moves the first records of the bucket, complete chunks of about `max_records` records, to
+  /// `out`, replacing its contents.
+  void take(Bucket& bucket, std::uint64_t max_records, std::vector<std::byte>& out);
+  /// Copies at most `max_records` records, from chunks throughout the bucket, to `out`.
+  void sample(const Bucket& bucket, std::uint64_t max_records, std::vector<std::byte>& out);
   /// Size of the file in bytes.
   [[nodiscard]] std::uint64_t bytes() const { return pages_ * kPageBytes; }
 
@@ -112,9 +112,9 @@ class BucketFile {
   static constexpr std::uint64_t kPageBytes = 1024;
   /// Chunks at the end of the file are written together, at least this many bytes, because short
   /// writes cost the system more, and so does reading what they wrote.
-  static constexpr std::size_t kWrittenBytes = 256u << 10;
+  static constexpr std::size_t kMinWriteBytes = 256u << 10;
 
-  Bucket::Chunk room_for(std::size_t bytes);
+  Bucket::Chunk allocate(std::size_t bytes);
   void write(Bucket& bucket, RecordPacker& packer);
   void read(const Bucket::Chunk& chunk, std::span<std::byte> records);
 
@@ -122,11 +122,11 @@ class BucketFile {
   Spool file_;
   RecordPacker packer_;
   std::vector<std::byte> packed_;
-  std::mutex mutex_;               ///< guards the members below
-  std::uint32_t pages_ = 0;        ///< of the file, including chunks to be written
-  std::uint64_t coming_page_ = 0;  ///< end of the pages written
-  std::vector<std::byte> coming_;  ///< to be written from there on
-  std::vector<std::byte> spare_;   ///< an empty buffer
+  std::mutex mutex_;                  ///< guards the members below
+  std::uint32_t pages_ = 0;           ///< of the file, including chunks to be written
+  std::uint64_t unwritten_page_ = 0;  ///< end of the pages written
+  std::vector<std::byte> unwritten_;  ///< to be written from there on
+  std::vector<std::byte> spare_;      ///< an empty buffer
   std::map<std::uint32_t, std::vector<std::uint32_t>> free_;  ///< free positions, by size in pages
 };
 

@@ -22,7 +22,7 @@ class RecordPacker {
  private:
   /// At most 16 bytes of a record that are either the same in all records or written for each.
   struct Run {
-    std::size_t in_record, written, bytes;
+    std::size_t record_offset, packed_offset, bytes;
     bool same;
   };
 

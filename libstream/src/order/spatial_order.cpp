@@ -27,14 +27,14 @@ namespace {
 constexpr std::size_t kWindowPoints = 1u << 18;
 /// A window is judged by every fourth of its points. In a stream that is in order, every fourth
 /// window is judged.
-constexpr std::size_t kJudgedPoints = 4;
-constexpr std::size_t kJudgedWindows = 4;
+constexpr std::size_t kSampleStep = 4;
+constexpr std::size_t kWindowStep = 4;
 /// Blocks are not compact if they are wider than a k-d tree's by more than this factor.
-constexpr double kWidest = 2.0;
+constexpr double kMaxSpread = 2.0;
 /// Buckets are the leaves of a k-d tree of this depth.
 constexpr unsigned kDepth = 8;
 /// Maximum number of points that are put in order at once.
-constexpr std::uint64_t kMostAtOnce = 1u << 18;
+constexpr std::uint64_t kMaxRegionPoints = 1u << 18;
 
 std::size_t blocks_of(std::size_t points, std::size_t block_points) {
   return (points + block_points - 1) / block_points;
@@ -56,20 +56,20 @@ double widths_of(std::span<const NumberedPoint> points, std::span<const std::siz
 }
 
 /// A window whose box has a greater share of the source's box represents all of it.
-constexpr double kWindowShowsAll = 0.25;
+constexpr double kRepresentativeShare = 0.25;
 /// Points that go to the buckets together, in about kSharesOfBucket shares if they come from one
 /// bucket.
 constexpr std::size_t kSharedPoints = 1u << 16;
 constexpr std::size_t kSharesOfBucket = 16;
 /// Number of buckets that a thread fills at a time.
-constexpr std::size_t kBucketsATime = 4;
+constexpr std::size_t kBucketsPerTask = 4;
 
 /// Returns the memory in bytes of the points that are held to be judged or to be delivered next,
 /// and of the ends of all buckets.
 std::uint64_t bytes_to_order(const SourceInfo& info, unsigned parts_ahead) {
-  static_assert(kWindowPoints <= kMostAtOnce);
+  static_assert(kWindowPoints <= kMaxRegionPoints);
   const std::uint64_t point = sizeof(Point3) + info.payload_size() + sizeof(NumberedPoint);
-  return std::max(kMostAtOnce + kSharedPoints, (1 + parts_ahead) * kMostAtOnce) * point +
+  return std::max(kMaxRegionPoints + kSharedPoints, (1 + parts_ahead) * kMaxRegionPoints) * point +
          (std::uint64_t{kBucketBytes} << kDepth);
 }
 
@@ -122,9 +122,9 @@ class SpatialSource final : public OrderedSource {
 
   /// Reads the next block of the source.
   bool next_block(PointBlock& block) {
-    if (following_.empty()) return source_->next(block);
-    std::swap(block, following_);
-    following_.clear();
+    if (lookahead_.empty()) return source_->next(block);
+    std::swap(block, lookahead_);
+    lookahead_.clear();
     return true;
   }
 
@@ -132,16 +132,16 @@ class SpatialSource final : public OrderedSource {
   /// each, and memory must not grow with the number of blocks.
   bool next_full_block(PointBlock& block) {
     block.clear();
-    for (; !ended_; following_.clear()) {
-      if (following_.empty() && !source_->next(following_)) {
+    for (; !ended_; lookahead_.clear()) {
+      if (lookahead_.empty() && !source_->next(lookahead_)) {
         ended_ = true;
       } else if (block.empty()) {
-        std::swap(block, following_);
-      } else if (block.size() + following_.size() <= options_.block_points) {
-        block.positions.insert(block.positions.end(), following_.positions.begin(),
-                               following_.positions.end());
-        block.payload.insert(block.payload.end(), following_.payload.begin(),
-                             following_.payload.end());
+        std::swap(block, lookahead_);
+      } else if (block.size() + lookahead_.size() <= options_.block_points) {
+        block.positions.insert(block.positions.end(), lookahead_.positions.begin(),
+                               lookahead_.positions.end());
+        block.payload.insert(block.payload.end(), lookahead_.payload.begin(),
+                             lookahead_.payload.end());
       } else {
         break;
       }
@@ -153,10 +153,10 @@ class SpatialSource final : public OrderedSource {
   void open() {
     state_ = State::judging;
     bool more = true;
-    while (seen_ < kWindowPoints && more) {
+    while (window_points_ < kWindowPoints && more) {
       PointBlock block;
       more = next_full_block(block);
-      look_at(block);
+      sample_window(block);
       // A source may reserve room for more points than it delivers.
       if (block.positions.capacity() > block.size() + block.size() / 4) {
         block.positions.shrink_to_fit();
@@ -164,49 +164,49 @@ class SpatialSource final : public OrderedSource {
       }
       if (!block.empty()) window_.push_back(std::move(block));
     }
-    if (seen_ > 0 && (options_.order == Order::spatial || spread() > kWidest)) {
+    if (window_points_ > 0 && (options_.order == Order::spatial || spread() > kMaxSpread)) {
       report_.reordered = true;
       state_ = State::gathering;
       if (!more) load_window();
     } else {
-      leave_window();
+      end_window();
     }
   }
 
   /// Judges blocks that are delivered. Points after a window that is not compact are put in order.
   void judge(const PointBlock& block) {
-    if (unjudged_ > 0) {
-      unjudged_ -= std::min<std::uint64_t>(unjudged_, block.size());
+    if (points_to_skip_ > 0) {
+      points_to_skip_ -= std::min<std::uint64_t>(points_to_skip_, block.size());
       return;
     }
-    look_at(block);
-    if (seen_ < kWindowPoints) return;
-    if (spread() > kWidest) {
+    sample_window(block);
+    if (window_points_ < kWindowPoints) return;
+    if (spread() > kMaxSpread) {
       report_.reordered = true;
       state_ = State::gathering;
     } else {
-      leave_window();
+      end_window();
     }
   }
 
   /// Adds points of a block to those that represent its window.
-  void look_at(const PointBlock& block) {
-    places_.reserve(kWindowPoints / kJudgedPoints + block.size());
+  void sample_window(const PointBlock& block) {
+    places_.reserve(kWindowPoints / kSampleStep + block.size());
     for (const Point3& p : block.positions) {
-      if (seen_++ % kJudgedPoints == 0) places_.push_back({p, places_.size()});
+      if (window_points_++ % kSampleStep == 0) places_.push_back({p, places_.size()});
     }
   }
 
-  void leave_window() {
+  void end_window() {
     places_.clear();
-    seen_ = 0;
-    unjudged_ = (kJudgedWindows - 1) * kWindowPoints;
+    window_points_ = 0;
+    points_to_skip_ = (kWindowStep - 1) * kWindowPoints;
   }
 
   /// Returns the spread of the window represented by `places_`, which it reorders.
   double spread() {
     const std::size_t blocks =
-        blocks_of(places_.size(), std::max<std::size_t>(options_.block_points / kJudgedPoints, 1));
+        blocks_of(places_.size(), std::max<std::size_t>(options_.block_points / kSampleStep, 1));
     std::vector<std::size_t> begins;
     for (std::size_t b = 0; b <= blocks; ++b) begins.push_back(b * places_.size() / blocks);
     measure_units();
@@ -246,7 +246,7 @@ class SpatialSource final : public OrderedSource {
       for (const Point3& p : block.positions) places_.push_back({p, places_.size()});
     }
     measure_units();
-    expect_elsewhere();
+    spread_places();
     planes_ = kd_planes(places_, kDepth, lengths_);
     packed_.emplace(info());
     file_.emplace(info().files.empty() ? std::string("points") : info().files.front(),
@@ -281,7 +281,7 @@ class SpatialSource final : public OrderedSource {
           lock.unlock();
           find_leaves(share, share.block.size(),
                       [&](std::size_t p) -> const Point3& { return share.block.positions[p]; });
-          packed_->sort(share.block, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+          packed_->sort(share.block, share.leaves, planes_.size() + 1, share.sorted, share.begins);
           lock.lock();
         }
       });
@@ -298,7 +298,7 @@ class SpatialSource final : public OrderedSource {
   /// source states a larger box, replaces most of the window's points by places spread evenly over
   /// that box, in proportion to the points still to come. Otherwise nearly all of these would go to
   /// the outermost buckets, which would have to be divided later.
-  void expect_elsewhere() {
+  void spread_places() {
     const std::optional<Box3>& bounds = info().stated_bounds;
     const std::uint64_t points = info().points.value_or(0);
     if (!bounds || points <= places_.size()) return;
@@ -313,13 +313,14 @@ class SpatialSource final : public OrderedSource {
     }
     // The shortest axis does not count: on land it is the height, which one outlier may stretch.
     parts[static_cast<std::size_t>(std::ranges::min_element(lengths) - lengths.begin())] = 1;
-    const double seen = std::min(parts[0], 1.0) * std::min(parts[1], 1.0) * std::min(parts[2], 1.0);
-    if (seen > kWindowShowsAll) return;
+    const double window_share =
+        std::min(parts[0], 1.0) * std::min(parts[1], 1.0) * std::min(parts[2], 1.0);
+    if (window_share > kRepresentativeShare) return;
     const std::size_t count = places_.size();
     const double share = std::max(static_cast<double>(count) / static_cast<double>(points), 0.125);
-    const auto kept = static_cast<std::size_t>(static_cast<double>(count) * share);
-    for (std::size_t i = 0; i < kept; ++i) places_[i] = places_[i * count / kept];
-    for (std::size_t i = kept; i < count; ++i) {
+    const auto window_places = static_cast<std::size_t>(static_cast<double>(count) * share);
+    for (std::size_t i = 0; i < window_places; ++i) places_[i] = places_[i * count / window_places];
+    for (std::size_t i = window_places; i < count; ++i) {
       // The additive sequence of low discrepancy in three dimensions: powers of 1 / 1.2207...
       constexpr std::array<double, 3> kSteps{0.8191725133961645, 0.6710436067037893,
                                              0.5497004779019703};
@@ -338,7 +339,7 @@ class SpatialSource final : public OrderedSource {
     std::vector<std::byte> records;     ///< if from another bucket
     std::vector<NumberedPoint> places;  ///< of these records
     std::vector<std::uint16_t> leaves;  ///< by record
-    std::vector<std::byte> by_leaf;     ///< the records
+    std::vector<std::byte> sorted;      ///< the records
     std::vector<std::size_t> begins;    ///< of each leaf's, and the end
   };
 
@@ -354,15 +355,14 @@ class SpatialSource final : public OrderedSource {
   void distribute(const std::deque<Share>& shares, std::size_t count,
                   std::vector<Bucket>& buckets) {
     while (packers_.size() < team_.threads()) packers_.emplace_back(packed_->record_bytes());
-    team_.run(buckets.size() / kBucketsATime, [&](std::size_t i, std::size_t worker) {
-      for (std::size_t b = i * kBucketsATime; b < (i + 1) * kBucketsATime; ++b) {
+    team_.run(buckets.size() / kBucketsPerTask, [&](std::size_t i, std::size_t worker) {
+      for (std::size_t b = i * kBucketsPerTask; b < (i + 1) * kBucketsPerTask; ++b) {
         for (std::size_t s = 0; s < count; ++s) {
           const Share& share = shares[s];
           const std::size_t bytes = packed_->record_bytes(), first = share.begins[b] * bytes;
-          file_->append(
-              buckets[b],
-              std::span(share.by_leaf).subspan(first, share.begins[b + 1] * bytes - first),
-              packers_[worker]);
+          file_->append(buckets[b],
+                        std::span(share.sorted).subspan(first, share.begins[b + 1] * bytes - first),
+                        packers_[worker]);
         }
       }
     });
@@ -386,7 +386,7 @@ class SpatialSource final : public OrderedSource {
     std::uint64_t records = 0;
     for (const Bucket& bucket : buckets) records += file_->records(bucket);
     if (records == 0) return;
-    if (buckets.size() > 1 && records > kMostAtOnce) {
+    if (buckets.size() > 1 && records > kMaxRegionPoints) {
       join(buckets.first(buckets.size() / 2), joined);
       join(buckets.subspan(buckets.size() / 2), joined);
       return;
@@ -399,14 +399,14 @@ class SpatialSource final : public OrderedSource {
   /// Fills the block with the next points; leaves it empty at the end.
   void deliver(PointBlock& block) {
     while (next_piece_ + 1 >= region_.pieces.size()) {
-      if (!region_.records.empty()) spare_.push_back(std::exchange(region_, {}));
+      if (!region_.records.empty()) free_regions_.push_back(std::exchange(region_, {}));
       prepare_ahead();
-      if (coming_.empty()) {
+      if (prepared_.empty()) {
         file_.reset();
         return block.clear();
       }
-      region_ = coming_.front().get();
-      coming_.pop_front();
+      region_ = prepared_.front().get();
+      prepared_.pop_front();
       next_piece_ = 0;
       if (options_.parts_ahead > 0) prepare_ahead();
     }
@@ -428,24 +428,25 @@ class SpatialSource final : public OrderedSource {
   };
 
   void prepare_ahead() {
-    while (coming_.size() < std::max(options_.parts_ahead, 1U) && !pending_.empty()) {
+    while (prepared_.size() < std::max(options_.parts_ahead, 1U) && !pending_.empty()) {
       Pending& next = pending_.back();
-      if (next.divisible && file_->records(next.bucket) > kMostAtOnce) {
+      if (next.divisible && file_->records(next.bucket) > kMaxRegionPoints) {
         divide();
         continue;
       }
       Region region;
-      if (!spare_.empty()) {
-        region = std::move(spare_.back());
-        spare_.pop_back();
+      if (!free_regions_.empty()) {
+        region = std::move(free_regions_.back());
+        free_regions_.pop_back();
       }
-      file_->take(next.bucket, kMostAtOnce, region.records);
+      file_->take(next.bucket, kMaxRegionPoints, region.records);
       if (file_->records(next.bucket) == 0) pending_.pop_back();
       // If the system grants no more threads, the region is cut when it is needed.
-      const std::launch when = options_.parts_ahead > 0 ? std::launch::async | std::launch::deferred
-                                                        : std::launch::deferred;
-      coming_.push_back(std::async(
-          when, [this](Region cut) { return cut_region(std::move(cut)); }, std::move(region)));
+      const std::launch policy = options_.parts_ahead > 0
+                                     ? std::launch::async | std::launch::deferred
+                                     : std::launch::deferred;
+      prepared_.push_back(std::async(
+          policy, [this](Region cut) { return cut_region(std::move(cut)); }, std::move(region)));
     }
   }
 
@@ -492,18 +493,18 @@ class SpatialSource final : public OrderedSource {
     std::vector<Bucket> buckets(planes_.size() + 1);
     std::deque<Share> shares(kSharesOfBucket);
     while (file_->records(bucket) > 0) {
-      std::size_t taken = 0;
-      for (; taken < shares.size() && file_->records(bucket) > 0; ++taken) {
-        file_->take(bucket, kSharedPoints / kSharesOfBucket, shares[taken].records);
+      std::size_t filled = 0;
+      for (; filled < shares.size() && file_->records(bucket) > 0; ++filled) {
+        file_->take(bucket, kSharedPoints / kSharesOfBucket, shares[filled].records);
       }
-      team_.run(taken, [&](std::size_t i, std::size_t) {
+      team_.run(filled, [&](std::size_t i, std::size_t) {
         Share& share = shares[i];
         packed_->unpack(share.records, share.places);
         find_leaves(share, share.places.size(),
                     [&](std::size_t p) -> const Point3& { return share.places[p].place; });
-        packed_->sort(share.records, share.leaves, planes_.size() + 1, share.by_leaf, share.begins);
+        packed_->sort(share.records, share.leaves, planes_.size() + 1, share.sorted, share.begins);
       });
-      distribute(shares, taken, buckets);
+      distribute(shares, filled, buckets);
     }
     push(std::move(buckets), count / 2);
     report_.temporary_bytes = file_->bytes();
@@ -518,12 +519,12 @@ class SpatialSource final : public OrderedSource {
   SpatialOrderOptions options_;
   State state_;
   std::uint64_t ordering_bytes_;
-  PointBlock following_;               ///< read, but did not fit into the last full block
+  PointBlock lookahead_;               ///< read, but did not fit into the last full block
   bool ended_ = false;                 ///< whether the source has no more blocks
   std::deque<PointBlock> window_;      ///< held until it is judged
   std::vector<NumberedPoint> places_;  ///< represent a window
-  std::uint64_t unjudged_ = 0;         ///< points to deliver before the next window to judge
-  std::uint64_t seen_ = 0;             ///< points of the window being judged
+  std::uint64_t points_to_skip_ = 0;   ///< points to deliver before the next window to judge
+  std::uint64_t window_points_ = 0;    ///< points of the window being judged
   std::array<double, 3> lengths_{1, 1, 1};
 
   std::optional<PackedPoints> packed_;
@@ -535,11 +536,11 @@ class SpatialSource final : public OrderedSource {
   std::vector<RecordPacker> packers_;  ///< by thread of the team
   Region region_;                      ///< being delivered
   std::size_t next_piece_ = 0;
-  std::vector<Region> spare_;
+  std::vector<Region> free_regions_;
 
   std::uint64_t delivered_ = 0, total_ = 0;
   Report report_;
-  std::deque<std::future<Region>> coming_;  ///< destroyed first, because it uses the others
+  std::deque<std::future<Region>> prepared_;  ///< destroyed first, because it uses the others
 };
 
 }  // namespace

@@ -18,24 +18,24 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint64_t kMostMosaicCells = 1u << 30;
-constexpr std::size_t kMostWkt = std::size_t{64} << 10;
+constexpr std::uint64_t kMaxMosaicCells = 1u << 30;
+constexpr std::size_t kMaxWkt = std::size_t{64} << 10;
 
-std::string shown(double value) {
+std::string short_text(double value) {
   std::ostringstream out;
   out.precision(3);
   out << value;
   return out.str();
 }
 
-std::string all_digits(double value) {
+std::string exact_text(double value) {
   std::ostringstream out;
   out.precision(17);
   out << value;
   return out.str();
 }
 
-Error differs(const std::string& first, const std::string& other, const std::string& what) {
+Error mismatch_error(const std::string& first, const std::string& other, const std::string& what) {
   return {other, fmt::format("does not match {}: {}", first, what)};
 }
 
@@ -55,9 +55,9 @@ struct Member {
 };
 
 /// Places a raster in the cells of the first one. All four corners must be on cells, to
-/// kNearestCell, so that cell sizes and rotation agree too. off: raised to the largest distance of
-/// a corner from its cell, in cells.
-Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
+/// kNearestCell, so that cell sizes and rotation agree too. max_offset: raised to the largest
+/// distance of a corner from its cell, in cells.
+Member place_member(const RasterInfo& first, const RasterInfo& other, double& max_offset) {
   const std::string &a = first.files.front(), &b = other.files.front();
   const auto& m = other.world.xy;
   const auto corner = [&](double c, double r) {
@@ -72,25 +72,25 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
     const auto at = corner(c, r);
     const double stretch =
         std::max(std::abs(at[0] - origin[0] - c), std::abs(at[1] - origin[1] - r));
-    off = std::max({off, std::abs(at[0] - column - c), std::abs(at[1] - row - r)});
+    max_offset = std::max({max_offset, std::abs(at[0] - column - c), std::abs(at[1] - row - r)});
     if (!(stretch <= kNearestCell)) {
-      throw differs(
+      throw mismatch_error(
           a, b,
-          fmt::format("its cells are {} x {}, not {} x {}", all_digits(m[0]), all_digits(m[4]),
-                      all_digits(first.world.xy[0]), all_digits(first.world.xy[4])))
+          fmt::format("its cells are {} x {}, not {} x {}", exact_text(m[0]), exact_text(m[4]),
+                      exact_text(first.world.xy[0]), exact_text(first.world.xy[4])))
           .remedy(align);
     }
   }
   const double shift = std::max(std::abs(origin[0] - column), std::abs(origin[1] - row));
-  off = std::max(off, shift);
+  max_offset = std::max(max_offset, shift);
   if (!(shift <= kNearestCell)) {
-    throw differs(a, b,
-                  fmt::format("its cells are shifted by {}, {} of a cell",
-                              shown(origin[0] - column), shown(origin[1] - row)))
+    throw mismatch_error(a, b,
+                         fmt::format("its cells are shifted by {}, {} of a cell",
+                                     short_text(origin[0] - column), short_text(origin[1] - row)))
         .remedy(align);
   }
   if (std::abs(column) >= 0x1p31 || std::abs(row) >= 0x1p31) {
-    throw differs(a, b, "it is 2^31 or more cells away").remedy("read them separately");
+    throw mismatch_error(a, b, "it is 2^31 or more cells away").remedy("read them separately");
   }
   return {.file = b,
           .column = static_cast<std::int64_t>(column),
@@ -100,29 +100,30 @@ Member placed(const RasterInfo& first, const RasterInfo& other, double& off) {
           .held_bytes = other.held_bytes};
 }
 
-std::string named(const std::string& unit) {
+std::string unit_name(const std::string& unit) {
   return unit.empty() ? "an unknown unit" : '"' + unit + '"';
 }
 
 void check_samples(const RasterInfo& first, const RasterInfo& other) {
   const std::string &a = first.files.front(), &b = other.files.front();
   if (first.sample.type != other.sample.type) {
-    throw differs(a, b,
-                  fmt::format("its samples are {}, not {}", name_of(other.sample.type),
-                              name_of(first.sample.type)))
+    throw mismatch_error(a, b,
+                         fmt::format("its samples are {}, not {}", name_of(other.sample.type),
+                                     name_of(first.sample.type)))
         .remedy("convert one: gdal_translate -ot");
   }
   if (first.sample.scale != other.sample.scale || first.sample.offset != other.sample.offset) {
-    throw differs(a, b,
-                  fmt::format("its scale and offset are {}, {}, not {}, {}",
-                              all_digits(other.sample.scale), all_digits(other.sample.offset),
-                              all_digits(first.sample.scale), all_digits(first.sample.offset)))
+    throw mismatch_error(
+        a, b,
+        fmt::format("its scale and offset are {}, {}, not {}, {}", exact_text(other.sample.scale),
+                    exact_text(other.sample.offset), exact_text(first.sample.scale),
+                    exact_text(first.sample.offset)))
         .remedy("make them agree: gdal_translate -unscale");
   }
   if (first.sample.unit != other.sample.unit) {
-    throw differs(a, b,
-                  fmt::format("its heights are in {}, not {}", named(other.sample.unit),
-                              named(first.sample.unit)))
+    throw mismatch_error(a, b,
+                         fmt::format("its heights are in {}, not {}", unit_name(other.sample.unit),
+                                     unit_name(first.sample.unit)))
         .remedy("give both the same unit (gdal_edit.py -units), or convert one (gdal_calc.py)");
   }
 }
@@ -151,8 +152,8 @@ void check_crs(const RasterInfo& first, const RasterInfo& other) {
       (a.epsg != 0 || a.geo_keys == b.geo_keys)) {
     return;
   }
-  throw differs(first.files.front(), other.files.front(),
-                fmt::format("its CRS is {}, not {}", described(b), described(a)))
+  throw mismatch_error(first.files.front(), other.files.front(),
+                       fmt::format("its CRS is {}, not {}", described(b), described(a)))
       .remedy("reproject one (gdalwarp -t_srs), or give the CRS of all");
 }
 
@@ -166,8 +167,8 @@ std::int64_t columns_around(const WorldTransform& world, const Crs& crs) {
       crs.geographic || (crs.wkt.starts_with("GEOG") && crs.wkt.find("0.01745329") != crs.wkt.npos);
   if (!geographic || !degrees || m[1] != 0 || m[3] != 0 || !(m[0] > 0)) return 0;
   const double columns = 360 / m[0];
-  const bool whole = columns < 0x1p31 && std::abs(columns - std::round(columns)) <= kSameCell;
-  return whole ? static_cast<std::int64_t>(std::round(columns)) : 0;
+  const bool is_integer = columns < 0x1p31 && std::abs(columns - std::round(columns)) <= kSameCell;
+  return is_integer ? static_cast<std::int64_t>(std::round(columns)) : 0;
 }
 
 std::int64_t modulo(std::int64_t value, std::int64_t turn) { return (value % turn + turn) % turn; }
@@ -236,14 +237,14 @@ class Mosaic final : public Raster {
         check_samples(*first, info);
         if (!crs && !agreement->agrees(info.crs)) check_crs(*first, info);
       }
-      double off = 0;
-      members_.push_back(placed(*first, info, off));
-      if (off > farthest) {
-        farthest = off;
+      double max_offset = 0;
+      members_.push_back(place_member(*first, info, max_offset));
+      if (max_offset > farthest) {
+        farthest = max_offset;
         farthest_file = file;
       }
       for (const std::string& line : info.notes) {
-        if (notes_.size() < kMostComments) notes_.push_back(line);
+        if (notes_.size() < kMaxComments) notes_.push_back(line);
       }
       for (const std::string& comment : info.comments) {
         std::string line = file;
@@ -254,7 +255,7 @@ class Mosaic final : public Raster {
       notes_.push_back(
           fmt::format("the cells of {} are up to {} of a cell off those of {}, and are placed on "
                       "the nearest cells",
-                      farthest_file, shown(farthest), files.front()));
+                      farthest_file, short_text(farthest), files.front()));
     }
     unite(*first, crs.value_or(first->crs));
     info_.notes = std::move(notes_);
@@ -278,13 +279,13 @@ class Mosaic final : public Raster {
       if (l >= r || t >= b) continue;
       const auto cell =
           static_cast<std::size_t>(t - top) * out.stride + static_cast<std::size_t>(l - left);
-      any |= opened(i).read_over({.column = static_cast<std::uint64_t>(l - member.column),
-                                  .row = static_cast<std::uint64_t>(t - member.row),
-                                  .columns = static_cast<std::uint64_t>(r - l),
-                                  .rows = static_cast<std::uint64_t>(b - t)},
-                                 {.samples = out.samples + cell * size_of(info_.sample.type),
-                                  .valid = out.valid + cell,
-                                  .stride = out.stride});
+      any |= member_raster(i).read_over({.column = static_cast<std::uint64_t>(l - member.column),
+                                         .row = static_cast<std::uint64_t>(t - member.row),
+                                         .columns = static_cast<std::uint64_t>(r - l),
+                                         .rows = static_cast<std::uint64_t>(b - t)},
+                                        {.samples = out.samples + cell * size_of(info_.sample.type),
+                                         .valid = out.valid + cell,
+                                         .stride = out.stride});
     }
     return any;
   }
@@ -295,10 +296,10 @@ class Mosaic final : public Raster {
     std::unique_ptr<Raster> raster;
   };
 
-  static constexpr std::size_t kMostComments = 16;
+  static constexpr std::size_t kMaxComments = 16;
 
   void note(std::string comment) {
-    if (info_.comments.size() < kMostComments) info_.comments.push_back(std::move(comment));
+    if (info_.comments.size() < kMaxComments) info_.comments.push_back(std::move(comment));
   }
 
   /// Determines the union's size and placement; afterwards members count from its corner.
@@ -306,7 +307,7 @@ class Mosaic final : public Raster {
     if (crs.epsg == 0 && crs.wkt.empty() && !crs.geographic) {
       const std::string prj = prj_beside(first.files.front());
       const std::vector<char> text =
-          prj.empty() ? std::vector<char>() : peek_head(prj, kMostWkt, {});
+          prj.empty() ? std::vector<char>() : peek_head(prj, kMaxWkt, {});
       crs.wkt.assign(text.begin(), text.end());
     }
     const std::int64_t turn = columns_around(first.world, crs);
@@ -331,7 +332,7 @@ class Mosaic final : public Raster {
     }
     info_.columns = static_cast<std::uint64_t>(right - left);
     info_.rows = static_cast<std::uint64_t>(bottom - top);
-    if (info_.columns >= kMostMosaicCells || info_.rows >= kMostMosaicCells) {
+    if (info_.columns >= kMaxMosaicCells || info_.rows >= kMaxMosaicCells) {
       throw Error(members_.front().file,
                   fmt::format("the mosaic of the {} files has {} x {} cells: columns and rows must "
                               "each be fewer than 2^30",
@@ -346,20 +347,21 @@ class Mosaic final : public Raster {
     if (members_.size() > 1) info_.block_columns = info_.block_rows = 1;
   }
 
-  Raster& opened(std::size_t member) {
+  Raster& member_raster(std::size_t member) {
     const auto found =
         std::find_if(open_.begin(), open_.end(), [&](const Open& o) { return o.member == member; });
     if (found != open_.end()) {
       open_.splice(open_.begin(), open_, found);
       return *open_.front().raster;
     }
-    const std::uint64_t more = members_[member].held_bytes;
-    while (!open_.empty() && (open_.size() >= open_at_once_ || held_bytes_ + more > open_bytes_)) {
-      held_bytes_ -= members_[open_.back().member].held_bytes;
+    const std::uint64_t needed_bytes = members_[member].held_bytes;
+    while (!open_.empty() &&
+           (open_.size() >= open_at_once_ || open_held_bytes_ + needed_bytes > open_bytes_)) {
+      open_held_bytes_ -= members_[open_.back().member].held_bytes;
       open_.pop_back();
     }
     open_.push_front({member, opener_(members_[member].file)});
-    held_bytes_ += more;
+    open_held_bytes_ += needed_bytes;
     const RasterInfo& info = open_.front().raster->info();
     if (info.columns != members_[member].columns || info.rows != members_[member].rows ||
         info.sample.type != info_.sample.type) {
@@ -370,7 +372,7 @@ class Mosaic final : public Raster {
 
   RasterOpener opener_;
   std::size_t open_at_once_;
-  std::uint64_t open_bytes_, held_bytes_ = 0;
+  std::uint64_t open_bytes_, open_held_bytes_ = 0;
   RasterInfo info_;
   std::vector<std::string> files_, notes_;  ///< for info_, until it is complete
   std::vector<Member> members_;

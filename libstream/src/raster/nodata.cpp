@@ -17,7 +17,7 @@ namespace terrace::stream {
 namespace {
 
 template <class T>
-std::optional<T> whole_number(std::string_view text) {
+std::optional<T> parse_integer(std::string_view text) {
   T value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
@@ -49,15 +49,15 @@ std::optional<double> leading_number(std::string_view text) {
 }
 
 /// GDAL takes a and b for equal if |a - b| < 2 epsilon |a + b|; solved here for a.
-void set_float_range(NodataRule& rule, double value, double epsilon, double most) {
+void set_float_range(NodataRule& rule, double value, double epsilon, double limit) {
   const double k = 2 * epsilon;
   const double near = value * ((1 - k) / (1 + k)), far = value * ((1 + k) / (1 - k));
   rule.low = std::min({near, far, value});
   rule.high = std::max({near, far, value});
   // The far end may be out of the range of doubles; samples there are infinite and have no data
   // anyway.
-  rule.low = std::max(rule.low, -most);
-  rule.high = std::min(rule.high, most);
+  rule.low = std::max(rule.low, -limit);
+  rule.high = std::min(rule.high, limit);
   rule.unmatched = rule.low > rule.high;
 }
 
@@ -75,12 +75,12 @@ std::int64_t lowest_integer(ScalarType type) {
 }
 
 void set_float_rule(NodataRule& rule, double value) {
-  constexpr double kMost = std::numeric_limits<float>::max();
+  constexpr double kMax = std::numeric_limits<float>::max();
   if (!std::isfinite(value)) return;
-  set_float_range(rule, value, std::numeric_limits<float>::epsilon(), kMost);
+  set_float_range(rule, value, std::numeric_limits<float>::epsilon(), kMax);
   if (rule.unmatched) return;
   // Subnormal floats have larger steps.
-  const double rounded = static_cast<float>(std::clamp(value, -kMost, kMost));
+  const double rounded = static_cast<float>(std::clamp(value, -kMax, kMax));
   rule.low = std::min(rule.low, rounded);
   rule.high = std::max(rule.high, rounded);
 }
@@ -93,7 +93,7 @@ void set_double_rule(NodataRule& rule, double value) {
 
 /// Doubles cannot represent all large integers, so an integer is parsed from the text.
 void set_unsigned_rule(NodataRule& rule, std::string_view text, double value) {
-  if (const auto exact = whole_number<std::uint64_t>(text)) {
+  if (const auto exact = parse_integer<std::uint64_t>(text)) {
     rule.low_unsigned = rule.high_unsigned = *exact;
   } else if (value >= 0 && value < 0x1p64 && value == std::floor(value)) {
     rule.low_unsigned = rule.high_unsigned = static_cast<std::uint64_t>(value);
@@ -103,7 +103,7 @@ void set_unsigned_rule(NodataRule& rule, std::string_view text, double value) {
 }
 
 void set_integer_rule(NodataRule& rule, std::string_view text, double value, ScalarType type) {
-  if (const auto exact = whole_number<std::int64_t>(text)) {
+  if (const auto exact = parse_integer<std::int64_t>(text)) {
     rule.low_integer = rule.high_integer = *exact;
   } else if (value >= -0x1p63 && value < 0x1p63 && value == std::floor(value)) {
     rule.low_integer = rule.high_integer = static_cast<std::int64_t>(value);
@@ -140,9 +140,9 @@ Range<T> range_of(const NodataRule& rule) {
 }
 
 template <class T>
-T load(const std::byte* from) {
+T load(const std::byte* source) {
   T value;
-  std::memcpy(&value, from, sizeof value);
+  std::memcpy(&value, source, sizeof value);
   return value;
 }
 
@@ -150,8 +150,8 @@ template <class T>
 bool has_data(T value, Range<T> nodata) {
   const bool outside = (value < nodata.low) | (value > nodata.high);
   if constexpr (std::is_floating_point_v<T>) {
-    constexpr T most = std::numeric_limits<T>::max();
-    return outside & (value >= -most) & (value <= most);  // also false for NaN
+    constexpr T limit = std::numeric_limits<T>::max();
+    return outside & (value >= -limit) & (value <= limit);  // also false for NaN
   } else {
     return outside;
   }
@@ -161,7 +161,7 @@ bool has_data(T value, Range<T> nodata) {
 template <class T, bool kPacked>
 bool overlay(const SampleRow& row, Range<T> nodata, std::byte* out, std::uint8_t* valid) {
   const std::size_t step = kPacked ? sizeof(T) : row.step * sizeof(T);
-  const std::byte* const from = row.samples;
+  const std::byte* const source = row.samples;
   std::size_t holes = 0;
   constexpr std::size_t kChunk = 128;  // small enough to count in bytes, which vectorises better
   for (std::size_t begin = 0; begin < row.cells; begin += kChunk) {
@@ -169,7 +169,7 @@ bool overlay(const SampleRow& row, Range<T> nodata, std::byte* out, std::uint8_t
     std::uint8_t count = 0;
     for (std::size_t i = begin; i < end; ++i) {
       count =
-          static_cast<std::uint8_t>(count + (has_data(load<T>(from + i * step), nodata) ? 0 : 1));
+          static_cast<std::uint8_t>(count + (has_data(load<T>(source + i * step), nodata) ? 0 : 1));
     }
     holes += count;
   }
@@ -177,16 +177,16 @@ bool overlay(const SampleRow& row, Range<T> nodata, std::byte* out, std::uint8_t
   if (holes == 0) {
     std::memset(valid, 1, row.cells);
     if (kPacked) {
-      std::memcpy(out, from, row.cells * sizeof(T));
+      std::memcpy(out, source, row.cells * sizeof(T));
     } else {
       for (std::size_t i = 0; i < row.cells; ++i) {
-        std::memcpy(out + i * sizeof(T), from + i * step, sizeof(T));
+        std::memcpy(out + i * sizeof(T), source + i * step, sizeof(T));
       }
     }
     return true;
   }
   for (std::size_t i = 0; i < row.cells; ++i) {
-    const T value = load<T>(from + i * step);
+    const T value = load<T>(source + i * step);
     const bool good = has_data(value, nodata);
     const T result = good ? value : load<T>(out + i * sizeof(T));
     std::memcpy(out + i * sizeof(T), &result, sizeof(T));

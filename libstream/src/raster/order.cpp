@@ -11,8 +11,8 @@ namespace {
 
 constexpr std::uint64_t kTilesPerSide = 16;
 
-std::uint64_t parts_of(std::uint64_t whole, std::uint64_t part) {
-  return (whole + part - 1) / part;
+std::uint64_t parts_of(std::uint64_t total, std::uint64_t part) {
+  return (total + part - 1) / part;
 }
 
 int sign(int x) { return (x > 0) - (x < 0); }
@@ -70,23 +70,23 @@ class Hilbert {
   std::vector<std::uint32_t> order_;
 };
 
-/// Returns `length` rounded up to complete blocks, but at most `whole`.
-std::uint64_t in_blocks(std::uint64_t length, std::uint64_t block, std::uint64_t whole) {
-  return std::min(parts_of(std::min(length, whole), block) * block, whole);
+/// Returns `length` rounded up to complete blocks, but at most `total`.
+std::uint64_t in_blocks(std::uint64_t length, std::uint64_t block, std::uint64_t total) {
+  return std::min(parts_of(std::min(length, total), block) * block, total);
 }
 
-/// Returns the length of parts of `whole` that are as even as blocks allow, and at most `length`
-/// (complete blocks, or `whole`).
-std::uint64_t evened(std::uint64_t length, std::uint64_t block, std::uint64_t whole) {
-  return in_blocks(parts_of(whole, parts_of(whole, length)), block, whole);
+/// Returns the length of parts of `total` that are as even as blocks allow, and at most `length`
+/// (complete blocks, or `total`).
+std::uint64_t even_length(std::uint64_t length, std::uint64_t block, std::uint64_t total) {
+  return in_blocks(parts_of(total, parts_of(total, length)), block, total);
 }
 
 }  // namespace
 
 GridSize ground_square(std::uint64_t cells, double aspect) {
   const double side = std::sqrt(static_cast<double>(cells) * aspect);
-  const double most = static_cast<double>(cells);
-  const auto columns = static_cast<std::uint64_t>(std::clamp(side, 1.0, most));
+  const double max_side = static_cast<double>(cells);
+  const auto columns = static_cast<std::uint64_t>(std::clamp(side, 1.0, max_side));
   return {columns, std::max<std::uint64_t>(cells / columns, 1)};
 }
 
@@ -111,22 +111,23 @@ std::vector<std::uint32_t> hilbert_order(std::uint32_t columns, std::uint32_t ro
 GridSize window_size(const RasterInfo& info, std::uint64_t cells, std::uint64_t tile_cells,
                      double aspect) {
   const GridSize tile = ground_square(tile_cells, aspect);
-  const std::uint64_t wanted_columns =
+  const std::uint64_t min_columns =
       in_blocks(kTilesPerSide * tile.columns, info.block_columns, info.columns);
-  const std::uint64_t wanted_rows =
-      in_blocks(kTilesPerSide * tile.rows, info.block_rows, info.rows);
+  const std::uint64_t min_rows = in_blocks(kTilesPerSide * tile.rows, info.block_rows, info.rows);
   // As wide as memory allows, in complete blocks.
-  if (const std::uint64_t most = cells / wanted_rows; most >= wanted_columns) {
-    const std::uint64_t columns =
-        most >= info.columns ? info.columns : most / info.block_columns * info.block_columns;
-    return {evened(columns, info.block_columns, info.columns),
-            evened(wanted_rows, info.block_rows, info.rows)};
+  if (const std::uint64_t max_columns = cells / min_rows; max_columns >= min_columns) {
+    const std::uint64_t columns = max_columns >= info.columns
+                                      ? info.columns
+                                      : max_columns / info.block_columns * info.block_columns;
+    return {even_length(columns, info.block_columns, info.columns),
+            even_length(min_rows, info.block_rows, info.rows)};
   }
   // Even with the minimum width, memory is too small for the wanted rows.
-  const std::uint64_t columns = std::min(wanted_columns, std::max<std::uint64_t>(cells, 1));
-  const std::uint64_t most = std::max<std::uint64_t>(cells / columns, 1);
-  if (most < info.block_rows) return {columns, most};
-  return {columns, evened(most / info.block_rows * info.block_rows, info.block_rows, info.rows)};
+  const std::uint64_t columns = std::min(min_columns, std::max<std::uint64_t>(cells, 1));
+  const std::uint64_t max_rows = std::max<std::uint64_t>(cells / columns, 1);
+  if (max_rows < info.block_rows) return {columns, max_rows};
+  return {columns,
+          even_length(max_rows / info.block_rows * info.block_rows, info.block_rows, info.rows)};
 }
 
 }  // namespace terrace::stream

@@ -20,8 +20,8 @@ namespace terrace::stream {
 namespace {
 
 /// Maximum number of tiles in a window, which bounds the memory of their list.
-constexpr std::uint64_t kMostTiles = 1u << 18;
-constexpr std::size_t kMostBlockPoints = std::size_t{1} << 40;
+constexpr std::uint64_t kMaxTiles = 1u << 18;
+constexpr std::size_t kMaxBlockPoints = std::size_t{1} << 40;
 
 double transform_aspect(const WorldTransform& world) {
   const auto& m = world.xy;
@@ -92,20 +92,20 @@ CellWindow cells_in(const SourceInfo& info, const std::optional<Box3>& region) {
 
 std::uint64_t cells_of(const CellWindow& window) { return window.columns * window.rows; }
 
-/// Returns the length of the part of a crop that begins at cell `from`, at most `size` cells. The
+/// Returns the length of the part of a crop that begins at cell `first`, at most `size` cells. The
 /// part ends with a block of the file if possible, so that blocks are decoded once.
-std::uint64_t part_length(std::uint64_t from, std::uint64_t size, std::uint64_t whole,
+std::uint64_t part_length(std::uint64_t first, std::uint64_t size, std::uint64_t total,
                           std::uint64_t crop_begin, std::uint64_t block) {
-  if (size >= whole - from) return whole - from;
-  const std::uint64_t begin = crop_begin + from;
+  if (size >= total - first) return total - first;
+  const std::uint64_t begin = crop_begin + first;
   const std::uint64_t end = (begin + size) / block * block;
   return size < block || end <= begin ? size : end - begin;
 }
 
 /// Throws Error if the cells are more than a store can hold; reading them would never end.
 void check_count(const SourceInfo& info, const CellWindow& crop) {
-  constexpr std::uint64_t kMostReadableCells = std::uint64_t{1} << 48;
-  if (cells_of(crop) <= kMostReadableCells) return;
+  constexpr std::uint64_t kMaxReadableCells = std::uint64_t{1} << 48;
+  if (cells_of(crop) <= kMaxReadableCells) return;
   throw Error(info.files.front(), fmt::format("has {} x {} cells, more than the limit of 2^48",
                                               crop.columns, crop.rows))
       .remedy(message("select a part ({region}, gdal_translate -srcwin), or correct its size"));
@@ -118,7 +118,7 @@ class RasterSource final : public PointSource {
         info_(source_info(raster_->info(), options)),
         crop_(cells_in(info_, options.selection.region)),
         stop_(options.stop),
-        block_points_(std::clamp<std::size_t>(options.block_points, 1, kMostBlockPoints)) {
+        block_points_(std::clamp<std::size_t>(options.block_points, 1, kMaxBlockPoints)) {
     check_count(info_, crop_);
     progress_.excluded = *info_.points - cells_of(crop_);
     if (cells_of(crop_) == 0) {
@@ -160,7 +160,7 @@ class RasterSource final : public PointSource {
   void lay_out(double cell_aspect, std::uint64_t bytes) {
     aspect_ = cell_aspect;
     const std::size_t cell_bytes = size_of(raster_->info().sample.type) + 1;
-    const std::uint64_t cells = std::min(bytes / cell_bytes, kMostTiles * block_points_ / 2);
+    const std::uint64_t cells = std::min(bytes / cell_bytes, kMaxTiles * block_points_ / 2);
     RasterInfo crop = raster_->info();
     crop.columns = info_.columns;
     crop.rows = info_.rows;
@@ -251,8 +251,8 @@ class RasterSource final : public PointSource {
       const T* const samples = reinterpret_cast<const T*>(samples_.data()) + cell;
       const std::uint8_t* const valid = valid_.data() + cell;
       const double row = static_cast<double>(window_.row + r);
-      const bool whole = std::memchr(valid, 0, width) == nullptr;
-      if (whole) {
+      const bool all_valid = std::memchr(valid, 0, width) == nullptr;
+      if (all_valid) {
         for (std::size_t i = 0; i < width; ++i) {
           out[i] = {first_column + static_cast<double>(i), row, static_cast<double>(samples[i])};
         }

@@ -21,8 +21,8 @@ class JsonParser {
   }
 
  private:
-  static constexpr std::size_t kMostValues = std::size_t{1} << 20;
-  static constexpr unsigned kMostLevels = 16;
+  static constexpr std::size_t kMaxValues = std::size_t{1} << 20;
+  static constexpr unsigned kMaxLevels = 16;
 
   [[noreturn]] void fail(const char* cause) const {
     throw Damage("byte " + std::to_string(at_) + ": " + cause);
@@ -52,7 +52,7 @@ class JsonParser {
   }
 
   JsonValue value(unsigned level) {
-    if (++values_ > kMostValues) fail("there are too many values");
+    if (++values_ > kMaxValues) fail("there are too many values");
     JsonValue json;
     skip_blanks();
     const std::size_t begin = at_;
@@ -62,7 +62,7 @@ class JsonParser {
       return json;
     }
     if (next() == '{' || next() == '[') {
-      if (level == kMostLevels) fail("there are too many levels");
+      if (level == kMaxLevels) fail("there are too many levels");
       read_items(json, level + 1);
       return json;
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <initializer_list>
 
+#include "io/text.hpp"
 #include "store/codec/bytes.hpp"
 #include "store/codec/layout.hpp"
 #include "store/json.hpp"
@@ -104,7 +105,7 @@ Manifest from_json(const JsonValue& json) {
   for (const JsonValue& channel : json.at("attributes").items()) {
     m.schema.attributes.push_back(channel_of(channel));
   }
-  if (m.schema.attributes.size() > kMostAttributes) throw Damage("there are too many attributes");
+  if (m.schema.attributes.size() > kMaxAttributes) throw Damage("there are too many attributes");
   const auto& world = items(json.at("world"), 6, "the world transform is not six numbers");
   for (std::size_t i = 0; i < 6; ++i) m.schema.world.xy[i] = number(world[i]);
   m.schema.crs = crs_of(json.at("crs"));
@@ -139,7 +140,7 @@ Manifest from_json(const JsonValue& json) {
 void check_counts(const Manifest& m) {
   if (m.levels.empty() || m.levels.size() > 255) throw Damage("the number of levels is impossible");
   if (m.levels[0].points != m.points) throw Damage("the points of level 0 are not all points");
-  if (m.points > kMostStorePoints || m.schema.nodata > kMostStorePoints) {
+  if (m.points > kMaxStorePoints || m.schema.nodata > kMaxStorePoints) {
     throw Damage("the store has more points than possible");
   }
   if (m.points == 0 && (m.levels.size() > 1 || m.levels[0].data.bytes > 0)) {
@@ -156,10 +157,10 @@ void check_counts(const Manifest& m) {
     if (level.clusters != (top ? 1 : above)) {
       throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
     }
-    if (level.clusters / kMostPageClusters > level.index.bytes / kLeastPageBytes) {
+    if (level.clusters / kMaxPageClusters > level.index.bytes / kMinPageBytes) {
       throw Damage("level " + std::to_string(l) + " has more clusters than its index can hold");
     }
-    if (level.points / kMostPoints > level.clusters) {
+    if (level.points / kMaxPoints > level.clusters) {
       throw Damage("level " + std::to_string(l) + " has more points than its clusters can hold");
     }
   }
@@ -177,7 +178,10 @@ void check_places(const Manifest& m) {
       !std::isfinite(xy[5])) {
     throw Damage("the world transform cannot be inverted");
   }
-  if (m.bounds.empty() != (m.points == 0)) throw Damage("the bounds do not fit the points");
+  if (m.bounds.empty() != (m.points == 0)) {
+    throw Damage(m.points == 0 ? "a store without points has bounds"
+                               : "the bounds are missing or empty");
+  }
   for (std::size_t axis = 0; axis < 3 && m.points > 0; ++axis) {
     if (!std::isfinite(m.bounds.min[axis]) || !std::isfinite(m.bounds.max[axis])) {
       throw Damage("the bounds are not finite");
@@ -192,7 +196,7 @@ void check_places(const Manifest& m) {
   }
   const std::array<std::uint64_t, 2> cells{m.schema.columns, m.schema.rows};
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    if (cells[axis] < 1 || cells[axis] > kMostColumns) {
+    if (cells[axis] < 1 || cells[axis] > kMaxColumns) {
       throw Damage("the number of columns or rows is impossible");
     }
     const double low = m.bounds.min[axis], high = m.bounds.max[axis];
@@ -239,8 +243,10 @@ std::string hexadecimal(std::uint32_t value) {
 }
 
 std::string read_manifest(const ByteSource& file) {
-  if (file.size() > kMostManifestBytes) {
-    throw Error(file.name(), "the file is too large");
+  if (file.size() > kMaxManifestBytes) {
+    throw Error(file.name(), "the manifest has " + counted(file.size(), "byte") +
+                                 ", more than the limit of " + std::to_string(kMaxManifestBytes))
+        .remedy("restore the file or rebuild the store");
   }
   std::string text(static_cast<std::size_t>(file.size()), '\0');
   file.read(0, std::as_writable_bytes(std::span(text)));

@@ -14,12 +14,12 @@
 
 namespace terrace::stream::store {
 
-inline constexpr std::uint64_t kMostManifestBytes = 64u << 20;
-inline constexpr std::size_t kMostAttributes = 4096;
+inline constexpr std::uint64_t kMaxManifestBytes = 64u << 20;
+inline constexpr std::size_t kMaxAttributes = 4096;
 /// Limits of points, cells without data, columns and rows, so that their sums and products, and
 /// that of points and the bytes of a point, fit into 64 bits.
-inline constexpr std::uint64_t kMostStorePoints = std::uint64_t{1} << 48;
-inline constexpr std::uint64_t kMostColumns = std::uint64_t{1} << 31;
+inline constexpr std::uint64_t kMaxStorePoints = std::uint64_t{1} << 48;
+inline constexpr std::uint64_t kMaxColumns = std::uint64_t{1} << 31;
 
 /// The version of the format.
 inline constexpr int kVersion = 1;

@@ -54,7 +54,7 @@ struct Overlay::Impl {
   }
 
   void read_header(const Store& store);
-  void read_directory(std::uint64_t count, std::uint64_t header_end, std::uint64_t most_values);
+  void read_directory(std::uint64_t count, std::uint64_t header_end, std::uint64_t max_values);
   void load_page(std::size_t number);
 };
 
@@ -77,12 +77,12 @@ void Overlay::Impl::read_header(const Store& store) {
           .remedy("update");
     }
     ByteReader in(ByteView(bytes).subspan(kOverlayMarkBytes + 4));
-    const auto made_for = in.get<std::uint32_t>();
+    const auto store_checksum = in.get<std::uint32_t>();
     const auto count = in.get<std::uint64_t>();
     pages_end = in.get<std::uint64_t>();
     const auto name = in.get<std::uint32_t>();
     const std::uint64_t end = kOverlayHeadBytes + std::uint64_t{name} + 4;
-    if (name > kMostOverlayNameBytes || end > file->size()) {
+    if (name > kMaxOverlayNameBytes || end > file->size()) {
       throw Damage("the header has an impossible size");
     }
     Bytes rest(name + std::size_t{4});
@@ -92,11 +92,11 @@ void Overlay::Impl::read_header(const Store& store) {
       throw Damage("the checksum of the header is wrong");
     }
     channel.assign(rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(name));
-    if (made_for != store.checksum()) {
-      throw Error(
-          file->name(),
-          fmt::format("was made for the store with the checksum {}, {} has {}",
-                      hexadecimal(made_for), store.path().string(), hexadecimal(store.checksum())))
+    if (store_checksum != store.checksum()) {
+      throw Error(file->name(),
+                  fmt::format("was made for the store with the checksum {}, {} has {}",
+                              hexadecimal(store_checksum), store.path().string(),
+                              hexadecimal(store.checksum())))
           .remedy("give the store that it was made for, or write the overlay again");
     }
     read_directory(count, end, store.points());
@@ -106,7 +106,7 @@ void Overlay::Impl::read_header(const Store& store) {
 }
 
 void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end,
-                                   std::uint64_t most_values) {
+                                   std::uint64_t max_values) {
   if (pages_end < header_end || pages_end > file->size() - 4 ||
       count != (file->size() - 4 - pages_end) / kOverlayEntryBytes ||
       count * kOverlayEntryBytes != file->size() - 4 - pages_end) {
@@ -117,8 +117,8 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
     std::uint32_t checksum = 0;
     Bytes bytes;
     std::uint64_t at = pages_end;
-    for (std::uint64_t left = count; left > 0;) {
-      const std::uint64_t piece = std::min<std::uint64_t>(left, 4096);
+    for (std::uint64_t remaining = count; remaining > 0;) {
+      const std::uint64_t piece = std::min<std::uint64_t>(remaining, 4096);
       bytes.resize(piece * kOverlayEntryBytes);
       file->read(at, std::as_writable_bytes(std::span(bytes)));
       checksum = crc32(checksum, bytes.data(), bytes.size());
@@ -129,20 +129,20 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
         entry.offset = in.get<std::uint64_t>();
         entry.values = in.get<std::uint32_t>();
         const bool first = pages.empty();
-        if (entry.values == 0 || entry.values > most_values - values) {
+        if (entry.values == 0 || entry.values > max_values - values) {
           throw Damage("a page has an impossible number of values");
         }
         if (entry.offset >= pages_end ||
             (first ? entry.offset != header_end
                    : entry.offset <= pages.back().offset ||
                          entry.first_cluster <= pages.back().first_cluster)) {
-          throw Damage("the pages do not follow one another");
+          throw Damage("the pages are not in ascending order");
         }
         values += entry.values;
         pages.push_back(entry);
       }
       at += bytes.size();
-      left -= piece;
+      remaining -= piece;
     }
     bytes.resize(4);
     file->read(at, std::as_writable_bytes(std::span(bytes)));
@@ -150,7 +150,7 @@ void Overlay::Impl::read_directory(std::uint64_t count, std::uint64_t header_end
       throw Damage("the checksum of the directory is wrong");
     }
     if (pages.empty() && pages_end != header_end) {
-      throw Damage("there are bytes but no pages");
+      throw Damage("an overlay without pages has bytes between its header and its directory");
     }
   } catch (const Damage& damage) {
     throw damaged(pages_end, damage.what());
@@ -164,7 +164,7 @@ void Overlay::Impl::load_page(std::size_t number) {
   const bool last = number + 1 == pages.size();
   const std::uint64_t size = (last ? pages_end : pages[number + 1].offset) - entry.offset;
   try {
-    if (size > most_overlay_page_bytes(entry.values)) {
+    if (size > max_overlay_page_bytes(entry.values)) {
       throw Damage("the page is too long for its values");
     }
     Bytes bytes(size);

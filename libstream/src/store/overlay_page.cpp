@@ -52,7 +52,7 @@ void decode_overlay_page(ByteView bytes, std::uint64_t values, std::span<const L
   ByteReader in(bytes.first(bytes.size() - 4));
   const auto clusters = in.get<std::uint32_t>();
   // Every value takes nine bytes, one of them for its index, and every cluster has a value.
-  if (values > in.left() / 9 || clusters > values) {
+  if (values > in.remaining() / 9 || clusters > values) {
     throw Damage("the page is too short for its values");
   }
   page.clusters.reserve(clusters);
@@ -84,7 +84,7 @@ void decode_overlay_page(ByteView bytes, std::uint64_t values, std::span<const L
       next += gap + 1;
     }
   }
-  if (page.values.size() != values || in.left() != 8 * values) {
+  if (page.values.size() != values || in.remaining() != 8 * values) {
     throw Damage("the page does not have the number of values stated in the directory");
   }
   for (OverlayValue& value : page.values) {

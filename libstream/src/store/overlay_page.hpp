@@ -16,7 +16,7 @@ inline constexpr std::uint32_t kOverlayVersion = 1;
 /// Bytes of the mark, version, checksum of the store, pages, offset of the directory, length of the
 /// name.
 inline constexpr std::size_t kOverlayHeadBytes = kOverlayMarkBytes + 4 + 4 + 8 + 8 + 4;
-inline constexpr std::size_t kMostOverlayNameBytes = 65535;
+inline constexpr std::size_t kMaxOverlayNameBytes = 65535;
 /// A page ends with the cluster that brings it to this many values.
 inline constexpr std::size_t kOverlayPageValues = 4096;
 /// Bytes of a page's entry in the directory: first cluster, offset, number of values.
@@ -24,7 +24,7 @@ inline constexpr std::size_t kOverlayEntryBytes = 8 + 8 + 4;
 
 /// Returns the maximum bytes of a page of this many values, which it has if each is in a separate
 /// cluster.
-constexpr std::uint64_t most_overlay_page_bytes(std::uint64_t values) {
+constexpr std::uint64_t max_overlay_page_bytes(std::uint64_t values) {
   return 4 + values * (10 + 5 + 5 + 8) + 4;
 }
 

@@ -31,7 +31,7 @@ struct OverlayWriter::Impl {
   Bytes directory{};
   std::uint64_t last_cluster = 0;
   std::uint32_t last_index = 0;
-  std::optional<ClusterId> looked_up{};  // the cluster to which `members` refers
+  std::optional<ClusterId> current_cluster{};  // the cluster to which `members` refers
   std::uint32_t members = 0;
 
   [[nodiscard]] Bytes header() const {
@@ -62,19 +62,19 @@ struct OverlayWriter::Impl {
   }
 
   void look_up(ClusterId cluster, std::uint32_t index) {
-    if (looked_up == cluster) return;
+    if (current_cluster == cluster) return;
     const unsigned level = level_of(cluster);
     if (level > store.top() || ordinal_of(cluster) >= store.levels()[level].clusters) {
       refuse(cluster, index, "the store has no such cluster");
     }
     members = store.record(cluster).points;
-    looked_up = cluster;
+    current_cluster = cluster;
   }
 };
 
 OverlayWriter::OverlayWriter(const std::filesystem::path& path, const Store& store,
                              const std::string& channel, Naming replace) {
-  if (channel.size() > kMostOverlayNameBytes) {
+  if (channel.size() > kMaxOverlayNameBytes) {
     throw std::invalid_argument("the name of an overlay's channel has " +
                                 counted(channel.size(), "byte") + ", more than the limit of 65535");
   }

@@ -76,7 +76,7 @@ class Verification {
     sums_.resize(levels_.size());
     for (std::size_t l = 0; l < levels_.size(); ++l) {
       sums_[l].headed.resize(memory_size(levels_[l]->clusters()));
-      most_looked_into_ += levels_.size() * levels_[l]->clusters();
+      max_clusters_read_ += levels_.size() * levels_[l]->clusters();
     }
     check_files();
     for (unsigned l = 0; l < levels_.size(); ++l) check_level(l);
@@ -103,8 +103,8 @@ class Verification {
     }
   };
   /// State of a thread that reads clusters.
-  struct Reading {
-    explicit Reading(const LevelReader& level) : ahead(level.data()) {}
+  struct ReaderState {
+    explicit ReaderState(const LevelReader& level) : ahead(level.data()) {}
 
     SequentialBytes ahead;
     ClusterDecoder decoder;
@@ -179,15 +179,15 @@ class Verification {
   /// another.
   void check_level(unsigned l) {
     const LevelReader& level = *levels_[l];
-    std::vector<Reading> readings;
-    for (unsigned worker = 0; worker < team_.threads(); ++worker) readings.emplace_back(level);
+    std::vector<ReaderState> readers;
+    for (unsigned worker = 0; worker < team_.threads(); ++worker) readers.emplace_back(level);
     std::vector<Page> pages(l == 0 ? std::size_t{kPagesPerThread} * team_.threads() : 1);
     std::uint64_t data_end = 0;
     for (std::uint64_t first = 0; first < level.pages(); first += pages.size()) {
       const std::uint64_t count = std::min<std::uint64_t>(pages.size(), level.pages() - first);
       team_.run(static_cast<std::size_t>(count), [&](std::size_t i, std::size_t worker) {
         pages[i] = {};
-        check_page(l, first + i, readings[worker], pages[i]);
+        check_page(l, first + i, readers[worker], pages[i]);
       });
       for (std::uint64_t i = 0; i < count; ++i) add_page(l, first + i, pages[i], data_end);
     }
@@ -222,7 +222,7 @@ class Verification {
     height_sum_ += page.height_sum;
   }
 
-  void check_page(unsigned l, std::uint64_t number, Reading& reading, Page& page) {
+  void check_page(unsigned l, std::uint64_t number, ReaderState& reader, Page& page) {
     check_stop();
     const LevelReader& level = *levels_[l];
     std::uint64_t page_offset = 0;
@@ -239,27 +239,27 @@ class Verification {
       const std::uint64_t offset = page.index->offset(i);
       try {
         const Entry entry = level.entry(*page.index, ordinal);
-        level.read(ordinal, entry, offset, reading.ahead, reading.decoder, reading.points);
-        check_cluster(l, ordinal, record_of(entry, l, offset, level.top()), reading.points, page);
-        check_ranges(l, ordinal, offset, reading, page);
+        level.read(ordinal, entry, offset, reader.ahead, reader.decoder, reader.points);
+        check_cluster(l, ordinal, record_of(entry, l, offset, level.top()), reader.points, page);
+        check_ranges(l, ordinal, offset, reader, page);
       } catch (const Error& error) {
         page.problem(level.data().name(), offset, error.what());
       }
     }
   }
 
-  void check_ranges(unsigned l, std::uint64_t ordinal, std::uint64_t offset, Reading& reading,
+  void check_ranges(unsigned l, std::uint64_t ordinal, std::uint64_t offset, ReaderState& reader,
                     Page& page) const {
     const LevelReader& level = *levels_[l];
-    const ClusterPoints& points = reading.points;
-    level.ranges(ordinal, reading.ranges);
+    const ClusterPoints& points = reader.points;
+    level.ranges(ordinal, reader.ranges);
     const std::size_t stride = level.layout().payload_size;
     std::size_t at = 0;
-    for (std::size_t a = 0; a < reading.ranges.size(); ++a) {
+    for (std::size_t a = 0; a < reader.ranges.size(); ++a) {
       const ScalarType type = level.layout().attributes[a];
       const auto inside = [&](const std::byte* record) {
         const std::uint64_t key = key_of(type, record + at);
-        return reading.ranges[a].low <= key && key <= reading.ranges[a].high;
+        return reader.ranges[a].low <= key && key <= reader.ranges[a].high;
       };
       bool all = !points.has_representative || inside(points.representative_payload.data());
       for (std::size_t i = 0; i < points.size(); ++i) {
@@ -286,13 +286,13 @@ class Verification {
     for (const Point3& p : points.positions) inside &= summary.box.contains(p);
     if (points.has_representative) inside &= summary.box.contains(points.representative);
     if (!inside) problem("a point is outside its box");
-    Box3 within = summary.box;
+    Box3 clipped = summary.box;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      within.min[axis] = std::max(within.min[axis], manifest_.bounds.min[axis]);
-      within.max[axis] = std::min(within.max[axis], manifest_.bounds.max[axis]);
+      clipped.min[axis] = std::max(clipped.min[axis], manifest_.bounds.min[axis]);
+      clipped.max[axis] = std::min(clipped.max[axis], manifest_.bounds.max[axis]);
     }
     if (points.size() + points.has_representative > 0 &&
-        !holds(levels_[l]->page_box(ordinal), within)) {
+        !holds(levels_[l]->page_box(ordinal), clipped)) {
       problem("the box exceeds its page's");
     }
     if (!(summary.error >= 0)) {
@@ -342,7 +342,7 @@ class Verification {
       problem("the descendants do not add up");
     }
     if (!std::all_of(uncertain.begin(), uncertain.end(), [&](std::uint64_t child) {
-          return descendants_lie_in(summary.box, l - 1, child);
+          return contains_descendants(summary.box, l - 1, child);
         })) {
       problem("a cluster below exceeds its box");
     }
@@ -351,14 +351,14 @@ class Verification {
   /// Checks the points of the few clusters whose boxes were enlarged beyond that of the cluster
   /// above. Children have not been checked yet and may form cycles, so for each level above at most
   /// as many clusters are read as the store has.
-  bool descendants_lie_in(const Box3& box, unsigned l, std::uint64_t ordinal) {
-    if (++looked_into_ > most_looked_into_) return false;
+  bool contains_descendants(const Box3& box, unsigned l, std::uint64_t ordinal) {
+    if (++clusters_read_ > max_clusters_read_) return false;
     ClusterPoints points;
     store_.read(cluster_id(l, ordinal), points);
     const auto inside = [&](const Point3& p, const std::uint64_t* children) {
       if (!box.contains(p)) return false;
       return l == 0 || holds(box, store_.record(cluster_id(l - 1, children[l - 1])).summary.box) ||
-             descendants_lie_in(box, l - 1, children[l - 1]);
+             contains_descendants(box, l - 1, children[l - 1]);
     };
     if (!inside(points.representative, points.representative_children.data())) return false;
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -405,7 +405,7 @@ class Verification {
   base::ThreadTeam team_;
   Box3 bounds_;
   double height_sum_ = 0.0;
-  std::uint64_t looked_into_ = 0, most_looked_into_ = 0;
+  std::uint64_t clusters_read_ = 0, max_clusters_read_ = 0;
   bool good_ = true;
 };
 

@@ -32,7 +32,7 @@ class FileLock {
  private:
   std::filesystem::path path_;
   int descriptor_ = -1;
-  bool exclusive_ = false, made_ = false;
+  bool exclusive_ = false, created_ = false;
 };
 
 }  // namespace terrace::stream

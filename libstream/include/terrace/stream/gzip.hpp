@@ -18,10 +18,10 @@ bool is_gzip(std::span<const std::byte> bytes);
 /// 12 (small).
 std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level = 6);
 
-/// Decompresses. most: the maximum size; data that claims more is refused before it is
+/// Decompresses. max_bytes: the maximum size; data that claims more is refused before it is
 /// decompressed. name: for messages. Throws: Error if `bytes` are damaged, not gzip, or decompress
-/// to more than `most` bytes.
-std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t most,
+/// to more than `max_bytes` bytes.
+std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t max_bytes,
                               const std::string& name);
 
 }  // namespace terrace::stream

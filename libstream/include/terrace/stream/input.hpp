@@ -42,9 +42,9 @@ class Input {
 
   /// The unread bytes in memory. Valid until the next fill() or skip().
   [[nodiscard]] std::string_view window() const { return {buffer_.data() + begin_, end_ - begin_}; }
-  /// Reads until the window has `wanted` bytes or the input ends; returns the window. The window
+  /// Reads until the window has `min_bytes` bytes or the input ends; returns the window. The window
   /// grows to the requested size, so callers must bound it. Throws: Error, Stopped.
-  std::string_view fill(std::size_t wanted);
+  std::string_view fill(std::size_t min_bytes);
   /// Moves past the first `count` bytes of the window.
   void consume(std::size_t count);
   /// Moves past `count` bytes, read or not; false if the input ends before that. Throws: Error,
@@ -68,7 +68,7 @@ class Input {
   std::string name_;
   std::unique_ptr<Descriptor> descriptor_;
   std::unique_ptr<GzipStream> gzip_;
-  bool looked_at_ = false;  ///< whether it was checked for gzip
+  bool gzip_checked_ = false;  ///< whether it was checked for gzip
   bool ended_ = false;
   std::optional<std::uint64_t> size_;
   std::uint64_t offset_ = 0;

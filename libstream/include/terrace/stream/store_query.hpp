@@ -158,7 +158,7 @@ class StoreQuery {
 
   /// Nodes up to a total size, most recently used first.
   struct Cache {
-    std::uint64_t most_bytes = 0, held_bytes = 0;
+    std::uint64_t max_bytes = 0, held_bytes = 0;
     Nodes nodes{};
     std::unordered_map<std::uint64_t, Nodes::iterator> by_id{};
 
@@ -173,11 +173,11 @@ class StoreQuery {
   void fill(Node& node, ClusterId id);
   /// Throws Error if a traversal has opened more clusters than exist. Each cluster has one head, so
   /// that only happens in a damaged store, where the traversal could otherwise run almost forever.
-  void check_looked(std::uint64_t clusters) const;
+  void check_traversal(std::uint64_t clusters) const;
 
   const Store& store_;
   std::uint64_t clusters_ = 0;  ///< number of clusters on all levels
-  Node root_, passing_;         ///< passing_: the last node that is not cached
+  Node root_, uncached_;        ///< uncached_: the last node that is not cached
   Cache leaves_, inner_;
   ClusterPoints points_;
   std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
@@ -241,8 +241,8 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
   };
   if (level > store_.top()) return;
   look_into(root_);
-  for (std::uint64_t looked = 0; !open_.empty(); ++looked) {
-    check_looked(looked);
+  for (std::uint64_t opened = 0; !open_.empty(); ++opened) {
+    check_traversal(opened);
     std::pop_heap(open_.begin(), open_.end(), later);
     const Open next = open_.back();
     open_.pop_back();
@@ -261,8 +261,8 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
     return;
   }
   crossing_.assign(1, root_.id);
-  for (std::uint64_t looked = 0; !crossing_.empty(); ++looked) {
-    check_looked(looked);
+  for (std::uint64_t opened = 0; !crossing_.empty(); ++opened) {
+    check_traversal(opened);
     const Node& at = node(crossing_.back());
     crossing_.pop_back();
     for (std::size_t i = 0; i < at.heads(); ++i) {

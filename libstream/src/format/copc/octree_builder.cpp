@@ -99,17 +99,17 @@ std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t at
   // Unfinished nodes hold copies of the records in memory, in vectors with spare capacity, and wait
   // to be written. A node, its child and the bytes being written for it come on top.
   return kBuckets + at_once * (3 * kept + record_bytes) +
-         kChildren * kMostPromoted * (2 * kept + record_bytes);
+         kChildren * kMaxPromoted * (2 * kept + record_bytes);
 }
 
 OctreeBuilder::OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
                              std::size_t record_bytes, std::size_t at_once,
-                             std::uint64_t most_together, unsigned threads)
+                             std::uint64_t max_together, unsigned threads)
     : name_(name),
       record_bytes_(record_bytes),
       numbered_bytes_(record_bytes + sizeof(std::uint64_t)),
       at_once_(std::max(at_once, kLeafPoints)),
-      most_together_(std::max<std::uint64_t>(most_together, at_once_)),
+      max_together_(std::max<std::uint64_t>(max_together, at_once_)),
       file_(name, folder, numbered_bytes_),
       numbered_(numbered_bytes_),
       team_(threads) {}
@@ -218,11 +218,11 @@ OctreeBuilder::NodePoints OctreeBuilder::load(const OctreeNode& node, Bucket buc
 
 OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node, Bucket bucket) {
   const std::uint64_t count = file_.records(bucket);
-  if (count > most_together_) {
+  if (count > max_together_) {
     throw Error(
         name_,
         fmt::format("{} are in one place, more than a node of COPC can have in this memory: {}",
-                    counted(count, "point"), most_together_))
+                    counted(count, "point"), max_together_))
         .remedy(message("raise {memory_bytes}, leave them out, or write LAZ"));
   }
   NodePoints points = load(node, std::move(bucket));
@@ -353,8 +353,8 @@ void OctreeBuilder::promote(NodePoints child, const Write& write, const Add& add
       chosen.back() = i;
     }
   }
-  if (chosen.size() > kMostPromoted) {
-    const auto end = chosen.begin() + static_cast<std::ptrdiff_t>(kMostPromoted);
+  if (chosen.size() > kMaxPromoted) {
+    const auto end = chosen.begin() + static_cast<std::ptrdiff_t>(kMaxPromoted);
     std::nth_element(chosen.begin(), end, chosen.end(),
                      [&](std::size_t a, std::size_t b) { return items[a].goes_before(items[b]); });
     chosen.erase(end, chosen.end());

@@ -35,7 +35,7 @@ class OctreeBuilder {
   static constexpr std::size_t kLeafPoints = std::size_t{1} << 15;
   /// Upper limit of the points that a child promotes to its parent, which gets at most eight times
   /// as many. Surfaces promote fewer; only clouds that fill space reach the limit.
-  static constexpr std::size_t kMostPromoted = std::size_t{1} << 14;
+  static constexpr std::size_t kMaxPromoted = std::size_t{1} << 14;
 
   /// Upper bound of the memory held, in bytes, with `at_once` records in memory.
   static std::uint64_t bytes_with(std::size_t record_bytes, std::size_t at_once);
@@ -46,16 +46,16 @@ class OctreeBuilder {
 
   /// Records begin with x, y and z as int32. name: of the output, for messages. folder: for the
   /// temporary file. at_once: the number of records in memory, at least kLeafPoints.
-  /// most_together: limit of the points in one of the deepest nodes. threads: how many work on the
+  /// max_together: limit of the points in one of the deepest nodes. threads: how many work on the
   /// records in memory. Results depend neither on at_once nor on threads.
   OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                std::size_t record_bytes, std::size_t at_once, std::uint64_t most_together,
+                std::size_t record_bytes, std::size_t at_once, std::uint64_t max_together,
                 unsigned threads = 1);
 
   /// Throws: Error, mostly if the disk is full.
   void add(std::span<const std::byte> records);
   /// Builds the nodes. Called once, after all points. The cube of `octree` must enclose them.
-  /// Throws: Error if one of the deepest nodes has more than `most_together` points; what `write`
+  /// Throws: Error if one of the deepest nodes has more than `max_together` points; what `write`
   /// throws.
   void build(const Octree& octree, const Lattice& lattice, const Write& write);
 
@@ -89,7 +89,7 @@ class OctreeBuilder {
 
   std::string name_;
   std::size_t record_bytes_, numbered_bytes_, at_once_;
-  std::uint64_t most_together_;
+  std::uint64_t max_together_;
   BucketFile file_;
   Bucket all_;
   std::uint64_t points_ = 0;

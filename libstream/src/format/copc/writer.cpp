@@ -71,15 +71,15 @@ struct Shares {
   /// Upper bound of the memory held.
   [[nodiscard]] std::uint64_t bytes(std::size_t record_bytes) const {
     // Records and their coded bytes, of each thread and of a node that waits.
-    const std::uint64_t node = 8 * OctreeBuilder::kMostPromoted * record_bytes * 8 / 5;
+    const std::uint64_t node = 8 * OctreeBuilder::kMaxPromoted * record_bytes * 8 / 5;
     return OctreeBuilder::bytes_with(record_bytes, at_once) +
            (threads > 1 ? threads + 1 : 1) * node;
   }
 };
 
 Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t record_bytes) {
-  constexpr std::size_t kMostAtOnce = std::size_t{1} << 19;
-  constexpr std::uint64_t kMostTogether = 1u << 24;
+  constexpr std::size_t kMaxAtOnce = std::size_t{1} << 19;
+  constexpr std::uint64_t kMaxTogether = 1u << 24;
   Shares shares;
   for (shares.threads = std::max(1u, threads);
        shares.threads > 1 && shares.bytes(record_bytes) > memory_bytes; --shares.threads) {
@@ -89,8 +89,8 @@ Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t r
   const std::uint64_t room = memory_bytes - std::min(memory_bytes, fixed);
   const std::uint64_t each =
       OctreeBuilder::bytes_with(record_bytes, 1) - OctreeBuilder::bytes_with(record_bytes, 0);
-  shares.together = std::min(kMostTogether, shares.at_once + room / (each + 3 * record_bytes));
-  shares.at_once += std::min(kMostAtOnce - shares.at_once, room / each);
+  shares.together = std::min(kMaxTogether, shares.at_once + room / (each + 3 * record_bytes));
+  shares.at_once += std::min(kMaxAtOnce - shares.at_once, room / each);
   return shares;
 }
 

@@ -95,15 +95,15 @@ class EptMetadataReader {
   using Json = nlohmann::json;
 
   /// A schema takes about a hundred bytes per dimension, WKT a few kilobytes.
-  static constexpr std::uint64_t kMostBytes = 8u << 20;
-  static constexpr std::size_t kMostRecordBytes = 65535;
-  static constexpr std::size_t kMostDimensions = 4096;
+  static constexpr std::uint64_t kMaxBytes = 8u << 20;
+  static constexpr std::size_t kMaxRecordBytes = 65535;
+  static constexpr std::size_t kMaxDimensions = 4096;
 
   [[nodiscard]] Error fault(std::string cause) const { return ept_fault(file_, std::move(cause)); }
 
   [[nodiscard]] Json parse() const {
     const std::unique_ptr<ByteSource> bytes = open_file(file_);
-    if (bytes->size() > kMostBytes) throw fault("is too large for the description of a data set");
+    if (bytes->size() > kMaxBytes) throw fault("is too large for the description of a data set");
     std::string all(bytes->size(), '\0');
     bytes->read(0, std::as_writable_bytes(std::span(all)));
     try {
@@ -211,13 +211,13 @@ class EptMetadataReader {
     SourceInfo& info = stream.info;
     std::array<bool, 3> found{};
     std::set<std::string> names;
-    if (schema.size() > kMostDimensions) throw fault("has too many dimensions").at("schema");
+    if (schema.size() > kMaxDimensions) throw fault("has too many dimensions").at("schema");
     for (std::size_t i = 0; i < schema.size(); ++i) {
       const std::string where = fmt::format("dimension {} of the schema", i);
       const auto [name, channel] = dimension(schema[i], where);
       const std::size_t offset = stream.record_bytes;
       stream.record_bytes += size_of(channel.type);
-      if (stream.record_bytes > kMostRecordBytes)
+      if (stream.record_bytes > kMaxRecordBytes)
         throw fault("has too many dimensions").at("schema");
       if (name.size() == 1 && name[0] >= 'X' && name[0] <= 'Z') {
         const auto axis = static_cast<std::size_t>(name[0] - 'X');
@@ -388,7 +388,7 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
                                            std::uint64_t points) {
   const NodeKey root = key_of(OctreeNode{});
   /// Enough for some 800,000 nodes; Entwine begins another file after a few depths.
-  constexpr std::uint64_t kMostBytes = 16u << 20;
+  constexpr std::uint64_t kMaxBytes = 16u << 20;
   EptReading reading{.points = points};
   reading.seen.insert(root);
   reading.pending.push_back(root);
@@ -397,7 +397,7 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
     reading.pending.pop_back();
     const std::string name = name_of({.depth = depth, .place = {x, y, z}});
     const std::string file = (folder / "ept-hierarchy" / (name + ".json")).string();
-    if (open_file(file)->size() > kMostBytes) throw ept_fault(file, "is too large for a hierarchy");
+    if (open_file(file)->size() > kMaxBytes) throw ept_fault(file, "is too large for a hierarchy");
     std::ifstream bytes(file, std::ios::binary);
     EntryTaker taker(file, reading);
     nlohmann::json::sax_parse(bytes, &taker);

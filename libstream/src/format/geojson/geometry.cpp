@@ -53,7 +53,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     }
     if (depth_ > 0 || !(awaits(Awaited::object) || awaits(Awaited::item)))
       throw misplaced("an object");
-    if (objects_.size() == kMostObjects) throw fault("its collections are nested too deeply");
+    if (objects_.size() == kMaxObjects) throw fault("its collections are nested too deeply");
     objects_.emplace_back();
     objects_.back().first_run = runs_.size();
     return true;
@@ -126,7 +126,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
  private:
   /// The role of the next value; other: ignored.
   enum class Awaited : std::uint8_t { other, type, coordinates, object, list, item };
-  static constexpr std::size_t kMostObjects = 16, kMostBrackets = 4;
+  static constexpr std::size_t kMaxObjects = 16, kMaxBrackets = 4;
 
   struct Object {
     std::string type;
@@ -163,7 +163,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
 
   void open_bracket() {
-    if (depth_ == kMostBrackets) throw fault("its coordinates are nested too deeply");
+    if (depth_ == kMaxBrackets) throw fault("its coordinates are nested too deeply");
     if (depth_ > 0) {
       if (brackets_[depth_ - 1].numbers > 0) throw fault("a position has a list among its numbers");
       brackets_[depth_ - 1].brackets = true;
@@ -236,7 +236,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   Awaited awaited_ = Awaited::other;
   std::size_t left_out_ = 0;  ///< open brackets and braces of an ignored value
   std::size_t depth_ = 0;     ///< open brackets of coordinates
-  std::array<Bracket, kMostBrackets> brackets_{};
+  std::array<Bracket, kMaxBrackets> brackets_{};
   Point3 position_{};
   std::vector<GeoJsonGeometry::Line> runs_;
 };

@@ -45,8 +45,8 @@ std::optional<Crs> crs_named(std::string_view name) {
 
 }  // namespace
 
-GeoJsonItems::GeoJsonItems(Input& input, std::size_t most_bytes, bool wants_crs)
-    : input_(&input), most_bytes_(most_bytes), wants_crs_(wants_crs) {
+GeoJsonItems::GeoJsonItems(Input& input, std::size_t max_bytes, bool wants_crs)
+    : input_(&input), max_bytes_(max_bytes), wants_crs_(wants_crs) {
   if (wants_crs_) crs_ = longitude_and_latitude();
   refuse_utf16(*input_);
   if (at(0) == '\xEF' && at(1) == '\xBB' && at(2) == '\xBF') input_->consume(3);
@@ -63,12 +63,12 @@ Error GeoJsonItems::fault(std::string cause, std::size_t ahead) const {
 char GeoJsonItems::at(std::size_t place) {
   window_ = input_->window();
   if (place < window_.size()) return window_[place];
-  if (place >= most_bytes_) {
-    throw Error(input_->name(), fmt::format("a feature has more than {} MiB", most_bytes_ >> 20))
+  if (place >= max_bytes_) {
+    throw Error(input_->name(), fmt::format("a feature has more than {} MiB", max_bytes_ >> 20))
         .at_byte(input_->offset())
         .remedy(message("raise {memory_bytes}, or split the feature's lines"));
   }
-  window_ = input_->fill(std::min(most_bytes_, std::max(place + 1, 2 * window_.size())));
+  window_ = input_->fill(std::min(max_bytes_, std::max(place + 1, 2 * window_.size())));
   return place < window_.size() ? window_[place] : '\0';
 }
 

@@ -18,10 +18,10 @@ namespace terrace::stream {
 /// GeoJSON and GeoJSON text sequences (RFC 8142). Holds one feature at a time.
 class GeoJsonItems {
  public:
-  /// input: at its first byte; must outlive the object. most_bytes: limit for one feature, and for
+  /// input: at its first byte; must outlive the object. max_bytes: limit for one feature, and for
   /// the text before and after all of them. wants_crs: false leaves crs() empty. Moves to the first
   /// feature. Throws: Error, Stopped.
-  GeoJsonItems(Input& input, std::size_t most_bytes, bool wants_crs);
+  GeoJsonItems(Input& input, std::size_t max_bytes, bool wants_crs);
 
   /// The text of the next object; nullopt at the end. Valid until the next call. Throws: Error
   /// naming file and byte, Stopped.
@@ -49,7 +49,7 @@ class GeoJsonItems {
   [[nodiscard]] Error fault(std::string cause, std::size_t ahead = 0) const;
 
   Input* input_;
-  std::size_t most_bytes_;
+  std::size_t max_bytes_;
   bool wants_crs_;
   std::string_view window_;
   std::size_t found_ = 0;  ///< bytes of the object at the start of the window; 0 at the end

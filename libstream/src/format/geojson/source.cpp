@@ -42,13 +42,13 @@ class GeoJsonSource final : public PointSource {
       : input_(file, options.stop),
         items_(input_, item_bytes(options), !options.crs),
         block_points_(options.block_points),
-        most_vertices_(vertices_of(options.entities)) {
+        max_vertices_(vertices_of(options.entities)) {
     info_.format = "geojson";
     info_.files = {file};
     info_.crs = options.crs ? *options.crs : items_.crs();
     for (std::size_t axis = 0; axis < 3; ++axis) info_.coordinates[axis] = {.name = kAxes[axis]};
-    if (most_vertices_ == 1) return;
-    for (std::size_t vertex = 2; vertex <= most_vertices_; ++vertex) {
+    if (max_vertices_ == 1) return;
+    for (std::size_t vertex = 2; vertex <= max_vertices_; ++vertex) {
       for (const char* const axis : kAxes) {
         info_.attributes.push_back({.name = fmt::format("{}{}", axis, vertex)});
       }
@@ -67,7 +67,7 @@ class GeoJsonSource final : public PointSource {
     while (block.size() < block_points_) {
       if (!has_more()) {
         if (!read_item()) break;
-      } else if (most_vertices_ == 1) {
+      } else if (max_vertices_ == 1) {
         append_positions(block);
       } else {
         append_piece(block);
@@ -90,8 +90,8 @@ class GeoJsonSource final : public PointSource {
   /// A quarter of the memory for a feature's text: its parsed geometry takes at most as much, and
   /// vectors have spare capacity.
   static std::size_t item_bytes(const SourceOptions& options) {
-    constexpr std::uint64_t kLeast = 1u << 20;
-    return static_cast<std::size_t>(std::max(kLeast, options.memory_bytes / 4));
+    constexpr std::uint64_t kMin = 1u << 20;
+    return static_cast<std::size_t>(std::max(kMin, options.memory_bytes / 4));
   }
   static std::size_t vertices_of(Entities entities) {
     if (entities == Entities::points) return 1;
@@ -99,8 +99,8 @@ class GeoJsonSource final : public PointSource {
   }
 
   [[nodiscard]] bool has_more() const {
-    return most_vertices_ == 1 ? vertex_ < geometry_.positions.size()
-                               : line_ < geometry_.lines.size();
+    return max_vertices_ == 1 ? vertex_ < geometry_.positions.size()
+                              : line_ < geometry_.lines.size();
   }
 
   bool read_item() {
@@ -109,7 +109,7 @@ class GeoJsonSource final : public PointSource {
     geometry_.clear();
     append_geometry(*item, input_.name(), items_.offset(), geometry_);
     vertex_ = line_ = 0;
-    if (most_vertices_ == 1) return true;
+    if (max_vertices_ == 1) return true;
     std::uint64_t single = geometry_.positions.size();
     for (const GeoJsonGeometry::Line& line : geometry_.lines) single -= line.end - line.begin;
     progress_.excluded += single;
@@ -134,12 +134,12 @@ class GeoJsonSource final : public PointSource {
   /// Appends the next piece of a line, which begins with the last vertex of the previous one.
   void append_piece(PointBlock& block) {
     const GeoJsonGeometry::Line& line = geometry_.lines[line_];
-    const std::size_t count = std::min(most_vertices_, line.end - vertex_);
+    const std::size_t count = std::min(max_vertices_, line.end - vertex_);
     block.positions.push_back(geometry_.positions[vertex_]);
     std::fill(record_.begin(), record_.end(), std::byte{0});
     std::memcpy(record_.data(), geometry_.positions.data() + vertex_ + 1,
                 (count - 1) * sizeof(Point3));
-    std::byte* const numbers = record_.data() + (most_vertices_ - 1) * sizeof(Point3);
+    std::byte* const numbers = record_.data() + (max_vertices_ - 1) * sizeof(Point3);
     std::memcpy(numbers, &lines_, sizeof lines_);
     std::memcpy(numbers + sizeof lines_, &part_, sizeof part_);
     numbers[2 * sizeof lines_] = static_cast<std::byte>(count);
@@ -155,7 +155,7 @@ class GeoJsonSource final : public PointSource {
 
   Input input_;
   GeoJsonItems items_;
-  std::size_t block_points_, most_vertices_;
+  std::size_t block_points_, max_vertices_;
   SourceInfo info_;
   GeoJsonGeometry geometry_;  ///< of the feature being delivered
   std::size_t line_ = 0, vertex_ = 0;

@@ -18,11 +18,11 @@ namespace {
 constexpr char kDamaged[] = "the file is damaged or truncated: download it again";
 
 /// Codecs may enlarge a block, but not by much.
-constexpr std::uint64_t kMostGrowth = 4, kMostOverhead = 1u << 16;
+constexpr std::uint64_t kMaxGrowth = 4, kMaxOverhead = 1u << 16;
 
 /// Strips larger than this are decoded row by row if the codec can: a file of one strip then takes
 /// no more memory than its compressed bytes.
-constexpr std::uint64_t kMostWholeStrip = 4u << 20;
+constexpr std::uint64_t kMaxWholeStrip = 4u << 20;
 
 constexpr std::uint64_t kRawBytes = 1u << 20;  // of an uncompressed block, read at a time
 
@@ -90,9 +90,9 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
   // bits x 2^31 rows), so divide by the rows instead of multiplying.
   const std::uint64_t row = layout_.row_bytes();
   if (layout_.plain) return;
-  most_stored_ = most_stored();
+  max_stored_ = max_stored();
   const bool fits = row <= memory_bytes_ / layout_.block_rows;
-  const bool large = !fits || block_bytes() > kMostWholeStrip;
+  const bool large = !fits || block_bytes() > kMaxWholeStrip;
   by_rows_ = !layout_.tiled && row <= memory_bytes_ && large &&
              (!fits || decodes_by_rows(layout_.compression));
   if (fits || by_rows_) return;
@@ -116,7 +116,7 @@ Error GeoTiffBlocks::fault(const Part& part, std::uint64_t offset, std::string c
 
 /// Bytes of the largest block of the band, at most those of the file: larger claims are refused
 /// when the block is read.
-std::uint64_t GeoTiffBlocks::most_stored() const {
+std::uint64_t GeoTiffBlocks::max_stored() const {
   std::uint64_t most = 0;
   const std::uint32_t first = layout_.block(0, 0);
   const std::uint32_t count = layout_.blocks_across * layout_.blocks_down;
@@ -137,12 +137,12 @@ std::uint64_t GeoTiffBlocks::held_bytes() const {
   if (by_rows_) {
     const bool fits = layout_.row_bytes() <= memory_bytes_ / layout_.block_rows;
     return tables + codec_bytes(layout_.compression, fits ? block_bytes() : memory_bytes_) +
-           most_stored_ + 2 * layout_.row_bytes();
+           max_stored_ + 2 * layout_.row_bytes();
   }
   // Never more than all blocks of the band, which are fewer than 2^32.
   const std::uint64_t all = std::min<std::uint64_t>(
       std::uint64_t{layout_.blocks_across} * layout_.blocks_down, cache_bytes_ / block_bytes());
-  return tables + codec_bytes(layout_.compression, block_bytes()) + most_stored_ +
+  return tables + codec_bytes(layout_.compression, block_bytes()) + max_stored_ +
          (1 + all) * block_bytes();
 }
 
@@ -358,7 +358,7 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
 void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t bytes) {
   // Some writers omit a tile's rows beyond the lower edge of the image.
   const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
-  if (bytes > kMostGrowth * due + kMostOverhead) {
+  if (bytes > kMaxGrowth * due + kMaxOverhead) {
     throw fault(
         part, offset,
         fmt::format("claims {} for {} of samples", counted(bytes, "byte"), counted(due, "byte")));

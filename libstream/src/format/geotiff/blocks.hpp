@@ -47,7 +47,7 @@ class GeoTiffBlocks {
   [[nodiscard]] std::uint64_t block_bytes() const {
     return layout_.row_bytes() * layout_.block_rows;
   }
-  [[nodiscard]] std::uint64_t most_stored() const;
+  [[nodiscard]] std::uint64_t max_stored() const;
   bool read_block(const Part& part, const CellBuffer& out);
   bool read_plain(const Part& part, std::uint64_t offset, std::uint64_t bytes,
                   const CellBuffer& out);
@@ -67,7 +67,7 @@ class GeoTiffBlocks {
   NodataRule nodata_;
   std::uint64_t memory_bytes_, cache_bytes_;
   bool by_rows_ = false;                  // strips are decoded row by row
-  std::uint64_t most_stored_ = 0;         // bytes of the largest block in the file
+  std::uint64_t max_stored_ = 0;          // bytes of the largest block in the file
   std::uint64_t next_row_ = 0;            // of the raster: what libtiff decodes next, if by_rows_
   std::vector<std::byte> raw_;            // as stored
   std::vector<std::byte> block_;          // decoded, native byte order

@@ -157,8 +157,8 @@ Crs crs_of(const GeoKeys& keys) {
 
 void GeoKeyDirectory::add(std::uint16_t key, const std::string& text) {
   const auto at = static_cast<std::uint16_t>(ascii_.size());
-  constexpr std::size_t kMost = 16384;
-  ascii_ += text.substr(0, kMost) + "|";
+  constexpr std::size_t kMax = 16384;
+  ascii_ += text.substr(0, kMax) + "|";
   const auto length = static_cast<std::uint16_t>(ascii_.size() - at);
   entries_.push_back({key, static_cast<std::uint16_t>(kGeoAsciiParams), length, at});
 }

@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint32_t kMostCells = 1u << 30;  // later code has 30-bit columns and rows
+constexpr std::uint32_t kMaxCells = 1u << 30;  // later code has 30-bit columns and rows
 
 const char* name_of_codec(std::uint16_t compression) {
   switch (compression) {
@@ -94,7 +94,7 @@ void read_size(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   }
   layout.columns = *columns;
   layout.rows = *rows;
-  if (layout.columns >= kMostCells || layout.rows >= kMostCells) {
+  if (layout.columns >= kMaxCells || layout.rows >= kMaxCells) {
     throw handle
         .fault(fmt::format("{} x {} cells: columns and rows must each be fewer than 2^30",
                            layout.columns, layout.rows))

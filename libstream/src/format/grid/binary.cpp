@@ -24,11 +24,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kMostHeaderBytes = 64u << 10;
+constexpr std::uint64_t kMaxHeaderBytes = 64u << 10;
 
 std::string text_of(const fs::path& path) {
   const std::unique_ptr<ByteSource> bytes = open_file(path);
-  if (bytes->size() > kMostHeaderBytes) {
+  if (bytes->size() > kMaxHeaderBytes) {
     throw grid_fault(path.string(), "is not the header of a grid: it is longer than 64 KiB");
   }
   std::string text(bytes->size(), '\0');
@@ -114,9 +114,9 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
   grid.order = order_of(header);
   grid.first = header.count("skipbytes", 0);
 
-  constexpr std::uint64_t kMostBands = 65535;
+  constexpr std::uint64_t kMaxBands = 65535;
   const std::uint64_t bands = header.count("nbands", 1);
-  if (bands == 0 || bands > kMostBands)
+  if (bands == 0 || bands > kMaxBands)
     throw header.fault("is not between 1 and 65535").at("nbands");
   check_band(file, band, bands);
   const auto before = static_cast<std::uint64_t>(band - 1);

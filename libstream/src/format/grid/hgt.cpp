@@ -159,8 +159,8 @@ std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
 /// Throws: Error if it states more bytes than its packed bytes could ever unpack to.
 PackedFile find_in_gzip(const std::string& file) {
   const std::unique_ptr<ByteSource> bytes = open_file(file);
-  constexpr std::uint64_t kLeast = 18;  // a header of 10 bytes and a trailer of 8
-  if (bytes->size() < kLeast) throw grid_fault(file, "is truncated").at("gzip");
+  constexpr std::uint64_t kMin = 18;  // a header of 10 bytes and a trailer of 8
+  if (bytes->size() < kMin) throw grid_fault(file, "is truncated").at("gzip");
   std::array<std::byte, 4> trailer{};
   bytes->read(bytes->size() - trailer.size(), trailer);
   PackedFile packed;

@@ -16,7 +16,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint64_t kMostGridCells = 1u << 30;
+constexpr std::uint64_t kMaxGridCells = 1u << 30;
 /// Bytes read at a time.
 constexpr std::uint64_t kReadBytes = 256u << 10;
 
@@ -93,7 +93,7 @@ Error grid_fault(std::string file, std::string cause) {
 
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,
                      std::uint64_t rows, ScalarType type, const std::string& nodata) {
-  if (columns == 0 || rows == 0 || columns >= kMostGridCells || rows >= kMostGridCells) {
+  if (columns == 0 || rows == 0 || columns >= kMaxGridCells || rows >= kMaxGridCells) {
     throw grid_fault(
         file,
         fmt::format("{} x {} cells: columns and rows must each be at least 1 and fewer than 2^30",

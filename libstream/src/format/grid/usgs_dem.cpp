@@ -35,7 +35,7 @@ constexpr std::size_t kLevel = 144, kPattern = 150, kSystem = 156, kZone = 162, 
 constexpr std::size_t kInteger = 6, kReal = 24, kShortReal = 12, kRecord = 1024;
 constexpr int kNone = -32767;
 /// The number of samples in a profile has at most six digits.
-constexpr double kMostRows = 999'999;
+constexpr double kMaxRows = 999'999;
 
 std::optional<std::int32_t> integer_in(std::string_view field) {
   field = trim(field);
@@ -119,7 +119,7 @@ Head head_of(std::string_view record, const std::string& file) {
     head.north = std::ceil(head.north / head.height) * head.height;
   }
   const double rows = std::floor((head.north - head.south) / head.height + 1.5);
-  if (!(rows >= 1 && rows <= kMostRows)) {
+  if (!(rows >= 1 && rows <= kMaxRows)) {
     throw grid_fault(file, "its corners leave no rows, or too many");
   }
   head.rows = static_cast<std::uint64_t>(rows);
@@ -264,8 +264,8 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
     if (stop.stop_requested()) throw Stopped();
     const std::string where = fmt::format("profile {}", column + 1);
     // A quadrangle fills most of its grid, so a nearly empty grid is a forgery.
-    constexpr std::uint64_t kMostRowsPerByte = 1;
-    if (column * head.rows > kMostRowsPerByte * input.offset()) {
+    constexpr std::uint64_t kMaxRowsPerByte = 1;
+    if (column * head.rows > kMaxRowsPerByte * input.offset()) {
       throw grid_fault(file, "the grid has hardly any samples").at(where);
     }
     fields.integer("number of a row");

@@ -32,8 +32,8 @@ constexpr char kBadHeader[] = "the file is damaged or its header is wrong: expor
 /// Length of the user's name in VLRs and EVLRs.
 constexpr std::size_t kUserBytes = 16;
 /// The WKT of a file takes a few kilobytes, about a hundred if it includes a vertical grid.
-constexpr std::uint64_t kMostEvlrBytes = 1u << 20;
-constexpr std::uint64_t kMostEvlrs = 1u << 16;
+constexpr std::uint64_t kMaxEvlrBytes = 1u << 20;
+constexpr std::uint64_t kMaxEvlrs = 1u << 16;
 
 Error header_fault(const Input& input, std::string cause) {
   return Error(input.name(), std::move(cause)).at("header").remedy(kBadHeader);
@@ -97,7 +97,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
                 std::vector<std::string>& comments) {
   std::array<char, kLasEvlrHeaderBytes> head{};
   for (std::uint32_t i = 0; i < count; ++i) {
-    if (at > file.size() || file.size() - at < kLasEvlrHeaderBytes || i == kMostEvlrs) {
+    if (at > file.size() || file.size() - at < kLasEvlrHeaderBytes || i == kMaxEvlrs) {
       comments.push_back(fmt::format("the header counts {} EVLRs, but only {} are read", count, i));
       return;
     }
@@ -111,7 +111,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
       comments.push_back(fmt::format("EVLR {} is cut off", i));
       return;
     }
-    if (is_used(record) && bytes <= kMostEvlrBytes) {
+    if (is_used(record) && bytes <= kMaxEvlrBytes) {
       record.data.resize(bytes);
       file.read(at, std::as_writable_bytes(std::span(record.data)));
       header.vlrs.push_back(std::move(record));
@@ -328,7 +328,7 @@ void count_records(const Input& input, std::uint64_t file_bytes, const RecordFie
 }
 
 /// More than this means a corrupt header.
-constexpr std::size_t kMostExtraBytes = 2048;
+constexpr std::size_t kMaxExtraBytes = 2048;
 
 }  // namespace
 
@@ -411,9 +411,9 @@ Placement las_placement(const LasHeader& header) {
 RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments) {
   const std::size_t standard = las_record_bytes(header.point_format);
-  if (header.record_bytes - standard > kMostExtraBytes) {
+  if (header.record_bytes - standard > kMaxExtraBytes) {
     throw Error(name, fmt::format("its records have {} extra bytes; up to {} are read",
-                                  header.record_bytes - standard, kMostExtraBytes))
+                                  header.record_bytes - standard, kMaxExtraBytes))
         .at("header")
         .remedy("the file is damaged or its header is wrong: export it again");
   }

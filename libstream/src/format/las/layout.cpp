@@ -18,7 +18,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::size_t kMostRecordBytes = 65535, kMostVlrBytes = 65535;
+constexpr std::size_t kMaxRecordBytes = 65535, kMaxVlrBytes = 65535;
 constexpr std::size_t kExtraNameBytes = 32;
 
 bool has(std::span<const Channel> attributes, std::string_view name) {
@@ -60,16 +60,16 @@ void describe(const Channel& channel, std::string& descriptions) {
   descriptions += row;
 }
 
-constexpr int kMostDecimals = 9;
-constexpr std::array<double, kMostDecimals + 1> kPowers{1e0, 1e1, 1e2, 1e3, 1e4,
-                                                        1e5, 1e6, 1e7, 1e8, 1e9};
+constexpr int kMaxDecimals = 9;
+constexpr std::array<double, kMaxDecimals + 1> kPowers{1e0, 1e1, 1e2, 1e3, 1e4,
+                                                       1e5, 1e6, 1e7, 1e8, 1e9};
 /// One step less than the range of 32 bits, so that rounding stays within it.
 constexpr double kReach = std::numeric_limits<std::int32_t>::max() - 1.0;
 
 /// The fewest decimals, at least `decimals`, that reproduce every coordinate of the axis.
 int decimals_of(std::span<const Point3> points, std::size_t axis, int decimals) {
   for (const Point3& p : points) {
-    while (decimals < kMostDecimals &&
+    while (decimals < kMaxDecimals &&
            std::nearbyint(p[axis] * kPowers[static_cast<std::size_t>(decimals)]) /
                    kPowers[static_cast<std::size_t>(decimals)] !=
                p[axis]) {
@@ -113,7 +113,7 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
     describe(extra.channel, layout.extra_bytes);
     layout.fields.push_back(std::move(extra));
   }
-  if (layout.record_bytes > kMostRecordBytes || layout.extra_bytes.size() > kMostVlrBytes) {
+  if (layout.record_bytes > kMaxRecordBytes || layout.extra_bytes.size() > kMaxVlrBytes) {
     throw Error(file, counted(attributes.size(), "attribute") + " are more than LAS has room for")
         .remedy("write PLY");
   }

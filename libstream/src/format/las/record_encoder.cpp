@@ -133,8 +133,8 @@ void LasRecords::pack(const PointBlock& block, Records& out) const {
 
 void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const {
   const double scale = lattice_.scale[axis], offset = lattice_.offset[axis];
-  constexpr double kLeast = std::numeric_limits<std::int32_t>::min(),
-                   kMost = std::numeric_limits<std::int32_t>::max();
+  constexpr double kMin = std::numeric_limits<std::int32_t>::min(),
+                   kMax = std::numeric_limits<std::int32_t>::max();
   // Adding and subtracting it rounds numbers below 2^51 to the nearest integer, ties to even.
   constexpr double kToInteger = 0x1.8p52;
   std::int32_t least = INT32_MAX, most = INT32_MIN;
@@ -143,7 +143,7 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
   for (std::size_t i = 0; i < block.size(); ++i, to += layout_.record_bytes) {
     const double value = block.positions[i][axis];
     const double step = ((value - offset) / scale + kToInteger) - kToInteger;
-    if (!(step >= kLeast && step <= kMost)) {
+    if (!(step >= kMin && step <= kMax)) {
       throw Error(path_, fmt::format("its {} is out of range for 32 bits in steps of {}",
                                      "xyz"[axis], text_of(scale)))
           .at(fmt::format("point {}", out.first + i))

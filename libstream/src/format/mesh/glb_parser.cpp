@@ -119,10 +119,10 @@ class GlbParser final : public MeshParser {
  private:
   using Json = nlohmann::json;
 
-  static constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
-  static constexpr std::size_t kMostJsonBytes = std::size_t{64} << 20;
+  static constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::size_t kMaxJsonBytes = std::size_t{64} << 20;
   /// Limit of the primitives that nodes place, counting each place.
-  static constexpr std::size_t kMostParts = std::size_t{1} << 20;
+  static constexpr std::size_t kMaxParts = std::size_t{1} << 20;
 
   /// A primitive (3.7.2.1).
   struct Part {
@@ -163,7 +163,7 @@ class GlbParser final : public MeshParser {
     }
     if (word(16) != glb::kJson) throw fault_here("its first chunk is not JSON");
     if (all < kHeaders + json_bytes) throw fault_here("its JSON is larger than the file");
-    if (json_bytes > kMostJsonBytes)
+    if (json_bytes > kMaxJsonBytes)
       throw fault_here("its JSON is larger than 64 MiB").remedy(kPlainRemedy);
     input_->consume(kHeaders);
     parse(input_->fill(json_bytes).substr(0, json_bytes), json_bytes);
@@ -227,7 +227,7 @@ class GlbParser final : public MeshParser {
   }
 
   static std::optional<std::uint64_t> whole(const Json& value) {
-    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMost) return std::nullopt;
+    if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMax) return std::nullopt;
     return value.get<std::uint64_t>();
   }
 
@@ -235,7 +235,7 @@ class GlbParser final : public MeshParser {
     const auto found = object.find(name);
     if (found == object.end()) return std::nullopt;
     const std::optional<std::uint64_t> value = whole(*found);
-    if (!value) throw fault(fmt::format("is not a number from 0 to {}", kMost)).at(name);
+    if (!value) throw fault(fmt::format("is not a number from 0 to {}", kMax)).at(name);
     return value;
   }
 
@@ -409,12 +409,12 @@ class GlbParser final : public MeshParser {
         part.positions.count = 0;
       } else {
         vertices_ += part.vertices;
-        if (vertices_ >= kMost) throw fault("has more vertices than can be numbered").at(where);
+        if (vertices_ >= kMax) throw fault("has more vertices than can be numbered").at(where);
       }
       if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
       moved_ = moved_ || transform != kIdentity;
-      if (parts_.size() == kMostParts) {
-        throw fault(fmt::format("is one of more than {} placed primitives", kMostParts))
+      if (parts_.size() == kMaxParts) {
+        throw fault(fmt::format("is one of more than {} placed primitives", kMaxParts))
             .at(where)
             .remedy(kPlainRemedy);
       }

@@ -53,11 +53,11 @@ class GlbWriter final : public MeshWriter {
     };
     if (stride_ > kMaxStride) throw refused("GLB holds at most 60 attributes");
     // Check two sizes that cannot overflow first, then the sum.
-    constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
-    if (header.vertices >= kMost / stride_ || header.triangles >= kMost / 12 ||
+    constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max();
+    if (header.vertices >= kMax / stride_ || header.triangles >= kMax / 12 ||
         glb::kHeaderBytes + 2 * glb::kChunkHeaderBytes + 4096 * (1 + header.attributes.size()) +
                 8 * frame_.crs.size() + binary_bytes() >
-            kMost) {
+            kMax) {
       throw refused("GLB holds at most 4 GiB");
     }
     if (header.bounds && !header.bounds->empty()) {

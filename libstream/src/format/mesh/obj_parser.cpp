@@ -43,7 +43,7 @@ class ObjParser final : public MeshParser {
     std::string_view line;
     while (next_statement(line)) {
       if (line.starts_with("# ")) {
-        if (comments_.size() < kMostComments) comments_.emplace_back(line.substr(2));
+        if (comments_.size() < kMaxComments) comments_.emplace_back(line.substr(2));
         continue;
       }
       const std::string_view word = take_word(line);
@@ -62,7 +62,7 @@ class ObjParser final : public MeshParser {
   }
 
  private:
-  static constexpr std::size_t kMostComments = 64;
+  static constexpr std::size_t kMaxComments = 64;
 
   [[nodiscard]] Error fault(std::string cause) const {
     return Error(input_->name(), std::move(cause))

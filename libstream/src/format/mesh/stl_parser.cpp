@@ -35,8 +35,8 @@ class StlParser : public MeshParser {
       if (corner_ == 3 && !wants_faces_) begin_face();
       return Item::vertex;
     }
-    constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max() / 3;
-    if (faces_ == kMost)
+    constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max() / 3;
+    if (faces_ == kMax)
       throw fault("has more triangles than can be numbered").remedy("read it as points");
     const auto first = static_cast<std::uint32_t>(3 * faces_);
     face_ = {first, first + 1, first + 2};

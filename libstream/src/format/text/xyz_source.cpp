@@ -71,7 +71,7 @@ bool is_exact(std::string_view field, double value) {
 }
 
 /// Doubles hold every integer up to this one.
-constexpr std::int64_t kMostOfDouble = std::int64_t{1} << 53;
+constexpr std::int64_t kMaxOfDouble = std::int64_t{1} << 53;
 
 /// Properties of the first fields of a column.
 struct ColumnContent {
@@ -90,7 +90,7 @@ struct ColumnContent {
     const char* const end = field.data() + field.size();
     if (parse_number(field.data(), end, ScalarType::i64, bits) != nullptr) {
       const auto value = std::bit_cast<std::int64_t>(bits);
-      large = large || value > kMostOfDouble || value < -kMostOfDouble;
+      large = large || value > kMaxOfDouble || value < -kMaxOfDouble;
       negative = negative || value < 0;
     } else if (parse_number(field.data(), end, ScalarType::u64, bits) != nullptr) {
       unsigned_alone = true;
@@ -215,7 +215,7 @@ class XyzSource final : public PointSource {
       empty_values_ += empty_fields_;
       block.positions[count] = point;
       for (const std::size_t column : layout_.attributes) {
-        if (whole_[column] && std::abs(row_[column]) >= static_cast<double>(kMostOfDouble)) {
+        if (whole_[column] && std::abs(row_[column]) >= static_cast<double>(kMaxOfDouble)) {
           check_exact(line, column);
         }
         std::memcpy(record, &row_[column], sizeof(double));

@@ -47,7 +47,7 @@ class CoordinateText {
       const double scaled = value * power;
       return std::abs(scaled - std::round(scaled)) <= 0x1p-50 * std::abs(scaled);
     };
-    for (; decimals_ <= kMostDecimals && !(is_whole(scale) && is_whole(offset)); ++decimals_) {
+    for (; decimals_ <= kMaxDecimals && !(is_whole(scale) && is_whole(offset)); ++decimals_) {
       power *= 10.0;
     }
   }
@@ -55,7 +55,7 @@ class CoordinateText {
   void append(std::string& text, double value) const {
     const std::size_t begin = text.size();
     append_number(text, value);
-    if (text.size() - begin < kLongText || decimals_ > kMostDecimals) return;
+    if (text.size() - begin < kLongText || decimals_ > kMaxDecimals) return;
     char digits[kMaxNumber];
     auto [end, error] =
         std::to_chars(digits, digits + sizeof digits, value, std::chars_format::fixed, decimals_);
@@ -71,11 +71,11 @@ class CoordinateText {
   }
 
  private:
-  static constexpr int kMostDecimals = 9;
+  static constexpr int kMaxDecimals = 9;
   static constexpr std::size_t kLongText = 15;  // shorter texts show no rounding
 
   double offset_ = 0.0;
-  int decimals_ = kMostDecimals + 1;  ///< of the lattice; above kMostDecimals: not decimal
+  int decimals_ = kMaxDecimals + 1;  ///< of the lattice; above kMaxDecimals: not decimal
 };
 
 class XyzWriter final : public PlainPointWriter {

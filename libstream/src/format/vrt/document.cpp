@@ -26,7 +26,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint64_t kMostVrtCells = 1u << 30;
+constexpr std::uint64_t kMaxVrtCells = 1u << 30;
 
 class VrtReader {
  public:
@@ -106,8 +106,7 @@ class VrtReader {
 
   [[nodiscard]] std::uint64_t size_of_side(const XmlElement& root, const char* name) const {
     const double value = number(root.attribute(name), name);
-    if (!(value >= 1) || value >= static_cast<double>(kMostVrtCells) ||
-        value != std::floor(value)) {
+    if (!(value >= 1) || value >= static_cast<double>(kMaxVrtCells) || value != std::floor(value)) {
       throw fault("is not a number of cells from 1 to 2^30 - 1").at(name);
     }
     return static_cast<std::uint64_t>(value);
@@ -241,7 +240,7 @@ class VrtReader {
               .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
         }
         farthest_ = std::max(farthest_, off);
-        if (!(r[i] >= (i < 2 ? 0 : 1)) || r[i] >= static_cast<double>(kMostVrtCells)) {
+        if (!(r[i] >= (i < 2 ? 0 : 1)) || r[i] >= static_cast<double>(kMaxVrtCells)) {
           throw fault("is outside the raster").at(name).remedy(kAsGeoTiff);
         }
       }

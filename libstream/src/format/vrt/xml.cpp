@@ -19,9 +19,9 @@
 namespace terrace::stream {
 namespace {
 
-constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;
-constexpr std::uint64_t kMostTagBytes = std::uint64_t{4} << 20;
-constexpr std::size_t kMostHeldBytes = std::size_t{64} << 20;
+constexpr std::uint64_t kMaxBytes = std::uint64_t{256} << 20;
+constexpr std::uint64_t kMaxTagBytes = std::uint64_t{4} << 20;
+constexpr std::size_t kMaxHeldBytes = std::size_t{64} << 20;
 constexpr std::size_t kDeepest = 32;
 
 /// The size of a node of a map with two short strings.
@@ -44,7 +44,7 @@ struct XmlReading {
   void hold(std::size_t more) {
     bytes.back() += more;
     held += more;
-    if (held <= kMostHeldBytes) return;
+    if (held <= kMaxHeldBytes) return;
     refusal = "it is too large for a description";
     stop();
   }
@@ -69,7 +69,7 @@ void on_start(void* self, const XML_Char* name, const XML_Char** attributes) {
       reading.refusal = "its elements are nested too deeply";
       return reading.stop();
     }
-    if (static_cast<std::uint64_t>(XML_GetCurrentByteCount(reading.parser)) > kMostTagBytes) {
+    if (static_cast<std::uint64_t>(XML_GetCurrentByteCount(reading.parser)) > kMaxTagBytes) {
       reading.refusal = "has a tag that is too long";
       return reading.stop();
     }
@@ -146,7 +146,7 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
         .at_line(XML_GetCurrentLineNumber(parser.get()))
         .remedy("the file is damaged: export it again");
   };
-  if (bytes->size() > kMostBytes) throw fault("is too large for a description");
+  if (bytes->size() > kMaxBytes) throw fault("is too large for a description");
   XML_SetUserData(parser.get(), &reading);
   XML_SetElementHandler(parser.get(), &on_start, &on_end);
   XML_SetCharacterDataHandler(parser.get(), &on_text);
@@ -164,7 +164,7 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
     if (reading.failure) std::rethrow_exception(reading.failure);
     if (!reading.refusal.empty()) throw fault(reading.refusal);
     // Some versions of the parser look at an incomplete tag again only when it has doubled.
-    if (at > reading.parsed + 2 * kMostTagBytes) throw fault("has a tag that is too long");
+    if (at > reading.parsed + 2 * kMaxTagBytes) throw fault("has a tag that is too long");
     if (status != XML_STATUS_OK) {
       throw fault(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
     }

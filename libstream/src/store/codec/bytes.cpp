@@ -63,11 +63,11 @@ std::uint32_t portable_crc32(std::uint32_t crc, const void* data, std::size_t si
   const auto* next = static_cast<const std::uint8_t*>(data);
   for (; size >= 8; size -= 8, next += 8) {
     crc ^= load<std::uint32_t>(next);
-    std::uint32_t after = 0;
+    std::uint32_t next_crc = 0;
     for (std::size_t k = 0; k < 4; ++k) {
-      after ^= kCrc32Tables[7 - k][crc >> (8 * k) & 0xFF] ^ kCrc32Tables[3 - k][next[4 + k]];
+      next_crc ^= kCrc32Tables[7 - k][crc >> (8 * k) & 0xFF] ^ kCrc32Tables[3 - k][next[4 + k]];
     }
-    crc = after;
+    crc = next_crc;
   }
   for (; size > 0; --size, ++next) crc = (crc >> 8) ^ kCrc32Tables[0][(crc ^ *next) & 0xFF];
   return ~crc;
@@ -76,13 +76,13 @@ std::uint32_t portable_crc32(std::uint32_t crc, const void* data, std::size_t si
 std::uint16_t crc16(ByteView bytes) {
   unsigned crc = 0xFFFF;
   const std::uint8_t* next = bytes.data();
-  std::size_t left = bytes.size();
-  for (; left >= 8; left -= 8, next += 8) {
+  std::size_t remaining = bytes.size();
+  for (; remaining >= 8; remaining -= 8, next += 8) {
     crc ^= static_cast<unsigned>(next[0] << 8 | next[1]);
     crc = kCrc16Tables[7][crc >> 8] ^ kCrc16Tables[6][crc & 0xFF];
     for (std::size_t k = 2; k < 8; ++k) crc ^= kCrc16Tables[7 - k][next[k]];
   }
-  for (; left > 0; --left, ++next) {
+  for (; remaining > 0; --remaining, ++next) {
     crc = ((crc << 8) & 0xFFFF) ^ kCrc16Tables[0][(crc >> 8) ^ *next];
   }
   return static_cast<std::uint16_t>(crc ^ 0xFFFF);
@@ -91,13 +91,13 @@ std::uint16_t crc16(ByteView bytes) {
 std::uint8_t crc8(ByteView bytes) {
   std::uint8_t crc = 0;
   const std::uint8_t* next = bytes.data();
-  std::size_t left = bytes.size();
-  for (; left >= 8; left -= 8, next += 8) {
-    std::uint8_t after = kCrc8Tables[7][crc ^ next[0]];
-    for (std::size_t k = 1; k < 8; ++k) after ^= kCrc8Tables[7 - k][next[k]];
-    crc = after;
+  std::size_t remaining = bytes.size();
+  for (; remaining >= 8; remaining -= 8, next += 8) {
+    std::uint8_t next_crc = kCrc8Tables[7][crc ^ next[0]];
+    for (std::size_t k = 1; k < 8; ++k) next_crc ^= kCrc8Tables[7 - k][next[k]];
+    crc = next_crc;
   }
-  for (; left > 0; --left, ++next) crc = kCrc8Tables[0][crc ^ *next];
+  for (; remaining > 0; --remaining, ++next) crc = kCrc8Tables[0][crc ^ *next];
   return crc;
 }
 

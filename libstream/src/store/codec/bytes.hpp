@@ -83,7 +83,7 @@ class ByteReader {
   explicit ByteReader(ByteView bytes) : bytes_(bytes) {}
 
   [[nodiscard]] std::size_t offset() const { return at_; }
-  [[nodiscard]] std::size_t left() const { return bytes_.size() - at_; }
+  [[nodiscard]] std::size_t remaining() const { return bytes_.size() - at_; }
 
   template <class T>
   T get() {
@@ -101,7 +101,7 @@ class ByteReader {
     throw Damage("a number has too many bytes");
   }
   ByteView take(std::size_t size) {
-    if (size > left()) throw Damage("the data end too early");
+    if (size > remaining()) throw Damage("the data end too early");
     const ByteView part = bytes_.subspan(at_, size);
     at_ += size;
     return part;

@@ -21,7 +21,8 @@ std::uint64_t unsigned_of(std::int64_t value) { return static_cast<std::uint64_t
 
 }  // namespace
 
-TERRACE_STORE_AVX2_TOO bool find_differences(const std::int64_t* values, const std::int64_t* beside,
+TERRACE_STORE_AVX2_TOO bool find_differences(const std::int64_t* values,
+                                             const std::int64_t* preceding,
                                              std::int64_t* __restrict differences,
                                              std::uint32_t n) {
   std::uint64_t several = 0;
@@ -29,8 +30,8 @@ TERRACE_STORE_AVX2_TOO bool find_differences(const std::int64_t* values, const s
     several |= unsigned_of(values[i]) ^ unsigned_of(values[0]);
     differences[i] = static_cast<std::int64_t>(unsigned_of(values[i]) - unsigned_of(values[i - 1]));
   }
-  for (std::uint32_t i = 1; beside != nullptr && i < n; ++i) {
-    const std::uint64_t rise = unsigned_of(beside[i]) - unsigned_of(beside[i - 1]);
+  for (std::uint32_t i = 1; preceding != nullptr && i < n; ++i) {
+    const std::uint64_t rise = unsigned_of(preceding[i]) - unsigned_of(preceding[i - 1]);
     differences[i] = static_cast<std::int64_t>(unsigned_of(differences[i]) - rise);
   }
   return several != 0;

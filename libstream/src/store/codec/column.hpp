@@ -22,9 +22,9 @@ namespace terrace::stream::store {
 // Passes over the values of a column before they are coded. They are vectorised.
 
 /// Sets differences[i] to values[i] - values[i - 1] for 1 <= i < n. Also subtracts the same
-/// difference of the preceding column, `beside`, unless that is null. Returns false if all values
-/// are equal.
-bool find_differences(const std::int64_t* values, const std::int64_t* beside,
+/// difference of the preceding column, `preceding`, unless that is null. Returns false if all
+/// values are equal.
+bool find_differences(const std::int64_t* values, const std::int64_t* preceding,
                       std::int64_t* differences, std::uint32_t n);
 
 /// Zigzag-encodes n differences into `numbers`, and sets the size class of each in `classes`.
@@ -138,12 +138,12 @@ class Lines {
   enum Step : std::uint8_t { kAlong, kSame, kJump, kSteps };
 
   /// Sets the steps from the guide's differences. The first difference does not count.
-  void find_steps(const std::int64_t* differences, std::uint64_t least_jump, std::uint32_t n) {
+  void find_steps(const std::int64_t* differences, std::uint64_t min_jump, std::uint32_t n) {
     steps_.resize(n);
     for (std::uint32_t i = 1; i < n; ++i) {
       const auto bits = static_cast<std::uint64_t>(differences[i]);
       const std::uint64_t magnitude = differences[i] < 0 ? -bits : bits;
-      steps_[i] = magnitude >= least_jump ? kJump : magnitude == 0 ? kSame : kAlong;
+      steps_[i] = magnitude >= min_jump ? kJump : magnitude == 0 ? kSame : kAlong;
     }
     find_references();
   }
@@ -306,8 +306,8 @@ void encode_differences(Coder& coder, unsigned first, const Lines* lines, Column
 /// Codes the differences of a column; see code_column().
 template <bool kLined, bool kRecent, class Coder>
 void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines* lines,
-                      const std::int64_t* beside, std::int64_t* values, ColumnScratch* scratch,
-                      std::uint32_t n, std::int64_t by, unsigned number_class) {
+                      const std::int64_t* preceding, std::int64_t* values, ColumnScratch* scratch,
+                      std::uint32_t n, std::int64_t signed_divisor, unsigned number_class) {
   if constexpr (!kRecent && !Coder::kDecoding) {
     return encode_differences<kLined>(coder, first, lines, *scratch, n, number_class);
   }
@@ -327,34 +327,36 @@ void code_differences(Coder& coder, unsigned first, ColumnKind kind, const Lines
           code_signed(coder, context + (difference_step(number_class) >> shift), difference);
     }
     if constexpr (Coder::kDecoding) {
-      const std::uint32_t from = kLined && from_line(kind) ? lines->reference(i) : i - 1;
-      const std::int64_t rise = beside != nullptr ? wrapped_difference(beside[i], beside[from]) : 0;
+      const std::uint32_t reference = kLined && from_line(kind) ? lines->reference(i) : i - 1;
+      const std::int64_t rise =
+          preceding != nullptr ? wrapped_difference(preceding[i], preceding[reference]) : 0;
       if constexpr (kLined) {
         if (trend.exists() && step == Lines::kAlong) {
           difference = wrapped_sum(difference, trend.expected());
           trend.add(difference);
         }
       }
-      values[i] = wrapped_sum(wrapped_sum(values[from], rise), wrapped_product(difference, by));
+      values[i] = wrapped_sum(wrapped_sum(values[reference], rise),
+                              wrapped_product(difference, signed_divisor));
     }
   }
 }
 
 /// Codes a column of values: the first value, then differences according to `kind`, divided by
 /// their common divisor.
-/// first: the first context. form: coded unless null. lines: null without a guide. beside: the
-/// preceding column, for kind beside only. scratch: of size n, for encoding only.
+/// first: the first context. form: coded unless null. lines: null without a guide. preceding: the
+/// preceding column, read only for the kinds that use it. scratch: of size n, for encoding only.
 template <class Coder>
 void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form,
-                 const Lines* lines, const std::int64_t* beside, std::int64_t* values,
+                 const Lines* lines, const std::int64_t* preceding, std::int64_t* values,
                  ColumnScratch* scratch, std::uint32_t n) {
-  if (along_line(kind) != ColumnKind::beside) beside = nullptr;
+  if (along_line(kind) != ColumnKind::preceding) preceding = nullptr;
   typename Coder::Local coder = shared;
   bool several = false;
   std::uint64_t divisor = 1;
   if constexpr (!Coder::kDecoding) {
     std::int64_t* const differences = scratch->differences.data();
-    several = find_differences(values, beside, differences, n);
+    several = find_differences(values, preceding, differences, n);
     if (several) divisor = std::max<std::uint64_t>(common_divisor(differences + 1, n - 1), 1);
   }
   unsigned number_class = 0;
@@ -365,15 +367,15 @@ void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* for
     }
     return;
   }
-  const auto by = static_cast<std::int64_t>(divisor);
+  const auto signed_divisor = static_cast<std::int64_t>(divisor);
   if constexpr (!Coder::kDecoding) {
     std::int64_t* const differences = scratch->differences.data();
-    for (std::uint32_t i = 1; by != 1 && i < n; ++i) differences[i] /= by;
+    for (std::uint32_t i = 1; signed_divisor != 1 && i < n; ++i) differences[i] /= signed_divisor;
     if (lines != nullptr) refer_to_lines(*lines, kind, differences, n);
   }
   const auto code = [&](auto lined, auto is_recent) {
     code_differences<decltype(lined)::value, decltype(is_recent)::value>(
-        coder, first, kind, lines, beside, values, scratch, n, by, number_class);
+        coder, first, kind, lines, preceding, values, scratch, n, signed_divisor, number_class);
   };
   const bool is_recent = along_line(kind) == ColumnKind::recent;
   if (lines != nullptr) {
@@ -387,10 +389,10 @@ void code_column(Coder& shared, unsigned first, ColumnKind kind, NumberForm* for
 }
 
 /// Codes the column of the guide: the step of each point, and jumps minus the previous jump. Sets
-/// `lines`. least_jump: for encoding only.
+/// `lines`. min_jump: for encoding only.
 template <class Coder>
 void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form, Lines& lines,
-                std::uint64_t least_jump, std::int64_t* values, ColumnScratch* scratch,
+                std::uint64_t min_jump, std::int64_t* values, ColumnScratch* scratch,
                 std::uint32_t n) {
   typename Coder::Local coder = shared;
   bool several = false;
@@ -399,7 +401,7 @@ void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form
     std::int64_t* const differences = scratch->differences.data();
     several = find_differences(values, nullptr, differences, n);
     if (several) divisor = std::max<std::uint64_t>(common_divisor(differences + 1, n - 1), 1);
-    lines.find_steps(differences, least_jump, n);
+    lines.find_steps(differences, min_jump, n);
   } else {
     lines.resize(n);
   }
@@ -412,7 +414,7 @@ void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form
     }
     return;
   }
-  const auto by = static_cast<std::int64_t>(divisor);
+  const auto signed_divisor = static_cast<std::int64_t>(divisor);
   RecentCoder<Coder, kGuideRecent> recent;
   unsigned step = Lines::kAlong, jump_class = 0;
   std::int64_t last_jump = 0;
@@ -421,7 +423,7 @@ void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form
     const unsigned context = first + context::kWithinPulse + step;
     if constexpr (!Coder::kDecoding) {
       step = lines[i];
-      difference = scratch->differences[i] / by;
+      difference = scratch->differences[i] / signed_divisor;
     }
     code_symbol(coder, context, step);
     if (step >= Lines::kSteps) throw Damage("a guide has an unknown step");
@@ -438,7 +440,7 @@ void code_guide(Coder& shared, unsigned first, ColumnKind kind, NumberForm* form
     }
     if constexpr (Coder::kDecoding) {
       lines.set_step(i, step);
-      values[i] = wrapped_sum(values[i - 1], wrapped_product(difference, by));
+      values[i] = wrapped_sum(values[i - 1], wrapped_product(difference, signed_divisor));
     }
   }
   if constexpr (Coder::kDecoding) {

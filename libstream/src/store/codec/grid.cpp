@@ -25,16 +25,16 @@ const std::array<std::uint8_t, kSymbols> GridCodec::kMagnitude = [] {
 const std::array<GridCodec::Step, kPatterns> GridCodec::kStep = [] {
   std::array<Step, kPatterns> table{};
   for (unsigned pattern = 0; pattern < kPatterns; ++pattern) {
-    const auto there = [&](Neighbour n) { return pattern >> n & 1; };
+    const auto exists = [&](Neighbour n) { return pattern >> n & 1; };
     const unsigned weight =
-        2 * there(kWest) + 2 * there(kNorth) + there(kNorthWest) + there(kNorthEast);
-    const bool good = there(kWest) && there(kNorth);
+        2 * exists(kWest) + 2 * exists(kNorth) + exists(kNorthWest) + exists(kNorthEast);
+    const bool good = exists(kWest) && exists(kNorth);
     table[pattern].base = good ? 0 : context::kHeightSteps;
     if (weight == 0) {
       table[pattern].base += context::kHeightSteps - 1;
     } else {
       table[pattern].scale = static_cast<std::uint16_t>(1024 / weight);
-      table[pattern].most = context::kHeightSteps - 2;
+      table[pattern].max_step = context::kHeightSteps - 2;
     }
   }
   return table;
@@ -74,10 +74,10 @@ std::uint64_t GridCodec::count_runs(std::uint32_t row) const {
   return runs;
 }
 
-void GridCodec::find_run(std::uint32_t row, std::uint64_t from, std::uint64_t& begin,
+void GridCodec::find_run(std::uint32_t row, std::uint64_t column, std::uint64_t& begin,
                          std::uint64_t& end) const {
   const std::uint8_t* const cells = mask_.data() + cell_of(0, row);
-  begin = from;
+  begin = column;
   while (cells[begin] == 0) ++begin;
   end = begin;
   while (cells[end] != 0) ++end;  // stops in the padding at the latest

@@ -119,10 +119,10 @@ class GridCodec {
       return;
     }
     find_patterns();
-    const auto most = static_cast<std::int64_t>(std::min<std::uint64_t>(size - 1, INT64_MAX));
+    const auto max_height = static_cast<std::int64_t>(std::min<std::uint64_t>(size - 1, INT64_MAX));
     typename Coder::Local coder = shared;
     const std::ptrdiff_t up = stride_;
-    std::int64_t last = most / 2;
+    std::int64_t last = max_height / 2;
     std::size_t i = 0;
     for (const std::uint32_t cell : cells_) {
       const unsigned pattern = patterns_[cell];
@@ -142,13 +142,13 @@ class GridCodec {
                                   term(kWestWest, at[-2]) + term(kNorthNorth, at[-2 * up]);
         predicted = static_cast<std::int64_t>(sum + 128) >> 8;
       }
-      predicted = std::clamp<std::int64_t>(predicted, 0, most);
+      predicted = std::clamp<std::int64_t>(predicted, 0, max_height);
 
       const unsigned near =
           2u * magnitude[-1] + 2u * magnitude[-up] + magnitude[-up - 1] + magnitude[-up + 1];
       const unsigned step =
           kStep[pattern].base +
-          std::min<unsigned>((near * kStep[pattern].scale) >> 10, kStep[pattern].most);
+          std::min<unsigned>((near * kStep[pattern].scale) >> 10, kStep[pattern].max_step);
 
       std::uint64_t residual = 0;
       if constexpr (!Coder::kDecoding) {
@@ -219,7 +219,7 @@ class GridCodec {
   /// have separate contexts from those at the edges, which are predicted less well.
   struct Step {
     std::uint16_t scale = 0;
-    std::uint8_t base = 0, most = 0;
+    std::uint8_t base = 0, max_step = 0;
   };
   static const std::array<Step, kPatterns> kStep;
   static const std::array<std::uint8_t, kSymbols> kMagnitude;
@@ -245,7 +245,7 @@ class GridCodec {
   void start(std::uint32_t width, std::uint32_t height);
   void find_patterns();
   [[nodiscard]] std::uint64_t count_runs(std::uint32_t row) const;
-  void find_run(std::uint32_t row, std::uint64_t from, std::uint64_t& begin,
+  void find_run(std::uint32_t row, std::uint64_t column, std::uint64_t& begin,
                 std::uint64_t& end) const;
 
   std::ptrdiff_t stride_ = 0, rows_ = 0;  ///< with padding

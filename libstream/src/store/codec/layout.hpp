@@ -18,15 +18,15 @@ namespace terrace::stream::store {
 
 /// Limits of the points of a cluster and of its decoded bytes (see Layout). A few bytes can
 /// represent any number of points, so nothing else limits the cost of a damaged count.
-inline constexpr std::uint32_t kMostPoints = 1u << 20;
-inline constexpr std::uint64_t kMostDecodedBytes = std::uint64_t{1} << 28;
+inline constexpr std::uint32_t kMaxPoints = 1u << 20;
+inline constexpr std::uint64_t kMaxDecodedBytes = std::uint64_t{1} << 28;
 /// Limit of the coded bytes of a cluster; the limits above keep valid clusters far below it.
-inline constexpr std::uint32_t kMostBytes = 1u << 31;
+inline constexpr std::uint32_t kMaxBytes = 1u << 31;
 
 /// Maximum clusters per page of the index. Every page of a level but the last has the same number,
 /// so page numbers follow from ordinals.
-inline constexpr std::uint32_t kMostPageClusters = 64;
-inline constexpr std::uint64_t kLeastPageBytes = 4;
+inline constexpr std::uint32_t kMaxPageClusters = 64;
+inline constexpr std::uint64_t kMinPageBytes = 4;
 
 /// The common properties of the clusters of one level.
 struct Layout {
@@ -36,8 +36,8 @@ struct Layout {
   std::vector<std::size_t> offsets;  ///< of the attributes in the payload of a point
   std::size_t payload_size = 0;
 
-  Layout(const Schema& schema, unsigned of_level)
-      : grid(schema.grid), level(of_level), payload_size(schema.payload_size()) {
+  Layout(const Schema& schema, unsigned number)
+      : grid(schema.grid), level(number), payload_size(schema.payload_size()) {
     std::size_t offset = 0;
     for (const Channel& channel : schema.attributes) {
       attributes.push_back(channel.type);
@@ -46,10 +46,10 @@ struct Layout {
     }
   }
   /// Maximum points of a cluster. Their coordinates, attributes and children fit into
-  /// kMostDecodedBytes.
-  [[nodiscard]] std::uint64_t most_points() const {
+  /// kMaxDecodedBytes.
+  [[nodiscard]] std::uint64_t max_points() const {
     const std::uint64_t bytes = sizeof(Point3) + payload_size + sizeof(std::uint64_t) * level;
-    return std::min<std::uint64_t>(kMostPoints, kMostDecodedBytes / bytes);
+    return std::min<std::uint64_t>(kMaxPoints, kMaxDecodedBytes / bytes);
   }
   /// Number of columns: the attributes and the three axes.
   [[nodiscard]] unsigned columns() const { return static_cast<unsigned>(attributes.size()) + 3; }
@@ -57,7 +57,7 @@ struct Layout {
   /// above level 0 cover larger areas, and entries of rasters are large compared with their
   /// clusters.
   [[nodiscard]] std::uint64_t page_clusters() const {
-    return level > 0 ? 4 : grid ? 16 : kMostPageClusters;
+    return level > 0 ? 4 : grid ? 16 : kMaxPageClusters;
   }
   /// Whether clusters are small and many, as on level 0 of rasters. They may then share bytes, and
   /// have short checksums.
@@ -80,9 +80,9 @@ struct Layout {
   [[nodiscard]] unsigned first_context(unsigned column) const {
     return context::kAttribute + column * context::kPerAttribute;
   }
-  /// Whether the column may be coded beside the preceding one, which requires that both are
-  /// attributes of integers.
-  [[nodiscard]] bool may_lie_beside(unsigned column) const {
+  /// Whether the differences of the column may be predicted from those of the preceding one. Both
+  /// must be attributes of integer types.
+  [[nodiscard]] bool may_use_preceding(unsigned column) const {
     const auto integer = [](ScalarType t) { return t != ScalarType::f32 && t != ScalarType::f64; };
     return column > 0 && column < attributes.size() && integer(attributes[column]) &&
            integer(attributes[column - 1]);

@@ -63,9 +63,9 @@ NumberForm form_of(std::span<const double> values) {
   const NumberForm bits = floats ? kFloatBits : kDoubleBits;
   NumberForm best = bits;
   const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  const auto range = [&, least = *low, most = *high](NumberForm form) {
-    return static_cast<std::uint64_t>(to_integer(most, form)) -
-           static_cast<std::uint64_t>(to_integer(least, form));
+  const auto range = [&, bottom = *low, top = *high](NumberForm form) {
+    return static_cast<std::uint64_t>(to_integer(top, form)) -
+           static_cast<std::uint64_t>(to_integer(bottom, form));
   };
   for (const NumberForm base : {kIntegerForm, kFloatDecimals}) {
     if (base == kFloatDecimals && !floats) continue;

@@ -7,10 +7,10 @@
 namespace terrace::stream::store {
 namespace {
 
-constexpr std::int32_t kOne = 256;
-constexpr std::int32_t kMost = 16 * kOne;
+constexpr std::int32_t kUnit = 256;
+constexpr std::int32_t kMaxCoefficient = 16 * kUnit;
 /// Fewer samples than this do not justify separate coefficients.
-constexpr std::uint64_t kFewest = 64;
+constexpr std::uint64_t kMinSamples = 64;
 
 /// Returns the neighbour from which the others are measured, the lowest of the pattern.
 unsigned reference(unsigned pattern) { return static_cast<unsigned>(std::countr_zero(pattern)); }
@@ -20,13 +20,13 @@ unsigned reference(unsigned pattern) { return static_cast<unsigned>(std::countr_
 std::array<Predictor::Coefficients, kPatterns> Predictor::defaults() {
   std::array<Coefficients, kPatterns> result{};
   for (unsigned pattern = 1; pattern < kPatterns; ++pattern) {
-    const auto there = [&](unsigned n) { return (pattern >> n & 1) != 0; };
+    const auto exists = [&](unsigned n) { return (pattern >> n & 1) != 0; };
     Coefficients& c = result[pattern];
-    if (there(kWest) && there(kNorth) && there(kNorthWest)) {
-      c[kWest] = c[kNorth] = kOne;
-      c[kNorthWest] = -kOne;
+    if (exists(kWest) && exists(kNorth) && exists(kNorthWest)) {
+      c[kWest] = c[kNorth] = kUnit;
+      c[kNorthWest] = -kUnit;
     } else {
-      c[reference(pattern)] = kOne;
+      c[reference(pattern)] = kUnit;
     }
   }
   return result;
@@ -54,11 +54,11 @@ Predictor Predictor::read(ByteReader& in) {
   for (unsigned p = 1; p < kPatterns; ++p) {
     if ((fitted >> p & 1) == 0) continue;
     Coefficients c{};
-    std::int32_t rest = kOne;
+    std::int32_t rest = kUnit;
     for (unsigned n = reference(p) + 1; n < kNeighbours; ++n) {
       if ((p >> n & 1) == 0) continue;
       const std::int64_t value = unzigzag(in.varint());
-      if (value < -kMost || value > kMost)
+      if (value < -kMaxCoefficient || value > kMaxCoefficient)
         throw Damage("a predictor's coefficient is out of range");
       c[n] = static_cast<std::int32_t>(value);
       rest -= c[n];
@@ -95,7 +95,7 @@ Predictor PredictorFit::fit() const {
   Predictor predictor;
   for (unsigned pattern = 1; pattern < kPatterns; ++pattern) {
     const Sums& sums = sums_[pattern];
-    if (sums.count < kFewest) continue;
+    if (sums.count < kMinSamples) continue;
     const auto unknowns = static_cast<unsigned>(std::popcount(pattern)) - 1;
 
     // Cholesky decomposition; the small addition to the diagonal keeps flat land solvable.
@@ -129,13 +129,13 @@ Predictor PredictorFit::fit() const {
     }
 
     Predictor::Coefficients c{};
-    std::int32_t rest = kOne;
+    std::int32_t rest = kUnit;
     unsigned next = 0;
     bool usable = true;
     for (unsigned n = reference(pattern) + 1; n < kNeighbours; ++n) {
       if ((pattern >> n & 1) == 0) continue;
-      const double scaled = std::nearbyint(solution[next++] * kOne);
-      if (!(std::abs(scaled) <= kMost)) {
+      const double scaled = std::nearbyint(solution[next++] * kUnit);
+      if (!(std::abs(scaled) <= kMaxCoefficient)) {
         usable = false;
         break;
       }

@@ -52,12 +52,12 @@ void SymbolDecoder::throw_bad_symbol() { throw Damage("coded bytes have an unkno
 
 void BitWriter::append_reversed(Bytes& out) const {
   std::uint64_t rest = hold_;
-  unsigned left = held_;
-  if (left % 8 != 0) {
-    rest <<= 8 - left % 8;
-    left += 8 - left % 8;
+  unsigned remaining = held_;
+  if (remaining % 8 != 0) {
+    rest <<= 8 - remaining % 8;
+    remaining += 8 - remaining % 8;
   }
-  for (; left > 0; left -= 8, rest >>= 8) out.push_back(static_cast<std::uint8_t>(rest));
+  for (; remaining > 0; remaining -= 8, rest >>= 8) out.push_back(static_cast<std::uint8_t>(rest));
   const std::size_t end = out.size();
   out.resize(end + used_ * sizeof(std::uint32_t));
   std::uint8_t* to = out.data() + end;
@@ -86,21 +86,21 @@ void SymbolEncoder::numbers(unsigned first, std::span<const std::uint64_t> numbe
   const Entry* const entries = entries_ + std::size_t{first} * kSymbols;
   Entry* const out = symbols_.data() + used_;
   bool escape = false;
-  std::uint64_t any = 0;
+  std::uint64_t all_bits = 0;
   for (std::size_t i = 0; i < n; ++i) {
     out[i] = entries[slots[i]];
     escape |= out[i] == 0;
-    any |= numbers[i];
+    all_bits |= numbers[i];
   }
   used_ += n;
-  if (any < 16 && !escape) return;    // no raw bits
-  BitWriter bits = std::move(bits_);  // a copy, which the compiler can keep in registers
+  if (all_bits < 16 && !escape) return;  // no raw bits
+  BitWriter bits = std::move(bits_);     // a copy, which the compiler can keep in registers
   const auto open_bits = [&](std::size_t i) -> RawBits {
     const ClassRange& range = kClassRange[classes[i]];
     return {numbers[i] - range.base, range.bits};
   };
   std::size_t i = 0;
-  if (any >> 17 == 0 && !escape) {
+  if (all_bits >> 17 == 0 && !escape) {
     for (; i + 1 < n; i += 2) {  // the bits of two are at most 32
       const RawBits one = open_bits(i), other = open_bits(i + 1);
       bits.put_short(one.value << other.bits | other.value, one.bits + other.bits);
@@ -123,19 +123,19 @@ class SymbolEncoder::Words {
  public:
   /// The initial state is the decoder's final one, so it holds 16 bits at no cost.
   Words(SymbolEncoder& encoder, std::uint32_t last)
-      : left(encoder.used_),
+      : remaining(encoder.used_),
         symbols_(encoder.symbols_.data()),
-        alone_(encoder.bits_.empty()),
-        state_(alone_ ? last : kLow + last) {
+        without_raw_bits_(encoder.bits_.empty()),
+        state_(without_raw_bits_ ? last : kLow + last) {
     assert(last < kLow);
-    if (encoder.words_.size() <= left) encoder.words_.resize(2 * left + 64);
+    if (encoder.words_.size() <= remaining) encoder.words_.resize(2 * remaining + 64);
     end_ = next_ = encoder.words_.data() + encoder.words_.size();
   }
 
-  std::size_t left;  ///< symbols not yet taken
+  std::size_t remaining;  ///< symbols not yet taken
 
   TERRACE_STORE_INLINE void step() {
-    const Entry entry = symbols_[--left];
+    const Entry entry = symbols_[--remaining];
     const std::uint32_t frequency = entry & 0xffff, begin = entry >> 16;
     // Always written, even if it does not count, because a branch is often mispredicted.
     next_[-1] = static_cast<std::uint16_t>(state_);
@@ -148,7 +148,8 @@ class SymbolEncoder::Words {
     const auto bytes = static_cast<std::size_t>(end_ - next_) * sizeof(std::uint16_t);
     // If the string is only the state, it has only the bytes that the state needs.
     std::size_t of_state = sizeof state_;
-    while (alone_ && bytes == 0 && of_state > 1 && state_ >> (8 * of_state - 8) == 0) --of_state;
+    while (without_raw_bits_ && bytes == 0 && of_state > 1 && state_ >> (8 * of_state - 8) == 0)
+      --of_state;
     const std::size_t start = out.size();
     out.resize(start + of_state + bytes);
     std::memcpy(out.data() + start, &state_, of_state);
@@ -158,19 +159,19 @@ class SymbolEncoder::Words {
  private:
   const Entry* symbols_;
   std::uint16_t *next_, *end_;
-  bool alone_;  ///< no raw bits follow
+  bool without_raw_bits_;  ///< no raw bits follow
   std::uint32_t state_;
 };
 
 /// Codes the lanes in parallel until one has no symbols left, then continues with the others as
 /// long as there are two.
 template <std::size_t kLanes>
-void SymbolEncoder::finish_lanes(std::array<Words*, kTogether>& lanes) {
+void SymbolEncoder::finish_lanes(std::array<Words*, kBatch>& lanes) {
   std::sort(lanes.begin(), lanes.begin() + kLanes,
-            [](const Words* a, const Words* b) { return a->left > b->left; });
+            [](const Words* a, const Words* b) { return a->remaining > b->remaining; });
   const auto finish_shortest = [&]<std::size_t... kLane>(std::index_sequence<kLane...>) {
     std::array<Words, kLanes> words{*lanes[kLane]...};  // which the compiler can keep in registers
-    for (std::size_t steps = words.back().left; steps > 0; --steps) (words[kLane].step(), ...);
+    for (std::size_t steps = words.back().remaining; steps > 0; --steps) (words[kLane].step(), ...);
     ((*lanes[kLane] = words[kLane]), ...);
   };
   finish_shortest(std::make_index_sequence<kLanes>());
@@ -179,13 +180,13 @@ void SymbolEncoder::finish_lanes(std::array<Words*, kTogether>& lanes) {
 
 void SymbolEncoder::finish(std::span<SymbolEncoder> coders, std::span<std::uint32_t> last,
                            Bytes& out) {
-  assert(coders.size() <= kTogether && last.size() == coders.size());
-  std::array<std::optional<Words>, kTogether> words;
-  std::array<Words*, kTogether> lanes{};
+  assert(coders.size() <= kBatch && last.size() == coders.size());
+  std::array<std::optional<Words>, kBatch> words;
+  std::array<Words*, kBatch> lanes{};
   for (std::size_t i = 0; i < coders.size(); ++i) lanes[i] = &words[i].emplace(coders[i], last[i]);
-  if (coders.size() == kTogether) finish_lanes<kTogether>(lanes);
+  if (coders.size() == kBatch) finish_lanes<kBatch>(lanes);
   for (std::size_t i = 0; i < coders.size(); ++i) {
-    while (words[i]->left > 0) words[i]->step();
+    while (words[i]->remaining > 0) words[i]->step();
   }
   for (std::size_t i = 0; i < coders.size(); ++i) {
     const std::size_t start = out.size();

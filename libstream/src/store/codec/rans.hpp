@@ -163,7 +163,7 @@ class SymbolEncoder {
   /// shows that no words are left.
   void finish(std::uint32_t last, Bytes& out) { finish({this, 1}, {&last, 1}, out); }
   /// Number of clusters that are best finished together.
-  static constexpr std::size_t kTogether = 4;
+  static constexpr std::size_t kBatch = 4;
   /// Appends the strings of up to kTogether clusters, one after another. Faster than one by one,
   /// because each step of rANS waits for the previous one. last: one per cluster; replaced by the
   /// bytes of its string.
@@ -173,7 +173,7 @@ class SymbolEncoder {
   using Entry = EncodeTables::Entry;
   class Words;
   template <std::size_t kLanes>
-  static void finish_lanes(std::array<Words*, kTogether>& lanes);
+  static void finish_lanes(std::array<Words*, kBatch>& lanes);
   void grow(std::size_t more);
 
   const Entry* entries_;

@@ -119,8 +119,9 @@ struct NarrowPoints {
     const auto rank = [&](unsigned axis) {
       return static_cast<std::int64_t>(field(box.extent, axis) << 2 | (2 - axis));
     };
-    const std::int64_t most = larger(larger(rank(0), rank(1)), rank(2));
-    return {2 - static_cast<unsigned>(most & 3), static_cast<std::uint64_t>(most) >> 2};
+    const std::int64_t longest_rank = larger(larger(rank(0), rank(1)), rank(2));
+    return {2 - static_cast<unsigned>(longest_rank & 3),
+            static_cast<std::uint64_t>(longest_rank) >> 2};
   }
   TERRACE_STORE_INLINE static Limit limit(const Box& box, const BoxSide& side) {
     const Point in_place = kField << shift(side.axis);
@@ -142,10 +143,10 @@ struct NarrowPoints {
   }
   template <class Coder>
   TERRACE_STORE_INLINE static void place(Coder& coder, const Box& box, Point point) {
-    const Point within = point - box.low;
+    const Point offset = point - box.low;
     RawBits all;
     for (unsigned axis = 0; axis < 3; ++axis) {
-      const RawBits coded = uniform_bits(field(within, axis), field(box.extent, axis) + 1);
+      const RawBits coded = uniform_bits(field(offset, axis), field(box.extent, axis) + 1);
       all = {all.value << coded.bits | coded.value, all.bits + coded.bits};
     }
     coder.raw(all.value, all.bits);

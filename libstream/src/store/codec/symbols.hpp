@@ -42,20 +42,17 @@ inline constexpr std::array<ClassRange, kSymbols> kClassRange = [] {
   return table;
 }();
 
-/// How the differences of a column are coded. plain: unchanged. recent: as one of the most recent
-/// differences, otherwise unchanged. beside: minus the preceding column's difference, because
-/// colours change together. trend: minus the previous difference along the line. median: minus the
-/// median of the previous three. The other five kinds are the same, but where a line begins they
-/// take the difference from the beginning of the previous line.
+/// How the differences of a column are coded.
 enum class ColumnKind : std::uint8_t {
-  plain,
-  recent,
-  beside,
-  trend,
-  median,
+  plain,      ///< unchanged
+  recent,     ///< as one of the most recent differences, otherwise unchanged
+  preceding,  ///< minus the preceding column's difference, because colours change together
+  trend,      ///< minus the previous difference along the line
+  median,     ///< minus the median of the previous three differences along the line
+  // The same, but the first difference of a line is relative to the start of the previous line.
   line,
   line_recent,
-  line_beside,
+  line_preceding,
   line_trend,
   line_median
 };

@@ -61,23 +61,23 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::u
 
   Frequencies frequencies{};
   frequencies[kEscape] = static_cast<std::uint16_t>(escape);
-  std::uint64_t given = 0;
+  std::uint64_t sum = 0;
   for (unsigned s = 0; s < kClasses; ++s) {
     if (counts[s] < std::max(least, 1u)) continue;
     const std::uint64_t share = std::max<std::uint64_t>(1, counts[s] * available / total);
     frequencies[s] = static_cast<std::uint16_t>(share);
-    given += share;
+    sum += share;
   }
   // The most frequent symbols absorb the rounding, because it costs them least.
-  while (given != available) {
+  while (sum != available) {
     const auto largest = std::max_element(frequencies.begin(), frequencies.begin() + kClasses);
-    if (given < available) {
-      *largest = static_cast<std::uint16_t>(*largest + (available - given));
-      given = available;
+    if (sum < available) {
+      *largest = static_cast<std::uint16_t>(*largest + (available - sum));
+      sum = available;
     } else {
-      const std::uint64_t excess = std::min<std::uint64_t>(given - available, *largest / 8u + 1u);
+      const std::uint64_t excess = std::min<std::uint64_t>(sum - available, *largest / 8u + 1u);
       *largest = static_cast<std::uint16_t>(*largest - excess);
-      given -= excess;
+      sum -= excess;
     }
   }
   return frequencies;
@@ -128,16 +128,16 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
       throw Damage("a table has an unknown kind of columns");
     }
     tables.kinds.push_back(static_cast<ColumnKind>(kind));
-    if (along_line(tables.kinds[c]) == ColumnKind::beside &&
-        !(layout.may_lie_beside(c) && c != tables.guide.attribute)) {
-      throw Damage("a table has kind beside for columns other than integers");
+    if (along_line(tables.kinds[c]) == ColumnKind::preceding &&
+        !(layout.may_use_preceding(c) && c != tables.guide.attribute)) {
+      throw Damage("a table predicts a column from one that is not an integer attribute");
     }
   }
   const unsigned contexts = layout.contexts();
   tables.frequencies.reserve(contexts);
   for (unsigned c = 0; c < contexts; ++c) {
     Frequencies frequencies{};
-    std::uint64_t symbol = 0, left = kScale;
+    std::uint64_t symbol = 0, remaining = kScale;
     const std::uint64_t used = in.varint();
     if (used == 0) {
       const std::uint64_t more = in.varint();
@@ -153,42 +153,42 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
       }
       symbol += step;
       const std::uint64_t frequency = in.varint();
-      if (frequency == 0 || frequency >= left)
+      if (frequency == 0 || frequency >= remaining)
         throw Damage("the frequencies of a table do not add up");
       frequencies[static_cast<std::size_t>(symbol)] = static_cast<std::uint16_t>(frequency);
-      left -= frequency;
+      remaining -= frequency;
     }
-    frequencies[kEscape] = static_cast<std::uint16_t>(left);
+    frequencies[kEscape] = static_cast<std::uint16_t>(remaining);
     tables.frequencies.push_back(frequencies);
   }
-  if (in.left() != 0) throw Damage("bytes follow the tables");
+  if (in.remaining() != 0) throw Damage("bytes follow the tables");
   return tables;
 }
 
-EncodingTables::EncodingTables(const Tables& from)
-    : predictor(from.predictor), guide(from.guide), kinds(from.kinds) {
-  for (const Frequencies& frequencies : from.frequencies) {
+EncodingTables::EncodingTables(const Tables& source)
+    : predictor(source.predictor), guide(source.guide), kinds(source.kinds) {
+  for (const Frequencies& frequencies : source.frequencies) {
     tables.append(frequencies);
   }
 }
 
-DecodingTables::DecodingTables(const Tables& from)
-    : predictor(from.predictor), guide(from.guide), kinds(from.kinds) {
-  static const DecodeTable unseen = [] {
+DecodingTables::DecodingTables(const Tables& source)
+    : predictor(source.predictor), guide(source.guide), kinds(source.kinds) {
+  static const DecodeTable escape_table = [] {
     DecodeTable table;
     fill_decode_table(escape_only(), table);
     return table;
   }();
-  const auto seen = [](const Frequencies& f) { return f[kEscape] != kScale; };
+  const auto is_used = [](const Frequencies& f) { return f[kEscape] != kScale; };
   storage_.resize(static_cast<std::size_t>(
-      std::count_if(from.frequencies.begin(), from.frequencies.end(), seen)));
+      std::count_if(source.frequencies.begin(), source.frequencies.end(), is_used)));
   std::size_t next = 0;
-  for (const Frequencies& frequencies : from.frequencies) {
-    if (seen(frequencies)) {
+  for (const Frequencies& frequencies : source.frequencies) {
+    if (is_used(frequencies)) {
       fill_decode_table(frequencies, storage_[next]);
       tables.push_back(&storage_[next++]);
     } else {
-      tables.push_back(&unseen);
+      tables.push_back(&escape_table);
     }
   }
 }

@@ -30,7 +30,7 @@ struct Guide {
   static constexpr unsigned kNone = UINT32_MAX;
 
   unsigned attribute = kNone;
-  std::uint64_t least_jump = 0;  ///< a difference of at least this begins a line; not stored
+  std::uint64_t min_jump = 0;  ///< a difference of at least this begins a line; not stored
 
   [[nodiscard]] bool exists() const { return attribute != kNone; }
 };
@@ -54,7 +54,7 @@ struct EncodingTables {
   std::vector<ColumnKind> kinds;
   EncodeTables tables;
 
-  explicit EncodingTables(const Tables& from);
+  explicit EncodingTables(const Tables& source);
 };
 
 /// Tables prepared for decoding. Contexts without symbols share one table.
@@ -64,7 +64,7 @@ struct DecodingTables {
   std::vector<ColumnKind> kinds;
   std::vector<const DecodeTable*> tables;
 
-  explicit DecodingTables(const Tables& from);
+  explicit DecodingTables(const Tables& source);
   DecodingTables(const DecodingTables&) = delete;
   DecodingTables& operator=(const DecodingTables&) = delete;
 

@@ -28,12 +28,13 @@ constexpr double kRounding = 8 * std::numeric_limits<double>::epsilon();
 /// Returns the length of a vector, without overflow or underflow of squares; infinite if a double
 /// cannot represent it.
 double norm(const Point3& v) {
-  const double most = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
-  if (most > 1e-140 && most < 1e140) return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-  if (most == 0.0) return 0.0;
-  if (!(most < kFar)) return kFar;
+  const double largest = std::max({std::abs(v[0]), std::abs(v[1]), std::abs(v[2])});
+  if (largest > 1e-140 && largest < 1e140)
+    return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  if (largest == 0.0) return 0.0;
+  if (!(largest < kFar)) return kFar;
   int exponent = 0;
-  static_cast<void>(std::frexp(most, &exponent));
+  static_cast<void>(std::frexp(largest, &exponent));
   double square = 0;
   for (const double c : v) {
     const double scaled = std::ldexp(c, -exponent);
@@ -59,20 +60,20 @@ double distance_of(const LinearMap& map, const Point3& a, const Point3& b) {
 
 /// Returns a lower bound of distance_of() from `place` to any point in the box, including rounding:
 /// the distance to the box around the mapped box.
-double least_distance(const LinearMap& map, const Point3& place, const Box3& box) {
+double min_distance(const LinearMap& map, const Point3& place, const Box3& box) {
   const Point3 low = half_way(box.min, place), high = half_way(box.max, place);
   Point3 out;
   for (std::size_t row = 0; row < 3; ++row) {
-    double least = 0, most = 0, terms = 0;
+    double lower = 0, upper = 0, terms = 0;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double a = map[3 * row + axis] * low[axis], b = map[3 * row + axis] * high[axis];
-      least += std::min(a, b);
-      most += std::max(a, b);
+      lower += std::min(a, b);
+      upper += std::max(a, b);
       terms += std::max(std::abs(a), std::abs(b));
     }
     const double slack = kRounding * terms;
-    const double beyond = std::max(least - slack, -(most + slack));
-    out[row] = beyond > 0.0 ? beyond : 0.0;  // also if infinite terms give NaN
+    const double gap = std::max(lower - slack, -(upper + slack));
+    out[row] = gap > 0.0 ? gap : 0.0;  // also if infinite terms give NaN
   }
   // Finite, so that a box is not skipped because its distance overflows.
   return std::min(2 * norm(out) * (1 - kRounding), std::numeric_limits<double>::max());
@@ -102,14 +103,14 @@ double share_inside(const Box3& box, const Box3& other) {
 
 StoreQuery::StoreQuery(const Store& store, std::uint64_t leaf_bytes)
     : store_(store),
-      leaves_{.most_bytes = leaf_bytes},
-      inner_{.most_bytes = kInnerBytes},
+      leaves_{.max_bytes = leaf_bytes},
+      inner_{.max_bytes = kInnerBytes},
       wanted_(store.top() + 1) {
   for (const LevelInfo& level : store.levels()) clusters_ += level.clusters;
   fill(root_, store.root());
 }
 
-void StoreQuery::check_looked(std::uint64_t clusters) const {
+void StoreQuery::check_traversal(std::uint64_t clusters) const {
   if (clusters <= clusters_) return;
   throw Error(store_.path().string(),
               "the hierarchy is damaged: clusters are headed by several points")
@@ -169,9 +170,9 @@ void StoreQuery::Node::look_up(Branch& branch, unsigned below) const {
 const StoreQuery::Node& StoreQuery::node(ClusterId id) {
   if (id == root_.id) return root_;
   Cache& cache = level_of(id) == 0 ? leaves_ : inner_;
-  if (cache.most_bytes == 0) {
-    fill(passing_, id);
-    return passing_;
+  if (cache.max_bytes == 0) {
+    fill(uncached_, id);
+    return uncached_;
   }
   const auto key = static_cast<std::uint64_t>(id);
   if (const auto found = cache.by_id.find(key); found != cache.by_id.end()) {
@@ -180,8 +181,8 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
   }
   // The memory of a dropped node is reused for the new one. The new node is not in a map until it
   // is complete, so damage leaves no trace.
-  Nodes fresh, gone;
-  if (cache.held_bytes >= cache.most_bytes && !cache.nodes.empty()) {
+  Nodes fresh, dropped;
+  if (cache.held_bytes >= cache.max_bytes && !cache.nodes.empty()) {
     cache.drop(fresh);
   } else {
     fresh.emplace_front();
@@ -190,7 +191,7 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
   cache.held_bytes += fresh.front().bytes;
   cache.nodes.splice(cache.nodes.begin(), fresh);
   cache.by_id[key] = cache.nodes.begin();
-  while (cache.held_bytes > cache.most_bytes && cache.nodes.size() > 1) cache.drop(gone);
+  while (cache.held_bytes > cache.max_bytes && cache.nodes.size() > 1) cache.drop(dropped);
   return cache.nodes.front();
 }
 
@@ -233,7 +234,7 @@ std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
   descend(
       level,
       [&](unsigned, const Branch& branch) {
-        return least_distance(metric, place, branch.box) <= radius;
+        return min_distance(metric, place, branch.box) <= radius;
       },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
@@ -254,7 +255,7 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
   std::vector<FoundPoint> found;  // a heap with the farthest on top
   if (count == 0) return found;
   best_first(
-      level, [&](const Box3& box) { return least_distance(metric, place, box); },
+      level, [&](const Box3& box) { return min_distance(metric, place, box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
           const FoundPoint point{.position = node.positions[i],

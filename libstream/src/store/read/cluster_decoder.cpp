@@ -72,14 +72,14 @@ void ClusterDecoder::decode(const Layout& layout, const DecodingTables& tables, 
     out.representative_children.clear();
     return;
   }
-  if (n > layout.most_points()) throw Damage("a cluster has too many points");
+  if (n > layout.max_points()) throw Damage("a cluster has too many points");
   SymbolDecoder coder(tables.tables, bytes);
   const bool placed = positions(coder, layout, tables, entry);
   payload_.resize(n * layout.payload_size);
   if (tables.guide.exists()) attribute(coder, layout, tables, tables.guide.attribute, n);
   if (!placed) sequence(coder, layout, tables, n);
   for (unsigned a = 0; a < layout.attributes.size(); ++a) {
-    std::swap(column_, beside_);
+    std::swap(column_, preceding_);
     if (a == tables.guide.attribute) {
       column_ = guide_;
     } else {
@@ -107,12 +107,12 @@ void ClusterDecoder::deliver_payload(std::size_t stride, std::uint32_t n,
   out.payload.resize((root ? n : n - 1) * stride);
   out.representative_payload.resize(root ? 0 : stride);
   if (stride == 0) return;
-  const std::byte* const from = payload_.data();
+  const std::byte* const records = payload_.data();
   const std::size_t before = representative * stride;
-  std::copy(from, from + before, out.payload.begin());
+  std::copy(records, records + before, out.payload.begin());
   if (root) return;
-  std::copy(from + before, from + before + stride, out.representative_payload.begin());
-  std::copy(from + before + stride, from + n * stride,
+  std::copy(records + before, records + before + stride, out.representative_payload.begin());
+  std::copy(records + before + stride, records + n * stride,
             out.payload.begin() + static_cast<std::ptrdiff_t>(before));
 }
 
@@ -144,8 +144,8 @@ void ClusterDecoder::attribute(SymbolDecoder& coder, const Layout& layout,
     guide_ = column_;
   } else {
     code_column(coder, layout.first_context(number), tables.kinds[number], coded_form,
-                tables.guide.exists() ? &lines_ : nullptr, beside_.data(), column_.data(), nullptr,
-                n);
+                tables.guide.exists() ? &lines_ : nullptr, preceding_.data(), column_.data(),
+                nullptr, n);
   }
   scatter(type, form, column_, layout.payload_size, payload_.data() + layout.offsets[number]);
 }

@@ -43,7 +43,7 @@ class ClusterDecoder {
   std::array<std::vector<std::uint64_t>, 3> relative_;
   GridCodec grid_;
   SplitDecoder split_;
-  std::vector<std::int64_t> column_, beside_, guide_;
+  std::vector<std::int64_t> column_, preceding_, guide_;
   Lines lines_;
   std::vector<std::byte> payload_;
   std::vector<std::int64_t> children_;

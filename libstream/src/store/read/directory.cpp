@@ -9,10 +9,10 @@ namespace terrace::stream::store {
 namespace {
 
 /// Contents of chapters and tables of at most this many bytes are read with the directory.
-constexpr std::uint64_t kReadAtOnce = std::uint64_t{64} << 10;
+constexpr std::uint64_t kMaxCacheBytes = std::uint64_t{64} << 10;
 /// A writer makes one set per 1024 blocks, each of which has a cluster.
-constexpr std::uint64_t kFewestClustersOfTables = 1024;
-constexpr std::uint64_t kMostVarint = 10, kChecksum = 4;
+constexpr std::uint64_t kMinClustersOfTables = 1024;
+constexpr std::uint64_t kMaxVarint = 10, kChecksum = 4;
 
 /// Checks the CRC-32 at the end of `bytes`. Returns the bytes before it.
 ByteView checked(ByteView bytes, const char* damage) {
@@ -33,19 +33,19 @@ Directory::Directory(const ByteSource& index, std::uint64_t bytes, std::uint64_t
       pages_(clusters / layout.page_clusters() + (clusters % layout.page_clusters() != 0)),
       attributes_(layout.attributes.size()),
       bounds_(bounds) {
-  const std::uint64_t most_tables = 1 + clusters / kFewestClustersOfTables;
-  if (bytes > 64 * (1 + pages_ / kChapterPages) + most_tables * 2 * kMostVarint) {
+  const std::uint64_t max_tables = 1 + clusters / kMinClustersOfTables;
+  if (bytes > 64 * (1 + pages_ / kChapterPages) + max_tables * 2 * kMaxVarint) {
     throw Damage("the directory is too large for the level's clusters");
   }
   const std::uint64_t start = index_.size() - bytes;
-  held_at_ = start;
-  held_ = read(start, bytes);
-  ByteReader in(checked(held_, "the checksum of the directory is wrong"));
+  cache_offset_ = start;
+  cache_ = read(start, bytes);
+  ByteReader in(checked(cache_, "the checksum of the directory is wrong"));
   read_chapters(in, start);
   contents_ = std::vector<std::atomic<const Contents*>>(chapters_.size());
   const std::uint64_t tail = chapters_.front().contents_at;
-  held_ = start - tail > kReadAtOnce ? Bytes() : read(tail, start - tail);
-  held_at_ = tail;
+  cache_ = start - tail > kMaxCacheBytes ? Bytes() : read(tail, start - tail);
+  cache_offset_ = tail;
 }
 
 Directory::~Directory() {
@@ -58,18 +58,18 @@ void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
   for (std::uint64_t c = 0; c < chapters; ++c) {
     const std::uint64_t pages = std::min(kChapterPages, pages_ - c * kChapterPages);
     Chapter chapter;
-    const std::uint64_t of_pages = in.varint(), of_contents = in.varint();
-    if (of_pages > pages * most_page_bytes(attributes_) || of_pages > start - pages_end) {
-      throw Damage("the chapters of the directory do not follow one another");
+    const std::uint64_t pages_bytes = in.varint(), contents_size = in.varint();
+    if (pages_bytes > pages * max_page_bytes(attributes_) || pages_bytes > start - pages_end) {
+      throw Damage("the pages of a chapter have an impossible size");
     }
-    if (of_contents < 7 * pages + kChecksum || of_contents > 16 * pages + kChecksum) {
+    if (contents_size < 7 * pages + kChecksum || contents_size > 16 * pages + kChecksum) {
       throw Damage("the contents of a chapter have an impossible size");
     }
     chapter.pages_at = pages_end;
-    chapter.pages_end = pages_end += of_pages;
+    chapter.pages_end = pages_end += pages_bytes;
     chapter.contents_at = contents_bytes;
-    chapter.contents_bytes = static_cast<std::size_t>(of_contents);
-    contents_bytes += of_contents;
+    chapter.contents_bytes = static_cast<std::size_t>(contents_size);
+    contents_bytes += contents_size;
     ChapterBox box;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       box.low[axis] = in.get<std::uint16_t>();
@@ -79,7 +79,7 @@ void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
     chapters_.push_back(chapter);
   }
   if (contents_bytes > start - pages_end) {
-    throw Damage("the chapters of the directory do not follow one another");
+    throw Damage("the contents of the chapters are larger than the index");
   }
   for (Chapter& chapter : chapters_) chapter.contents_at += pages_end;
   read_sets(in, pages_end + contents_bytes);
@@ -88,34 +88,34 @@ void Directory::read_chapters(ByteReader& in, std::uint64_t start) {
   }
 }
 
-/// Reads the positions of the sets. at: where the first begins.
+/// Reads the positions of the sets of tables. at: the offset of the first set in the index.
 void Directory::read_sets(ByteReader& in, std::uint64_t at) {
   const std::uint64_t sets = in.varint();
   for (std::uint64_t t = 0; t < sets; ++t) {
-    TablesAt set;
+    TablesPosition set;
     set.first = in.varint();
     const std::uint64_t size = in.varint();
     if (size > index_.size() - at || kChecksum > index_.size() - at - size) {
-      throw Damage("the data end too early");
+      throw Damage("tables exceed the end of the index");
     }
     set.size = memory_size(size);
     set.offset = at;
     at += size + kChecksum;
     if (tables_.empty() ? set.first != 0 : set.first <= tables_.back().first) {
-      throw Damage("the tables do not follow one another");
+      throw Damage("the tables are not in the order of their clusters");
     }
     if (set.first >= clusters_) throw Damage("tables are for clusters that do not exist");
     tables_.push_back(set);
   }
-  if (in.left() != 0) throw Damage("bytes follow the directory");
+  if (in.remaining() != 0) throw Damage("bytes follow the directory");
   if (tables_.empty()) throw Damage("the level has no tables");
 }
 
 Bytes Directory::read(std::uint64_t offset, std::uint64_t size) const {
   Bytes bytes(memory_size(size));
-  if (offset >= held_at_ && offset - held_at_ <= held_.size() &&
-      size <= held_.size() - (offset - held_at_)) {
-    std::copy_n(held_.begin() + static_cast<std::ptrdiff_t>(offset - held_at_), size,
+  if (offset >= cache_offset_ && offset - cache_offset_ <= cache_.size() &&
+      size <= cache_.size() - (offset - cache_offset_)) {
+    std::copy_n(cache_.begin() + static_cast<std::ptrdiff_t>(offset - cache_offset_), size,
                 bytes.begin());
   } else {
     index_.read(offset, std::as_writable_bytes(std::span(bytes)));
@@ -135,8 +135,8 @@ const Directory::Contents& Directory::contents(std::uint64_t number) const {
   for (std::uint64_t p = 0; p < pages; ++p) {
     contents->offsets.push_back(offset);
     const std::uint64_t size = in.varint();
-    if (size > most_page_bytes(attributes_) || size > chapter.pages_end - offset) {
-      throw Damage("the pages of a chapter do not follow one another");
+    if (size > max_page_bytes(attributes_) || size > chapter.pages_end - offset) {
+      throw Damage("the sizes of a chapter's pages do not add up");
     }
     offset += size;
     PageBox& box = contents->boxes.emplace_back();
@@ -146,8 +146,8 @@ const Directory::Contents& Directory::contents(std::uint64_t number) const {
     }
   }
   contents->offsets.push_back(offset);
-  if (offset != chapter.pages_end) throw Damage("the pages of a chapter do not end where it does");
-  if (in.left() != 0) throw Damage("bytes follow the contents of a chapter");
+  if (offset != chapter.pages_end) throw Damage("the sizes of a chapter's pages do not add up");
+  if (in.remaining() != 0) throw Damage("bytes follow the contents of a chapter");
   const std::lock_guard lock(mutex_);
   if (known.load(std::memory_order_relaxed) == nullptr) {
     known.store(contents.release(), std::memory_order_release);
@@ -162,8 +162,8 @@ Directory::Range Directory::page_range(std::uint64_t page) const {
 }
 
 Box3 Directory::page_box(std::uint64_t page) const {
-  const Contents& of_pages = contents(page / kChapterPages);
-  return of_pages.boxes[static_cast<std::size_t>(page % kChapterPages)].in(
+  const Contents& pages_bytes = contents(page / kChapterPages);
+  return pages_bytes.boxes[static_cast<std::size_t>(page % kChapterPages)].in(
       chapters_[static_cast<std::size_t>(page / kChapterPages)].box);
 }
 
@@ -176,7 +176,7 @@ Box3 Directory::coarse_box(std::uint64_t page) const {
              : known->boxes[static_cast<std::size_t>(page % kChapterPages)].in(chapter);
 }
 
-Bytes Directory::read_tables(const TablesAt& at) const {
+Bytes Directory::read_tables(const TablesPosition& at) const {
   Bytes bytes = read(at.offset, at.size + kChecksum);
   bytes.resize(checked(bytes, "the checksum of tables is wrong").size());
   return bytes;

@@ -15,13 +15,13 @@
 
 namespace terrace::stream::store {
 
-/// A box inside another, with its ends in steps of 1/kMost of the outer box. A default object is
+/// A box inside another, with its ends in steps of 1/kMax of the outer box. A default object is
 /// empty.
 template <class Number>
 struct QuantisedBox {
-  static constexpr Number kMost = std::numeric_limits<Number>::max();
+  static constexpr Number kMax = std::numeric_limits<Number>::max();
 
-  std::array<Number, 3> low{kMost, kMost, kMost}, high{};
+  std::array<Number, 3> low{kMax, kMax, kMax}, high{};
 
   [[nodiscard]] Box3 in(const Box3& outer) const {
     Box3 box;
@@ -31,15 +31,15 @@ struct QuantisedBox {
     }
     return box;
   }
-  /// Returns the smallest one that contains the intersection of `box` and `outer`.
+  /// Returns the smallest quantised box that contains the intersection of `box` and `outer`.
   static QuantisedBox around(const Box3& box, const Box3& outer) {
     QuantisedBox found;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = outer.min[axis], high = outer.max[axis];
       const auto place = [&](double value) {
         // Halves, so that no difference overflows.
-        const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * kMost;
-        return static_cast<Number>(share > 0 ? std::min<double>(share, kMost) : 0);
+        const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * kMax;
+        return static_cast<Number>(share > 0 ? std::min<double>(share, kMax) : 0);
       };
       // Rounding may have moved an end inside.
       Number& first = found.low[axis];
@@ -47,7 +47,7 @@ struct QuantisedBox {
       while (first > 0 && !(between(low, high, first) <= box.min[axis])) --first;
       Number& last = found.high[axis];
       last = place(box.max[axis]);
-      while (last < kMost && !(between(low, high, last) >= box.max[axis])) ++last;
+      while (last < kMax && !(between(low, high, last) >= box.max[axis])) ++last;
     }
     return found;
   }
@@ -55,7 +55,7 @@ struct QuantisedBox {
  private:
   /// Interpolates; exact at both ends.
   static double between(double low, double high, Number place) {
-    const double share = place / static_cast<double>(kMost);
+    const double share = place / static_cast<double>(kMax);
     return low * (1 - share) + high * share;
   }
 };
@@ -72,7 +72,7 @@ using PageBox = QuantisedBox<std::uint8_t>;
 /// Thread-safe.
 class Directory {
  public:
-  struct TablesAt {
+  struct TablesPosition {
     std::uint64_t first = 0;  ///< ordinal of the first cluster that uses them
     std::uint64_t offset = 0;
     std::size_t size = 0;  ///< without the checksum
@@ -98,9 +98,9 @@ class Directory {
   /// read.
   [[nodiscard]] Box3 coarse_box(std::uint64_t page) const;
   /// The sets of tables, in the order of clusters.
-  [[nodiscard]] const std::vector<TablesAt>& tables() const { return tables_; }
+  [[nodiscard]] const std::vector<TablesPosition>& tables() const { return tables_; }
   /// The bytes of a set. Throws: Damage, Error.
-  [[nodiscard]] Bytes read_tables(const TablesAt& at) const;
+  [[nodiscard]] Bytes read_tables(const TablesPosition& at) const;
 
  private:
   struct Contents {
@@ -123,10 +123,10 @@ class Directory {
   std::uint64_t clusters_, pages_;
   std::size_t attributes_;
   Box3 bounds_;
-  Bytes held_;  ///< the part of the file from held_at_ on that was read with the directory
-  std::uint64_t held_at_ = 0;
+  Bytes cache_;  ///< the part of the file from held_at_ on that was read with the directory
+  std::uint64_t cache_offset_ = 0;
   std::vector<Chapter> chapters_;
-  std::vector<TablesAt> tables_;
+  std::vector<TablesPosition> tables_;
   mutable std::vector<std::atomic<const Contents*>> contents_;
   mutable std::mutex mutex_;
 };

@@ -36,17 +36,17 @@ std::uint64_t widened(std::uint64_t key, unsigned shift, bool up) {
 
 /// Returns the shift for the ends of ranges of doubles. It moves them by at most a 32nd of their
 /// extent on average, if the bits suffice.
-unsigned floating_shift(std::span<const std::uint64_t> keys, std::uint64_t least,
-                        std::uint64_t most, bool up) {
-  const double reach = double_of_key(most) - double_of_key(least);
+unsigned floating_shift(std::span<const std::uint64_t> keys, std::uint64_t lowest,
+                        std::uint64_t highest, bool up) {
+  const double reach = double_of_key(highest) - double_of_key(lowest);
   unsigned shift = 0;
   for (const unsigned bits : kFloatingRangeBits) {
-    shift = shift_of(most - least, bits);
-    double moved = 0;
+    shift = shift_of(highest - lowest, bits);
+    double movement = 0;
     for (const std::uint64_t key : keys) {
-      moved += std::abs(double_of_key(widened(key, shift, up)) - double_of_key(key));
+      movement += std::abs(double_of_key(widened(key, shift, up)) - double_of_key(key));
     }
-    if (moved <= reach / 32 * static_cast<double>(keys.size())) break;
+    if (movement <= reach / 32 * static_cast<double>(keys.size())) break;
   }
   return shift;
 }
@@ -68,11 +68,11 @@ class PageCoder {
     const auto points = columns.column(PageColumns::kPoints);
     const auto bytes = columns.column(PageColumns::kBytes);
     // Clusters of rasters fill a certain share of their boxes.
-    guessed(points, PageColumns::kPoints, [&](std::size_t i) {
+    code_residuals(points, PageColumns::kPoints, [&](std::size_t i) {
       return small_ ? sizes_x[i] * sizes_y[i] * 45 >> 6 : i > 0 ? points[i - 1] : 0;
     });
     // As many bytes per point as the previous cluster.
-    guessed(bytes, PageColumns::kBytes, [&](std::size_t i) {
+    code_residuals(bytes, PageColumns::kBytes, [&](std::size_t i) {
       return i > 0 ? bytes[i - 1] * points[i] / std::max<std::uint64_t>(points[i - 1], 1) : 0;
     });
     numbers(columns.column(PageColumns::kDescendants), PageColumns::kDescendants);
@@ -81,7 +81,7 @@ class PageCoder {
     const auto extent = [&](std::size_t i) {
       return error_code(static_cast<double>(sizes_x[i] + sizes_y[i]));
     };
-    guessed(errors, PageColumns::kError, [&](std::size_t i) {
+    code_residuals(errors, PageColumns::kError, [&](std::size_t i) {
       return i > 0 ? errors[i - 1] + extent(i) - extent(i - 1) : extent(0);
     });
     differences(columns.column(PageColumns::kForms), context_of(PageColumns::kForms));
@@ -105,15 +105,16 @@ class PageCoder {
       const bool ones = end % 2 != 0;
       std::uint64_t bits = 0;
       for (const std::uint64_t key : keys) bits |= ones ? ~key : key;
-      const unsigned by = shift(bits);
+      const unsigned shift_bits = shift(bits);
       // All in one context; the first relative to the lowest key.
-      differences(keys, first_ + context::kIndexRange + end, {}, 1, by, ones, INT64_MIN >> by);
+      differences(keys, first_ + context::kIndexRange + end, {}, 1, shift_bits, ones,
+                  INT64_MIN >> shift_bits);
     }
   }
 
  private:
   static constexpr unsigned kTop = 63;
-  using Steps = std::array<std::uint8_t, kMostPageClusters>;
+  using Steps = std::array<std::uint8_t, kMaxPageClusters>;
 
   /// Loops work on a copy of a decoder, see Coder::Local.
   void keep(const Coder& coder) {
@@ -130,16 +131,16 @@ class PageCoder {
     std::uint64_t bits = 0;
     for (const std::uint64_t size : sizes) bits |= size;
     for (const std::uint64_t low : lows) bits |= low;
-    const unsigned by = shift(bits);
+    const unsigned shift_bits = shift(bits);
     unsigned step = 0;
     const unsigned context = context_of(PageColumns::kSizeX + axis);
     std::size_t i = 0;
     typename Coder::Local coder = coder_;
     Steps of_sizes;
     for (std::uint64_t& size : sizes) {
-      std::uint64_t number = (size >> by) - 1;
+      std::uint64_t number = (size >> shift_bits) - 1;
       step = difference_step(code_number(coder, context + step, number));
-      if constexpr (Coder::kDecoding) size = (number + 1) << by;
+      if constexpr (Coder::kDecoding) size = (number + 1) << shift_bits;
       of_sizes[i++] = static_cast<std::uint8_t>(step);
     }
     keep(coder);
@@ -148,7 +149,7 @@ class PageCoder {
     if (axis == 2) steps_ = of_sizes;
     differences(lows, context_of(PageColumns::kLowX + axis),
                 axis > 0 ? std::span<const std::uint8_t>(steps_) : std::span<const std::uint8_t>(),
-                context::kIndexSteps, by);
+                context::kIndexSteps, shift_bits);
   }
 
   /// Codes numbers unchanged, in contexts by the previous one.
@@ -162,7 +163,7 @@ class PageCoder {
   }
   /// Codes differences from guess(i), which may depend on earlier values.
   template <class Guess>
-  void guessed(std::span<std::uint64_t> values, unsigned field, const Guess& guess) {
+  void code_residuals(std::span<std::uint64_t> values, unsigned field, const Guess& guess) {
     unsigned step = 0;
     typename Coder::Local coder = coder_;
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -179,20 +180,22 @@ class PageCoder {
   /// difference does.
   void differences(std::span<std::uint64_t> values, unsigned context,
                    std::span<const std::uint8_t> steps = {},
-                   unsigned contexts = context::kIndexSteps, unsigned by = 0, bool ones = false,
-                   std::int64_t previous = 0) {
-    const std::uint64_t mask = ones ? (std::uint64_t{1} << by) - 1 : 0;
+                   unsigned contexts = context::kIndexSteps, unsigned shift_bits = 0,
+                   bool ones = false, std::int64_t previous = 0) {
+    const std::uint64_t mask = ones ? (std::uint64_t{1} << shift_bits) - 1 : 0;
     unsigned step = 0;
     typename Coder::Local coder = coder_;
     for (std::size_t i = 0; i < values.size(); ++i) {
       if (!steps.empty()) step = steps[i];
       // Ranges are unsigned, but differences wrap either way.
-      std::int64_t now = static_cast<std::int64_t>(values[i]) >> by;
-      const unsigned found = code_difference(coder, context + step % contexts, previous, now);
-      step = difference_step(found);
+      std::int64_t current = static_cast<std::int64_t>(values[i]) >> shift_bits;
+      const unsigned number_class =
+          code_difference(coder, context + step % contexts, previous, current);
+      step = difference_step(number_class);
       last_steps_[i] = static_cast<std::uint8_t>(step);
-      previous = now;
-      if constexpr (Coder::kDecoding) values[i] = static_cast<std::uint64_t>(now) << by | mask;
+      previous = current;
+      if constexpr (Coder::kDecoding)
+        values[i] = static_cast<std::uint64_t>(current) << shift_bits | mask;
     }
     keep(coder);
   }
@@ -200,10 +203,10 @@ class PageCoder {
   /// Codes the number of lowest bits that are 0 in all values of a column. bits: the union of the
   /// values' bits, for encoding.
   unsigned shift(std::uint64_t bits) {
-    std::uint64_t by = bits == 0 ? kTop : static_cast<unsigned>(std::countr_zero(bits));
-    code_number(coder_, first_ + context::kIndexShift, by);
-    if (by > kTop) throw Damage("an index page has a bad column");
-    return static_cast<unsigned>(by);
+    std::uint64_t shift_bits = bits == 0 ? kTop : static_cast<unsigned>(std::countr_zero(bits));
+    code_number(coder_, first_ + context::kIndexShift, shift_bits);
+    if (shift_bits > kTop) throw Damage("an index page has a bad column");
+    return static_cast<unsigned>(shift_bits);
   }
 
   Coder& coder_;
@@ -233,7 +236,7 @@ std::uint32_t decode_symbols(const Bytes& padded, const Layout& layout,
 
 PageColumns::PageColumns(std::span<const Entry> entries)
     : PageColumns(static_cast<std::uint32_t>(entries.size())) {
-  assert(!entries.empty() && entries.size() <= kMostPageClusters);
+  assert(!entries.empty() && entries.size() <= kMaxPageClusters);
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const Entry& entry = entries[i];
     const auto put = [&](std::size_t field, std::uint64_t value) { column(field)[i] = value; };
@@ -263,11 +266,11 @@ RangeColumns::RangeColumns(std::span<const KeyRange> ranges, std::span<const Sca
   for (std::size_t end = 0; end < columns(); ++end) {
     const std::span<std::uint64_t> keys = column(end);
     const ScalarType type = types[end / 2];
-    const auto [least, most] = std::minmax_element(keys.begin(), keys.end());
+    const auto [lowest, highest] = std::minmax_element(keys.begin(), keys.end());
     const bool up = end % 2 != 0;
     const unsigned shift = type == ScalarType::f32 || type == ScalarType::f64
-                               ? floating_shift(keys, *least, *most, up)
-                               : shift_of(*most - *least, kRangeBits);
+                               ? floating_shift(keys, *lowest, *highest, up)
+                               : shift_of(*highest - *lowest, kRangeBits);
     for (std::uint64_t& key : keys) key = widened(key, shift, up);
   }
 }
@@ -312,10 +315,10 @@ CodedPage read_page(ByteView bytes, std::uint32_t clusters, const Layout& layout
   ByteReader in(bytes);
   const std::uint64_t upper = in.varint();
   if (upper >> 48 != 0) throw Damage("an index entry is out of range");
-  const std::uint64_t of_ranges = layout.attributes.empty() ? 0 : in.varint();
-  if (of_ranges > in.left()) throw Damage("the data end too early");
-  const ByteView entries = in.take(in.left() - static_cast<std::size_t>(of_ranges));
-  page.ranges = padded_copy(in.take(in.left()));
+  const std::uint64_t ranges_bytes = layout.attributes.empty() ? 0 : in.varint();
+  if (ranges_bytes > in.remaining()) throw Damage("the data end too early");
+  const ByteView entries = in.take(in.remaining() - static_cast<std::size_t>(ranges_bytes));
+  page.ranges = padded_copy(in.take(in.remaining()));
   page.offset = upper << 16 | decode_symbols(padded_copy(entries), layout, tables,
                                              [&](auto coder) { coder.entries(page.entries); });
   return page;
@@ -341,7 +344,7 @@ IndexPage::IndexPage(ByteView bytes, std::uint32_t clusters, const Layout& layou
     const std::uint64_t size = page.entries.column(Field::kBytes)[i];
     std::uint64_t& offset = page.entries.column(kOffset)[i];
     at += offset;  // beyond the file if the offset is out of range
-    if (size >= kMostBytes || at > UINT64_MAX - size) {
+    if (size >= kMaxBytes || at > UINT64_MAX - size) {
       throw Damage("an index entry is out of range");
     }
     offset = at;
@@ -370,8 +373,8 @@ void IndexPage::keep(const PageColumns& columns) {
     // Each store overwrites the extra bytes of the previous one.
     std::uint8_t* to = bytes_.data() + column.start;
     for (const std::uint64_t value : values) {
-      const std::uint64_t kept = value >> column.shift;
-      std::memcpy(to, &kept, sizeof kept);
+      const std::uint64_t stored = value >> column.shift;
+      std::memcpy(to, &stored, sizeof stored);
       to += column.width;
     }
   }
@@ -379,9 +382,9 @@ void IndexPage::keep(const PageColumns& columns) {
 
 std::uint64_t IndexPage::value(Field field, std::uint32_t i) const {
   const Column& column = columns_[field];
-  const auto kept =
+  const auto stored =
       load<std::uint64_t>(bytes_.data() + column.start + std::size_t{i} * column.width);
-  return column.base | (kept & column.mask) << column.shift;
+  return column.base | (stored & column.mask) << column.shift;
 }
 
 Entry IndexPage::entry(std::uint32_t i) const {
@@ -390,7 +393,7 @@ Entry IndexPage::entry(std::uint32_t i) const {
   const std::uint64_t bytes = value(Field::kBytes, i), points = value(Field::kPoints, i);
   std::uint64_t forms = value(Field::kForms, i);
   const std::uint64_t error = value(Field::kError, i), checksum = value(Field::kChecksum, i);
-  if (points > kMostPoints || error > error_code(std::numeric_limits<double>::infinity()) ||
+  if (points > kMaxPoints || error > error_code(std::numeric_limits<double>::infinity()) ||
       checksum > UINT16_MAX) {
     throw Damage("an index entry is out of range");
   }

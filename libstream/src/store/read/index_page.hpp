@@ -14,14 +14,14 @@ namespace terrace::stream::store {
 /// Returns the maximum bytes of a page of thirteen columns and two for each attribute. A column has
 /// a shift and a number per cluster, each of at most 81 bits; two varints, the states of two
 /// strings of symbols and a checksum take the rest.
-constexpr std::uint64_t most_page_bytes(std::size_t attributes) {
-  return 32 + (13 + 2 * std::uint64_t{attributes}) * 11 * (1 + kMostPageClusters);
+constexpr std::uint64_t max_page_bytes(std::size_t attributes) {
+  return 32 + (13 + 2 * std::uint64_t{attributes}) * 11 * (1 + kMaxPageClusters);
 }
 
 /// Columns of unsigned integers, one number per cluster.
 class NumberColumns {
  public:
-  /// clusters: 1 to kMostPageClusters.
+  /// clusters: 1 to kMaxPageClusters.
   NumberColumns(std::uint32_t clusters, std::size_t columns)
       : clusters_(clusters), values_(columns * clusters) {}
 

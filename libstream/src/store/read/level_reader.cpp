@@ -48,7 +48,7 @@ auto LevelReader::from_directory(Read&& read) const {
 LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
     : layout_(manifest.schema, level),
       clusters_(manifest.levels[level].clusters),
-      most_points_(std::min(layout_.most_points(), manifest.levels[level].points)),
+      max_points_(std::min(layout_.max_points(), manifest.levels[level].points)),
       top_(level + 1 == manifest.levels.size()),
       store_points_(manifest.points),
       bounds_(manifest.bounds),
@@ -66,9 +66,9 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
   directory_ = from_directory([&] {
     return std::make_unique<const Directory>(*index_, size, clusters_, layout_, bounds_);
   });
-  const auto slots = [](std::uint64_t wanted, std::uint64_t most) {
+  const auto slots = [](std::uint64_t wanted, std::uint64_t limit) {
     return static_cast<std::size_t>(
-        std::clamp<std::uint64_t>(wanted, 1, std::max<std::uint64_t>(1, most)));
+        std::clamp<std::uint64_t>(wanted, 1, std::max<std::uint64_t>(1, limit)));
   };
   page_cache_ = SlotCache<IndexPage>(slots(pages(), kCachedPages));
   if (!layout_.attributes.empty()) {
@@ -91,19 +91,19 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
   const Directory::Range at = from_directory([&] { return directory_->page_range(number); });
   const std::uint64_t start = at.begin;
   const auto size = static_cast<std::size_t>(at.end - start);
-  Bytes own;
+  Bytes buffer;
   ByteView bytes;
   if (ahead != nullptr) {
     bytes = ahead->at(start, size);
   } else {
-    own.resize(size);
-    index_->read(start, std::as_writable_bytes(std::span(own)));
-    bytes = own;
+    buffer.resize(size);
+    index_->read(start, std::as_writable_bytes(std::span(buffer)));
+    bytes = buffer;
   }
   try {
-    const std::uint64_t most = layout_.page_clusters(), first = number * most;
+    const std::uint64_t page_clusters = layout_.page_clusters(), first = number * page_clusters;
     return std::make_shared<const IndexPage>(
-        bytes, static_cast<std::uint32_t>(std::min(most, clusters_ - first)), layout_,
+        bytes, static_cast<std::uint32_t>(std::min(page_clusters, clusters_ - first)), layout_,
         *tables(first));
   } catch (const Damage& damage) {
     throw damaged_file(*index_, start, damage.what());
@@ -158,7 +158,7 @@ void LevelReader::check_entry(const Entry& entry) const {
     if (store_points_ > 0) throw Damage("an index entry has no points");
     return;
   }
-  if (entry.points > most_points_) throw Damage("an index entry has more points than possible");
+  if (entry.points > max_points_) throw Damage("an index entry has more points than possible");
   const bool counted =
       layout_.level == 0 ? entry.descendants == 0
                          : entry.descendants >= entry.points && entry.descendants <= store_points_;
@@ -181,11 +181,11 @@ void LevelReader::check_entry(const Entry& entry) const {
 }
 
 std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal) const {
-  const std::vector<Directory::TablesAt>& sets = directory_->tables();
+  const std::vector<Directory::TablesPosition>& sets = directory_->tables();
   const auto next = std::upper_bound(
       sets.begin(), sets.end(), ordinal,
-      [](std::uint64_t value, const Directory::TablesAt& at) { return value < at.first; });
-  const Directory::TablesAt& at = *(next - 1);
+      [](std::uint64_t value, const Directory::TablesPosition& at) { return value < at.first; });
+  const Directory::TablesPosition& at = *(next - 1);
   return tables_cache_.get(static_cast<std::uint64_t>(next - 1 - sets.begin()), [&] {
     try {
       return std::make_shared<const DecodingTables>(

@@ -62,8 +62,9 @@ class SequentialBytes {
       again_.read(file_, offset, size);
       return again_.part(offset, size);
     }
-    const std::uint64_t left = file_.size() - offset;
-    ahead_.read(file_, offset, std::max(size, static_cast<std::size_t>(std::min(left, kAtOnce))));
+    const std::uint64_t remaining = file_.size() - offset;
+    ahead_.read(file_, offset,
+                std::max(size, static_cast<std::size_t>(std::min(remaining, kAtOnce))));
     return ahead_.part(offset, size);
   }
 
@@ -89,7 +90,7 @@ class SequentialBytes {
   Window ahead_, again_;
 };
 
-/// What one thread needs to read clusters.
+/// The decoder and the buffer of one thread that reads clusters.
 struct ReadSpace {
   ClusterDecoder decoder;
   Bytes bytes;
@@ -131,16 +132,17 @@ class LevelReader {
   /// Error.
   void read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, SequentialBytes& ahead,
             ClusterDecoder& decoder, ClusterPoints& out) const;
-  /// Calls visit(page, from, to) for each page of the index that has clusters from `first` up to,
-  /// but not including, `end`; it has those from `from` to before `to`. Throws: Error.
+  /// Calls visit(page, first, end) for each page of the index that has clusters in [first, end),
+  /// with the range of those clusters in the page. Throws: Error.
   template <class Visit>
   void for_each_page(std::uint64_t first, std::uint64_t end, Visit&& visit) const {
     SequentialBytes ahead(*index_);
-    const std::uint64_t most = layout_.page_clusters();
+    const std::uint64_t page_clusters = layout_.page_clusters();
     while (first < end) {
-      const std::uint64_t number = first / most, to = std::min(end, (number + 1) * most);
-      visit(*read_page(number, &ahead), first, to);
-      first = to;
+      const std::uint64_t number = first / page_clusters;
+      const std::uint64_t page_end = std::min(end, (number + 1) * page_clusters);
+      visit(*read_page(number, &ahead), first, page_end);
+      first = page_end;
     }
   }
 
@@ -163,7 +165,7 @@ class LevelReader {
 
   Layout layout_;
   std::uint64_t clusters_;
-  std::uint64_t most_points_;  ///< of a cluster
+  std::uint64_t max_points_;  ///< of a cluster
   bool top_;
   std::uint64_t store_points_;
   Box3 bounds_;                                ///< of the store

@@ -79,7 +79,7 @@ Store Store::open(const std::filesystem::path& path) {
 bool Store::exists(const std::filesystem::path& path) {
   std::error_code error;
   return std::filesystem::is_regular_file(path / kManifestName, error) ||
-         put_back_replaced(follow_links(path));
+         restore_replaced(follow_links(path));
 }
 
 }  // namespace terrace::stream

@@ -132,21 +132,22 @@ std::uint64_t Store::for_each(unsigned number, std::uint64_t first, std::uint64_
   auto space = impl_->spaces.take();
   ClusterPoints points;
   std::uint64_t members = 0;
-  level.for_each_page(first, end, [&](const IndexPage& page, std::uint64_t from, std::uint64_t to) {
-    for (std::uint64_t ordinal = from; ordinal < to; ++ordinal) {
-      check_stop();
-      const auto place = static_cast<std::uint32_t>(ordinal % level.layout().page_clusters());
-      const std::uint64_t offset = page.offset(place);
-      const ClusterId id = cluster_id(number, ordinal);
-      const Entry entry = level.entry(page, ordinal);
-      const ClusterRecord record = record_of(entry, number, offset, level.top());
-      members += record.points;
-      if (number == 0 && !may_match(id)) continue;
-      level.read(ordinal, entry, offset, ahead, space->decoder, points);
-      mark(points);
-      visit(id, record, points);
-    }
-  });
+  level.for_each_page(
+      first, end, [&](const IndexPage& page, std::uint64_t page_first, std::uint64_t page_end) {
+        for (std::uint64_t ordinal = page_first; ordinal < page_end; ++ordinal) {
+          check_stop();
+          const auto place = static_cast<std::uint32_t>(ordinal % level.layout().page_clusters());
+          const std::uint64_t offset = page.offset(place);
+          const ClusterId id = cluster_id(number, ordinal);
+          const Entry entry = level.entry(page, ordinal);
+          const ClusterRecord record = record_of(entry, number, offset, level.top());
+          members += record.points;
+          if (number == 0 && !may_match(id)) continue;
+          level.read(ordinal, entry, offset, ahead, space->decoder, points);
+          mark(points);
+          visit(id, record, points);
+        }
+      });
   impl_->spaces.put(std::move(space));
   return members;
 }

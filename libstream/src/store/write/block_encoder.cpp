@@ -26,7 +26,7 @@ constexpr unsigned kBoxBits = 11;
 
 /// Returns the maximum shift of a form: a box enlarged to multiples of 2^shift must still be finite
 /// (see record_of()).
-unsigned most_shift(NumberForm form) {
+unsigned max_shift(NumberForm form) {
   if (form == kFloatBits) return 23;
   return form == kDoubleBits ? 52 : 40;
 }
@@ -207,7 +207,7 @@ void BlockEncoder::measure(std::size_t axis) {
                                              : static_cast<std::uint64_t>(whole.high) -
                                                    static_cast<std::uint64_t>(whole.low);
   const auto bits = static_cast<unsigned>(std::bit_width(extent));
-  shifts_[axis] = std::min(bits > kBoxBits ? bits - kBoxBits : 0, most_shift(forms_[axis]));
+  shifts_[axis] = std::min(bits > kBoxBits ? bits - kBoxBits : 0, max_shift(forms_[axis]));
 }
 
 void BlockEncoder::load_attributes() {
@@ -268,9 +268,9 @@ Entry BlockEncoder::enter(std::size_t cluster) {
   first_ = block_->first[cluster];
   members_ = block_->order.subspan(first_, block_->first[cluster + 1] - first_);
   const auto n = static_cast<std::uint32_t>(members_.size());
-  if (n > layout_->most_points()) {
+  if (n > layout_->max_points()) {
     throw Error({}, fmt::format("a cluster has {} of this size, more than the limit of {}",
-                                counted(n, "point"), layout_->most_points()))
+                                counted(n, "point"), layout_->max_points()))
         .remedy("make the blocks smaller");
   }
   Entry entry;
@@ -361,8 +361,8 @@ void BlockEncoder::sequence(Coder& coder, const Columns& columns) {
   for (unsigned axis = 0; axis < 3; ++axis) {
     const auto number = static_cast<unsigned>(layout_->attributes.size()) + axis;
     column_.assign(relative_[axis].begin(), relative_[axis].end());
-    code_as_kinds(coder, columns, number, [&](auto& with, ColumnKind kind) {
-      code_column(with, layout_->first_context(number), kind, nullptr,
+    code_as_kinds(coder, columns, number, [&](auto& column_coder, ColumnKind kind) {
+      code_column(column_coder, layout_->first_context(number), kind, nullptr,
                   columns.guide.exists() ? &lines_ : nullptr, nullptr, column_.data(), &scratch_,
                   static_cast<std::uint32_t>(members_.size()));
     });
@@ -397,15 +397,15 @@ void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
   if (columns.guide.exists()) {
     const unsigned a = columns.guide.attribute;
     gather(attributes_[a]);
-    code_as_kinds(coder, columns, a, [&](auto& with, ColumnKind kind) {
-      code_guide(with, layout_->first_context(a), kind, coded_form(attributes_[a]), lines_,
-                 columns.guide.least_jump, column_.data(), &scratch_, n);
+    code_as_kinds(coder, columns, a, [&](auto& column_coder, ColumnKind kind) {
+      code_guide(column_coder, layout_->first_context(a), kind, coded_form(attributes_[a]), lines_,
+                 columns.guide.min_jump, column_.data(), &scratch_, n);
     });
     std::swap(column_, guide_);
   }
   const Lines* const lines = columns.guide.exists() ? &lines_ : nullptr;
   if (!placed) sequence(coder, columns);
-  bool beside = false;  // whether the preceding column has several values
+  bool has_preceding = false;  // whether the preceding column has several values
   for (unsigned a = 0; a < attributes_.size(); ++a) {
     Attribute& attribute = attributes_[a];
     NumberForm* const form = coded_form(attribute);
@@ -416,19 +416,19 @@ void BlockEncoder::encode_cluster(Coder& coder, const Predictor& predictor,
     } else if (attribute.one_value) {
       std::int64_t value = attribute.value;
       ranges_.push_back(range_of(attribute.type, attribute.form, {&value, 1}));
-      code_as_kinds(coder, columns, a, [&](auto& with, ColumnKind kind) {
-        code_column(with, first, kind, form, nullptr, nullptr, &value, &scratch_, 1);
+      code_as_kinds(coder, columns, a, [&](auto& column_coder, ColumnKind kind) {
+        code_column(column_coder, first, kind, form, nullptr, nullptr, &value, &scratch_, 1);
       });
     } else {
-      std::swap(column_, beside_);
+      std::swap(column_, preceding_);
       gather(attribute);
       ranges_.push_back(range_of(attribute.type, attribute.form, column_));
-      code_as_kinds(coder, columns, a, [&](auto& with, ColumnKind kind) {
-        code_column(with, first, kind, form, lines, beside ? beside_.data() : nullptr,
-                    column_.data(), &scratch_, n);
+      code_as_kinds(coder, columns, a, [&](auto& column_coder, ColumnKind kind) {
+        code_column(column_coder, first, kind, form, lines,
+                    has_preceding ? preceding_.data() : nullptr, column_.data(), &scratch_, n);
       });
     }
-    beside = !attribute.one_value;
+    has_preceding = !attribute.one_value;
   }
   if (const unsigned level = layout_->level; level > 0) {
     column_.resize(std::size_t{n} * level);
@@ -495,36 +495,36 @@ std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
 void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& bytes,
                           std::vector<Entry>& entries, std::vector<KeyRange>& ranges) {
   const Columns columns{sequence, tables.guide, tables.kinds};
-  constexpr std::size_t kTogether = SymbolEncoder::kTogether;
-  std::vector<SymbolEncoder> coders(kTogether, SymbolEncoder(tables.tables));
-  std::array<std::uint32_t, kTogether> last{};
-  std::array<std::size_t, kTogether> entry_of{};
-  std::size_t waiting = 0;
+  constexpr std::size_t kBatch = SymbolEncoder::kBatch;
+  std::vector<SymbolEncoder> coders(kBatch, SymbolEncoder(tables.tables));
+  std::array<std::uint32_t, kBatch> last{};
+  std::array<std::size_t, kBatch> entry_of{};
+  std::size_t pending = 0;
   const auto finish = [&] {
     std::size_t start = bytes.size();
-    const std::span sizes = std::span(last).first(waiting);
-    SymbolEncoder::finish(std::span(coders).first(waiting), sizes, bytes);
-    for (std::size_t i = 0; i < waiting; ++i) {
+    const std::span sizes = std::span(last).first(pending);
+    SymbolEncoder::finish(std::span(coders).first(pending), sizes, bytes);
+    for (std::size_t i = 0; i < pending; ++i) {
       Entry& entry = entries[entry_of[i]];
       entry.bytes = sizes[i];
       entry.checksum = layout_->checksum({bytes.data() + start, sizes[i]});
       start += sizes[i];
     }
-    waiting = 0;
+    pending = 0;
   };
   for (std::size_t c = 0; c < block_->representatives.size(); ++c) {
     entries.push_back(enter(c));
     ranges_.clear();
     if (entries.back().points > 0) {
-      SymbolEncoder& coder = coders[waiting];
+      SymbolEncoder& coder = coders[pending];
       coder.start();
       encode_cluster(coder, tables.predictor, columns);
       const std::uint32_t at = place_of_representative(c);
       // The positions of most representatives fit into the coder's free 16 bits.
       if (entries.back().points >= kLow) coder.raw(at >> 16, 16);
-      last[waiting] = at & 0xffff;
-      entry_of[waiting] = entries.size() - 1;
-      if (++waiting == kTogether) finish();
+      last[pending] = at & 0xffff;
+      entry_of[pending] = entries.size() - 1;
+      if (++pending == kBatch) finish();
     } else {
       ranges_.assign(attributes_.size(), {0, UINT64_MAX});
     }

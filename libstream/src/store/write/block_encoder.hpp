@@ -30,7 +30,7 @@ struct KindCounts {
 class BlockEncoder {
  public:
   /// Loads a block, which must outlive the calls below. Throws: Error for a position that is not
-  /// finite or a cluster of more than kMostPoints points.
+  /// finite or a cluster of more than kMaxPoints points.
   void load(const Layout& layout, const ClusteredBlock& block);
 
   /// For training: adds the loaded block to the least squares.
@@ -102,7 +102,7 @@ class BlockEncoder {
   GridCodec grid_;
   SplitEncoder split_;
   Lines lines_;
-  std::vector<std::int64_t> column_, beside_, guide_;
+  std::vector<std::int64_t> column_, preceding_, guide_;
   ColumnScratch scratch_;
   std::vector<double> doubles_;
 };

@@ -29,7 +29,7 @@ Error failed(const std::filesystem::path& path, const char* action) {
 }
 
 /// Blocks of at most this many bytes are looked up among earlier ones.
-constexpr std::size_t kMostSharedBytes = 1024;
+constexpr std::size_t kMaxSharedBytes = 1024;
 /// Maximum number of held blocks that are used to choose how columns are coded. Rasters have
 /// columns only above level 0, where the choice matters little.
 constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
@@ -37,9 +37,9 @@ constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
 /// only an estimate, so keeping the points' sequence must save more than this share of the bits.
 constexpr std::uint64_t kOrderShare = 64;
 /// Number of 64-bit attributes, from the first, that are tried as guides.
-constexpr std::size_t kMostGuides = 2;
+constexpr std::size_t kMaxGuides = 2;
 /// At least one in this many differences of a guide begins a line, and at least as many do not.
-constexpr std::uint64_t kLeastShare = 50;
+constexpr std::uint64_t kMinShare = 50;
 
 template <class Box>
 void put_box(Bytes& out, const Box& box) {
@@ -91,13 +91,13 @@ void OutputFile::write(ByteView bytes) {
 void OutputFile::flush() {
   const FileSizeSignalBlock no_signal;
   const std::uint8_t* next = buffer_.data();
-  std::size_t left = buffer_.size();
-  while (left > 0) {
-    const ssize_t written = ::write(fd_.get(), next, left);
+  std::size_t remaining = buffer_.size();
+  while (remaining > 0) {
+    const ssize_t written = ::write(fd_.get(), next, remaining);
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) throw failed(shown_, "cannot be written");
     next += written;
-    left -= static_cast<std::size_t>(written);
+    remaining -= static_cast<std::size_t>(written);
   }
 #ifdef SYNC_FILE_RANGE_WRITE
   // Starts writing to disk while further blocks are encoded, so that finish() waits less. finish()
@@ -126,7 +126,7 @@ LevelWriter::LevelWriter(const std::filesystem::path& folder, const std::filesys
 
 std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   if (at_segment_start()) {
-    if (!held_.empty()) train();
+    if (!training_blocks_.empty()) train();
     tables_.reset();
     small_blocks_.clear();
     segment_start_ = clusters_;
@@ -143,8 +143,8 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
                                                  block.entries, std::move(block.summaries), root));
   }
   if (tables_ == nullptr) {
-    held_.push_back(std::move(*block.raw));
-    if (held_.size() == kTrainingBlocks) train();
+    training_blocks_.push_back(std::move(*block.raw));
+    if (training_blocks_.size() == kTrainingBlocks) train();
     return ordinal;
   }
   if (block.raw != nullptr) {
@@ -176,8 +176,8 @@ std::uint64_t LevelWriter::bits_of_column(const Counts& counts, unsigned column)
 
 template <class Count>
 void LevelWriter::each_block(std::size_t step, Count&& count) {
-  team_.run((held_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
-    const ClusteredBlock view = held_[i * step].view();
+  team_.run((training_blocks_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
+    const ClusteredBlock view = training_blocks_[i * step].view();
     encoders_[worker].load(layout_, view);
     count(encoders_[worker], worker);
   });
@@ -205,13 +205,14 @@ std::vector<LevelWriter::Trial> LevelWriter::count(const Predictor& predictor,
 
 /// Returns the step between the blocks that are used to choose how columns are coded.
 std::size_t LevelWriter::trial_step() const {
-  const std::size_t most = layout_.grid && layout_.level > 0 ? kRasterTrialBlocks : kTrialBlocks;
-  return (held_.size() + most - 1) / most;
+  const std::size_t count_limit =
+      layout_.grid && layout_.level > 0 ? kRasterTrialBlocks : kTrialBlocks;
+  return (training_blocks_.size() + count_limit - 1) / count_limit;
 }
 
 bool LevelWriter::possible(ColumnKind kind, unsigned column, const Guide& guide) const {
   if (column == guide.attribute) return kind == ColumnKind::plain || kind == ColumnKind::recent;
-  if (along_line(kind) == ColumnKind::beside && !layout_.may_lie_beside(column)) return false;
+  if (along_line(kind) == ColumnKind::preceding && !layout_.may_use_preceding(column)) return false;
   return guide.exists() || static_cast<unsigned>(kind) < kUnguidedKinds;
 }
 
@@ -220,13 +221,13 @@ bool LevelWriter::possible(ColumnKind kind, unsigned column, const Guide& guide)
 /// rarest size, if there are enough on either side.
 std::vector<Guide> LevelWriter::find_guides() {
   std::vector<unsigned> attributes;
-  for (unsigned a = 0; a < layout_.attributes.size() && attributes.size() < kMostGuides; ++a) {
+  for (unsigned a = 0; a < layout_.attributes.size() && attributes.size() < kMaxGuides; ++a) {
     if (size_of(layout_.attributes[a]) == sizeof(double)) attributes.push_back(a);
   }
   std::vector<std::array<std::uint64_t, 65>> widths(attributes.size());
-  const std::size_t step = (held_.size() + kTrialBlocks - 1) / kTrialBlocks;
-  for (std::size_t b = 0; b < held_.size() && !attributes.empty(); b += step) {
-    const ClusteredBlock view = held_[b].view();
+  const std::size_t step = (training_blocks_.size() + kTrialBlocks - 1) / kTrialBlocks;
+  for (std::size_t b = 0; b < training_blocks_.size() && !attributes.empty(); b += step) {
+    const ClusteredBlock view = training_blocks_[b].view();
     encoders_.front().load(layout_, view);
     for (std::size_t i = 0; i < attributes.size(); ++i) {
       encoders_.front().count_differences(attributes[i], widths[i]);
@@ -236,14 +237,14 @@ std::vector<Guide> LevelWriter::find_guides() {
   for (std::size_t i = 0; i < attributes.size(); ++i) {
     const std::uint64_t all =
         std::accumulate(widths[i].begin() + 1, widths[i].end(), std::uint64_t{0});
-    std::uint64_t below = 0, least = UINT64_MAX;
+    std::uint64_t below = 0, minimum = UINT64_MAX;
     Guide guide;
     for (unsigned width = 1; width < 63; ++width) {
       below += widths[i][width];
       const std::uint64_t near = widths[i][width] + widths[i][width + 1];
-      const bool divides = below >= all / kLeastShare && all - below >= all / kLeastShare;
-      if (!divides || below == 0 || below == all || near >= least) continue;
-      least = near;
+      const bool divides = below >= all / kMinShare && all - below >= all / kMinShare;
+      if (!divides || below == 0 || below == all || near >= minimum) continue;
+      minimum = near;
       guide = {attributes[i], std::uint64_t{1} << width};
     }
     if (guide.exists()) guides.push_back(guide);
@@ -268,13 +269,13 @@ void LevelWriter::choose_columns(Tables& tables) {
     for (const Guide& guide : guides) choices.push_back({sequence, guide, tables.kinds});
   }
   const std::vector<Trial> trials = count(tables.predictor, choices, trial_step());
-  std::uint64_t least = UINT64_MAX;
+  std::uint64_t minimum = UINT64_MAX;
   std::size_t best = 0;
   for (std::size_t i = 0; i < choices.size(); ++i) {
     std::uint64_t bits = trials[i].bits();
     if (choices[i].sequence) bits += bits / kOrderShare;
-    if (bits >= least) continue;
-    least = bits;
+    if (bits >= minimum) continue;
+    minimum = bits;
     best = i;
   }
   sequence_ = choices[best].sequence;
@@ -301,11 +302,11 @@ void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
     for (const KindCounts& part : parts) add(part.counts[kind], counts[kind]);
   }
   for (unsigned c = 0; c < layout_.columns(); ++c) {
-    std::uint64_t least = bits_of_column(plain, c);
+    std::uint64_t minimum = bits_of_column(plain, c);
     for (const ColumnKind kind : possible_kinds[c]) {
       const std::uint64_t bits = bits_of_column(counts[static_cast<std::size_t>(kind)], c);
-      if (bits >= least) continue;
-      least = bits;
+      if (bits >= minimum) continue;
+      minimum = bits;
       tables.kinds[c] = kind;
     }
   }
@@ -314,12 +315,12 @@ void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
 void LevelWriter::train() {
   encoders_.resize(team_.threads());
   // If there are many blocks, counts only some of them, because other threads wait for this.
-  const bool many = held_.size() == kTrainingBlocks;
+  const bool many = training_blocks_.size() == kTrainingBlocks;
   Tables tables;
   if (layout_.grid && layout_.level == 0) {
     PredictorFit sums;
-    for (std::size_t b = 0; b < held_.size(); b += many ? 4 : 1) {
-      const ClusteredBlock view = held_[b].view();
+    for (std::size_t b = 0; b < training_blocks_.size(); b += many ? 4 : 1) {
+      const ClusteredBlock view = training_blocks_[b].view();
       encoders_.front().load(layout_, view);
       encoders_.front().fit(sums);
     }
@@ -330,20 +331,20 @@ void LevelWriter::train() {
   Counts counts = std::move(count(tables.predictor, {&columns, 1}, many ? 2 : 1)[0].counts);
   // A symbol costs its table at least two bytes. If the tables serve only the counted blocks, a
   // symbol that occurred once is not worth them.
-  const std::uint32_t least = many ? 1 : 2;
-  for (const auto& context : counts) tables.frequencies.push_back(normalised(context, least));
+  const std::uint32_t minimum = many ? 1 : 2;
+  for (const auto& context : counts) tables.frequencies.push_back(normalised(context, minimum));
 
-  std::vector<PreparedBlock> prepared(held_.size());
+  std::vector<PreparedBlock> prepared(training_blocks_.size());
   const EncodingTables encoding(tables);
-  team_.run(held_.size(), [&](std::size_t b, std::size_t worker) {
-    const ClusteredBlock view = held_[b].view();
+  team_.run(training_blocks_.size(), [&](std::size_t b, std::size_t worker) {
+    const ClusteredBlock view = training_blocks_[b].view();
     PreparedBlock& block = prepared[b];
     encoders_[worker].load(layout_, view);
     encoders_[worker].encode(encoding, *sequence_, block.bytes, block.entries, block.ranges);
   });
   count_index(prepared, counts);
   for (std::size_t c = layout_.index_context(); c < counts.size(); ++c) {
-    tables.frequencies[c] = normalised(counts[c], least);
+    tables.frequencies[c] = normalised(counts[c], minimum);
   }
 
   sets_.push_back({.first = segment_start_, .bytes = {}});
@@ -351,8 +352,8 @@ void LevelWriter::train() {
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
   for (const PreparedBlock& block : prepared) write(block);
   encoders_.resize(1);
-  held_.clear();
-  held_.shrink_to_fit();
+  training_blocks_.clear();
+  training_blocks_.shrink_to_fit();
 }
 
 /// Counts the symbols of the index as if the first block began a page.
@@ -379,14 +380,14 @@ void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& cou
 
 void LevelWriter::write(const PreparedBlock& block) {
   std::uint64_t at = data_.size();
-  bool there = false;
-  if (layout_.small() && block.bytes.size() <= kMostSharedBytes) {
-    const auto [found, fresh] =
+  bool is_shared = false;
+  if (layout_.small() && block.bytes.size() <= kMaxSharedBytes) {
+    const auto [found, inserted] =
         small_blocks_.try_emplace(std::string(block.bytes.begin(), block.bytes.end()), at);
     at = found->second;
-    there = !fresh;
+    is_shared = !inserted;
   }
-  if (!there) data_.write(block.bytes);
+  if (!is_shared) data_.write(block.bytes);
   const std::size_t attributes = layout_.attributes.size();
   for (std::size_t i = 0; i < block.entries.size(); ++i) {
     if (page_.empty()) {
@@ -456,7 +457,7 @@ std::uint64_t LevelWriter::write_directory(const Box3& bounds) {
 }
 
 LevelEntry LevelWriter::finish(bool root, const Box3& bounds) {
-  if (!held_.empty()) train();
+  if (!training_blocks_.empty()) train();
   if (!page_.empty()) write_page();
   const std::uint64_t directory_bytes = write_directory(bounds);
   data_.finish();

@@ -71,8 +71,8 @@ inline constexpr std::size_t kTrainingBlocks = 64;
 /// Tables for encoding and decoding. A block that was encoded with those of an earlier segment must
 /// be decoded.
 struct SharedTables {
-  SharedTables(Tables made, bool in_sequence)
-      : tables(std::move(made)), encoding(tables), sequence(in_sequence) {}
+  SharedTables(Tables trained, bool keeps_order)
+      : tables(std::move(trained)), encoding(tables), sequence(keeps_order) {}
   Tables tables;
   EncodingTables encoding;
   bool sequence;  ///< see Columns
@@ -145,7 +145,7 @@ class LevelWriter {
 
   Layout layout_;
   OutputFile data_, index_;
-  std::vector<RawBlock> held_;
+  std::vector<RawBlock> training_blocks_;
   /// Whether points are coded in the order in which they were passed. One choice for the whole
   /// level, because a block that was encoded with the tables of the previous segment has lost any
   /// other order.

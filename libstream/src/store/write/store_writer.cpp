@@ -147,7 +147,7 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
       throw not_replaced(path.string(), found);
     }
   }
-  if (schema.attributes.size() > kMostAttributes) {
+  if (schema.attributes.size() > kMaxAttributes) {
     throw Error(path.string(), "there are too many attributes");
   }
   impl_ = std::make_unique<Impl>(path, std::move(schema), replace, threads);
