@@ -169,11 +169,11 @@ class Where::Parser {
           .remedy(text_[at_] == '=' ? "for equality write ==" : "");
     }
     at_ += static_cast<std::size_t>(rest - begin);
-    std::uint64_t whole = 0;
-    const auto [end, error] = std::from_chars(begin, rest, whole);
+    std::uint64_t integer = 0;
+    const auto [end, error] = std::from_chars(begin, rest, integer);
     const bool is_whole = error == std::errc{} && end == rest;
     emit({.operation = Operation::constant,
-          .number = is_whole ? static_cast<long double>(whole) : value});
+          .number = is_whole ? static_cast<long double>(integer) : value});
   }
 
   void name() {
@@ -424,10 +424,10 @@ void Where::test(std::span<const Point3> positions, std::span<const std::byte> r
 
 template <class Domain>
 void Where::evaluate(const Domain& domain, std::span<typename Domain::Operand> stack) const {
-  std::size_t held = 0;
+  std::size_t depth = 0;
   for (const Step& step : steps_) {
-    held = held + 1 - step.operands;
-    typename Domain::Operand* const a = &stack[held - 1];  // the first operand, then the result
+    depth = depth + 1 - step.operands;
+    typename Domain::Operand* const a = &stack[depth - 1];  // the first operand, then the result
     const typename Domain::Operand* const b = a + 1;
     switch (step.operation) {
       case Operation::constant:

@@ -79,8 +79,8 @@ class Chain final : public PointSource {
         return std::any_of(attributes.begin(), attributes.end(),
                            [&](const Channel& attribute) { return attribute.name == name; });
       });
-      if (i > 0 && attributes != info_.attributes) narrow_all();
-      if (narrowed_) source = narrowed(std::move(source));
+      if (i > 0 && attributes != info_.attributes) drop_unneeded_attributes();
+      if (drops_attributes_) source = with_needed_attributes(std::move(source));
       const SourceInfo& info = source->info();
       if (i == 0) {
         info_ = info;
@@ -125,7 +125,7 @@ class Chain final : public PointSource {
       Part& part = parts_[turn_];
       if (!part.source) {
         part.source = open_one_(part.file, options_);
-        if (narrowed_) part.source = narrowed(std::move(part.source));
+        if (drops_attributes_) part.source = with_needed_attributes(std::move(part.source));
         check_agreement(info_, part.source->info(), *crs_);
       }
       if (part.source->next(block)) {
@@ -182,7 +182,8 @@ class Chain final : public PointSource {
   };
 
   /// The source with only the attributes that the selection needs, in the order of the first file.
-  [[nodiscard]] std::unique_ptr<PointSource> narrowed(std::unique_ptr<PointSource> source) const {
+  [[nodiscard]] std::unique_ptr<PointSource> with_needed_attributes(
+      std::unique_ptr<PointSource> source) const {
     // Select before the flags of withheld points are dropped, so that those points are counted.
     SourceOptions selecting = options_;
     selecting.selection.keep.reset();
@@ -197,15 +198,15 @@ class Chain final : public PointSource {
     return with_attributes(std::move(source), names, options_.block_points);
   }
   /// Files need to agree only in the attributes that the selection needs.
-  void narrow_all() {
-    if (narrowed_) return;
-    narrowed_ = true;
+  void drop_unneeded_attributes() {
+    if (drops_attributes_) return;
+    drops_attributes_ = true;
     const std::vector<std::string> needed = needed_attributes(info_, options_.selection);
     std::erase_if(info_.attributes, [&](const Channel& attribute) {
       return std::find(needed.begin(), needed.end(), attribute.name) == needed.end();
     });
     for (Part& part : parts_) {
-      if (part.source) part.source = narrowed(std::move(part.source));
+      if (part.source) part.source = with_needed_attributes(std::move(part.source));
     }
   }
 
@@ -216,7 +217,7 @@ class Chain final : public PointSource {
   OpenOne open_one_;
   SourceInfo info_;
   std::optional<CrsAgreement> crs_;
-  bool narrowed_ = false;
+  bool drops_attributes_ = false;
   std::vector<Part> parts_;
   std::size_t turn_ = 0;
   std::uint64_t delivered_ = 0, nodata_ = 0, empty_values_ = 0, withheld_ = 0, excluded_ = 0,
@@ -226,8 +227,9 @@ class Chain final : public PointSource {
 
 }  // namespace
 
-std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
-                                          const SourceOptions& options, const OpenOne& open_one) {
+std::unique_ptr<PointSource> open_in_sequence(std::span<const std::string> files,
+                                              const SourceOptions& options,
+                                              const OpenOne& open_one) {
   if (files.size() == 1) return open_one(files.front(), options);
   return std::make_unique<Chain>(files, options, open_one);
 }

@@ -18,7 +18,8 @@ using OpenOne =
 /// Checks each file's header immediately and reopens the file when its turn comes; pipes are opened
 /// only once. Throws: Error if a file cannot be opened or differs from the first in channels or
 /// CRS.
-std::unique_ptr<PointSource> open_in_turn(std::span<const std::string> files,
-                                          const SourceOptions& options, const OpenOne& open_one);
+std::unique_ptr<PointSource> open_in_sequence(std::span<const std::string> files,
+                                              const SourceOptions& options,
+                                              const OpenOne& open_one);
 
 }  // namespace terrace::stream

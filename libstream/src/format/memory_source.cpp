@@ -70,7 +70,7 @@ class ColumnSource final : public PointSource {
       }
     }
     read_ += size;
-    if (missing) nodata_ += leave_out_missing(block, record);
+    if (missing) nodata_ += remove_missing(block, record);
   }
 
   /// Copies one coordinate of all points of the block; returns whether one of them is NaN.

@@ -21,17 +21,18 @@ inline bool is_infinite(const Point3& point) {
 
 /// Removes the missing points and their payload records of `record` bytes each. Returns how many
 /// were removed.
-inline std::size_t leave_out_missing(PointBlock& block, std::size_t record) {
-  std::size_t kept = 0;
+inline std::size_t remove_missing(PointBlock& block, std::size_t record) {
+  std::size_t remaining = 0;
   for (std::size_t i = 0; i < block.size(); ++i) {
     if (is_missing(block.positions[i])) continue;
-    block.positions[kept] = block.positions[i];
-    std::copy_n(block.payload.data() + i * record, record, block.payload.data() + kept * record);
-    ++kept;
+    block.positions[remaining] = block.positions[i];
+    std::copy_n(block.payload.data() + i * record, record,
+                block.payload.data() + remaining * record);
+    ++remaining;
   }
-  const std::size_t missing = block.size() - kept;
-  block.positions.resize(kept);
-  block.payload.resize(kept * record);
+  const std::size_t missing = block.size() - remaining;
+  block.positions.resize(remaining);
+  block.payload.resize(remaining * record);
   return missing;
 }
 

@@ -79,20 +79,20 @@ std::string name_of(const OctreeNode& node) {
   return fmt::format("{}-{}-{}-{}", node.depth, node.place[0], node.place[1], node.place[2]);
 }
 
-bool before(const OctreeNode& a, const OctreeNode& b) {
+bool precedes(const OctreeNode& a, const OctreeNode& b) {
   // The axis whose places differ in the highest bit decides; in a tie z, then y.
-  std::uint32_t most = 0;
+  std::uint32_t highest_difference = 0;
   bool less = false;
   for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
     const std::uint32_t p = a.place[axis] << (kDeepestNode - a.depth);
     const std::uint32_t q = b.place[axis] << (kDeepestNode - b.depth);
     const std::uint32_t differ = p ^ q;
-    if (most < differ && most < (differ ^ most)) {
-      most = differ;
+    if (highest_difference < differ && highest_difference < (differ ^ highest_difference)) {
+      highest_difference = differ;
       less = p < q;
     }
   }
-  return most == 0 ? a.depth < b.depth : less;
+  return highest_difference == 0 ? a.depth < b.depth : less;
 }
 
 Box3 Octree::box(const OctreeNode& node) const {
@@ -118,9 +118,9 @@ OctreeInfo Octree::info() const {
 }
 
 const OctreeNode* Octree::arrange() {
-  std::sort(nodes.begin(), nodes.end(), before);
+  std::sort(nodes.begin(), nodes.end(), precedes);
   for (std::size_t i = 1; i < nodes.size(); ++i) {
-    if (!before(nodes[i - 1], nodes[i])) return &nodes[i];
+    if (!precedes(nodes[i - 1], nodes[i])) return &nodes[i];
   }
   return nullptr;
 }

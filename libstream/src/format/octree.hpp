@@ -32,14 +32,14 @@ struct OctreeNode {
 /// "D-X-Y-Z", as EPT names it.
 std::string name_of(const OctreeNode& node);
 
-/// Parents before children, and siblings in Morton order.
-bool before(const OctreeNode& a, const OctreeNode& b);
+/// Orders parents before children, and siblings in Morton order.
+bool precedes(const OctreeNode& a, const OctreeNode& b);
 
 struct Octree {
   Point3 centre{};
   double half_size = 0.0;  ///< of the root's cube, in the CRS
   double spacing = 0.0;    ///< of the root's points, in the CRS
-  /// In the order of before(): consecutive nodes are close together.
+  /// In the order of precedes(): consecutive nodes are close together.
   std::vector<OctreeNode> nodes;
 
   [[nodiscard]] Box3 box(const OctreeNode& node) const;

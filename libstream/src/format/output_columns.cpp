@@ -33,12 +33,12 @@ OutputColumns::OutputColumns(std::span<const Channel> attributes) {
   for (const Channel& channel : attributes) {
     const std::string word = word_of(channel.name);
     std::string name = word;
-    const auto taken = [&] {
+    const auto is_taken = [&] {
       return is_axis(name) ||
              std::any_of(columns_.begin(), columns_.end(),
                          [&](const OutputColumn& column) { return column.name == name; });
     };
-    for (int n = 2; taken(); ++n) name = fmt::format("{}_{}", word, n);
+    for (int n = 2; is_taken(); ++n) name = fmt::format("{}_{}", word, n);
     const bool real = channel.scale != 1.0 || channel.offset != 0.0;
     columns_.push_back({.name = name,
                         .stored = channel.type,

@@ -57,11 +57,11 @@ void copy_coordinate(const PackedColumn& column, Point3* points, std::size_t axi
 }
 
 template <class T, bool kSwap>
-void copy_values(const PackedColumn& column, std::byte* to, std::size_t to_stride) {
+void copy_values(const PackedColumn& column, std::byte* target, std::size_t target_stride) {
   const char* at = column.rows;
-  for (std::size_t i = 0; i < column.count; ++i, at += column.stride, to += to_stride) {
+  for (std::size_t i = 0; i < column.count; ++i, at += column.stride, target += target_stride) {
     const T value = load<T, kSwap>(at);
-    std::memcpy(to, &value, sizeof value);
+    std::memcpy(target, &value, sizeof value);
   }
 }
 
@@ -100,11 +100,11 @@ void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t a
   });
 }
 
-void decode_values(const PackedColumn& column, std::byte* to, std::size_t to_stride) {
+void decode_values(const PackedColumn& column, std::byte* target, std::size_t target_stride) {
   with_type(column.type, [&](auto tag) {
     using T = typename Unsigned<sizeof(tag)>::type;
-    column.swap ? copy_values<T, true>(column, to, to_stride)
-                : copy_values<T, false>(column, to, to_stride);
+    column.swap ? copy_values<T, true>(column, target, target_stride)
+                : copy_values<T, false>(column, target, target_stride);
   });
 }
 

@@ -20,9 +20,9 @@ struct PackedColumn {
 
 /// Copies the column into coordinate `axis` of `points`.
 void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t axis);
-/// Copies the column's values to `to`, `to_stride` bytes apart, in native byte order. `to` may be
-/// the rows themselves.
-void decode_values(const PackedColumn& column, std::byte* to, std::size_t to_stride);
+/// Copies the column's values to `target`, `target_stride` bytes apart, in native byte order.
+/// `target` may be the rows themselves.
+void decode_values(const PackedColumn& column, std::byte* target, std::size_t target_stride);
 
 /// The value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to negative.
 std::int64_t to_integer(const std::byte* raw, ScalarType type);

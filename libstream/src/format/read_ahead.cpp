@@ -68,8 +68,8 @@ class ReadAhead final : public PointSource {
 
   /// Forwards a stop request.
   struct Forward {
-    std::stop_source to;
-    void operator()() { to.request_stop(); }
+    std::stop_source target;
+    void operator()() { target.request_stop(); }
   };
 
   void give_blocks() {

@@ -18,17 +18,17 @@ class PartsInTurn final : public RecordReader {
         records_(std::max<std::size_t>(1, kPieceBytes / parts_.record_bytes) *
                  parts_.record_bytes) {}
 
-  std::string_view read(std::uint64_t wanted) override {
-    if (left_ == 0) {
+  std::string_view read(std::uint64_t max_records) override {
+    if (remaining_ == 0) {
       reader_->start(number_);
-      left_ = parts_.parts[number_].points;
+      remaining_ = parts_.parts[number_].points;
     }
     const auto records = static_cast<std::size_t>(
-        std::min<std::uint64_t>({wanted, left_, records_.size() / parts_.record_bytes}));
+        std::min<std::uint64_t>({max_records, remaining_, records_.size() / parts_.record_bytes}));
     const std::size_t bytes =
         reader_->read(std::span(records_).first(records * parts_.record_bytes));
-    left_ -= bytes / parts_.record_bytes;
-    if (left_ == 0) ++number_;
+    remaining_ -= bytes / parts_.record_bytes;
+    if (remaining_ == 0) ++number_;
     return {reinterpret_cast<const char*>(records_.data()), bytes};
   }
 
@@ -44,8 +44,8 @@ class PartsInTurn final : public RecordReader {
   RecordParts parts_;
   std::unique_ptr<PartReader> reader_;
   std::vector<std::byte> records_;
-  std::size_t number_ = 0;  ///< of the current part
-  std::uint64_t left_ = 0;  ///< points of it that have not been read
+  std::size_t number_ = 0;       ///< of the current part
+  std::uint64_t remaining_ = 0;  ///< points of it that have not been read
 };
 
 class PartsAhead final : public RecordReader {
@@ -58,13 +58,14 @@ class PartsAhead final : public RecordReader {
         slots_(slots),
         ahead_(threads, [this] { return work(); }) {}
 
-  std::string_view read(std::uint64_t wanted) override {
+  std::string_view read(std::uint64_t max_records) override {
     while (at_ == current_.records.size()) {
       if (number_ == parts_.parts.size()) return {};
       take_next();
     }
     const std::size_t bytes = static_cast<std::size_t>(
-        std::min<std::uint64_t>(wanted, (current_.records.size() - at_) / parts_.record_bytes) *
+        std::min<std::uint64_t>(max_records,
+                                (current_.records.size() - at_) / parts_.record_bytes) *
         parts_.record_bytes);
     const std::string_view found(reinterpret_cast<const char*>(current_.records.data()) + at_,
                                  bytes);
@@ -86,8 +87,8 @@ class PartsAhead final : public RecordReader {
     // The first parts are given here, not on construction, because files are also opened just for
     // their header.
     for (std::size_t free = slots_ - ahead_.size(); free > 0; --free) {
-      if (given_ < parts_.parts.size()) {
-        ahead_.give({.number = given_++, .records = std::exchange(current_.records, {})});
+      if (next_part_ < parts_.parts.size()) {
+        ahead_.give({.number = next_part_++, .records = std::exchange(current_.records, {})});
       }
     }
     current_.records.clear();
@@ -115,10 +116,10 @@ class PartsAhead final : public RecordReader {
   const OnDamage on_damage_;
   const std::size_t slots_;
   std::uint64_t lost_ = 0;
-  Part current_;            ///< the part being read
-  std::size_t at_ = 0;      ///< bytes of it that were read
-  std::size_t number_ = 0;  ///< of the part after it
-  std::size_t given_ = 0;   ///< of the next part to give
+  Part current_;               ///< the part being read
+  std::size_t at_ = 0;         ///< bytes of it that were read
+  std::size_t number_ = 0;     ///< of the part after it
+  std::size_t next_part_ = 0;  ///< of the next part to give
   base::WorkAhead<Part> ahead_;
 };
 
@@ -140,11 +141,11 @@ Ahead ahead_within(std::uint64_t memory_bytes, const RecordParts& parts, unsigne
       {threads, memory_bytes / (largest + kReaderBytes), parts.parts.size()});
   // If all parts are equal, one slot for each reader and two for waiting parts are enough. While
   // one reader has the largest part, the others read as many points in a larger number of parts.
-  const std::uint64_t wanted =
+  const std::uint64_t slots =
       readers * std::max<std::uint64_t>(1, max_points * parts.parts.size() / points) + 2;
-  return {static_cast<std::size_t>(readers),
-          static_cast<std::size_t>(
-              std::min(wanted, (memory_bytes - readers * kReaderBytes) / largest))};
+  return {
+      static_cast<std::size_t>(readers),
+      static_cast<std::size_t>(std::min(slots, (memory_bytes - readers * kReaderBytes) / largest))};
 }
 
 }  // namespace
@@ -160,13 +161,13 @@ std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const Source
   return std::make_unique<PartsAhead>(parts, 0, 1, options.on_damage);
 }
 
-std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts) {
+std::unique_ptr<RecordReader> parts_in_sequence(RecordParts parts) {
   return std::make_unique<PartsInTurn>(std::move(parts));
 }
 
 std::unique_ptr<RecordReader> records_of_parts(RecordParts parts, const SourceOptions& options) {
   if (auto reader = parts_ahead(parts, options)) return reader;
-  return parts_in_turn(std::move(parts));
+  return parts_in_sequence(std::move(parts));
 }
 
 }  // namespace terrace::stream

@@ -45,8 +45,8 @@ struct RecordParts {
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options);
 /// Like parts_ahead(), but on the caller's thread and in small pieces: a part's records are never
 /// all in memory, however many points it has.
-std::unique_ptr<RecordReader> parts_in_turn(RecordParts parts);
-/// parts_ahead() if that returns a reader, otherwise parts_in_turn().
+std::unique_ptr<RecordReader> parts_in_sequence(RecordParts parts);
+/// parts_ahead() if that returns a reader, otherwise parts_in_sequence().
 std::unique_ptr<RecordReader> records_of_parts(RecordParts parts, const SourceOptions& options);
 
 }  // namespace terrace::stream

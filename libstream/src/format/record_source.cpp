@@ -29,12 +29,12 @@ class PayloadUnpacker {
  public:
   PayloadUnpacker(std::span<const LasField> fields, std::size_t payload_bytes)
       : payload_bytes_(payload_bytes) {
-    std::size_t to = 0;
+    std::size_t target = 0;
     for (std::size_t i = 0; i < fields.size();) {
       if (fields[i].bits > 0) {
-        add_bits(fields, i, to);
+        add_bits(fields, i, target);
       } else {
-        add_values(fields, i, to);
+        add_values(fields, i, target);
       }
     }
   }
@@ -46,13 +46,13 @@ class PayloadUnpacker {
                         .type = ScalarType::u8,
                         .swap = kForeign};
     for (const Values& values : values_) {
-      column.rows = rows.data() + values.from;
+      column.rows = rows.data() + values.offset;
       column.type = values.type;
-      decode_values(column, payload + values.to, payload_bytes_);
+      decode_values(column, payload + values.target, payload_bytes_);
     }
     for (const Bits& bits : bits_) {
-      column.rows = rows.data() + bits.from;
-      bits.unpack(column, bits.parts, payload + bits.to, payload_bytes_);
+      column.rows = rows.data() + bits.offset;
+      bits.unpack(column, bits.parts, payload + bits.target, payload_bytes_);
     }
   }
 
@@ -61,26 +61,26 @@ class PayloadUnpacker {
   using Parts = std::array<std::byte, 8>;
   using PartsOfBytes = std::array<Parts, 256>;
   struct Values {
-    std::size_t from = 0, to = 0;
+    std::size_t offset = 0, target = 0;
     ScalarType type = ScalarType::u8;
   };
   struct Bits {
-    std::size_t from = 0, to = 0;
-    void (*unpack)(const PackedColumn& bytes, const PartsOfBytes& parts, std::byte* to,
-                   std::size_t to_stride) = nullptr;
+    std::size_t offset = 0, target = 0;
+    void (*unpack)(const PackedColumn& bytes, const PartsOfBytes& parts, std::byte* target,
+                   std::size_t target_stride) = nullptr;
     PartsOfBytes parts{};
   };
 
   /// Adds consecutive fields as few wide numbers, of which the last two may overlap.
-  void add_values(std::span<const LasField> fields, std::size_t& i, std::size_t& to) {
-    const std::size_t first = i, from = fields[i].offset;
+  void add_values(std::span<const LasField> fields, std::size_t& i, std::size_t& target) {
+    const std::size_t first = i, offset = fields[i].offset;
     std::size_t bytes = 0;
     do {
       bytes += size_of(fields[i++].channel.type);
     } while (!kForeign && i < fields.size() && fields[i].bits == 0 &&
-             fields[i].offset == from + bytes);
+             fields[i].offset == offset + bytes);
     if (kForeign) {
-      values_.push_back({from, to, fields[first].channel.type});
+      values_.push_back({offset, target, fields[first].channel.type});
     } else {
       const ScalarType type = bytes >= 8   ? ScalarType::u64
                               : bytes >= 4 ? ScalarType::u32
@@ -89,22 +89,22 @@ class PayloadUnpacker {
       const std::size_t width = size_of(type);
       for (std::size_t at = 0; at < bytes; at += width) {
         const std::size_t begin = std::min(at, bytes - width);
-        values_.push_back({from + begin, to + begin, type});
+        values_.push_back({offset + begin, target + begin, type});
       }
     }
-    to += bytes;
+    target += bytes;
   }
 
   /// Adds fields that are bits of one byte.
-  void add_bits(std::span<const LasField> fields, std::size_t& i, std::size_t& to) {
+  void add_bits(std::span<const LasField> fields, std::size_t& i, std::size_t& target) {
     constexpr std::array<decltype(Bits::unpack), 9> kUnpack{
         nullptr,         &unpack_bits<1>, &unpack_bits<2>, &unpack_bits<3>, &unpack_bits<4>,
         &unpack_bits<5>, &unpack_bits<6>, &unpack_bits<7>, &unpack_bits<8>};
     Bits& bits = bits_.emplace_back();
-    bits.from = fields[i].offset;
-    bits.to = to;
+    bits.offset = fields[i].offset;
+    bits.target = target;
     std::size_t count = 0;
-    for (; i < fields.size() && fields[i].bits > 0 && fields[i].offset == bits.from &&
+    for (; i < fields.size() && fields[i].bits > 0 && fields[i].offset == bits.offset &&
            count < bits.parts[0].size();
          ++i, ++count) {
       const unsigned mask = (1U << fields[i].bits) - 1;
@@ -113,14 +113,14 @@ class PayloadUnpacker {
       }
     }
     bits.unpack = kUnpack[count];
-    to += count;
+    target += count;
   }
   template <std::size_t kCount>
-  static void unpack_bits(const PackedColumn& bytes, const PartsOfBytes& parts, std::byte* to,
-                          std::size_t to_stride) {
+  static void unpack_bits(const PackedColumn& bytes, const PartsOfBytes& parts, std::byte* target,
+                          std::size_t target_stride) {
     const char* at = bytes.rows;
-    for (std::size_t i = 0; i < bytes.count; ++i, at += bytes.stride, to += to_stride) {
-      std::memcpy(to, parts[static_cast<unsigned char>(*at)].data(), kCount);
+    for (std::size_t i = 0; i < bytes.count; ++i, at += bytes.stride, target += target_stride) {
+      std::memcpy(target, parts[static_cast<unsigned char>(*at)].data(), kCount);
     }
   }
 
@@ -131,7 +131,7 @@ class PayloadUnpacker {
 
 class RecordSource final : public PointSource {
  public:
-  RecordSource(RecordStream stream, std::size_t block_points, const Placement* onto)
+  RecordSource(RecordStream stream, std::size_t block_points, const Placement* placement)
       : stream_(std::move(stream)),
         block_points_(block_points),
         payload_bytes_(stream_.info.payload_size()),
@@ -145,7 +145,7 @@ class RecordSource final : public PointSource {
       // Coordinates are doubles in memory; check() refuses integers that these cannot hold.
       if (is_wide_integer(type)) type = ScalarType::f64;
     }
-    if (onto != nullptr) move_onto(*onto);
+    if (placement != nullptr) move_to(*placement);
     for (std::size_t i = 0; i < stream_.fields.size(); ++i) {
       const Channel& channel = stream_.fields[i].channel;
       if (channel.name == "withheld" && channel.type == ScalarType::u8) withheld_attribute_ = i;
@@ -155,13 +155,13 @@ class RecordSource final : public PointSource {
   const SourceInfo& info() const override { return stream_.info; }
 
   bool next(PointBlock& block) override {
-    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(
+    const auto max_records = static_cast<std::size_t>(std::min<std::uint64_t>(
         block_points_, wanted_points_ - delivered_ - stream_.records->lost()));
-    block.positions.resize(wanted);
-    block.payload.resize(wanted * payload_bytes_);
+    block.positions.resize(max_records);
+    block.payload.resize(max_records * payload_bytes_);
     std::size_t done = 0;
-    for (std::size_t some = 1; done < wanted && some > 0; done += some) {
-      some = unpack(block, done, wanted - done);
+    for (std::size_t some = 1; done < max_records && some > 0; done += some) {
+      some = unpack(block, done, max_records - done);
     }
     block.positions.resize(done);
     block.payload.resize(done * payload_bytes_);
@@ -195,8 +195,8 @@ class RecordSource final : public PointSource {
   }
 
   /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
-  std::size_t unpack(PointBlock& block, std::size_t done, std::size_t wanted) {
-    const std::string_view rows = stream_.records->read(wanted);
+  std::size_t unpack(PointBlock& block, std::size_t done, std::size_t max_records) {
+    const std::string_view rows = stream_.records->read(max_records);
     if (rows.empty()) return 0;
     const std::size_t stride = stream_.record_bytes, count = rows.size() / stride;
     PackedColumn column{.rows = nullptr,
@@ -247,10 +247,10 @@ class RecordSource final : public PointSource {
     for (std::size_t i = 0; i < block.size(); ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const double value = block.positions[i][axis];
-        const double most =
+        const double limit =
             is_wide_integer(types_[axis]) ? 0x1p53 : std::numeric_limits<double>::max();
         const auto [scale, offset] = scale_and_offset(axis);
-        if (!(std::abs(value) <= most) || !std::isfinite(value * scale + offset)) {
+        if (!(std::abs(value) <= limit) || !std::isfinite(value * scale + offset)) {
           throw fault(i,
                       fmt::format("its {} is not a number that can be kept exactly", "xyz"[axis]))
               .remedy("the file is damaged: download it again");
@@ -259,7 +259,7 @@ class RecordSource final : public PointSource {
     }
   }
 
-  void move_onto(const Placement& placement) {
+  void move_to(const Placement& placement) {
     SourceInfo& info = stream_.info;
     if (info.world == placement.world && info.coordinates == placement.coordinates) return;
     try {
@@ -292,14 +292,14 @@ class RecordSource final : public PointSource {
   }
   void move(PointBlock& block) const {
     constexpr double kInt = std::numeric_limits<std::int32_t>::max();
-    const double most = stream_.info.coordinates[0].type == ScalarType::i32
-                            ? kInt
-                            : std::numeric_limits<double>::max();
+    const double limit = stream_.info.coordinates[0].type == ScalarType::i32
+                             ? kInt
+                             : std::numeric_limits<double>::max();
     for (std::size_t i = 0; i < block.size(); ++i) {
       Point3& point = block.positions[i];
       point = moved(point);
       for (const double value : point) {
-        if (value < -most - 1 || value > most) {
+        if (value < -limit - 1 || value > limit) {
           throw fault(i, "is out of range of the lattice chosen from the headers of all files")
               .remedy(
                   "its header states wrong bounds: export the file again, or read it separately");
@@ -321,8 +321,8 @@ class RecordSource final : public PointSource {
 }  // namespace
 
 std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points,
-                                               const Placement* onto) {
-  return std::make_unique<RecordSource>(std::move(stream), block_points, onto);
+                                               const Placement* placement) {
+  return std::make_unique<RecordSource>(std::move(stream), block_points, placement);
 }
 
 }  // namespace terrace::stream

@@ -24,14 +24,14 @@ struct RecordStream {
   std::vector<LasField> fields{};  ///< of info.attributes
   std::unique_ptr<Input> input{};  ///< the input of `records`, unless they have their own file
   std::unique_ptr<RecordReader> records{};
-  std::uint64_t points = 0;  ///< number in the file, wanted or not
+  std::uint64_t points = 0;  ///< number in the file, including those not selected
 };
 
-/// Returns a source of these points. onto: the common_placement() of several files, onto which the
-/// points are moved; null for a single file. Throws: Error if they are not on its lattice. next()
-/// throws what the RecordReader throws, and Error for coordinates that are not finite or are out of
-/// range after the move.
+/// Returns a source of these points. placement: the common_placement() of several files, to which
+/// the points are moved; null for a single file. Throws: Error if they are not on its lattice.
+/// next() throws what the RecordReader throws, and Error for coordinates that are not finite or are
+/// out of range after the move.
 std::unique_ptr<PointSource> source_of_records(RecordStream stream, std::size_t block_points,
-                                               const Placement* onto);
+                                               const Placement* placement);
 
 }  // namespace terrace::stream

@@ -20,23 +20,23 @@
 namespace terrace::stream {
 namespace {
 
-bool is_kept(const std::string& name, const Selection& wanted) {
+bool is_selected(const std::string& name, const Selection& selection) {
   const auto among = [&](const std::vector<std::string>& names) {
     return std::find(names.begin(), names.end(), name) != names.end();
   };
-  return (!wanted.keep || among(*wanted.keep)) && !among(wanted.drop);
+  return (!selection.keep || among(*selection.keep)) && !among(selection.drop);
 }
 
 class SelectedSource final : public PointSource {
  public:
-  /// kept: attributes by number, in the order in which they are delivered.
+  /// selected: the numbers of the attributes to deliver, in their order.
   SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options,
-                 const std::vector<std::size_t>& kept)
+                 const std::vector<std::size_t>& selected)
       : source_(std::move(source)), block_points_(options.block_points) {
     const SourceInfo& all = source_->info();
-    const Selection& wanted = options.selection;
+    const Selection& selection = options.selection;
     info_ = all;
-    region_ = wanted.region;
+    region_ = selection.region;
     if (region_) {
       const std::array<double, 2> tolerance = border_tolerance(all);
       for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -44,8 +44,8 @@ class SelectedSource final : public PointSource {
         region_->max[axis] += tolerance[axis];
       }
     }
-    covers_ = wanted.covers;
-    if (!wanted.where.empty()) where_.emplace(wanted.where, all);
+    covers_ = selection.covers;
+    if (!selection.where.empty()) where_.emplace(selection.where, all);
     if (where_ || region_) {
       if (!all.grid) info_.points.reset();
       for (std::size_t i = 0; i < all.attributes.size(); ++i) {
@@ -55,13 +55,13 @@ class SelectedSource final : public PointSource {
       }
     }
     info_.attributes.clear();
-    for (const std::size_t i : kept) {
+    for (const std::size_t i : selected) {
       info_.attributes.push_back(all.attributes[i]);
-      const std::size_t from = all.attribute_offset(i), bytes = size_of(all.attributes[i].type);
-      if (!pieces_.empty() && pieces_.back().from + pieces_.back().bytes == from) {
+      const std::size_t offset = all.attribute_offset(i), bytes = size_of(all.attributes[i].type);
+      if (!pieces_.empty() && pieces_.back().offset + pieces_.back().bytes == offset) {
         pieces_.back().bytes += bytes;
       } else {
-        pieces_.push_back({from, bytes});
+        pieces_.push_back({offset, bytes});
       }
     }
   }
@@ -75,9 +75,9 @@ class SelectedSource final : public PointSource {
   bool next(PointBlock& block) override {
     block.clear();
     // Begin with the points left over from the last call.
-    std::swap(block, rest_);
-    rest_.clear();
-    while (block.size() < block_points_ && source_->next(read_)) {
+    std::swap(block, pending_);
+    pending_.clear();
+    while (block.size() < block_points_ && source_->next(input_)) {
       append(block);
       if (info_.grid && !block.empty()) break;
     }
@@ -85,8 +85,8 @@ class SelectedSource final : public PointSource {
       const auto record = info_.payload_size();
       const auto points = static_cast<std::ptrdiff_t>(block_points_);
       const auto bytes = static_cast<std::ptrdiff_t>(block_points_ * record);
-      rest_.positions.assign(block.positions.begin() + points, block.positions.end());
-      rest_.payload.assign(block.payload.begin() + bytes, block.payload.end());
+      pending_.positions.assign(block.positions.begin() + points, block.positions.end());
+      pending_.payload.assign(block.payload.begin() + bytes, block.payload.end());
       block.positions.resize(block_points_);
       block.payload.resize(block_points_ * record);
     }
@@ -103,42 +103,42 @@ class SelectedSource final : public PointSource {
   }
 
  private:
-  /// Bytes of a record that are kept.
+  /// Contiguous bytes of a record that are delivered.
   struct Piece {
-    std::size_t from = 0, bytes = 0;
+    std::size_t offset = 0, bytes = 0;
   };
 
   /// Appends the selected points of the block in read_.
   void append(PointBlock& block) {
     const std::size_t from_bytes = source_->info().payload_size(), to_bytes = info_.payload_size();
-    matches_.assign(read_.size(), 1);
-    if (where_) where_->test(read_.positions, read_.payload, matches_);
+    matches_.assign(input_.size(), 1);
+    if (where_) where_->test(input_.positions, input_.payload, matches_);
     if (region_) {
-      for (std::size_t i = 0; i < read_.size(); ++i) {
+      for (std::size_t i = 0; i < input_.size(); ++i) {
         if (matches_[i] == 0) continue;
-        const Point3 place = world_point(source_->info(), read_.positions[i]);
+        const Point3 place = world_point(source_->info(), input_.positions[i]);
         if (!region_->contains(place) || (covers_ && !covers_({place[0], place[1]}))) {
           matches_[i] = 0;
         }
       }
     }
     const std::size_t before = block.payload.size();
-    block.payload.resize(before + read_.size() * to_bytes);
-    std::byte* to = block.payload.data() + before;
-    for (std::size_t i = 0; i < read_.size(); ++i) {
+    block.payload.resize(before + input_.size() * to_bytes);
+    std::byte* target = block.payload.data() + before;
+    for (std::size_t i = 0; i < input_.size(); ++i) {
       if (matches_[i] == 0) {
         ++excluded_;
         continue;
       }
-      const std::byte* const record = read_.payload.data() + i * from_bytes;
+      const std::byte* const record = input_.payload.data() + i * from_bytes;
       if (withheld_attribute_) {
         withheld_ +=
             record[source_->info().attribute_offset(*withheld_attribute_)] != std::byte{0} ? 1 : 0;
       }
-      block.positions.push_back(read_.positions[i]);
+      block.positions.push_back(input_.positions[i]);
       for (const Piece& piece : pieces_) {
-        std::memcpy(to, record + piece.from, piece.bytes);
-        to += piece.bytes;
+        std::memcpy(target, record + piece.offset, piece.bytes);
+        target += piece.bytes;
       }
     }
     block.payload.resize(block.size() * to_bytes);
@@ -152,7 +152,7 @@ class SelectedSource final : public PointSource {
   std::function<bool(const std::array<double, 2>&)> covers_;
   std::vector<Piece> pieces_;
   std::optional<std::size_t> withheld_attribute_;
-  PointBlock read_, rest_;
+  PointBlock input_, pending_;
   std::vector<std::uint8_t> matches_;
   std::uint64_t delivered_ = 0, excluded_ = 0, withheld_ = 0;
 };
@@ -162,24 +162,24 @@ class SelectedSource final : public PointSource {
 std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
                                              const std::vector<std::string>& names,
                                              std::size_t block_points) {
-  std::vector<std::size_t> kept;
+  std::vector<std::size_t> selected;
   const std::vector<Channel>& attributes = source->info().attributes;
   for (const std::string& name : names) {
     for (std::size_t i = 0; i < attributes.size(); ++i) {
-      if (attributes[i].name == name) kept.push_back(i);
+      if (attributes[i].name == name) selected.push_back(i);
     }
   }
   return std::make_unique<SelectedSource>(std::move(source),
-                                          SourceOptions{.block_points = block_points}, kept);
+                                          SourceOptions{.block_points = block_points}, selected);
 }
 
-std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted) {
+std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& selection) {
   std::optional<Where> where;
-  if (!wanted.where.empty()) where.emplace(wanted.where, info);
+  if (!selection.where.empty()) where.emplace(selection.where, info);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < info.attributes.size(); ++i) {
     const std::string& name = info.attributes[i].name;
-    if (is_kept(name, wanted) || (where && where->uses(i))) names.push_back(name);
+    if (is_selected(name, selection) || (where && where->uses(i))) names.push_back(name);
   }
   return names;
 }
@@ -202,18 +202,19 @@ void check_attributes(const std::vector<std::string>& names, const std::vector<C
 
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options) {
-  const Selection& wanted = options.selection;
-  if (wanted.where.empty() && !wanted.keep && wanted.drop.empty() && !wanted.region) return source;
+  const Selection& selection = options.selection;
+  if (selection.where.empty() && !selection.keep && selection.drop.empty() && !selection.region)
+    return source;
   const SourceInfo& all = source->info();
   const std::string file = all.files.empty() ? std::string() : all.files.front();
   // A chain of files has already checked and dropped these attributes.
-  if (all.files.size() <= 1 || all.grid) check_attributes(wanted.drop, all.attributes, file);
-  if (wanted.keep) check_attributes(*wanted.keep, all.attributes, file);
-  std::vector<std::size_t> kept;
+  if (all.files.size() <= 1 || all.grid) check_attributes(selection.drop, all.attributes, file);
+  if (selection.keep) check_attributes(*selection.keep, all.attributes, file);
+  std::vector<std::size_t> selected;
   for (std::size_t i = 0; i < all.attributes.size(); ++i) {
-    if (is_kept(all.attributes[i].name, wanted)) kept.push_back(i);
+    if (is_selected(all.attributes[i].name, selection)) selected.push_back(i);
   }
-  return std::make_unique<SelectedSource>(std::move(source), options, kept);
+  return std::make_unique<SelectedSource>(std::move(source), options, selected);
 }
 
 }  // namespace terrace::stream

@@ -129,14 +129,14 @@ class WithAuxXml final : public Raster {
   /// own_nodata: the file's own value, even if `raster` was opened with the sidecar's. band: the
   /// element in `root`, or null.
   WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, const XmlElement& root,
-             std::optional<double> own_nodata, const XmlElement* band)
+             std::optional<double> file_nodata, const XmlElement* band)
       : raster_(std::move(raster)),
         info_(raster_->info()),
         sidecar_(std::move(sidecar)),
-        overrides_(is_overridden(info_)) {
+        overrides_file_(is_overridden(info_)) {
     if (const XmlElement* const srs = root.child("SRS")) read_crs(crs_of_srs(srs->text));
     if (const XmlElement* const place = root.child("GeoTransform")) read_place(place->text);
-    if (band != nullptr) read_band(*band, own_nodata);
+    if (band != nullptr) read_band(*band, file_nodata);
   }
   /// Applies nothing and adds a comment.
   WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, std::string comment)
@@ -159,18 +159,19 @@ class WithAuxXml final : public Raster {
       raster_->read_over({window.column, window.row + row, window.columns, rows},
                          {samples_.data(), valid_.data(), columns});
       for (std::size_t r = 0; r < rows; ++r) {
-        const std::size_t from = r * columns, to = (row + r) * out.stride;
+        const std::size_t source_row = r * columns, target_row = (row + r) * out.stride;
         for (std::size_t first = 0, end = 0; first < columns; first = end + 1) {
           // One run of cells with data at a time.
-          while (first < columns && valid_[from + first] == 0) ++first;
+          while (first < columns && valid_[source_row + first] == 0) ++first;
           end = first;
-          while (end < columns && valid_[from + end] != 0) ++end;
+          while (end < columns && valid_[source_row + end] != 0) ++end;
           if (end == first) continue;
           any |= overlay_row(info_.sample.type,
-                             {.samples = samples_.data() + (from + first) * bytes,
+                             {.samples = samples_.data() + (source_row + first) * bytes,
                               .step = 1,
                               .cells = end - first},
-                             *nodata_, out.samples + (to + first) * bytes, out.valid + to + first);
+                             *nodata_, out.samples + (target_row + first) * bytes,
+                             out.valid + target_row + first);
         }
       }
     }
@@ -182,7 +183,7 @@ class WithAuxXml final : public Raster {
 
   /// Returns whether to use the sidecar's value of something that the file may state as well. Adds
   /// a note about the choice if the two differ.
-  bool takes(bool file_says_it, bool differs, bool overrides, const std::string& what) {
+  bool is_applicable(bool file_says_it, bool differs, bool overrides, const std::string& what) {
     if (!file_says_it) return true;
     if (differs) {
       info_.notes.push_back(fmt::format("{}: its {}{}", sidecar_, what,
@@ -195,15 +196,17 @@ class WithAuxXml final : public Raster {
 
   void read_crs(Crs crs) {
     if (crs.epsg == 0 && crs.wkt.empty()) return;
-    const Crs& own = info_.crs;
-    const bool has_own = !lacks_crs(own);
-    if (has_own && own.epsg == crs.epsg && own.wkt == crs.wkt) return;
-    if (!takes(has_own, crs.epsg == 0 || crs.epsg != own.epsg, overrides_, "CRS")) return;
+    const Crs& file_crs = info_.crs;
+    const bool has_file_crs = !lacks_crs(file_crs);
+    if (has_file_crs && file_crs.epsg == crs.epsg && file_crs.wkt == crs.wkt) return;
+    if (!is_applicable(has_file_crs, crs.epsg == 0 || crs.epsg != file_crs.epsg, overrides_file_,
+                       "CRS"))
+      return;
     // The sidecar may not say anything about heights.
     if (crs.vertical_epsg == 0 && crs.wkt.find("VERT") == std::string::npos) {
-      crs.vertical_epsg = own.vertical_epsg;
+      crs.vertical_epsg = file_crs.vertical_epsg;
     }
-    crs.vertical_unit = own.vertical_unit;
+    crs.vertical_unit = file_crs.vertical_unit;
     info_.crs = std::move(crs);
   }
 
@@ -222,7 +225,9 @@ class WithAuxXml final : public Raster {
     // From the corner of the first cell to its middle.
     const WorldTransform world{
         {g[1], g[2], g[0] + 0.5 * (g[1] + g[2]), g[4], g[5], g[3] + 0.5 * (g[4] + g[5])}};
-    if (!takes(info_.world != kPlainWorld, !is_near(world), overrides_, "georeferencing")) return;
+    if (!is_applicable(info_.world != kPlainWorld, !is_near(world), overrides_file_,
+                       "georeferencing"))
+      return;
     info_.world = world;
     std::erase(info_.comments, kNoGeoreferencing);
   }
@@ -238,10 +243,10 @@ class WithAuxXml final : public Raster {
            kSameCell * cell;
   }
 
-  void read_band(const XmlElement& band, std::optional<double> own_nodata) {
+  void read_band(const XmlElement& band, std::optional<double> file_nodata) {
     Channel& sample = info_.sample;
     if (const XmlElement* const nodata = band.child("NoDataValue")) {
-      read_nodata(nodata->text, own_nodata);
+      read_nodata(nodata->text, file_nodata);
     }
     const auto number = [&](const char* name, double otherwise) {
       const XmlElement* const element = band.child(name);
@@ -249,27 +254,29 @@ class WithAuxXml final : public Raster {
     };
     const double scale = number("Scale", 1), offset = number("Offset", 0);
     if (scale != 0 && (scale != 1 || offset != 0) &&
-        takes(sample.scale != 1 || sample.offset != 0,
-              scale != sample.scale || offset != sample.offset, false, "scale")) {
+        is_applicable(sample.scale != 1 || sample.offset != 0,
+                      scale != sample.scale || offset != sample.offset, false, "scale")) {
       sample.scale = scale;
       sample.offset = offset;
     }
     if (const XmlElement* const element = band.child("UnitType")) {
       const std::string unit = canonical_unit(element->text);
-      if (!unit.empty() &&
-          takes(!sample.unit.empty(), unit != sample.unit, overrides_, "unit of heights")) {
+      if (!unit.empty() && is_applicable(!sample.unit.empty(), unit != sample.unit, overrides_file_,
+                                         "unit of heights")) {
         sample.unit = info_.crs.vertical_unit = unit;
       }
     }
   }
 
-  void read_nodata(const std::string& text, std::optional<double> own) {
+  void read_nodata(const std::string& text, std::optional<double> file_value) {
     const NodataRule rule = NodataRule::parse(text, info_.sample.type);
     if (!rule.value) return;
-    const bool same = own == rule.value || (own && std::isnan(*own) && std::isnan(*rule.value));
-    const bool taken = takes(own.has_value(), !same, overrides_, "nodata value");
+    const bool same = file_value == rule.value ||
+                      (file_value && std::isnan(*file_value) && std::isnan(*rule.value));
+    const bool is_applied =
+        is_applicable(file_value.has_value(), !same, overrides_file_, "nodata value");
     // A value that overrides the file's was already applied when the file was opened.
-    if (!taken || overrides_) return;
+    if (!is_applied || overrides_file_) return;
     nodata_ = rule;
     info_.nodata = nodata_->value;
     constexpr std::uint64_t kWindowColumns = 4096;  // most windows are not wider
@@ -280,7 +287,7 @@ class WithAuxXml final : public Raster {
   std::unique_ptr<Raster> raster_;
   RasterInfo info_;
   std::string sidecar_;
-  bool overrides_ = false;            ///< see is_overridden()
+  bool overrides_file_ = false;       ///< see is_overridden()
   std::optional<NodataRule> nodata_;  ///< the sidecar's, applied to the file's samples
   std::vector<std::byte> samples_;
   std::vector<std::uint8_t> valid_;
@@ -326,7 +333,7 @@ std::unique_ptr<Raster> open_with_aux_xml(const OpenRaster& open, const std::str
                                         std::string("ignored: ") + error.what());
   }
   if (root.name != "PAMDataset") return raster;
-  const std::optional<double> own = raster->info().nodata;
+  const std::optional<double> file_value = raster->info().nodata;
   const XmlElement* const band = band_of(root, options);
   const XmlElement* const nodata = band != nullptr ? band->child("NoDataValue") : nullptr;
   if (nodata != nullptr && is_overridden(raster->info()) &&
@@ -335,7 +342,7 @@ std::unique_ptr<Raster> open_with_aux_xml(const OpenRaster& open, const std::str
     overridden.nodata = nodata->text;
     raster = open(file, overridden);
   }
-  return std::make_unique<WithAuxXml>(std::move(raster), sidecar, root, own, band);
+  return std::make_unique<WithAuxXml>(std::move(raster), sidecar, root, file_value, band);
 }
 
 }  // namespace terrace::stream

@@ -38,7 +38,7 @@ class SpooledSource final : public PointSource {
                 const SourceOptions& options)
       : names_(files.begin(), files.end()), copies_(files.begin(), files.end()) {
     for (std::size_t i = 0; i < names_.size(); ++i) {
-      if (!is_seekable(names_[i])) copies_[i] = set_aside(names_[i], options.stop);
+      if (!is_seekable(names_[i])) copies_[i] = copy_to_temporary(names_[i], options.stop);
     }
     with_names([&] { source_ = format.open(copies_, options); });
     info_ = source_->info();
@@ -60,7 +60,7 @@ class SpooledSource final : public PointSource {
 
  private:
   /// Copies a file to a temporary one; returns the name by which that can be opened.
-  std::string set_aside(const std::string& file, const std::stop_token& stop) {
+  std::string copy_to_temporary(const std::string& file, const std::stop_token& stop) {
     Input input(file, stop);
     auto spool = std::make_unique<Spool>(input.name());
     while (!input.fill(kCopyBytes).empty()) {
@@ -184,8 +184,8 @@ bool needs_copies(const Format& format, std::span<const std::string> files) {
 }
 
 /// open_source() without reading ahead.
-std::unique_ptr<PointSource> open_here(std::span<const std::string> files,
-                                       const SourceOptions& options) {
+std::unique_ptr<PointSource> open_on_this_thread(std::span<const std::string> files,
+                                                 const SourceOptions& options) {
   const HeadScope scope;
   const Format& format = common_format(files, options);
   const bool copies = needs_copies(format, files);
@@ -211,13 +211,13 @@ std::unique_ptr<PointSource> open_source(std::span<const std::string> names,
   if (names.empty()) throw std::invalid_argument("there is no file to open");
   if (options.block_points == 0) throw std::invalid_argument("block_points must be positive");
   const std::vector<std::string> files = input_files(names, options.format);
-  if (options.blocks_ahead == 0) return open_here(files, options);
+  if (options.blocks_ahead == 0) return open_on_this_thread(files, options);
   // Reading ends when the source is destroyed, not only when the caller requests a stop.
   std::stop_source reading;
   SourceOptions inner = options;
   inner.stop = reading.get_token();
   const std::stop_callback on_stop(options.stop, [&reading] { reading.request_stop(); });
-  return read_ahead(open_here(files, inner), options.blocks_ahead, reading, options.stop);
+  return read_ahead(open_on_this_thread(files, inner), options.blocks_ahead, reading, options.stop);
 }
 
 }  // namespace terrace::stream

@@ -49,16 +49,17 @@ class HierarchyReader {
   }
 
  private:
-  /// from: offset of the reference to the page. No page is read twice, so circular references end.
-  void add_page(const Page& page, std::uint64_t from) {
+  /// reference_offset: of the entry that refers to the page. No page is read twice, so circular
+  /// references end.
+  void add_page(const Page& page, std::uint64_t reference_offset) {
     if (page.bytes % kCopcEntryBytes != 0 || page.bytes == 0 || page.offset > file_.size() ||
         page.bytes > file_.size() - page.offset) {
-      throw damaged(file_, from, "a page of the COPC hierarchy is outside the file");
+      throw damaged(file_, reference_offset, "a page of the COPC hierarchy is outside the file");
     }
     // Pages that overlap could be many more bytes than the file has.
     page_bytes_ += page.bytes;
-    if (!seen_.insert(page.offset).second || page_bytes_ > file_.size()) {
-      throw damaged(file_, from, "a page of the COPC hierarchy is referred to twice");
+    if (!page_offsets_.insert(page.offset).second || page_bytes_ > file_.size()) {
+      throw damaged(file_, reference_offset, "a page of the COPC hierarchy is referred to twice");
     }
     pages_.push_back(page);
   }
@@ -99,7 +100,7 @@ class HierarchyReader {
   const ByteSource& file_;
   std::uint64_t first_chunk_;
   std::vector<Page> pages_;
-  std::set<std::uint64_t> seen_;  ///< offsets of pages
+  std::set<std::uint64_t> page_offsets_;  ///< offsets of pages
   std::uint64_t page_bytes_ = 0;
   std::vector<OctreeNode> nodes_;
 };
@@ -152,10 +153,11 @@ CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at, std::
   const std::span<const OctreeNode> nodes = octree.nodes;
   const std::vector<std::size_t> ends = subtree_ends(nodes);
   // A smaller page is not worth a request.
-  const std::size_t least = nodes.size() <= page_nodes ? nodes.size() + 1 : page_nodes / 16;
+  const std::size_t min_page_nodes =
+      nodes.size() <= page_nodes ? nodes.size() + 1 : page_nodes / 16;
   const auto has_page = [&](std::size_t node) {
     const std::size_t count = ends[node] - node;
-    return count >= least && count <= page_nodes;
+    return count >= min_page_nodes && count <= page_nodes;
   };
   CopcHierarchy hierarchy;
   for (std::size_t i = 0; i < nodes.size(); i = has_page(i) ? ends[i] : i + 1) {

@@ -39,7 +39,7 @@ struct CopcHierarchy {
 /// Writes one page if there are at most `page_nodes` nodes. Otherwise each of the largest subtrees
 /// with at most that many nodes gets a page after the root page, which keeps small subtrees. Nodes
 /// without points are written for the sake of their children. octree: includes all ancestors of its
-/// nodes, in the order of before(). at: offset of the payload in the file.
+/// nodes, in the order of precedes(). at: offset of the payload in the file.
 CopcHierarchy write_copc_hierarchy(const Octree& octree, std::uint64_t at,
                                    std::size_t page_nodes = kCopcPageNodes);
 

@@ -92,24 +92,24 @@ std::span<const std::byte> OctreeBuilder::record_of(const NodePoints& points,
       .subspan(std::size_t{item.index} * numbered_bytes_, numbered_bytes_);
 }
 
-std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t at_once) {
+std::uint64_t OctreeBuilder::bytes_with(std::size_t record_bytes, std::size_t batch_records) {
   // The unwritten tails of 64 buckets for each pass; ten billion points take three or four passes.
   constexpr std::uint64_t kBuckets = 8u << 20;
-  const std::uint64_t kept = record_bytes + sizeof(std::uint64_t) + sizeof(Item);
+  const std::uint64_t item_bytes = record_bytes + sizeof(std::uint64_t) + sizeof(Item);
   // Unfinished nodes hold copies of the records in memory, in vectors with spare capacity, and wait
   // to be written. A node, its child and the bytes being written for it come on top.
-  return kBuckets + at_once * (3 * kept + record_bytes) +
-         kChildren * kMaxPromoted * (2 * kept + record_bytes);
+  return kBuckets + batch_records * (3 * item_bytes + record_bytes) +
+         kChildren * kMaxPromoted * (2 * item_bytes + record_bytes);
 }
 
 OctreeBuilder::OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                             std::size_t record_bytes, std::size_t at_once,
-                             std::uint64_t max_together, unsigned threads)
+                             std::size_t record_bytes, std::size_t batch_records,
+                             std::uint64_t max_deep_points, unsigned threads)
     : name_(name),
       record_bytes_(record_bytes),
       numbered_bytes_(record_bytes + sizeof(std::uint64_t)),
-      at_once_(std::max(at_once, kLeafPoints)),
-      max_together_(std::max<std::uint64_t>(max_together, at_once_)),
+      batch_records_(std::max(batch_records, kLeafPoints)),
+      max_deep_points_(std::max<std::uint64_t>(max_deep_points, batch_records_)),
       file_(name, folder, numbered_bytes_),
       numbered_(numbered_bytes_),
       team_(threads) {}
@@ -149,14 +149,14 @@ std::array<std::uint32_t, 3> OctreeBuilder::cell_of(const std::byte* record) con
 }
 
 OctreeBuilder::NodePoints OctreeBuilder::build(const OctreeNode& node, Bucket bucket) {
-  if (file_.records(bucket) <= at_once_ || node.depth == kDeepestLeaf) {
+  if (file_.records(bucket) <= batch_records_ || node.depth == kDeepestLeaf) {
     return build_in_memory(node, std::move(bucket));
   }
   const unsigned depths = std::min(kDepthsAtOnce, kDeepestLeaf - node.depth);
   std::vector<Bucket> buckets(std::size_t{1} << (3 * depths));
   std::vector<std::byte> records;
   while (file_.records(bucket) > 0) {
-    file_.take(bucket, at_once_ / 8, records);
+    file_.take(bucket, batch_records_ / 8, records);
     for (std::size_t at = 0; at < records.size(); at += numbered_bytes_) {
       const auto cell = cell_of(records.data() + at);
       std::size_t place = 0;
@@ -177,7 +177,7 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
     for (const Bucket& bucket : some) sum += file_.records(bucket);
     return sum;
   };
-  if (records(buckets) <= at_once_) {
+  if (records(buckets) <= batch_records_) {
     Bucket all;
     for (Bucket& bucket : buckets) all.append(std::move(bucket));
     return build_in_memory(node, std::move(all));
@@ -218,11 +218,11 @@ OctreeBuilder::NodePoints OctreeBuilder::load(const OctreeNode& node, Bucket buc
 
 OctreeBuilder::NodePoints OctreeBuilder::build_in_memory(const OctreeNode& node, Bucket bucket) {
   const std::uint64_t count = file_.records(bucket);
-  if (count > max_together_) {
+  if (count > max_deep_points_) {
     throw Error(
         name_,
         fmt::format("{} are in one place, more than a node of COPC can have in this memory: {}",
-                    counted(count, "point"), max_together_))
+                    counted(count, "point"), max_deep_points_))
         .remedy(message("raise {memory_bytes}, leave them out, or write LAZ"));
   }
   NodePoints points = load(node, std::move(bucket));
@@ -282,12 +282,12 @@ void OctreeBuilder::sort(std::vector<Item>& items, unsigned depth) {
     const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
     std::sort(at(begins[part]), at(begins[part + 1]), [](const Item& a, const Item& b) {
       // The axis whose cells differ in the highest bit decides; in a tie z, then y.
-      std::uint32_t most = 0;
+      std::uint32_t highest_difference = 0;
       bool less = a.number < b.number;
       for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
         const std::uint32_t differ = a.cell[axis] ^ b.cell[axis];
-        if (most < differ && most < (differ ^ most)) {
-          most = differ;
+        if (highest_difference < differ && highest_difference < (differ ^ highest_difference)) {
+          highest_difference = differ;
           less = a.cell[axis] < b.cell[axis];
         }
       }
@@ -360,16 +360,16 @@ void OctreeBuilder::promote(NodePoints child, const Write& write, const Add& add
     chosen.erase(end, chosen.end());
     std::sort(chosen.begin(), chosen.end());
   }
-  std::size_t kept = 0, next = 0;
+  std::size_t item_bytes = 0, next = 0;
   for (std::size_t i = 0; i < items.size(); ++i) {
     if (next < chosen.size() && chosen[next] == i) {
       add(items[i], record_of(child, items[i]));
       ++next;
     } else {
-      items[kept++] = items[i];
+      items[item_bytes++] = items[i];
     }
   }
-  items.resize(kept);
+  items.resize(item_bytes);
   this->write(child, write);
 }
 

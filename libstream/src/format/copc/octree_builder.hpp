@@ -37,25 +37,25 @@ class OctreeBuilder {
   /// as many. Surfaces promote fewer; only clouds that fill space reach the limit.
   static constexpr std::size_t kMaxPromoted = std::size_t{1} << 14;
 
-  /// Upper bound of the memory held, in bytes, with `at_once` records in memory.
-  static std::uint64_t bytes_with(std::size_t record_bytes, std::size_t at_once);
+  /// Upper bound of the memory held, in bytes, with `batch_records` records in memory.
+  static std::uint64_t bytes_with(std::size_t record_bytes, std::size_t batch_records);
 
   /// Receives a node and its records, if any, in the order in which they were added. Children come
   /// before their parents.
   using Write = std::function<void(const OctreeNode& node, std::span<const std::byte> records)>;
 
   /// Records begin with x, y and z as int32. name: of the output, for messages. folder: for the
-  /// temporary file. at_once: the number of records in memory, at least kLeafPoints.
-  /// max_together: limit of the points in one of the deepest nodes. threads: how many work on the
-  /// records in memory. Results depend neither on at_once nor on threads.
+  /// temporary file. batch_records: the number of records in memory, at least kLeafPoints.
+  /// max_deep_points: limit of the points in one of the deepest nodes. threads: how many work on
+  /// the records in memory. Results depend neither on batch_records nor on threads.
   OctreeBuilder(const std::string& name, const std::filesystem::path& folder,
-                std::size_t record_bytes, std::size_t at_once, std::uint64_t max_together,
+                std::size_t record_bytes, std::size_t batch_records, std::uint64_t max_deep_points,
                 unsigned threads = 1);
 
   /// Throws: Error, mostly if the disk is full.
   void add(std::span<const std::byte> records);
   /// Builds the nodes. Called once, after all points. The cube of `octree` must enclose them.
-  /// Throws: Error if one of the deepest nodes has more than `max_together` points; what `write`
+  /// Throws: Error if one of the deepest nodes has more than `max_deep_points` points; what `write`
   /// throws.
   void build(const Octree& octree, const Lattice& lattice, const Write& write);
 
@@ -88,8 +88,8 @@ class OctreeBuilder {
   void write(NodePoints& node, const Write& write) const;
 
   std::string name_;
-  std::size_t record_bytes_, numbered_bytes_, at_once_;
-  std::uint64_t max_together_;
+  std::size_t record_bytes_, numbered_bytes_, batch_records_;
+  std::uint64_t max_deep_points_;
   BucketFile file_;
   Bucket all_;
   std::uint64_t points_ = 0;

@@ -65,32 +65,33 @@ Octree cube_around(const LasRecords& records) {
 /// How the parts of the writer share its memory. Results do not depend on it.
 struct Shares {
   unsigned threads = 1;
-  std::size_t at_once = OctreeBuilder::kLeafPoints;  ///< records
-  std::uint64_t together = 0;                        ///< records at one place
+  std::size_t batch_records = OctreeBuilder::kLeafPoints;  ///< records
+  std::uint64_t deep_points = 0;                           ///< records at one place
 
   /// Upper bound of the memory held.
   [[nodiscard]] std::uint64_t bytes(std::size_t record_bytes) const {
     // Records and their coded bytes, of each thread and of a node that waits.
     const std::uint64_t node = 8 * OctreeBuilder::kMaxPromoted * record_bytes * 8 / 5;
-    return OctreeBuilder::bytes_with(record_bytes, at_once) +
+    return OctreeBuilder::bytes_with(record_bytes, batch_records) +
            (threads > 1 ? threads + 1 : 1) * node;
   }
 };
 
 Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t record_bytes) {
-  constexpr std::size_t kMaxAtOnce = std::size_t{1} << 19;
-  constexpr std::uint64_t kMaxTogether = 1u << 24;
+  constexpr std::size_t kMaxBatchRecords = std::size_t{1} << 19;
+  constexpr std::uint64_t kMaxDeepPoints = 1u << 24;
   Shares shares;
   for (shares.threads = std::max(1u, threads);
        shares.threads > 1 && shares.bytes(record_bytes) > memory_bytes; --shares.threads) {
   }
   // A record at one place takes as much as any record in memory, and is encoded with the others.
-  const std::uint64_t fixed = shares.bytes(record_bytes);
-  const std::uint64_t room = memory_bytes - std::min(memory_bytes, fixed);
+  const std::uint64_t minimum = shares.bytes(record_bytes);
+  const std::uint64_t room = memory_bytes - std::min(memory_bytes, minimum);
   const std::uint64_t each =
       OctreeBuilder::bytes_with(record_bytes, 1) - OctreeBuilder::bytes_with(record_bytes, 0);
-  shares.together = std::min(kMaxTogether, shares.at_once + room / (each + 3 * record_bytes));
-  shares.at_once += std::min(kMaxAtOnce - shares.at_once, room / each);
+  shares.deep_points =
+      std::min(kMaxDeepPoints, shares.batch_records + room / (each + 3 * record_bytes));
+  shares.batch_records += std::min(kMaxBatchRecords - shares.batch_records, room / each);
   return shares;
 }
 
@@ -106,7 +107,7 @@ class CopcWriter final : public PointWriter {
         vlr_(laz::Vlr::of(records_.layout().point_format, records_.layout().record_bytes,
                           laz::Vlr::kVariable)),
         shares_(shares_within(options.memory_bytes, options.threads, record_bytes())),
-        builder_(path, folder_of(path), record_bytes(), shares_.at_once, shares_.together,
+        builder_(path, folder_of(path), record_bytes(), shares_.batch_records, shares_.deep_points,
                  options.threads),
         encoders_(vlr_, shares_.threads,
                   [this](std::span<const std::byte> coded) { write_chunk(coded); }) {

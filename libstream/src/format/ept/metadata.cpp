@@ -122,16 +122,16 @@ class EptMetadataReader {
   }
 
   [[nodiscard]] std::string text(const Json& json, const char* name,
-                                 const std::optional<std::string>& without) const {
-    if (without && !json.contains(name)) return *without;
+                                 const std::optional<std::string>& fallback) const {
+    if (fallback && !json.contains(name)) return *fallback;
     const Json& value = member(json, name);
     if (!value.is_string()) throw fault("is not text").at(name);
     return value.get<std::string>();
   }
 
-  [[nodiscard]] double number(const Json& json, const char* name, double without) const {
+  [[nodiscard]] double number(const Json& json, const char* name, double fallback) const {
     const auto found = json.find(name);
-    if (found == json.end()) return without;
+    if (found == json.end()) return fallback;
     if (!found->is_number() || !std::isfinite(found->get<double>()))
       throw fault("is not a number").at(name);
     return found->get<double>();
@@ -302,18 +302,18 @@ NodeKey key_of(const OctreeNode& node) {
 }
 
 /// The part of the hierarchy read so far.
-struct EptReading {
+struct HierarchyState {
   std::uint64_t points = 0;  ///< promised
   std::uint64_t found = 0;
   std::vector<OctreeNode> nodes{};
   std::vector<NodeKey> pending{};  ///< of files to be read
-  std::set<NodeKey> seen{};        ///< of files
+  std::set<NodeKey> files{};       ///< of files
 };
 
 /// Takes the entries of one file as they are parsed: an object of names and numbers.
-class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
+class EntryParser final : public nlohmann::json_sax<nlohmann::json> {
  public:
-  EntryTaker(const std::string& file, EptReading& reading) : file_(file), reading_(reading) {}
+  EntryParser(const std::string& file, HierarchyState& state) : file_(file), state_(state) {}
 
   bool key(string_t& name) override {
     name_ = name;
@@ -323,24 +323,24 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
     OctreeNode node = place();
     if (value == 0) return true;
     // Compared before adding, because the sum could overflow.
-    if (value > reading_.points - reading_.found) {
+    if (value > state_.points - state_.found) {
       throw ept_fault(file_, fmt::format("the nodes have more points than ept.json promises: {}",
-                                         reading_.points))
+                                         state_.points))
           .at("node " + name_);
     }
     node.points = value;
-    reading_.found += value;
-    reading_.nodes.push_back(node);
+    state_.found += value;
+    state_.nodes.push_back(node);
     return true;
   }
   bool number_integer(number_integer_t value) override {
     const NodeKey key = key_of(place());
     if (value != -1)
       throw ept_fault(file_, fmt::format("has {} points", value)).at("node " + name_);
-    if (!reading_.seen.insert(key).second) {
+    if (!state_.files.insert(key).second) {
       throw ept_fault(file_, "its part of the hierarchy is referred to twice").at("node " + name_);
     }
-    reading_.pending.push_back(key);
+    state_.pending.push_back(key);
     return true;
   }
   bool start_object(std::size_t) override { return depth_++ == 0 || refuse(); }
@@ -370,7 +370,7 @@ class EntryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
 
   const std::string& file_;
-  EptReading& reading_;
+  HierarchyState& state_;
   std::string name_;
   int depth_ = 0;
 };
@@ -389,25 +389,25 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
   const NodeKey root = key_of(OctreeNode{});
   /// Enough for some 800,000 nodes; Entwine begins another file after a few depths.
   constexpr std::uint64_t kMaxBytes = 16u << 20;
-  EptReading reading{.points = points};
-  reading.seen.insert(root);
-  reading.pending.push_back(root);
-  while (!reading.pending.empty()) {
-    const auto [depth, x, y, z] = reading.pending.back();
-    reading.pending.pop_back();
+  HierarchyState state{.points = points};
+  state.files.insert(root);
+  state.pending.push_back(root);
+  while (!state.pending.empty()) {
+    const auto [depth, x, y, z] = state.pending.back();
+    state.pending.pop_back();
     const std::string name = name_of({.depth = depth, .place = {x, y, z}});
     const std::string file = (folder / "ept-hierarchy" / (name + ".json")).string();
     if (open_file(file)->size() > kMaxBytes) throw ept_fault(file, "is too large for a hierarchy");
     std::ifstream bytes(file, std::ios::binary);
-    EntryTaker taker(file, reading);
-    nlohmann::json::sax_parse(bytes, &taker);
+    EntryParser parser(file, state);
+    nlohmann::json::sax_parse(bytes, &parser);
   }
-  if (reading.found != points) {
+  if (state.found != points) {
     throw ept_fault((folder / "ept-hierarchy").string(),
                     fmt::format("its nodes have {}, but ept.json promises {}",
-                                counted(reading.found, "point"), points));
+                                counted(state.found, "point"), points));
   }
-  return std::move(reading.nodes);
+  return std::move(state.nodes);
 }
 
 }  // namespace terrace::stream

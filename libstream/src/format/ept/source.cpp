@@ -42,24 +42,25 @@ Error miscounted(std::string file, std::uint64_t points, const std::string& foun
 class ZstdRecords final : public RecordReader {
  public:
   ZstdRecords(Input& input, std::size_t record_bytes, std::uint64_t points)
-      : input_(&input), record_bytes_(record_bytes), points_(points), left_(points) {
+      : input_(&input), record_bytes_(record_bytes), points_(points), remaining_(points) {
     if (stream_ == nullptr) throw std::bad_alloc();
     // Compression levels above 19 need this much; a damaged frame may claim any size.
     constexpr int kLargestWindow = 25;
     ZSTD_DCtx_setParameter(stream_.get(), ZSTD_d_windowLogMax, kLargestWindow);
   }
 
-  std::string_view read(std::uint64_t wanted) override {
+  std::string_view read(std::uint64_t max_records) override {
     constexpr std::size_t kPieceBytes = 64u << 10;
     const std::uint64_t records = std::min<std::uint64_t>(
-        {wanted, left_, std::max<std::size_t>(1, kPieceBytes / record_bytes_)});
+        {max_records, remaining_, std::max<std::size_t>(1, kPieceBytes / record_bytes_)});
     records_.resize(static_cast<std::size_t>(records) * record_bytes_);
     if (decode(records_) < records_.size()) {
       throw miscounted(input_->name(), points_, "ends earlier");
     }
-    left_ -= records;
+    remaining_ -= records;
     std::byte more{};
-    if (left_ == 0 && decode({&more, 1}) > 0) throw miscounted(input_->name(), points_, "has more");
+    if (remaining_ == 0 && decode({&more, 1}) > 0)
+      throw miscounted(input_->name(), points_, "has more");
     return {reinterpret_cast<const char*>(records_.data()), records_.size()};
   }
 
@@ -93,7 +94,7 @@ class ZstdRecords final : public RecordReader {
 
   Input* input_;
   std::size_t record_bytes_;
-  std::uint64_t points_, left_;
+  std::uint64_t points_, remaining_;
   std::unique_ptr<ZSTD_DStream, Free> stream_{ZSTD_createDStream()};
   std::vector<std::byte> records_;
   bool ended_ = true;  ///< not within a frame
@@ -252,9 +253,10 @@ std::unique_ptr<PointSource> open_ept(std::span<const std::string> files,
     }
     common = common_placement(placements, {});
   }
-  return open_in_turn(files, options, [common](const std::string& file, const SourceOptions& one) {
-    return open_one_ept(file, one, common ? &*common : nullptr);
-  });
+  return open_in_sequence(files, options,
+                          [common](const std::string& file, const SourceOptions& one) {
+                            return open_one_ept(file, one, common ? &*common : nullptr);
+                          });
 }
 
 /// True for a JSON object with a member that only EPT has. Its names are sorted, so the member is

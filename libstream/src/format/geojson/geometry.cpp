@@ -28,31 +28,32 @@ constexpr std::array<GeometryType, 6> kGeometryTypes{{{"Point", 1, false},
                                                       {"MultiPolygon", 4, true}}};
 
 /// Takes positions as they are parsed, so that only the geometry of a feature is held in memory.
-class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
+class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
  public:
-  GeometryTaker(const std::string& file, std::uint64_t offset, GeoJsonGeometry& geometry)
+  GeometryParser(const std::string& file, std::uint64_t offset, GeoJsonGeometry& geometry)
       : file_(file), offset_(offset), geometry_(geometry) {}
 
   bool key(string_t& name) override {
-    if (left_out_ > 0) return true;
-    awaited_ = name == "type"                               ? Awaited::type
-               : name == "coordinates"                      ? Awaited::coordinates
-               : name == "geometry"                         ? Awaited::object
-               : name == "geometries" || name == "features" ? Awaited::list
-                                                            : Awaited::other;
-    if (awaited_ == Awaited::coordinates && std::exchange(objects_.back().has_coordinates, true)) {
+    if (ignored_depth_ > 0) return true;
+    expected_ = name == "type"                               ? Expected::type
+                : name == "coordinates"                      ? Expected::coordinates
+                : name == "geometry"                         ? Expected::object
+                : name == "geometries" || name == "features" ? Expected::list
+                                                             : Expected::other;
+    if (expected_ == Expected::coordinates &&
+        std::exchange(objects_.back().has_coordinates, true)) {
       throw fault("a geometry has its coordinates twice");
     }
     return true;
   }
 
   bool start_object(std::size_t) override {
-    if (left_out()) {
-      ++left_out_;
+    if (is_ignored()) {
+      ++ignored_depth_;
       return true;
     }
-    if (depth_ > 0 || !(awaits(Awaited::object) || awaits(Awaited::item)))
-      throw misplaced("an object");
+    if (depth_ > 0 || !(expects(Expected::object) || expects(Expected::item)))
+      throw misplaced_error("an object");
     if (objects_.size() == kMaxObjects) throw fault("its collections are nested too deeply");
     objects_.emplace_back();
     objects_.back().first_run = runs_.size();
@@ -60,8 +61,8 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
 
   bool end_object() override {
-    if (left_out_ > 0) {
-      --left_out_;
+    if (ignored_depth_ > 0) {
+      --ignored_depth_;
       return true;
     }
     finish(objects_.back());
@@ -71,21 +72,21 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   }
 
   bool start_array(std::size_t) override {
-    if (left_out()) {
-      ++left_out_;
-    } else if (depth_ > 0 || awaits(Awaited::coordinates)) {
+    if (is_ignored()) {
+      ++ignored_depth_;
+    } else if (depth_ > 0 || expects(Expected::coordinates)) {
       open_bracket();
-    } else if (awaits(Awaited::list)) {
+    } else if (expects(Expected::list)) {
       objects_.back().in_list = true;
     } else {
-      throw misplaced("a list");
+      throw misplaced_error("a list");
     }
     return true;
   }
 
   bool end_array() override {
-    if (left_out_ > 0) {
-      --left_out_;
+    if (ignored_depth_ > 0) {
+      --ignored_depth_;
     } else if (depth_ > 0) {
       close_bracket();
     } else {
@@ -103,17 +104,17 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   bool number_float(number_float_t value, const string_t&) override { return number(value); }
 
   bool string(string_t& value) override {
-    if (left_out()) return true;
-    if (depth_ > 0 || !awaits(Awaited::type)) throw misplaced("a string");
+    if (is_ignored()) return true;
+    if (depth_ > 0 || !expects(Expected::type)) throw misplaced_error("a string");
     objects_.back().type = value;
     return true;
   }
   bool null() override {
-    if (!left_out() && (depth_ > 0 || !awaits(Awaited::object))) throw misplaced("null");
+    if (!is_ignored() && (depth_ > 0 || !expects(Expected::object))) throw misplaced_error("null");
     return true;
   }
   bool boolean(bool) override {
-    if (!left_out()) throw misplaced("a truth value");
+    if (!is_ignored()) throw misplaced_error("a truth value");
     return true;
   }
   bool binary(binary_t&) override { return true; }  // text has no binary values
@@ -125,7 +126,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
 
  private:
   /// The role of the next value; other: ignored.
-  enum class Awaited : std::uint8_t { other, type, coordinates, object, list, item };
+  enum class Expected : std::uint8_t { other, type, coordinates, object, list, item };
   static constexpr std::size_t kMaxObjects = 16, kMaxBrackets = 4;
 
   struct Object {
@@ -144,17 +145,17 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     std::uint8_t dimensions = 2;  ///< of positions directly within
   };
 
-  [[nodiscard]] bool awaits(Awaited what) const {
-    if (objects_.empty()) return what == Awaited::object;
-    return (objects_.back().in_list ? Awaited::item : awaited_) == what;
+  [[nodiscard]] bool expects(Expected what) const {
+    if (objects_.empty()) return what == Expected::object;
+    return (objects_.back().in_list ? Expected::item : expected_) == what;
   }
-  [[nodiscard]] bool left_out() const {
-    return left_out_ > 0 || (depth_ == 0 && awaits(Awaited::other));
+  [[nodiscard]] bool is_ignored() const {
+    return ignored_depth_ > 0 || (depth_ == 0 && expects(Expected::other));
   }
 
   bool number(double value) {
-    if (left_out()) return true;
-    if (depth_ == 0) throw misplaced("a number");
+    if (is_ignored()) return true;
+    if (depth_ == 0) throw misplaced_error("a number");
     Bracket& bracket = brackets_[depth_ - 1];
     if (bracket.brackets) throw fault("a position has a list among its numbers");
     if (bracket.numbers < 3) position_[bracket.numbers] = value;
@@ -220,7 +221,7 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
     }
   }
 
-  [[nodiscard]] Error misplaced(const std::string& what) const {
+  [[nodiscard]] Error misplaced_error(const std::string& what) const {
     return fault(what + " is not allowed here");
   }
   [[nodiscard]] Error fault(std::string cause) const {
@@ -233,9 +234,9 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
   std::uint64_t offset_;
   GeoJsonGeometry& geometry_;
   std::vector<Object> objects_;
-  Awaited awaited_ = Awaited::other;
-  std::size_t left_out_ = 0;  ///< open brackets and braces of an ignored value
-  std::size_t depth_ = 0;     ///< open brackets of coordinates
+  Expected expected_ = Expected::other;
+  std::size_t ignored_depth_ = 0;  ///< open brackets and braces of an ignored value
+  std::size_t depth_ = 0;          ///< open brackets of coordinates
   std::array<Bracket, kMaxBrackets> brackets_{};
   Point3 position_{};
   std::vector<GeoJsonGeometry::Line> runs_;
@@ -245,8 +246,8 @@ class GeometryTaker final : public nlohmann::json_sax<nlohmann::json> {
 
 void append_geometry(std::string_view item, const std::string& file, std::uint64_t offset,
                      GeoJsonGeometry& geometry) {
-  GeometryTaker taker(file, offset, geometry);
-  nlohmann::json::sax_parse(item, &taker);
+  GeometryParser parser(file, offset, geometry);
+  nlohmann::json::sax_parse(item, &parser);
 }
 
 }  // namespace terrace::stream

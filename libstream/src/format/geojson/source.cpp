@@ -219,7 +219,7 @@ std::unique_ptr<PointSource> open_one_geojson(const std::string& file,
 
 std::unique_ptr<PointSource> open_geojson(std::span<const std::string> files,
                                           const SourceOptions& options) {
-  auto source = open_in_turn(files, options, &open_one_geojson);
+  auto source = open_in_sequence(files, options, &open_one_geojson);
   if (files.size() == 1 || options.entities == Entities::points) return source;
   return std::make_unique<NumberedLines>(std::move(source));
 }

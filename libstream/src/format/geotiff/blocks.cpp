@@ -117,16 +117,16 @@ Error GeoTiffBlocks::fault(const Part& part, std::uint64_t offset, std::string c
 /// Bytes of the largest block of the band, at most those of the file: larger claims are refused
 /// when the block is read.
 std::uint64_t GeoTiffBlocks::max_stored() const {
-  std::uint64_t most = 0;
+  std::uint64_t largest = 0;
   const std::uint32_t first = layout_.block(0, 0);
   const std::uint32_t count = layout_.blocks_across * layout_.blocks_down;
   for (std::uint32_t i = 0; i < count; ++i) {
     int failed = 0;
     const std::uint64_t bytes = TIFFGetStrileByteCountWithErr(handle_.tiff(), first + i, &failed);
-    if (failed == 0) most = std::max(most, bytes);
+    if (failed == 0) largest = std::max(largest, bytes);
   }
   handle_.take_complaint();
-  return std::min(most, handle_.file_bytes());
+  return std::min(largest, handle_.file_bytes());
 }
 
 std::uint64_t GeoTiffBlocks::held_bytes() const {
@@ -298,9 +298,9 @@ bool GeoTiffBlocks::overlay_part_row(const Part& part, const std::byte* stored,
 bool GeoTiffBlocks::overlay_cells(const Part& part, const SampleRow& samples, std::uint32_t row,
                                   const CellBuffer& out) {
   const std::size_t size = size_of(layout_.type);
-  std::byte* const to = part.samples + row * out.stride * size;
+  std::byte* const target = part.samples + row * out.stride * size;
   std::uint8_t* const valid = part.valid + row * out.stride;
-  if (mask_ == nullptr) return overlay_row(layout_.type, samples, nodata_, to, valid);
+  if (mask_ == nullptr) return overlay_row(layout_.type, samples, nodata_, target, valid);
   mask_samples_.resize(part.columns * size_of(mask_->layout_.type));
   unmasked_.assign(part.columns, 0);
   mask_->read_over(
@@ -317,7 +317,7 @@ bool GeoTiffBlocks::overlay_cells(const Part& part, const SampleRow& samples, st
     const SampleRow run{.samples = samples.samples + first * samples.step * size,
                         .step = samples.step,
                         .cells = static_cast<std::size_t>(end - begin)};
-    any |= overlay_row(layout_.type, run, nodata_, to + first * size, valid + first);
+    any |= overlay_row(layout_.type, run, nodata_, target + first * size, valid + first);
     begin = end;
   }
   return any;
@@ -357,11 +357,11 @@ const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint
 
 void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t bytes) {
   // Some writers omit a tile's rows beyond the lower edge of the image.
-  const std::uint64_t due = layout_.row_bytes() * layout_.rows_in_image(part.down);
-  if (bytes > kMaxGrowth * due + kMaxOverhead) {
-    throw fault(
-        part, offset,
-        fmt::format("claims {} for {} of samples", counted(bytes, "byte"), counted(due, "byte")));
+  const std::uint64_t expected_bytes = layout_.row_bytes() * layout_.rows_in_image(part.down);
+  if (bytes > kMaxGrowth * expected_bytes + kMaxOverhead) {
+    throw fault(part, offset,
+                fmt::format("claims {} for {} of samples", counted(bytes, "byte"),
+                            counted(expected_bytes, "byte")));
   }
   if (raw_.size() < bytes) raw_.resize(bytes);
   if (!handle_.read(offset, std::span(raw_.data(), bytes))) {
@@ -371,7 +371,7 @@ void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t
   if (block_.size() != whole) block_.assign(whole, std::byte{0});
   const std::uint32_t number = layout_.block(part.across, part.down);
   if (TIFFReadFromUserBuffer(handle_.tiff(), number, raw_.data(), static_cast<tmsize_t>(bytes),
-                             block_.data(), static_cast<tmsize_t>(due)) != 1) {
+                             block_.data(), static_cast<tmsize_t>(expected_bytes)) != 1) {
     throw fault(part, offset, "cannot be decoded: " + handle_.take_complaint());
   }
   handle_.take_complaint();

@@ -54,8 +54,8 @@ std::optional<double> number_in(std::string_view text) {
 }
 
 /// The file's own georeferencing; nullopt if it has none, or only ground control points.
-std::optional<WorldTransform> own_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
-                                            std::vector<std::string>& comments) {
+std::optional<WorldTransform> embedded_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
+                                                 std::vector<std::string>& comments) {
   const auto matrix = handle.doubles(kModelTransformation);
   const auto scale = handle.doubles(kModelPixelScale);
   const auto tie = handle.doubles(kModelTiepoint);
@@ -99,16 +99,17 @@ void compare_with_world_file(const std::string& file, RasterInfo& info) {
   if (!world_file) return;
   const auto &m = info.world.xy, &n = world_file->world.xy;
   const double cell = std::max({std::abs(m[0]), std::abs(m[1]), std::abs(m[3]), std::abs(m[4])});
-  double most = 0;
+  double max_distance = 0;
   for (const double c : {0.0, static_cast<double>(info.columns)}) {
     for (const double r : {0.0, static_cast<double>(info.rows)}) {
       for (const std::size_t i : {std::size_t{0}, std::size_t{3}}) {
-        most = std::max(
-            most, std::abs((m[i] - n[i]) * c + (m[i + 1] - n[i + 1]) * r + m[i + 2] - n[i + 2]));
+        max_distance =
+            std::max(max_distance,
+                     std::abs((m[i] - n[i]) * c + (m[i + 1] - n[i + 1]) * r + m[i + 2] - n[i + 2]));
       }
     }
   }
-  if (most <= kNearestCell * cell) return;
+  if (max_distance <= kNearestCell * cell) return;
   info.notes.push_back(
       fmt::format("{} is ignored: {} itself places the raster elsewhere; remove the wrong one",
                   world_file->name, file));
@@ -117,8 +118,8 @@ void compare_with_world_file(const std::string& file, RasterInfo& info) {
 }  // namespace
 
 void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo& info) {
-  if (const auto own = own_transform(handle, keys, info.comments)) {
-    info.world = *own;
+  if (const auto transform = embedded_transform(handle, keys, info.comments)) {
+    info.world = *transform;
     compare_with_world_file(handle.file(), info);
     return;
   }

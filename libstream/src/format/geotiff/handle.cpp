@@ -67,9 +67,9 @@ struct GeoTiffHandle::Io {
   static tmsize_t read(thandle_t handle, void* out, tmsize_t bytes) {
     Io& io = *static_cast<Io*>(handle);
     if (bytes < 0) return -1;
-    const std::uint64_t left = io.position < io.size ? io.size - io.position : 0;
+    const std::uint64_t remaining = io.position < io.size ? io.size - io.position : 0;
     const std::int64_t n = io.read_some(io.position, static_cast<std::byte*>(out),
-                                        std::min(static_cast<std::uint64_t>(bytes), left));
+                                        std::min(static_cast<std::uint64_t>(bytes), remaining));
     if (n > 0) io.position += static_cast<std::uint64_t>(n);
     return n;
   }
@@ -127,13 +127,13 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
 
   // The longest arrays of a directory are the offsets and sizes of blocks: 8 bytes in memory for at
   // least 2 in the file. Codecs need at most a decoded block.
-  const std::uint64_t most =
+  const std::uint64_t max_array_bytes =
       std::max({memory_bytes, std::min(4 * file_bytes_ + kMiB, 1024 * kMiB), 4 * kMiB});
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(),
                                                                              TIFFOpenOptionsFree);
   if (options == nullptr) throw fault("there is no memory to open it");
   TIFFOpenOptionsSetMaxSingleMemAlloc(
-      options.get(), static_cast<tmsize_t>(std::min<std::uint64_t>(most, INT64_MAX)));
+      options.get(), static_cast<tmsize_t>(std::min<std::uint64_t>(max_array_bytes, INT64_MAX)));
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), on_error, this);
   TIFFOpenOptionsSetWarningHandlerExtR(options.get(), on_warning, this);
   // r: read; m: do not map; h: only the header, so that the loop below reads each directory;
@@ -165,12 +165,12 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
 GeoTiffHandle::~GeoTiffHandle() { TIFFClose(tiff_); }
 
 bool GeoTiffHandle::go_to_mask() {
-  bool found = false, ours = true;
+  bool found = false, is_image = true;
   // A damaged directory after the image must not prevent reading the image.
-  while (!found && ours && TIFFLastDirectory(tiff_) == 0 && TIFFReadDirectory(tiff_) == 1) {
+  while (!found && is_image && TIFFLastDirectory(tiff_) == 0 && TIFFReadDirectory(tiff_) == 1) {
     const auto kind = value_or<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
     found = (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == FILETYPE_MASK;
-    ours = kind != 0;
+    is_image = kind != 0;
   }
   take_complaint();
   return found;

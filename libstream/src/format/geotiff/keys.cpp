@@ -132,8 +132,8 @@ Crs crs_of(const GeoKeys& keys) {
   std::uint16_t model = keys.number(kGTModelType).value_or(0);
   if (model != kModelProjected && model != kModelGeographic && model != kModelGeocentric) {
     // With a user-defined model, the name of a projected CRS may be its whole definition.
-    const bool named = !keys.text(kProjectedCitation).empty();
-    model = projected || named ? kModelProjected : geodetic ? kModelGeographic : 0;
+    const bool has_citation = !keys.text(kProjectedCitation).empty();
+    model = projected || has_citation ? kModelProjected : geodetic ? kModelGeographic : 0;
   }
   crs.geographic = model == kModelGeographic;
   crs.epsg = epsg_of(model == kModelProjected ? projected : geodetic);
@@ -195,18 +195,18 @@ GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type
   };
   const std::uint16_t epsg = code(crs.epsg), unit = unit_code(crs.horizontal_unit);
   GeoKeyDirectory keys;
-  const std::span<const GeoKey> own =
+  const std::span<const GeoKey> crs_keys =
       epsg == 0 ? std::span(crs.geo_keys) : std::span<const GeoKey>();
   // Longitudes and latitudes whose datum is unknown.
-  const bool angles = epsg == 0 && own.empty() && crs.geographic && unit != 0;
+  const bool angles = epsg == 0 && crs_keys.empty() && crs.geographic && unit != 0;
   if (epsg != 0) keys.add(kGTModelType, crs.geographic ? kModelGeographic : kModelProjected);
   if (angles) keys.add(kGTModelType, kModelGeographic);
-  for (const GeoKey& key : own) {
+  for (const GeoKey& key : crs_keys) {
     if (key.key == kGTModelType) keys.add(key);
   }
   if (raster_type) keys.add(kGTRasterType, *raster_type);
   if (!crs.name.empty()) keys.add(kGTCitation, crs.name);
-  for (const GeoKey& key : own) {
+  for (const GeoKey& key : crs_keys) {
     const bool known_unit = key.key == kLinearUnit && unit != 0 && !crs.geographic;
     if (key.key > kGTCitation && key.key < kVerticalCrs && !known_unit) keys.add(key);
   }

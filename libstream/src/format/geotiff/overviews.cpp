@@ -97,8 +97,8 @@ void Overviews::add(std::size_t level, std::uint32_t across, std::uint32_t down,
   const auto children =
       std::min(2u, here.across - 2 * place.first) * std::min(2u, here.down - 2 * place.second);
   if (++parent.children < children) return;
-  auto whole = open_[level + 1].extract(place);
-  complete(level + 1, place, std::move(whole.mapped()));
+  auto complete_tile = open_[level + 1].extract(place);
+  complete(level + 1, place, std::move(complete_tile.mapped()));
 }
 
 void Overviews::complete(std::size_t level, Place place, Tile tile) {

@@ -132,7 +132,7 @@ constexpr std::string_view kLayout =
     "BLOCK_LEADER=SIZE_AS_UINT4\n"
     "BLOCK_TRAILER=LAST_4_BYTES_REPEATED\n"
     "KNOWN_INCOMPATIBLE_EDITION=NO\n ";
-constexpr std::size_t kAround = 4;          ///< bytes of a leader, and of a trailer
+constexpr std::size_t kFrameBytes = 4;      ///< bytes of a leader, and of a trailer
 constexpr std::size_t kTilesPerThread = 2;  ///< waiting to be compressed
 
 /// Where the tiles of a level are; 0 for those that are left out.
@@ -166,14 +166,14 @@ struct GeoTiffWriter::Impl {
   AtomicFile file;
   std::optional<Spool> spool;  ///< tiles of a file with overviews, in the order of arrival
   /// A tile on its way to the file.
-  struct Waiting {
+  struct QueuedTile {
     std::size_t level, number;
     std::vector<std::byte> samples, coded;
   };
   base::ThreadTeam team;
   std::deque<TileEncoder> encoders;  ///< by thread
-  std::vector<Waiting> waiting;
-  std::size_t waiting_count = 0;
+  std::vector<QueuedTile> queue;
+  std::size_t queued = 0;
   Overviews overviews;
   std::vector<std::byte> band;  ///< the rows of one row of tiles
   std::vector<std::byte> tile;  ///< one tile of `band`
@@ -187,7 +187,7 @@ struct GeoTiffWriter::Impl {
         big(needs_big(options, levels)),
         file(path, options.replace),
         team(options.threads),
-        waiting(team.threads() == 1 ? 1 : kTilesPerThread * team.threads()),
+        queue(team.threads() == 1 ? 1 : kTilesPerThread * team.threads()),
         overviews(
             options, levels,
             [this](std::size_t level, std::uint32_t across, std::uint32_t down,
@@ -209,19 +209,19 @@ struct GeoTiffWriter::Impl {
   void put(std::size_t level, std::uint32_t across, std::uint32_t down,
            std::span<const std::byte> samples) {
     check_stop();
-    Waiting& added = waiting[waiting_count++];
+    QueuedTile& added = queue[queued++];
     added.level = level;
     added.number = std::size_t{down} * levels[level].across + across;
     added.samples.assign(samples.begin(), samples.end());
-    if (waiting_count == waiting.size()) write_waiting();
+    if (queued == queue.size()) write_queue();
   }
   /// Compresses the waiting tiles on all threads and writes them in the order of arrival.
-  void write_waiting() {
-    team.run(waiting_count, [this](std::size_t i, std::size_t worker) {
-      const std::span<const std::byte> coded = encoders[worker].encode(waiting[i].samples);
-      waiting[i].coded.assign(coded.begin(), coded.end());
+  void write_queue() {
+    team.run(queued, [this](std::size_t i, std::size_t worker) {
+      const std::span<const std::byte> coded = encoders[worker].encode(queue[i].samples);
+      queue[i].coded.assign(coded.begin(), coded.end());
     });
-    for (const Waiting& done : std::span(waiting).first(waiting_count)) {
+    for (const QueuedTile& done : std::span(queue).first(queued)) {
       TileIndex& index = tiles[done.level];
       index.bytes[done.number] = static_cast<std::uint32_t>(done.coded.size());
       index.offsets[done.number] = spool ? spool->size() : file.size();
@@ -231,7 +231,7 @@ struct GeoTiffWriter::Impl {
         file.write(done.coded);
       }
     }
-    waiting_count = 0;
+    queued = 0;
   }
 
   void put_tile(std::uint32_t across, std::uint32_t down, std::span<const std::byte> samples) {
@@ -282,7 +282,7 @@ TiffDirectory GeoTiffWriter::Impl::directory(std::size_t level) const {
 
 /// Writes the directory after the tiles.
 void GeoTiffWriter::Impl::finish_plain() {
-  write_waiting();
+  write_queue();
   if (file.size() % 2 != 0) file.write(std::string_view("\0", 1));
   const std::uint64_t at = file.size();
   file.write(directory(0).bytes(big, at, 0));
@@ -293,7 +293,7 @@ void GeoTiffWriter::Impl::finish_plain() {
 /// Writes the directories, then the tiles, beginning with those of the smallest overview.
 void GeoTiffWriter::Impl::finish_with_overviews() {
   overviews.finish();
-  write_waiting();
+  write_queue();
   std::vector<std::uint64_t> directory_at{even(tiff_head(big, 0).size() + kLayout.size())};
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const std::uint64_t at = directory_at.back();
@@ -304,8 +304,8 @@ void GeoTiffWriter::Impl::finish_with_overviews() {
   for (std::size_t level = levels.size(); level-- > 0;) {
     for (std::size_t i = 0; i < levels[level].tiles(); ++i) {
       if (spooled[level].bytes[i] == 0) continue;
-      tiles[level].offsets[i] = end + kAround;
-      end += spooled[level].bytes[i] + 2 * kAround;
+      tiles[level].offsets[i] = end + kFrameBytes;
+      end += spooled[level].bytes[i] + 2 * kFrameBytes;
     }
   }
   file.write(tiff_head(big, directory_at.front()));
@@ -328,7 +328,7 @@ void GeoTiffWriter::Impl::finish_with_overviews() {
       file.write(leader);
       assert(file.size() == tiles[level].offsets[i]);
       file.write(coded);
-      file.write(std::span(coded).last(kAround));
+      file.write(std::span(coded).last(kFrameBytes));
     }
   }
 }

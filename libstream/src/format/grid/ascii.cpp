@@ -85,15 +85,15 @@ class Words {
   static constexpr std::size_t kLongest = 1024;
 
   void more() {
-    const auto left = static_cast<std::size_t>(end_ - at_);
-    if (left > kLongest) {
+    const auto pending = static_cast<std::size_t>(end_ - at_);
+    if (pending > kLongest) {
       throw Error(input_.name(), "a word of more than 1,024 characters is not a number")
           .at_byte(input_.offset())
           .remedy("the file is damaged or not an ASCII grid: download it again");
     }
     input_.consume(static_cast<std::size_t>(at_ - begin_));
-    const std::string_view window = input_.fill(left + 1);
-    ended_ = window.size() == left;
+    const std::string_view window = input_.fill(pending + 1);
+    ended_ = window.size() == pending;
     begin_ = at_ = window.data();
     end_ = at_ + window.size();
   }

@@ -128,9 +128,9 @@ PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header
     band_start = before * size;
   } else if (layout == "bsq") {
     grid.row_bytes = header.count("totalrowbytes", columns * size);
-    const std::uint64_t whole = product(header, "totalrowbytes", grid.row_bytes, rows);
+    const std::uint64_t band_bytes = product(header, "totalrowbytes", grid.row_bytes, rows);
     const std::uint64_t gap = header.count("bandgapbytes", 0);
-    band_start = product(header, "bandgapbytes", before, whole + gap);
+    band_start = product(header, "bandgapbytes", before, band_bytes + gap);
   } else if (layout == "bil" || layout.empty()) {
     const std::uint64_t band_row = header.count("bandrowbytes", columns * size);
     grid.row_bytes =

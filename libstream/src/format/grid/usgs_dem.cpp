@@ -178,7 +178,7 @@ class Fields {
   }
 
  private:
-  std::string_view next(std::size_t most) {
+  std::string_view next(std::size_t max_characters) {
     input_.consume(last_);
     last_ = 0;
     std::string_view window = input_.window();
@@ -186,14 +186,14 @@ class Fields {
       const auto* const word = std::find_if_not(window.begin(), window.end(), is_white_space);
       input_.consume(static_cast<std::size_t>(word - window.begin()));
       window = input_.window();
-      if (window.size() > most) break;
+      if (window.size() > max_characters) break;
       const std::size_t before = window.size();
-      window = input_.fill(most + 1);
+      window = input_.fill(max_characters + 1);
       if (window.size() == before) break;
     }
     const auto* const begin = window.begin();
     const auto* end = begin;
-    while (end != window.end() && static_cast<std::size_t>(end - begin) < most &&
+    while (end != window.end() && static_cast<std::size_t>(end - begin) < max_characters &&
            !is_white_space(*end) &&
            (end == begin || *end != '-' || end[-1] == 'D' || end[-1] == 'd' || end[-1] == 'E' ||
             end[-1] == 'e')) {
@@ -307,9 +307,9 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
 bool recognise_usgs(std::span<const std::byte> head) {
   const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
   if (text.size() < kOldEnd) return false;
-  const auto integer = [&](std::size_t at, int least, int most) {
+  const auto integer = [&](std::size_t at, int least, int max_characters) {
     const auto value = integer_in(text.substr(at, kInteger));
-    return value && *value >= least && *value <= most;
+    return value && *value >= least && *value <= max_characters;
   };
   return integer(kLevel, 1, 4) && integer(kPattern, 1, 2) && integer(kSystem, 0, 20) &&
          integer(kGroundUnit, 0, 3) && integer(kHeightUnit, 1, 2) && integer(kSides, 4, 4);

@@ -66,9 +66,9 @@ class ExtraBytes {
     options_ = static_cast<unsigned char>(row[3]);
     name_ = plain_text({row + 4, 32});
     // Types above 10 are the deprecated arrays of two or three; type 0 is undocumented bytes.
-    opaque_ = type == 0 || type > 3 * kExtraTypes.size();
-    count_ = opaque_ ? options_ : 1 + (type - 1) / kExtraTypes.size();
-    if (!opaque_) type_ = kExtraTypes[(type - 1) % kExtraTypes.size()];
+    undocumented_ = type == 0 || type > 3 * kExtraTypes.size();
+    count_ = undocumented_ ? options_ : 1 + (type - 1) / kExtraTypes.size();
+    if (!undocumented_) type_ = kExtraTypes[(type - 1) % kExtraTypes.size()];
   }
 
   [[nodiscard]] const std::string& name() const { return name_; }
@@ -77,7 +77,7 @@ class ExtraBytes {
 
   /// The i-th of count() channels.
   [[nodiscard]] Channel channel(std::size_t i, std::vector<std::string>& comments) const {
-    Channel channel{.name = opaque_ || count_ > 1 ? fmt::format("{}_{}", name_, i) : name_,
+    Channel channel{.name = undocumented_ || count_ > 1 ? fmt::format("{}_{}", name_, i) : name_,
                     .type = type_};
     if (has(kScale)) channel.scale = load_little_endian<double>(row_ + 112 + 8 * i);
     if (has(kOffset)) channel.offset = load_little_endian<double>(row_ + 136 + 8 * i);
@@ -96,7 +96,7 @@ class ExtraBytes {
   enum Option : unsigned { kNodata = 1, kScale = 8, kOffset = 16 };
 
   /// Undocumented bytes have a count in place of options.
-  [[nodiscard]] bool has(Option option) const { return !opaque_ && (options_ & option) != 0; }
+  [[nodiscard]] bool has(Option option) const { return !undocumented_ && (options_ & option) != 0; }
 
   /// The value is widened to eight bytes, as an integer of the same signedness or a double.
   [[nodiscard]] std::string nodata(std::size_t i) const {
@@ -115,7 +115,7 @@ class ExtraBytes {
   const char* row_;
   std::string name_;
   unsigned options_ = 0;
-  bool opaque_ = false;
+  bool undocumented_ = false;
   std::size_t count_ = 0;
   ScalarType type_ = ScalarType::u8;
 };
@@ -173,11 +173,12 @@ std::vector<LasField> las_fields(unsigned point_format, bool adjusted_time) {
 }
 
 std::vector<LasField> las_extra_fields(const std::string& descriptions, std::size_t first,
-                                       std::size_t record_bytes, std::span<const LasField> taken,
+                                       std::size_t record_bytes,
+                                       std::span<const LasField> other_fields,
                                        std::vector<std::string>& comments) {
   FieldList list{.fields = {}, .offset = first};
   DistinctNames distinct;
-  for (const LasField& field : taken) distinct.add(field.channel.name);
+  for (const LasField& field : other_fields) distinct.add(field.channel.name);
   const auto add = [&](Channel channel) {
     channel.name = distinct.add(channel.name.empty() ? "extra" : channel.name);
     list.add(std::move(channel));
@@ -191,8 +192,8 @@ std::vector<LasField> las_extra_fields(const std::string& descriptions, std::siz
     }
     for (std::size_t i = 0; i < extra.count(); ++i) add(extra.channel(i, comments));
   }
-  const std::size_t left = record_bytes - list.offset;
-  for (std::size_t i = 0; i < left; ++i) {
+  const std::size_t undescribed = record_bytes - list.offset;
+  for (std::size_t i = 0; i < undescribed; ++i) {
     add({.name = fmt::format("extra_{}", i), .type = ScalarType::u8});
   }
   return list.fields;

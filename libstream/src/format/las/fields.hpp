@@ -37,9 +37,10 @@ std::vector<LasField> las_fields(unsigned point_format, bool adjusted_time = fal
 
 /// The fields in the extra bytes: those described by `descriptions` (the data of the VLR, 192 bytes
 /// each), then each remaining byte as uint8. Names are made distinct from each other and from those
-/// in `taken`. Nodata values are listed in `comments`.
+/// in `other_fields`. Nodata values are listed in `comments`.
 std::vector<LasField> las_extra_fields(const std::string& descriptions, std::size_t first,
-                                       std::size_t record_bytes, std::span<const LasField> taken,
+                                       std::size_t record_bytes,
+                                       std::span<const LasField> other_fields,
                                        std::vector<std::string>& comments);
 
 }  // namespace terrace::stream

@@ -61,8 +61,8 @@ bool is_used(const LasVlr& record) {
 void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
                std::vector<std::string>& comments) {
   for (std::uint32_t i = 0; i < count; ++i) {
-    const std::uint64_t left = header.points_offset - input.offset();
-    if (left < kLasVlrHeaderBytes) {
+    const std::uint64_t remaining = header.points_offset - input.offset();
+    if (remaining < kLasVlrHeaderBytes) {
       comments.push_back(fmt::format("the header counts {} VLRs, but there are {}", count, i));
       return;
     }
@@ -73,7 +73,7 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
                   .id = load_little_endian<std::uint16_t>(head.data() + 18),
                   .data = {}};
     const std::size_t bytes = load_little_endian<std::uint16_t>(head.data() + 20);
-    if (bytes > left - kLasVlrHeaderBytes) {
+    if (bytes > remaining - kLasVlrHeaderBytes) {
       comments.push_back(
           fmt::format("VLR {} extends into the points: it and the rest are ignored", i));
       return;
@@ -311,19 +311,19 @@ void check_fields(const Input& input, const LasHeader& header, std::size_t heade
 /// Compares the number of points with the size of an uncompressed file.
 void count_records(const Input& input, std::uint64_t file_bytes, const RecordFields& fields,
                    LasHeader& header) {
-  const std::uint64_t left = file_bytes - std::min(file_bytes, header.points_offset);
-  if (header.points > left / header.record_bytes) {
+  const std::uint64_t remaining = file_bytes - std::min(file_bytes, header.points_offset);
+  if (header.points > remaining / header.record_bytes) {
     throw header_fault(
         input, fmt::format("the header promises {} of {}, but only {}{} left",
                            counted(header.points, "point"), counted(header.record_bytes, "byte"),
-                           counted(left, "byte"), left == 1 ? " is" : " are"))
+                           counted(remaining, "byte"), remaining == 1 ? " is" : " are"))
         .at_byte(header.points_offset)
         .remedy("the file is truncated or its header is wrong: download it again");
   }
   const std::uint64_t end = fields.evlrs > 0 ? fields.evlr_offset : file_bytes;
   if (!fields.waveforms && end <= file_bytes && end > header.points_offset) {
-    const std::uint64_t whole = (end - header.points_offset) / header.record_bytes;
-    header.uncounted = whole - std::min(whole, header.points);
+    const std::uint64_t complete_records = (end - header.points_offset) / header.record_bytes;
+    header.uncounted_records = complete_records - std::min(complete_records, header.points);
   }
 }
 
@@ -356,7 +356,7 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
       on_damage(damage, 0);
     }
   } else {
-    header.unread_evlrs = fields.evlrs > 0;
+    header.has_unread_evlrs = fields.evlrs > 0;
   }
   if (!input.skip(header.points_offset - input.offset())) {
     throw header_fault(input, "the file ends before its points").at_byte(input.offset());
@@ -373,7 +373,7 @@ std::optional<LasHeader> peek_las_header(std::string_view head) {
 
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments) {
   std::vector<std::string> ignored;
-  if (header.wkt && header.unread_evlrs && wkt_of_records(header, ignored).empty()) {
+  if (header.wkt && header.has_unread_evlrs && wkt_of_records(header, ignored).empty()) {
     throw Error(name,
                 "the record of its coordinate reference system (an EVLR) follows the points, so it "
                 "cannot be read from a pipe")
@@ -382,20 +382,21 @@ Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::s
   return recorded_crs(header, comments);
 }
 
-Crs with_own_height_unit(Crs given, const Crs& own) {
-  if (given.vertical_epsg == 0 && given.vertical_unit.empty()) {
-    given.vertical_unit =
-        own.vertical_unit.empty() ? height_unit_of_wkt(own.wkt) : own.vertical_unit;
+Crs with_own_height_unit(Crs crs, const Crs& file_crs) {
+  if (crs.vertical_epsg == 0 && crs.vertical_unit.empty()) {
+    crs.vertical_unit =
+        file_crs.vertical_unit.empty() ? height_unit_of_wkt(file_crs.wkt) : file_crs.vertical_unit;
   }
-  return given;
+  return crs;
 }
 
-Crs las_crs_given(const LasHeader& header, const Crs& given) {
+Crs las_crs_overridden(const LasHeader& header, const Crs& crs) {
   std::vector<std::string> ignored;
-  Crs own = recorded_crs(header, ignored);
+  Crs file_crs = recorded_crs(header, ignored);
   // GeoKeys may name a unit and nothing else.
-  if (own.wkt.empty()) own.vertical_unit = crs_of_key_records(header, ignored).vertical_unit;
-  return with_own_height_unit(given, own);
+  if (file_crs.wkt.empty())
+    file_crs.vertical_unit = crs_of_key_records(header, ignored).vertical_unit;
+  return with_own_height_unit(crs, file_crs);
 }
 
 Placement las_placement(const LasHeader& header) {

@@ -46,12 +46,13 @@ struct LasHeader {
   bool adjusted_time = false;  ///< GPS time is adjusted standard time, not time of the week
   std::size_t record_bytes = 0;
   std::uint64_t points = 0, points_offset = 0;
-  std::uint64_t uncounted = 0;  ///< more records than counted, at least, in an uncompressed file
+  std::uint64_t uncounted_records =
+      0;  ///< more records than counted, at least, in an uncompressed file
   std::array<double, 3> scale{}, offset{};
   Box3 bounds;               ///< in the CRS, as stated; empty if not filled in or not finite
   std::vector<LasVlr> vlrs;  ///< those used here, including EVLRs unless from a pipe
   /// There are EVLRs, but the input is a pipe.
-  bool unread_evlrs = false;
+  bool has_unread_evlrs = false;
 };
 
 /// Reads the header and leaves `input` at the first byte of the points. EVLRs are read from `file`
@@ -68,11 +69,11 @@ std::optional<LasHeader> peek_las_header(std::string_view head);
 /// pipe.
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments);
 
-/// Returns a CRS that overrides a file's own one. A horizontal system says nothing of heights: it
-/// keeps the unit that `own` names, in WKT too.
-Crs with_own_height_unit(Crs given, const Crs& own);
+/// Returns the user's `crs`, which overrides that of a file. If it has no vertical part, it gets
+/// the unit of heights of `file_crs`, from its WKT if necessary.
+Crs with_own_height_unit(Crs crs, const Crs& file_crs);
 /// The same for a LAS file.
-Crs las_crs_given(const LasHeader& header, const Crs& given);
+Crs las_crs_overridden(const LasHeader& header, const Crs& crs);
 
 /// The placement of the records' coordinates, without a CRS.
 Placement las_placement(const LasHeader& header);

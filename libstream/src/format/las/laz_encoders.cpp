@@ -23,7 +23,7 @@ void LazEncoders::encode(std::span<const std::byte> records) {
     write_(coded_);
     return;
   }
-  while (ahead_.threads() > 0 && ahead_.size() > ahead_.threads()) pass_on();
+  while (ahead_.threads() > 0 && ahead_.size() > ahead_.threads()) deliver_oldest();
   Chunk chunk;
   if (!spare_.empty()) {
     chunk = std::move(spare_.back());
@@ -31,14 +31,14 @@ void LazEncoders::encode(std::span<const std::byte> records) {
   }
   chunk.records.assign(records.begin(), records.end());
   ahead_.give(std::move(chunk));
-  if (ahead_.threads() == 0) pass_on();
+  if (ahead_.threads() == 0) deliver_oldest();
 }
 
 void LazEncoders::finish() {
-  while (ahead_.size() > 0) pass_on();
+  while (ahead_.size() > 0) deliver_oldest();
 }
 
-void LazEncoders::pass_on() {
+void LazEncoders::deliver_oldest() {
   Chunk chunk = ahead_.take();
   write_(chunk.coded);
   spare_.push_back(std::move(chunk));

@@ -32,7 +32,7 @@ class LazEncoders {
   };
 
   /// Waits for the oldest chunk and passes it on.
-  void pass_on();
+  void deliver_oldest();
 
   Write write_;
   std::optional<laz::Encoder> own_;  ///< with one thread, which needs no copy of the records

@@ -57,18 +57,19 @@ class LazChunkReader final : public PartReader {
     coded_.resize(chunk.bytes);
     file_->bytes->read(begin(), coded_);
     decoder_.start(chunk.points);
-    left_ = chunk.points;
-    used_ = 0;
+    remaining_ = chunk.points;
+    consumed_ = 0;
   }
 
   std::size_t read(std::span<std::byte> room) override {
     try {
-      const laz::Decoder::Step step = decoder_.step(std::span(coded_).subspan(used_), true, room);
-      used_ += step.bytes;
-      left_ -= step.points;
-      if (step.points == 0) throw laz::Corrupt("the chunk ends before its points", used_);
-      if (left_ == 0 && used_ != coded_.size()) {
-        throw laz::Corrupt("coded bytes are left over", used_);
+      const laz::Decoder::Step step =
+          decoder_.step(std::span(coded_).subspan(consumed_), true, room);
+      consumed_ += step.bytes;
+      remaining_ -= step.points;
+      if (step.points == 0) throw laz::Corrupt("the chunk ends before its points", consumed_);
+      if (remaining_ == 0 && consumed_ != coded_.size()) {
+        throw laz::Corrupt("coded bytes are left over", consumed_);
       }
       return step.points * file_->layout.vlr.record_length();
     } catch (const laz::Corrupt& error) {
@@ -84,8 +85,8 @@ class LazChunkReader final : public PartReader {
   std::shared_ptr<const LazFile> file_;
   laz::Decoder decoder_;
   std::vector<std::byte> coded_;
-  std::size_t number_ = 0, used_ = 0;  ///< of the chunk; bytes of it that have been decoded
-  std::uint64_t left_ = 0;             ///< points of it that have not been decoded
+  std::size_t number_ = 0, consumed_ = 0;  ///< of the chunk; bytes of it that have been decoded
+  std::uint64_t remaining_ = 0;            ///< points of it that have not been decoded
 };
 
 /// One part per chunk of the layout. A reader holds the coded bytes of one chunk and the models of
@@ -148,25 +149,25 @@ std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layo
 }
 
 /// Reads one chunk after the other through a window of the input.
-class LazInTurn final : public RecordReader {
+class SequentialLaz final : public RecordReader {
  public:
-  LazInTurn(Input& input, LazLayout layout, std::uint64_t points, OnDamage on_damage)
+  SequentialLaz(Input& input, LazLayout layout, std::uint64_t points, OnDamage on_damage)
       : input_(&input),
         on_damage_(std::move(on_damage)),
         layout_(std::move(layout)),
         record_bytes_(layout_.vlr.record_length()),
-        left_(points),
+        remaining_(points),
         decoder_(layout_.vlr),
         records_(std::max<std::size_t>(1, kPieceBytes / record_bytes_) * record_bytes_) {}
 
-  std::string_view read(std::uint64_t wanted) override {
-    if (left_ == 0) return {};
+  std::string_view read(std::uint64_t max_records) override {
+    if (remaining_ == 0) return {};
     try {
-      return read_on(wanted);
+      return read_chunk(max_records);
     } catch (const Error& damage) {
       if (!on_damage_) throw;
       // The start of the next chunk is unknown.
-      lost_ = std::exchange(left_, 0);
+      lost_ = std::exchange(remaining_, 0);
       on_damage_(damage, lost_);
       return {};
     }
@@ -184,55 +185,56 @@ class LazInTurn final : public RecordReader {
  private:
   static constexpr std::size_t kPieceBytes = 64u << 10, kWindowBytes = 64u << 10;
 
-  std::string_view read_on(std::uint64_t wanted) {
-    if (chunk_left_ == 0) begin_chunk();
+  std::string_view read_chunk(std::uint64_t max_records) {
+    if (chunk_remaining_ == 0) begin_chunk();
     const auto records = static_cast<std::size_t>(
-        std::min<std::uint64_t>({wanted, chunk_left_, records_.size() / record_bytes_}));
+        std::min<std::uint64_t>({max_records, chunk_remaining_, records_.size() / record_bytes_}));
     const std::span<std::byte> room = std::span(records_).first(records * record_bytes_);
     laz::Decoder::Step step;
-    for (std::size_t need = kWindowBytes; step.points == 0; need *= 2) {
-      step = decode(need, room);
+    for (std::size_t min_bytes = kWindowBytes; step.points == 0; min_bytes *= 2) {
+      step = decode(min_bytes, room);
     }
-    chunk_left_ -= step.points;
-    left_ -= step.points;
-    if (chunk_left_ == 0) end_chunk();
+    chunk_remaining_ -= step.points;
+    remaining_ -= step.points;
+    if (chunk_remaining_ == 0) end_chunk();
     return {reinterpret_cast<const char*>(records_.data()), step.points * record_bytes_};
   }
 
   void begin_chunk() {
     begin_ = input_->offset();
     chunk_bytes_.reset();
-    chunk_left_ = left_;
+    chunk_remaining_ = remaining_;
     if (!layout_.chunks.empty()) {
-      chunk_left_ = layout_.chunks[number_].points;
+      chunk_remaining_ = layout_.chunks[number_].points;
       chunk_bytes_ = layout_.chunks[number_].bytes;
     } else if (layout_.vlr.compressor == laz::Compressor::layered) {
       const std::size_t bytes = laz::layered_head_size(layout_.vlr);
       const std::string_view window = input_->fill(bytes);
       try {
         const laz::Chunk chunk = laz::layered_chunk(layout_.vlr, std::as_bytes(std::span(window)));
-        if (chunk.points == 0 || chunk.points > left_) {
+        if (chunk.points == 0 || chunk.points > remaining_) {
           throw laz::Corrupt("the chunk has " + counted(chunk.points, "point"), 0);
         }
-        chunk_left_ = chunk.points;
+        chunk_remaining_ = chunk.points;
         chunk_bytes_ = chunk.bytes;
       } catch (const laz::Corrupt& error) {
         throw fault(error);
       }
     } else if (layout_.vlr.compressor == laz::Compressor::pointwise_chunked) {
-      chunk_left_ = std::min<std::uint64_t>(left_, layout_.vlr.chunk_size);
+      chunk_remaining_ = std::min<std::uint64_t>(remaining_, layout_.vlr.chunk_size);
     }
-    if (chunk_left_ == 0) throw fault(laz::Corrupt("the chunks end before the points", 0));
-    decoder_.start(chunk_left_);
+    if (chunk_remaining_ == 0) throw fault(laz::Corrupt("the chunks end before the points", 0));
+    decoder_.start(chunk_remaining_);
   }
 
   /// Decodes from a window of `need` bytes, or as many as the chunk has.
-  laz::Decoder::Step decode(std::size_t need, std::span<std::byte> room) {
-    std::uint64_t most = need;
-    if (chunk_bytes_) most = std::min(most, *chunk_bytes_ - (input_->offset() - begin_));
-    std::string_view window = input_->fill(static_cast<std::size_t>(most));
-    const bool ended = window.size() < most;
-    if (chunk_bytes_) window = window.substr(0, static_cast<std::size_t>(most));
+  laz::Decoder::Step decode(std::size_t min_bytes, std::span<std::byte> room) {
+    std::uint64_t window_bytes = min_bytes;
+    if (chunk_bytes_)
+      window_bytes = std::min(window_bytes, *chunk_bytes_ - (input_->offset() - begin_));
+    std::string_view window = input_->fill(static_cast<std::size_t>(window_bytes));
+    const bool ended = window.size() < window_bytes;
+    if (chunk_bytes_) window = window.substr(0, static_cast<std::size_t>(window_bytes));
     const bool last =
         ended || (chunk_bytes_ && input_->offset() - begin_ + window.size() == *chunk_bytes_);
     try {
@@ -249,9 +251,9 @@ class LazInTurn final : public RecordReader {
   }
 
   void end_chunk() {
-    const std::uint64_t used = input_->offset() - begin_;
-    if (chunk_bytes_ && used != *chunk_bytes_) {
-      throw fault(laz::Corrupt("coded bytes are left over", used));
+    const std::uint64_t consumed = input_->offset() - begin_;
+    if (chunk_bytes_ && consumed != *chunk_bytes_) {
+      throw fault(laz::Corrupt("coded bytes are left over", consumed));
     }
     ++number_;
   }
@@ -264,11 +266,11 @@ class LazInTurn final : public RecordReader {
   OnDamage on_damage_;
   LazLayout layout_;
   std::size_t record_bytes_;
-  std::uint64_t left_, lost_ = 0;
+  std::uint64_t remaining_, lost_ = 0;
   laz::Decoder decoder_;
   std::vector<std::byte> records_;
   std::uint64_t number_ = 0, begin_ = 0;      ///< of the chunk
-  std::uint64_t chunk_left_ = 0;              ///< points left in the chunk
+  std::uint64_t chunk_remaining_ = 0;         ///< points left in the chunk
   std::optional<std::uint64_t> chunk_bytes_;  ///< size of the chunk, if known
 };
 
@@ -284,7 +286,7 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
   }
   const bool has_table = layout.vlr.compressor != laz::Compressor::pointwise;
   if (header.points == 0) {
-    return std::make_unique<LazInTurn>(input, std::move(layout), 0, options.on_damage);
+    return std::make_unique<SequentialLaz>(input, std::move(layout), 0, options.on_damage);
   }
   if (has_table) {
     layout.first += kPositionBytes;
@@ -311,7 +313,8 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
       throw chunk_fault(input.name(), 0, input.offset(), "the file ends before its points");
     }
   }
-  return std::make_unique<LazInTurn>(input, std::move(layout), header.points, options.on_damage);
+  return std::make_unique<SequentialLaz>(input, std::move(layout), header.points,
+                                         options.on_damage);
 }
 
 RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,

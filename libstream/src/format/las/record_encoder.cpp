@@ -139,8 +139,8 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
   constexpr double kToInteger = 0x1.8p52;
   std::int32_t least = INT32_MAX, most = INT32_MIN;
   double rounding = 0;
-  char* to = out.bytes.data() + 4 * axis;
-  for (std::size_t i = 0; i < block.size(); ++i, to += layout_.record_bytes) {
+  char* target = out.bytes.data() + 4 * axis;
+  for (std::size_t i = 0; i < block.size(); ++i, target += layout_.record_bytes) {
     const double value = block.positions[i][axis];
     const double step = ((value - offset) / scale + kToInteger) - kToInteger;
     if (!(step >= kMin && step <= kMax)) {
@@ -150,7 +150,7 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
           .remedy("write PLY, or build a store and write its points, whose bounds are known");
     }
     const auto stored = static_cast<std::int32_t>(step);
-    std::memcpy(to, &stored, sizeof stored);
+    std::memcpy(target, &stored, sizeof stored);
     const double read = step * scale + offset;
     const double moved = std::abs(read - value);
     if (moved > 0x1p-50 * (std::abs(value) + std::abs(offset))) {
@@ -167,14 +167,14 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
 void LasRecords::put_attribute(const std::byte* from, const Channel& channel, const LasField& field,
                                Records& out) const {
   const auto count = static_cast<std::size_t>(out.sums.points);
-  char* const to = out.bytes.data() + field.offset;
+  char* const target = out.bytes.data() + field.offset;
   const bool same = channel.type == field.channel.type && channel.scale == field.channel.scale &&
                     channel.offset == field.channel.offset;
   if (same && field.bits == 0) {
     with_type(channel.type, [&](auto value) {
       for (std::size_t i = 0; i < count; ++i) {
         std::memcpy(&value, from + i * payload_bytes_, sizeof value);
-        std::memcpy(to + i * layout_.record_bytes, &value, sizeof value);
+        std::memcpy(target + i * layout_.record_bytes, &value, sizeof value);
       }
     });
     return;
@@ -188,7 +188,7 @@ void LasRecords::put_attribute(const std::byte* from, const Channel& channel, co
       if (!same || !fits(value, field)) {
         value = converted<Value>(from + i * payload_bytes_, channel, field, exact, out.first + i);
       }
-      char* const at = to + i * layout_.record_bytes;
+      char* const at = target + i * layout_.record_bytes;
       if (field.bits == 0) {
         std::memcpy(at, &value, sizeof value);
       } else {
@@ -208,17 +208,17 @@ Value LasRecords::converted(const std::byte* from, const Channel& channel, const
     return static_cast<Value>(real);
   } else {
     const double step = (real - field.channel.offset) / field.channel.scale;
-    const double whole = std::nearbyint(step);
+    const double rounded = std::nearbyint(step);
     const double most = field.bits == 0 ? static_cast<double>(std::numeric_limits<Value>::max())
                                         : static_cast<double>((1U << field.bits) - 1);
-    if (!(whole >= static_cast<double>(std::numeric_limits<Value>::min()) && whole <= most &&
-          std::abs(step - whole) <= exact)) {
+    if (!(rounded >= static_cast<double>(std::numeric_limits<Value>::min()) && rounded <= most &&
+          std::abs(step - rounded) <= exact)) {
       throw Error(path_, fmt::format("{} does not fit into the field {} of LAS", text_of(real),
                                      field.channel.name))
           .at(fmt::format("point {}", point))
           .remedy("rename the column, so that it becomes extra bytes");
     }
-    return static_cast<Value>(whole);
+    return static_cast<Value>(rounded);
   }
 }
 

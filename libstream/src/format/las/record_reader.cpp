@@ -9,14 +9,14 @@
 
 namespace terrace::stream {
 
-std::string_view PlainRecords::read(std::uint64_t wanted) {
+std::string_view PlainRecords::read(std::uint64_t max_records) {
   /// Bytes read at once: few, because each field makes a pass over them, so they must stay in
   /// cache.
   constexpr std::size_t kPieceBytes = 64u << 10;
   input_->consume(std::exchange(used_, 0));
   if (left_ == 0) return {};
   auto records =
-      std::min<std::uint64_t>(wanted, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
+      std::min<std::uint64_t>(max_records, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
   const std::string_view window = input_->fill(static_cast<std::size_t>(records) * record_bytes_);
   if (window.size() < records * record_bytes_) {
     const Error damage =

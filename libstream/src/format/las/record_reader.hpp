@@ -15,11 +15,11 @@ namespace terrace::stream {
 class RecordReader {
  public:
   virtual ~RecordReader() = default;
-  /// Returns the next records, at least one and at most `wanted`; valid until the next call. Empty
-  /// if all remaining records are lost. The caller never asks for more than the header's count
-  /// minus the records read and lost(). Throws: Error if records are missing and no handler for
-  /// damage is set; Stopped on a stop request.
-  virtual std::string_view read(std::uint64_t wanted) = 0;
+  /// Returns the next records, at least one and at most `max_records`; valid until the next call.
+  /// Empty if all remaining records are lost. The caller never asks for more than the header's
+  /// count minus the records read and lost(). Throws: Error if records are missing and no handler
+  /// for damage is set; Stopped on a stop request.
+  virtual std::string_view read(std::uint64_t max_records) = 0;
   /// Number of records in damaged parts so far (see SourceOptions::on_damage).
   [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
   /// The memory in bytes that this file needs in addition to the fixed minimum.
@@ -36,7 +36,7 @@ class PlainRecords final : public RecordReader {
         record_bytes_(record_bytes),
         left_(points),
         on_damage_(std::move(on_damage)) {}
-  std::string_view read(std::uint64_t wanted) override;
+  std::string_view read(std::uint64_t max_records) override;
   [[nodiscard]] std::uint64_t lost() const override { return lost_; }
 
  private:

@@ -46,15 +46,15 @@ class LasOpener {
     info.format = header_.compressed ? "laz" : "las";
     info.files = {file_};
     if (options_.crs) {
-      info.crs = las_crs_given(header_, *options_.crs);
+      info.crs = las_crs_overridden(header_, *options_.crs);
     } else {
       info.crs = las_crs(header_, stream_.input->name(), info.comments);
     }
-    if (header_.uncounted > 0) {
+    if (header_.uncounted_records > 0) {
       info.note = fmt::format(
           "{}: the header counts {}, but the bytes of {} more follow, which are left out; a writer "
           "may have been interrupted",
-          stream_.input->name(), counted(header_.points, "point"), header_.uncounted);
+          stream_.input->name(), counted(header_.points, "point"), header_.uncounted_records);
       info.comments.push_back(info.note);
     }
     state_bounds();
@@ -152,10 +152,11 @@ std::unique_ptr<PointSource> open_las(std::span<const std::string> files,
                                       const SourceOptions& options) {
   assert(options.block_points > 0);
   const std::optional<Placement> common = placement_of_all(files, options.stop);
-  return open_in_turn(files, options, [common](const std::string& file, const SourceOptions& one) {
-    return source_of_records(LasOpener(file, one).open(), one.block_points,
-                             common ? &*common : nullptr);
-  });
+  return open_in_sequence(files, options,
+                          [common](const std::string& file, const SourceOptions& one) {
+                            return source_of_records(LasOpener(file, one).open(), one.block_points,
+                                                     common ? &*common : nullptr);
+                          });
 }
 
 }  // namespace

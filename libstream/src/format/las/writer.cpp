@@ -37,12 +37,12 @@ class LazChunks {
 
   /// Adds records, and writes the chunks that they complete.
   void append(std::string_view records) {
-    const std::size_t whole = vlr_.chunk_size * vlr_.record_length();
+    const std::size_t chunk_bytes = vlr_.chunk_size * vlr_.record_length();
     while (!records.empty()) {
-      const std::string_view part = records.substr(0, whole - pending_.size());
+      const std::string_view part = records.substr(0, chunk_bytes - pending_.size());
       pending_ += part;
       records.remove_prefix(part.size());
-      if (pending_.size() == whole) encode();
+      if (pending_.size() == chunk_bytes) encode();
     }
   }
   /// Writes the last chunk and the table; returns the table's offset from the first chunk.
@@ -79,8 +79,7 @@ class LazChunks {
 /// The number of threads, at most options.threads, whose chunks fit into memory: one chunk being
 /// filled, and the records and coded bytes of one per thread and one more. Throws: Error if the
 /// memory does not suffice for one thread.
-unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
-                        const std::string& path) {
+unsigned thread_count(const WriterOptions& options, const laz::Vlr& vlr, const std::string& path) {
   const std::uint64_t chunk = vlr.chunk_size * vlr.record_length();
   const std::uint64_t chunks = options.memory_bytes / chunk;
   if (chunks < 2) {
@@ -89,8 +88,8 @@ unsigned threads_within(const WriterOptions& options, const laz::Vlr& vlr,
                           counted(vlr.record_length(), "byte"), (2 * chunk >> 20) + 1))
         .remedy(message("raise {memory_bytes}"));
   }
-  const std::uint64_t most = chunks < 5 ? 1 : (chunks - 3) / 2;
-  return static_cast<unsigned>(std::min<std::uint64_t>(options.threads, most));
+  const std::uint64_t max_threads = chunks < 5 ? 1 : (chunks - 3) / 2;
+  return static_cast<unsigned>(std::min<std::uint64_t>(options.threads, max_threads));
 }
 
 class LasWriter final : public PointWriter {
@@ -109,7 +108,7 @@ class LasWriter final : public PointWriter {
       append_vlr(vlrs, laz::Vlr::kUserId, laz::Vlr::kRecordId,
                  {reinterpret_cast<const char*>(data.data()), data.size()});
       ++file_.vlrs;
-      chunks_.emplace(vlr, threads_within(options, vlr, path), sink_);
+      chunks_.emplace(vlr, thread_count(options, vlr, path), sink_);
     }
     file_.points_offset = kLas14HeaderBytes + vlrs.size();
     sink_.write(std::string(kLas14HeaderBytes, '\0') + vlrs);

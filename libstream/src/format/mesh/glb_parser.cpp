@@ -105,7 +105,7 @@ class GlbParser final : public MeshParser {
   const char* format() const override { return "glb"; }
   const Input& input() const override { return *input_; }
   std::optional<std::uint64_t> vertices() const override { return vertices_; }
-  ScalarType type() const override { return moved_ ? ScalarType::f64 : ScalarType::f32; }
+  ScalarType type() const override { return has_transforms_ ? ScalarType::f64 : ScalarType::f32; }
 
   Item next() override {
     for (; at_ < parts_.size(); ++at_, begun_ = false) {
@@ -169,24 +169,24 @@ class GlbParser final : public MeshParser {
     parse(input_->fill(json_bytes).substr(0, json_bytes), json_bytes);
     input_->consume(json_bytes);
 
-    std::uint64_t left = all - kHeaders - json_bytes;
-    if (left < glb::kChunkHeaderBytes) return;
+    std::uint64_t remaining = all - kHeaders - json_bytes;
+    if (remaining < glb::kChunkHeaderBytes) return;
     if (input_->fill(glb::kChunkHeaderBytes).size() < glb::kChunkHeaderBytes)
       throw fault_here("ends before its second chunk");
     std::uint64_t bytes = word(0);
     const bool binary = word(4) == glb::kBinary;
     input_->consume(glb::kChunkHeaderBytes);
-    left -= glb::kChunkHeaderBytes;
+    remaining -= glb::kChunkHeaderBytes;
     if (!binary) return;
-    if (bytes > left) throw fault_here("its binary chunk is larger than the file");
+    if (bytes > remaining) throw fault_here("its binary chunk is larger than the file");
     // Positions and corners may be in any order and are read in parallel, so keep them in a file.
     while (bytes > 0) {
-      const std::string_view some = input_->fill(1);
-      if (some.empty()) throw fault_here("ends within its binary chunk").remedy(kTruncatedRemedy);
-      const auto taken = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, some.size()));
-      numbers_.append(std::as_bytes(std::span(some.data(), taken)));
-      input_->consume(taken);
-      bytes -= taken;
+      const std::string_view window = input_->fill(1);
+      if (window.empty()) throw fault_here("ends within its binary chunk").remedy(kTruncatedRemedy);
+      const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(bytes, window.size()));
+      numbers_.append(std::as_bytes(std::span(window.data(), size)));
+      input_->consume(size);
+      bytes -= size;
     }
   }
 
@@ -226,7 +226,7 @@ class GlbParser final : public MeshParser {
     return all[index];
   }
 
-  static std::optional<std::uint64_t> whole(const Json& value) {
+  static std::optional<std::uint64_t> unsigned_integer(const Json& value) {
     if (!value.is_number_unsigned() || value.get<std::uint64_t>() > kMax) return std::nullopt;
     return value.get<std::uint64_t>();
   }
@@ -234,13 +234,13 @@ class GlbParser final : public MeshParser {
   std::optional<std::uint64_t> count(const Json& object, const char* name) const {
     const auto found = object.find(name);
     if (found == object.end()) return std::nullopt;
-    const std::optional<std::uint64_t> value = whole(*found);
+    const std::optional<std::uint64_t> value = unsigned_integer(*found);
     if (!value) throw fault(fmt::format("is not a number from 0 to {}", kMax)).at(name);
     return value;
   }
 
   /// Reads a list of out.size() finite numbers; false if there is no such list.
-  bool take_numbers(const Json& object, const char* name, std::span<double> out) const {
+  bool read_numbers(const Json& object, const char* name, std::span<double> out) const {
     if (!object.contains(name)) return false;
     const Json& all = list(object, name);
     if (all.size() != out.size()) {
@@ -307,7 +307,7 @@ class GlbParser final : public MeshParser {
 
   Transform transform_of(const Json& node) const {
     std::array<double, 16> columns{};
-    if (take_numbers(node, "matrix", columns)) {
+    if (read_numbers(node, "matrix", columns)) {
       Transform out{};
       for (std::size_t row = 0; row < 3; ++row) {
         for (std::size_t column = 0; column < 4; ++column) {
@@ -318,9 +318,9 @@ class GlbParser final : public MeshParser {
     }
     std::array<double, 3> move{}, scale{1, 1, 1};
     std::array<double, 4> turn{0, 0, 0, 1};
-    take_numbers(node, "translation", move);
-    take_numbers(node, "rotation", turn);
-    take_numbers(node, "scale", scale);
+    read_numbers(node, "translation", move);
+    read_numbers(node, "rotation", turn);
+    read_numbers(node, "scale", scale);
     const auto [x, y, z, w] = turn;
     const Transform rotation{
         1 - 2 * (y * y + z * z), 2 * (x * y - z * w),     2 * (x * z + y * w),     0,
@@ -341,7 +341,7 @@ class GlbParser final : public MeshParser {
     std::vector<std::uint64_t> out;
     const auto add = [&](const Json& nodes) {
       for (const Json& node : nodes) {
-        const std::optional<std::uint64_t> number = whole(node);
+        const std::optional<std::uint64_t> number = unsigned_integer(node);
         if (!number) throw fault("a node index is invalid").at("nodes");
         out.push_back(*number);
       }
@@ -376,7 +376,7 @@ class GlbParser final : public MeshParser {
       if (const auto mesh = count(node, "mesh")) add_mesh(*mesh, transform);
       const Json& children = list(node, "children");
       for (std::size_t i = children.size(); i-- > 0;) {
-        const std::optional<std::uint64_t> child = whole(children[i]);
+        const std::optional<std::uint64_t> child = unsigned_integer(children[i]);
         if (!child)
           throw fault("the index of a child is invalid").at(fmt::format("nodes {}", index));
         stack.emplace_back(*child, transform);
@@ -386,7 +386,7 @@ class GlbParser final : public MeshParser {
 
   void add_mesh(std::uint64_t index, const Transform& transform) {
     // The first vertex of each accessor in this mesh: primitives may share their vertices.
-    std::map<std::uint64_t, std::uint64_t> placed;
+    std::map<std::uint64_t, std::uint64_t> first_vertices;
     const std::string where = fmt::format("meshes {}", index);
     for (const Json& primitive : list(entry("meshes", index), "primitives")) {
       const auto attributes = primitive.find("attributes");
@@ -403,7 +403,7 @@ class GlbParser final : public MeshParser {
         throw fault("has positions that are not floats").at(where).remedy(kPlainRemedy);
       part.vertices = part.positions.count;
       part.first = vertices_;
-      const auto [same, is_new] = placed.emplace(*positions, vertices_);
+      const auto [same, is_new] = first_vertices.emplace(*positions, vertices_);
       if (!is_new) {
         part.first = same->second;
         part.positions.count = 0;
@@ -412,7 +412,7 @@ class GlbParser final : public MeshParser {
         if (vertices_ >= kMax) throw fault("has more vertices than can be numbered").at(where);
       }
       if (part.mode >= glb::kTriangles) add_corners(primitive, where, part);
-      moved_ = moved_ || transform != kIdentity;
+      has_transforms_ = has_transforms_ || transform != kIdentity;
       if (parts_.size() == kMaxParts) {
         throw fault(fmt::format("is one of more than {} placed primitives", kMaxParts))
             .at(where)
@@ -458,7 +458,7 @@ class GlbParser final : public MeshParser {
     Point3 world;
     for (std::size_t row = 0; row < 3; ++row) {
       const double* const t = parts_[at_].transform.data() + 4 * row;
-      world[row] = moved_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
+      world[row] = has_transforms_ ? t[0] * p[0] + t[1] * p[1] + t[2] * p[2] + t[3] : p[row];
       if (std::isinf(world[row])) throw fault(kInfinite);
     }
     vertex_ = {world[0], 0.0 - world[2], world[1]};  // from y up to z up, without negative zero
@@ -515,7 +515,7 @@ class GlbParser final : public MeshParser {
   Json json_;
   std::vector<Part> parts_;
   std::uint64_t vertices_ = 0;
-  bool moved_ = false;  ///< a node has a transform
+  bool has_transforms_ = false;  ///< a node has a transform
 
   std::size_t at_ = 0;  ///< the current part
   bool begun_ = false;

@@ -84,7 +84,7 @@ std::unique_ptr<PointSource> open_one_mesh(const std::string& file, const Source
 template <MakeParser kMake>
 std::unique_ptr<PointSource> open_meshes(std::span<const std::string> files,
                                          const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_mesh<kMake>);
+  return open_in_sequence(files, options, &open_one_mesh<kMake>);
 }
 
 }  // namespace

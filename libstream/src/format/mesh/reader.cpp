@@ -87,23 +87,23 @@ MeshFile read_simple(const std::string& file, const SourceOptions& options,
 }
 
 /// Removes vertices with a coordinate that is NaN, and their triangles.
-void leave_out_missing(MeshFile& mesh) {
+void remove_missing(MeshFile& mesh) {
   PointBlock& vertices = mesh.vertices;
   constexpr std::uint32_t kLeftOut = std::numeric_limits<std::uint32_t>::max();
   const std::size_t record = mesh.info.payload_size();
   std::vector<std::uint32_t> numbers(vertices.size(), kLeftOut);
-  std::uint32_t kept = 0;
+  std::uint32_t remaining = 0;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     if (is_missing(vertices.positions[i])) continue;
-    vertices.positions[kept] = vertices.positions[i];
+    vertices.positions[remaining] = vertices.positions[i];
     std::copy_n(vertices.payload.data() + i * record, record,
-                vertices.payload.data() + kept * record);
-    numbers[i] = kept++;
+                vertices.payload.data() + remaining * record);
+    numbers[i] = remaining++;
   }
-  if (kept == vertices.size()) return;
-  vertices.positions.resize(kept);
-  vertices.payload.resize(kept * record);
-  mesh.info.points = kept;
+  if (remaining == vertices.size()) return;
+  vertices.positions.resize(remaining);
+  vertices.payload.resize(remaining * record);
+  mesh.info.points = remaining;
   mesh.nodata = std::erase_if(mesh.triangles, [&](TriangleIndices& triangle) {
     for (std::uint32_t& corner : triangle) corner = numbers[corner];
     return std::find(triangle.begin(), triangle.end(), kLeftOut) != triangle.end();
@@ -134,7 +134,7 @@ std::optional<MeshFile> read_any_mesh(const std::string& file, const SourceOptio
 
 std::optional<MeshFile> read_mesh(const std::string& file, const SourceOptions& options) {
   std::optional<MeshFile> mesh = read_any_mesh(file, options);
-  if (mesh) leave_out_missing(*mesh);
+  if (mesh) remove_missing(*mesh);
   return mesh;
 }
 

@@ -105,23 +105,23 @@ PlyProperty parse_property(const std::vector<std::string_view>& words, const Hea
 void check_counts(const PlyHeader& header, const Input& input) {
   if (!input.size()) return;
   // The last number of an ASCII file needs no separator after it.
-  std::uint64_t left = *input.size() - std::min(*input.size(), input.offset());
-  if (header.encoding == PlyEncoding::ascii) ++left;
+  std::uint64_t remaining = *input.size() - std::min(*input.size(), input.offset());
+  if (header.encoding == PlyEncoding::ascii) ++remaining;
   for (const PlyElement& element : header.elements) {
     const std::uint64_t least = header.encoding == PlyEncoding::ascii
                                     ? 2 * element.properties.size()
                                     : element.binary_bytes();
     if (least == 0) continue;
-    if (element.count > left / least) {
-      throw Error(
-          input.name(),
-          fmt::format("the header promises {} of {} of at least {}, but only {}{} left",
-                      counted(element.count, "item"), in_quotes(element.name),
-                      counted(least, "byte"), counted(left, "byte"), left == 1 ? " is" : " are"))
+    if (element.count > remaining / least) {
+      throw Error(input.name(),
+                  fmt::format("the header promises {} of {} of at least {}, but only {}{} left",
+                              counted(element.count, "item"), in_quotes(element.name),
+                              counted(least, "byte"), counted(remaining, "byte"),
+                              remaining == 1 ? " is" : " are"))
           .at_byte(input.offset())
           .remedy("the file is truncated or its header is wrong: download it again");
     }
-    left -= element.count * least;
+    remaining -= element.count * least;
   }
 }
 

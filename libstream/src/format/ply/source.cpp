@@ -91,10 +91,10 @@ class PlySource final : public PointSource {
       const PlyElement& element = header_.elements[element_];
       const PlyProperty* const corners = corners_of(element);
       if (element.name == "vertex") {
-        past_vertices_ = true;
+        after_vertices_ = true;
       } else if (corners == nullptr) {
-        if (past_vertices_) skip_element(element);
-      } else if (!past_vertices_) {
+        if (after_vertices_) skip_element(element);
+      } else if (!after_vertices_) {
         throw fault("the element " + in_quotes(element.name) + " precedes the vertices")
             .at("header")
             .remedy("export the file with the vertices first");
@@ -230,19 +230,19 @@ class PlySource final : public PointSource {
     }
     if (!is_finite(block)) {
       check_infinite(block);
-      if (!keeps_missing_) nodata_ += leave_out_missing(block, record_bytes_);
+      if (!keeps_missing_) nodata_ += remove_missing(block, record_bytes_);
     }
     read_ += wanted;
   }
 
   /// Reads vertices of fixed size in a binary file.
   void read_rows(PointBlock& block, std::size_t wanted) {
-    for (std::size_t done = 0; done < wanted;) {
+    for (std::size_t first = 0; first < wanted;) {
       const std::size_t rows =
-          std::min(wanted - done, std::max<std::size_t>(1, kChunkBytes / stride_));
+          std::min(wanted - first, std::max<std::size_t>(1, kChunkBytes / stride_));
       const std::string_view window = input_.fill(rows * stride_);
       if (window.size() < rows * stride_) {
-        throw early_end("vertex", read_ + done + window.size() / stride_);
+        throw early_end("vertex", read_ + first + window.size() / stride_);
       }
       for (const Field& field : fields_) {
         const PackedColumn column{.rows = window.data() + field.offset,
@@ -251,14 +251,14 @@ class PlySource final : public PointSource {
                                   .type = field.property.type,
                                   .swap = swap_};
         if (field.axis >= 0) {
-          decode_coordinate(column, block.positions.data() + done,
+          decode_coordinate(column, block.positions.data() + first,
                             static_cast<std::size_t>(field.axis));
         } else {
-          decode_values(column, attribute_at(block, field, done), record_bytes_);
+          decode_values(column, attribute_at(block, field, first), record_bytes_);
         }
       }
       input_.consume(rows * stride_);
-      done += rows;
+      first += rows;
     }
   }
 
@@ -443,7 +443,7 @@ class PlySource final : public PointSource {
   std::vector<std::int64_t> corners_;  ///< of one face
   std::size_t element_ = 0;            ///< the element read by next_triangles()
   std::uint64_t item_ = 0;
-  bool past_vertices_ = false;  ///< element_ follows the vertices
+  bool after_vertices_ = false;  ///< element_ follows the vertices
 };
 
 /// Parses the vertices, without their attributes, and then the triangles.
@@ -507,7 +507,7 @@ std::unique_ptr<PointSource> open_one_ply(const std::string& file, const SourceO
 
 std::unique_ptr<PointSource> open_ply(std::span<const std::string> files,
                                       const SourceOptions& options) {
-  return open_in_turn(files, options, &open_one_ply);
+  return open_in_sequence(files, options, &open_one_ply);
 }
 
 }  // namespace

@@ -71,12 +71,12 @@ bool is_exact(std::string_view field, double value) {
 }
 
 /// Doubles hold every integer up to this one.
-constexpr std::int64_t kMaxOfDouble = std::int64_t{1} << 53;
+constexpr std::int64_t kMaxExactInteger = std::int64_t{1} << 53;
 
 /// Properties of the first fields of a column.
 struct ColumnContent {
-  bool whole = true;   ///< all fields that are not empty are integers
-  bool empty = false;  ///< some fields are empty
+  bool integers = true;  ///< all fields that are not empty are integers
+  bool empty = false;    ///< some fields are empty
   bool large = false, negative = false, unsigned_alone = false;
 
   void add(std::string_view field) {
@@ -84,20 +84,20 @@ struct ColumnContent {
       empty = true;
       return;
     }
-    whole = whole && is_integer(field);
-    if (!whole) return;
+    integers = integers && is_integer(field);
+    if (!integers) return;
     double bits = 0;
     const char* const end = field.data() + field.size();
     if (parse_number(field.data(), end, ScalarType::i64, bits) != nullptr) {
       const auto value = std::bit_cast<std::int64_t>(bits);
-      large = large || value > kMaxOfDouble || value < -kMaxOfDouble;
+      large = large || value > kMaxExactInteger || value < -kMaxExactInteger;
       negative = negative || value < 0;
     } else if (parse_number(field.data(), end, ScalarType::u64, bits) != nullptr) {
       unsigned_alone = true;
     }
   }
   [[nodiscard]] ScalarType type() const {
-    if (!whole || empty || !(large || unsigned_alone) || (unsigned_alone && negative)) {
+    if (!integers || empty || !(large || unsigned_alone) || (unsigned_alone && negative)) {
       return ScalarType::f64;
     }
     return unsigned_alone ? ScalarType::u64 : ScalarType::i64;
@@ -172,7 +172,7 @@ class XyzSource final : public PointSource {
       info_.attributes.push_back({.name = name, .type = ScalarType::f64});
     }
     types_.assign(layout_.columns, ScalarType::f64);
-    whole_.resize(layout_.columns);
+    integer_columns_.resize(layout_.columns);
     info_.comments = layout_.comments;
     const std::vector<std::string> needed = needed_attributes(info_, options.selection);
     optional_.resize(layout_.columns);
@@ -215,7 +215,8 @@ class XyzSource final : public PointSource {
       empty_values_ += empty_fields_;
       block.positions[count] = point;
       for (const std::size_t column : layout_.attributes) {
-        if (whole_[column] && std::abs(row_[column]) >= static_cast<double>(kMaxOfDouble)) {
+        if (integer_columns_[column] &&
+            std::abs(row_[column]) >= static_cast<double>(kMaxExactInteger)) {
           check_exact(line, column);
         }
         std::memcpy(record, &row_[column], sizeof(double));
@@ -287,7 +288,7 @@ class XyzSource final : public PointSource {
       });
       attribute.type = same != first.end() ? same->type : contents[column].type();
       types_[column] = attribute.type;
-      whole_[column] = contents[column].whole && attribute.type == ScalarType::f64;
+      integer_columns_[column] = contents[column].integers && attribute.type == ScalarType::f64;
     }
   }
 
@@ -374,9 +375,9 @@ class XyzSource final : public PointSource {
   TextLayout layout_;
   ParseRow parse_row_ = nullptr;
   std::vector<double> row_;
-  std::vector<bool> optional_;     ///< columns that may contain anything
-  std::vector<ScalarType> types_;  ///< of the columns: f64, i64 or u64
-  std::vector<bool> whole_;        ///< columns of doubles that seem to be integers
+  std::vector<bool> optional_;         ///< columns that may contain anything
+  std::vector<ScalarType> types_;      ///< of the columns: f64, i64 or u64
+  std::vector<bool> integer_columns_;  ///< columns of doubles that seem to be integers
   SourceInfo info_;
   std::uint64_t delivered_ = 0, nodata_ = 0, empty_values_ = 0;
   std::uint64_t empty_fields_ = 0;  ///< empty attributes of the current row
@@ -419,7 +420,7 @@ std::unique_ptr<PointSource> open_xyz(std::span<const std::string> files,
     if (first.empty()) first = source->info().attributes;
     return source;
   };
-  return open_in_turn(files, options, open_one);
+  return open_in_sequence(files, options, open_one);
 }
 
 }  // namespace

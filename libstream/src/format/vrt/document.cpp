@@ -30,7 +30,7 @@ constexpr std::uint64_t kMaxVrtCells = 1u << 30;
 
 class VrtReader {
  public:
-  VrtReader(const std::string& file, int band) : file_(file), wanted_(band) {
+  VrtReader(const std::string& file, int band) : file_(file), band_number_(band) {
     const XmlElement root =
         read_xml(file, [this](std::span<const XmlElement> open, const XmlElement& done) {
           return take(open, done);
@@ -78,7 +78,7 @@ class VrtReader {
       return done.name != kBand && done.name != "SRS" && done.name != "GeoTransform" &&
              done.name != "MaskBand";
     }
-    if (open[1].name != kBand || bands_ + 1 != wanted_) return true;
+    if (open[1].name != kBand || bands_ + 1 != band_number_) return true;
     if (open.size() > 2) return !open[2].name.ends_with("Source");
     if (done.name == "SimpleSource" || done.name == "ComplexSource") {
       if (sources_.empty()) {
@@ -138,13 +138,13 @@ class VrtReader {
   void read_band(const XmlElement& root) {
     if (root.child("MaskBand") != nullptr)
       throw fault("is not supported").at("MaskBand").remedy(kAsGeoTiff);
-    if (wanted_ > bands_) {
-      throw fault(fmt::format("has no band {}, only {}", wanted_, bands_))
+    if (band_number_ > bands_) {
+      throw fault(fmt::format("has no band {}, only {}", band_number_, bands_))
           .remedy("choose another band, or make it again: gdalbuildvrt");
     }
     int number_of_band = 0;
     for (const XmlElement& element : root.children) {
-      if (element.name != kBand || ++number_of_band != wanted_) continue;
+      if (element.name != kBand || ++number_of_band != band_number_) continue;
       read_kind(element);
       for (const XmlElement& part : element.children) read_part(part);
     }
@@ -233,13 +233,13 @@ class VrtReader {
       for (std::size_t i = 0; i < 4; ++i) {
         const double value = number(found->attribute(kNames[i]), name);
         r[i] = std::round(value);
-        const double off = std::abs(value - r[i]);
-        if (off > kNearestCell) {
+        const double distance = std::abs(value - r[i]);
+        if (distance > kNearestCell) {
           throw fault("is not on whole cells, so its source would be resampled")
               .at(name)
               .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
         }
-        farthest_ = std::max(farthest_, off);
+        farthest_ = std::max(farthest_, distance);
         if (!(r[i] >= (i < 2 ? 0 : 1)) || r[i] >= static_cast<double>(kMaxVrtCells)) {
           throw fault("is outside the raster").at(name).remedy(kAsGeoTiff);
         }
@@ -258,8 +258,8 @@ class VrtReader {
       throw fault("is outside the raster").at("DstRect").remedy(kAsGeoTiff);
     }
     const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
-    source.from_column = cells(from[0]);
-    source.from_row = cells(from[1]);
+    source.source_column = cells(from[0]);
+    source.source_row = cells(from[1]);
     source.column = cells(to[0]);
     source.row = cells(to[1]);
     source.columns = cells(to[2]);
@@ -269,7 +269,7 @@ class VrtReader {
   static constexpr std::string_view kBand = "VRTRasterBand";
 
   const std::string& file_;
-  int wanted_;
+  int band_number_;
   int bands_ = 0;  ///< number of bands read to their end
   RasterInfo info_;
   NodataRule nodata_;

@@ -23,7 +23,7 @@ struct VrtSource {
   /// The source's nodata value, which overrides that of its file. Without it the source replaces
   /// the cells below it, whether it has data or not.
   std::optional<std::string> nodata{};
-  std::uint64_t from_column = 0, from_row = 0;  ///< of the source
+  std::uint64_t source_column = 0, source_row = 0;  ///< of the source
   std::uint64_t column = 0, row = 0, columns = 0, rows = 0;
 };
 

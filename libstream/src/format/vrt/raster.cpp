@@ -97,9 +97,9 @@ class WholeNumbers final : public Raster {
           {.samples = reals_.data(), .valid = valid_.data(), .stride = columns});
       for (std::size_t i = 0; i < columns; ++i) {
         if (valid_[i] == 0) continue;
-        const std::size_t to = static_cast<std::size_t>(row) * out.stride + i;
-        put(to_double(from, reals_.data() + i * size_of(from)), out.samples, to);
-        out.valid[to] = 1;
+        const std::size_t target = static_cast<std::size_t>(row) * out.stride + i;
+        put(to_double(from, reals_.data() + i * size_of(from)), out.samples, target);
+        out.valid[target] = 1;
         any = true;
       }
     }
@@ -107,7 +107,7 @@ class WholeNumbers final : public Raster {
   }
 
  private:
-  void put(double real, std::byte* samples, std::size_t to) const {
+  void put(double real, std::byte* samples, std::size_t target) const {
     with_type(info_.sample.type, [&]<class T>(T) {
       // Both limits are exact: the upper one is the power of two after the largest value.
       const double end = std::ldexp(1.0, std::numeric_limits<T>::digits);
@@ -120,7 +120,7 @@ class WholeNumbers final : public Raster {
             .remedy("make the virtual raster again: gdalbuildvrt");
       }
       const T number = static_cast<T>(real);
-      std::memcpy(samples + to * sizeof number, &number, sizeof number);
+      std::memcpy(samples + target * sizeof number, &number, sizeof number);
     });
   }
 
@@ -173,11 +173,11 @@ class VrtRaster final : public Raster {
         const VrtSource& source = sources_[i];
         const std::optional<Overlap> overlap = overlap_of(source, window);
         if (!overlap) continue;
-        const std::size_t to = static_cast<std::size_t>(overlap->row) * out.stride +
-                               static_cast<std::size_t>(overlap->column);
-        any |= opened(i).read_over(
-            overlap->inside,
-            {.samples = out.samples + to * bytes, .valid = out.valid + to, .stride = out.stride});
+        const std::size_t target = static_cast<std::size_t>(overlap->row) * out.stride +
+                                   static_cast<std::size_t>(overlap->column);
+        any |= opened(i).read_over(overlap->inside, {.samples = out.samples + target * bytes,
+                                                     .valid = out.valid + target,
+                                                     .stride = out.stride});
       }
       return any;
     }
@@ -186,10 +186,10 @@ class VrtRaster final : public Raster {
                              .row = window.row + row,
                              .columns = window.columns,
                              .rows = std::min(kStripRows, window.rows - row)};
-      const std::size_t to = static_cast<std::size_t>(row) * out.stride;
-      any |= compose(
-          strip,
-          {.samples = out.samples + to * bytes, .valid = out.valid + to, .stride = out.stride});
+      const std::size_t target = static_cast<std::size_t>(row) * out.stride;
+      any |= compose(strip, {.samples = out.samples + target * bytes,
+                             .valid = out.valid + target,
+                             .stride = out.stride});
     }
     return any;
   }
@@ -210,8 +210,8 @@ class VrtRaster final : public Raster {
                                      source.column + source.columns),
                         b = std::min(window.row + window.rows, source.row + source.rows);
     if (l >= r || t >= b) return std::nullopt;
-    return Overlap{.inside = {.column = source.from_column + (l - source.column),
-                              .row = source.from_row + (t - source.row),
+    return Overlap{.inside = {.column = source.source_column + (l - source.column),
+                              .row = source.source_row + (t - source.row),
                               .columns = r - l,
                               .rows = b - t},
                    .column = l - window.column,
@@ -258,8 +258,8 @@ class VrtRaster final : public Raster {
       throw fault(fmt::format("its samples are {}, but those of the virtual raster are {}",
                               name_of(found.sample.type), name_of(info_.sample.type)));
     }
-    if (source.from_column + source.columns > found.columns ||
-        source.from_row + source.rows > found.rows) {
+    if (source.source_column + source.columns > found.columns ||
+        source.source_row + source.rows > found.rows) {
       throw fault(fmt::format("has {} x {} cells, fewer than the virtual raster uses",
                               found.columns, found.rows));
     }
@@ -318,9 +318,9 @@ class VrtRaster final : public Raster {
       for (std::size_t column = 0; column < window.columns; ++column) {
         const std::size_t at = row * static_cast<std::size_t>(window.columns) + column;
         if (valid_[at] == 0) continue;
-        const std::size_t to = row * out.stride + column;
-        std::memcpy(out.samples + to * bytes, samples_.data() + at * bytes, bytes);
-        out.valid[to] = 1;
+        const std::size_t target = row * out.stride + column;
+        std::memcpy(out.samples + target * bytes, samples_.data() + at * bytes, bytes);
+        out.valid[target] = 1;
         any = true;
       }
     }
@@ -343,13 +343,13 @@ class VrtRaster final : public Raster {
       const std::byte* const samples = part_.data() + row * columns * bytes;
       const std::uint8_t* const has_data = part_valid_.data() + row * columns;
       mask(samples, columns, nodata_, data_);
-      const std::size_t to =
+      const std::size_t target =
           static_cast<std::size_t>((overlap->row + row) * window.columns + overlap->column);
       for (std::size_t i = 0; i < columns; ++i) {
         if (source.nodata && has_data[i] == 0) continue;
         const bool good = has_data[i] != 0 && data_[i] != 0;
-        valid_[to + i] = good ? 1 : 0;
-        if (good) std::memcpy(samples_.data() + (to + i) * bytes, samples + i * bytes, bytes);
+        valid_[target + i] = good ? 1 : 0;
+        if (good) std::memcpy(samples_.data() + (target + i) * bytes, samples + i * bytes, bytes);
       }
     }
   }

@@ -34,7 +34,7 @@ struct XmlReading {
   XmlElement root{};
   std::vector<XmlElement> open{};    ///< incomplete elements, the root first
   std::vector<std::size_t> bytes{};  ///< held by each of these and its kept children
-  std::size_t held = 0;              ///< the sum of `bytes`
+  std::size_t total_bytes = 0;       ///< the sum of `bytes`
   std::uint64_t parsed = 0;          ///< bytes of the file up to the end of the last event
   std::string refusal{};
   std::exception_ptr failure{};
@@ -43,8 +43,8 @@ struct XmlReading {
   /// Counts more bytes held for the innermost element.
   void hold(std::size_t more) {
     bytes.back() += more;
-    held += more;
-    if (held <= kMaxHeldBytes) return;
+    total_bytes += more;
+    if (total_bytes <= kMaxHeldBytes) return;
     refusal = "it is too large for a description";
     stop();
   }
@@ -95,7 +95,7 @@ void on_end(void* self, const XML_Char* /*name*/) {
     if (reading.open.empty()) {
       reading.root = std::move(done);
     } else if ((*reading.take)(reading.open, done)) {
-      reading.held -= bytes;
+      reading.total_bytes -= bytes;
     } else {
       reading.bytes.back() += bytes;
       reading.open.back().children.push_back(std::move(done));
@@ -124,14 +124,15 @@ void on_document_type(void* self, const XML_Char*, const XML_Char*, const XML_Ch
 
 }  // namespace
 
-const XmlElement* XmlElement::child(std::string_view wanted) const {
-  const auto at = std::find_if(children.begin(), children.end(),
-                               [&](const XmlElement& element) { return element.name == wanted; });
+const XmlElement* XmlElement::child(std::string_view name_sought) const {
+  const auto at = std::find_if(children.begin(), children.end(), [&](const XmlElement& element) {
+    return element.name == name_sought;
+  });
   return at == children.end() ? nullptr : &*at;
 }
 
-std::string XmlElement::attribute(const std::string& wanted) const {
-  const auto at = attributes.find(wanted);
+std::string XmlElement::attribute(const std::string& name_sought) const {
+  const auto at = attributes.find(name_sought);
   return at == attributes.end() ? std::string() : at->second;
 }
 
