@@ -27,7 +27,7 @@ void require(bool condition) {
 StoreSchema schema_for(bool grid) {
   StoreSchema schema;
   schema.grid = grid;
-  // A column of kind "beside" needs a preceding column of integers.
+  // A column of kind `preceding` needs a preceding column of integers.
   for (const ScalarType type :
        {ScalarType::u64, ScalarType::i16, ScalarType::u8, ScalarType::f32, ScalarType::f64}) {
     schema.attributes.push_back({std::string(name_of(type)), type, 1.0, 0.0, {}});

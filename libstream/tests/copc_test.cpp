@@ -216,7 +216,7 @@ TEST(CopcOctree, RejectsInvalidHierarchies) {
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(64)), "is outside the file");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 0)), "not a positive number");
   EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32, 1, -1)), "not a positive number");
-  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "cut off");
+  EXPECT_PRED2(has, refusal_of({{root}}, 1, info_of(32).substr(1)), "truncated");
 }
 
 /// With a misplaced cube, a region would lose all its points.

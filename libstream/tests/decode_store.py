@@ -105,11 +105,11 @@ class Tables:
         self.border = 148 + 18 * columns
         contexts = self.border + 50 + 96 + 1 + 2 * len(schema)
         source = Bytes(data + struct.pack("<I", zlib.crc32(data)), "tables")
-        given = source.number(8)
+        fitted = source.number(8)
         self.coefficients = {}
         for pattern in range(64):
             neighbours = [bit for bit in range(6) if pattern >> bit & 1]
-            if given >> pattern & 1:
+            if fitted >> pattern & 1:
                 rest = [source.signed_varint() for _ in neighbours[1:]]
                 self.coefficients[pattern] = dict(zip(neighbours, [256 - sum(rest)] + rest))
             elif pattern & 7 == 7:
@@ -122,8 +122,8 @@ class Tables:
         integers = [not channel['type'].startswith('float') for channel in schema]
         for k, kind in enumerate(self.kinds):
             possible = (10 if k != self.guide else 2) if self.guide >= 0 else 3
-            beside = 0 < k < len(schema) and integers[k] and integers[k - 1]
-            require(kind < possible and (kind % 5 != 2 or beside), "kind")
+            after_integers = 0 < k < len(schema) and integers[k] and integers[k - 1]
+            require(kind < possible and (kind % 5 != 2 or after_integers), "kind")
         self.symbols = []  # per context: the (symbol, start, frequency) of every slot
         while len(self.symbols) < contexts:
             slots, symbol = [], 0

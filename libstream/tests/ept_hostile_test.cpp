@@ -137,7 +137,7 @@ TEST(Ept, RejectsInvalidDataSets) {
                }),
                "ends earlier");
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node.pop_back(); }),
-               "is cut off");
+               "is truncated");
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node.clear(); }),
                "ends earlier");
   EXPECT_PRED2(has, with_zstd([](std::string& node, const std::string&) { node[0] ^= 1; }),

@@ -25,8 +25,8 @@ TEST(Error, LeavesOutPartsThatAreNotGiven) {
 
 TEST(Error, TakesTheLastOfEachPart) {
   const Error error =
-      Error("a.las", "is cut off").at("header").remedy("export it").at_byte(7).remedy("restore it");
-  EXPECT_STREQ(error.what(), "a.las: byte 7: is cut off; restore it");
+      Error("a.las", "is truncated").at("header").remedy("export it").at_byte(7).remedy("restore it");
+  EXPECT_STREQ(error.what(), "a.las: byte 7: is truncated; restore it");
 }
 
 TEST(Error, KeepsTheNumberOfAFailedSystemCall) {

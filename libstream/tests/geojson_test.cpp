@@ -327,8 +327,8 @@ TEST_F(GeoJson, RejectsInvalidGeoJson) {
   const auto line = [](const std::string& coordinates) {
     return R"({"type":"LineString","coordinates":)" + coordinates + "}";
   };
-  expect_error(line("[[0,0]]"), "has one position");
-  expect_error(line("[[0,0],[1]]"), "has one number");
+  expect_error(line("[[0,0]]"), "has only one position");
+  expect_error(line("[[0,0],[1]]"), "has only one number");
   expect_error(line("[[0,0],[]]"), "not those of a LineString");
   expect_error(line("[[[0,0],[1,1]]]"), "not those of a LineString");
   expect_error(line("[0,0]"), "not those of a LineString");

@@ -280,7 +280,7 @@ TEST_F(Grids, PlacesTilesByTheirName) {
   EXPECT_EQ(corner("N00E011.hgt"), (std::array<double, 2>{11, 0}));
   for (const char* name : {"N46E08.hgt", "N461E008.hgt", "X46E008.hgt", "N91E008.hgt",
                            "N46E181.hgt", "N46E0081.hgt", "tile.hgt"}) {
-    EXPECT_NE(refusal_of(put(name, tile_of(11, 11))).find("does not show its place"),
+    EXPECT_NE(refusal_of(put(name, tile_of(11, 11))).find("does not give its south-west corner"),
               std::string::npos)
         << name;
   }

@@ -623,7 +623,7 @@ TEST(StoreInvariants, RefusesClustersThatBreakTheRules) {
                      }),
             "a part of a cluster has more points than the whole");
   // Nine raw bits are followed by seven bits of padding.
-  const char* const ends = "coded bytes do not end with their numbers";
+  const char* const ends = "coded bytes do not end after their last number";
   EXPECT_EQ(
       decoding(false, 1, 0, one_point, [](store::Bytes& bytes) { bytes[bytes.size() - 2] ^= 1; }),
       ends);

@@ -121,7 +121,7 @@ fs::path follow_links(fs::path path) {
     if (error) return path;
     path = next.is_absolute() ? next : path.parent_path() / next;
   }
-  throw system_error(path.string(), "cannot be followed", ELOOP);
+  throw system_error(path.string(), "the symbolic links cannot be followed", ELOOP);
 }
 
 fs::path folder_of(const fs::path& target) {

@@ -61,7 +61,8 @@ void SymbolDecoder::refuse(const CodedBytes& bytes, const std::uint8_t* next) {
 void SymbolDecoder::check_used(bool open) const {
   const std::size_t used = offset(), size = bytes_->stream.size();
   if (used > size) throw Corrupt(kTooShort, bytes_->origin + size);
-  if (used < size && !open) throw Corrupt("coded bytes are left over", bytes_->origin + used);
+  if (used < size && !open)
+    throw Corrupt("bytes follow the last point of the chunk", bytes_->origin + used);
 }
 
 void SymbolEncoder::begin(std::vector<std::uint8_t>& bytes, ChunkNumber chunk) {

@@ -117,7 +117,8 @@ Decoder::Step Decoder::step(std::span<const std::byte> bytes, bool last,
 void Decoder::decode_chunk(std::span<const std::byte> chunk, std::span<std::byte> records) {
   start(records.size() / impl_->layout.length);
   const Step done = step(chunk, true, records);
-  if (done.bytes < chunk.size()) throw Corrupt("coded bytes are left over", done.bytes);
+  if (done.bytes < chunk.size())
+    throw Corrupt("bytes follow the last point of the chunk", done.bytes);
 }
 
 Decoder::Step Decoder::Impl::step_pointwise(Bytes bytes, bool last, std::uint8_t* records,

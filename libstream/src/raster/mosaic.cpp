@@ -365,7 +365,8 @@ class Mosaic final : public Raster {
     const RasterInfo& info = open_.front().raster->info();
     if (info.columns != members_[member].columns || info.rows != members_[member].rows ||
         info.sample.type != info_.sample.type) {
-      throw Error(members_[member].file, "changed while it was read").remedy("start again");
+      throw Error(members_[member].file, "changed while it was read")
+          .remedy("read it again when it is complete");
     }
     return *open_.front().raster;
   }

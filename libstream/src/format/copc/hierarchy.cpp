@@ -183,7 +183,7 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
                            std::uint64_t points) {
   // The info follows the LAS 1.4 header and its own VLR header.
   constexpr std::uint64_t kInfoAt = 375 + 54;
-  if (info.size() < kCopcInfoBytes) throw damaged(file, kInfoAt, "the COPC info is cut off");
+  if (info.size() < kCopcInfoBytes) throw damaged(file, kInfoAt, "the COPC info is truncated");
   Octree octree;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     octree.centre[axis] = load_little_endian<double>(info.data() + 8 * axis);

@@ -181,7 +181,7 @@ class CopcWriter final : public PointWriter {
     OctreeNode& node = octree_.nodes[written_++];
     if (coded.size() > std::numeric_limits<std::int32_t>::max()) {
       throw Error(path_, counted(node.points, "point") +
-                             " in one place take more bytes than a node of COPC can have")
+                             " at one place take more bytes than a node of COPC can have")
           .remedy("leave them out, or write LAZ");
     }
     node.offset = sink_.size();

@@ -84,7 +84,7 @@ class ZstdRecords final : public RecordReader {
       }
       input_->consume(in.pos);
       if (in.pos == 0 && out.pos == before) {
-        if (result > 0 && !ended_) throw ept_fault(input_->name(), "is cut off");
+        if (result > 0 && !ended_) throw ept_fault(input_->name(), "is truncated");
         break;
       }
       ended_ = result == 0;

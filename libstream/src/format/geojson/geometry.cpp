@@ -176,7 +176,7 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
     const Bracket& bracket = brackets_[depth_ - 1];
     Object& object = objects_.back();
     if (bracket.numbers > 0) {
-      if (bracket.numbers == 1) throw fault("a position has one number");
+      if (bracket.numbers == 1) throw fault("a position has only one number");
       if (object.position_depth != 0 && object.position_depth != depth_) {
         throw fault("its positions are nested unevenly");
       }
@@ -216,7 +216,7 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
     if (!type->lines) return;
     for (std::size_t i = object.first_run; i < runs_.size(); ++i) {
       if (runs_[i].end - runs_[i].begin < 2)
-        throw fault("a line of a " + object.type + " has one position");
+        throw fault("a line of a " + object.type + " has only one position");
       geometry_.lines.push_back(runs_[i]);
     }
   }

@@ -183,7 +183,7 @@ bool GeoTiffBlocks::read_block(const Part& part, const CellBuffer& out) {
   int failed = 0;
   const std::uint64_t offset = TIFFGetStrileOffsetWithErr(handle_.tiff(), number, &failed);
   const std::uint64_t bytes = TIFFGetStrileByteCountWithErr(handle_.tiff(), number, &failed);
-  if (failed != 0) throw fault(part, 0, "has no place in the file: " + handle_.take_complaint());
+  if (failed != 0) throw fault(part, 0, "has no offset in the file: " + handle_.take_complaint());
   if (bytes == 0) return fill_sparse(part, out);
   if (offset > handle_.file_bytes() || bytes > handle_.file_bytes() - offset) {
     throw fault(part, offset,
@@ -220,7 +220,7 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
                             counted(rows, "row"), counted(row_bytes, "byte")));
   }
   const std::uint64_t pixel_bytes = layout_.samples_per_pixel() * size_of(layout_.type);
-  // Read whole rows, unless the part is so narrow that most bytes would be read in vain.
+  // Read whole rows, unless the part is so narrow that most bytes of a row would not be used.
   const bool whole = part.columns >= layout_.block_columns / 4 && row_bytes <= memory_bytes_ / 4;
   const std::uint64_t piece_bytes = whole ? row_bytes : part.columns * pixel_bytes;
   const std::uint64_t skip = whole ? 0 : part.column * pixel_bytes;
@@ -232,7 +232,7 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
     if (raw_.size() < n * piece_bytes) raw_.resize(n * piece_bytes);
     const std::span<std::byte> piece(raw_.data(), n * piece_bytes);
     const std::uint64_t place = offset + (std::uint64_t{part.row} + row) * row_bytes + skip;
-    if (!handle_.read(place, piece)) throw fault(part, place, "cannot be read to its end");
+    if (!handle_.read(place, piece)) throw fault(part, place, "extends beyond the end of the file");
     if (layout_.swapped) {
       swap_bytes(raw_.data(), size_of(layout_.type), piece.size() / size_of(layout_.type));
     }
@@ -365,7 +365,7 @@ void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t
   }
   if (raw_.size() < bytes) raw_.resize(bytes);
   if (!handle_.read(offset, std::span(raw_.data(), bytes))) {
-    throw fault(part, offset, "cannot be read to its end");
+    throw fault(part, offset, "extends beyond the end of the file");
   }
   const std::uint64_t whole = layout_.row_bytes() * layout_.block_rows;
   if (block_.size() != whole) block_.assign(whole, std::byte{0});

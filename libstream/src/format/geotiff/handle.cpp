@@ -131,7 +131,7 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
       std::max({memory_bytes, std::min(4 * file_bytes_ + kMiB, 1024 * kMiB), 4 * kMiB});
   const std::unique_ptr<TIFFOpenOptions, void (*)(TIFFOpenOptions*)> options(TIFFOpenOptionsAlloc(),
                                                                              TIFFOpenOptionsFree);
-  if (options == nullptr) throw fault("there is no memory to open it");
+  if (options == nullptr) throw fault("cannot be opened: out of memory");
   TIFFOpenOptionsSetMaxSingleMemAlloc(
       options.get(), static_cast<tmsize_t>(std::min<std::uint64_t>(max_array_bytes, INT64_MAX)));
   TIFFOpenOptionsSetErrorHandlerExtR(options.get(), on_error, this);

@@ -90,7 +90,7 @@ void read_size(const GeoTiffHandle& handle, GeoTiffLayout& layout) {
   const auto columns = handle.value<std::uint32_t>(TIFFTAG_IMAGEWIDTH);
   const auto rows = handle.value<std::uint32_t>(TIFFTAG_IMAGELENGTH);
   if (!columns || !rows || *columns == 0 || *rows == 0) {
-    throw handle.fault("has no size").remedy("check the file (tiffinfo)");
+    throw handle.fault("has no columns or rows").remedy("check the file (tiffinfo)");
   }
   layout.columns = *columns;
   layout.rows = *rows;

@@ -255,16 +255,16 @@ std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, st
   return {side, side};
 }
 
-/// packed_name: the tile's name in its archive. If it does not give the place, the name of the file
+/// packed_name: the tile's name in its archive. If it does not give the corner, the name of the file
 /// must.
 PlainGrid describe_tile(const std::string& file, const std::string& packed_name,
                         std::uint64_t bytes) {
   std::optional<Corner> corner = corner_of(packed_name);
   if (!corner) corner = corner_of(file);
   if (!corner) {
-    throw grid_fault(file, "its name does not show its place")
+    throw grid_fault(file, "its name does not give its south-west corner")
         .at(packed_name)
-        .remedy("rename it after its south-west corner, such as N46E008.hgt");
+        .remedy("rename it, for example to N46E008.hgt");
   }
   const auto [columns, rows] = size_of_tile(file, bytes);
   PlainGrid grid = plain_grid("hgt", file, columns, rows, ScalarType::i16, "-32768");

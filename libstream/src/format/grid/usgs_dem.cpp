@@ -120,7 +120,7 @@ Head head_of(std::string_view record, const std::string& file) {
   }
   const double rows = std::floor((head.north - head.south) / head.height + 1.5);
   if (!(rows >= 1 && rows <= kMaxRows)) {
-    throw grid_fault(file, "its corners leave no rows, or too many");
+    throw grid_fault(file, "the number of rows between its corners is not from 1 to 999,999");
   }
   head.rows = static_cast<std::uint64_t>(rows);
   head.south = head.north - (rows - 1) * head.height;
@@ -266,7 +266,8 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
     // A quadrangle fills most of its grid, so a nearly empty grid is a forgery.
     constexpr std::uint64_t kMaxRowsPerByte = 1;
     if (column * head.rows > kMaxRowsPerByte * input.offset()) {
-      throw grid_fault(file, "the grid has hardly any samples").at(where);
+      throw grid_fault(file, "its profiles have less than a byte for each row of the grid")
+          .at(where);
     }
     fields.integer("number of a row");
     fields.integer("number of a profile");
@@ -280,7 +281,7 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
     fields.real("greatest height");
     if (column == 0) west = x;
     if (!(std::abs(x - west - static_cast<double>(column) * head.width) < head.width)) {
-      throw grid_fault(file, "is not next to the previous one").at(where);
+      throw grid_fault(file, "is not adjacent to the previous one").at(where);
     }
     const double offset = datum / head.step;
     if (std::abs(offset) > 1e9 || std::abs(offset - std::round(offset)) > 1e-6) {

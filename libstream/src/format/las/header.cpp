@@ -68,7 +68,7 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
     }
     const std::string_view head = input.fill(kLasVlrHeaderBytes);
     if (head.size() < kLasVlrHeaderBytes)
-      throw header_fault(input, "the file ends").at(fmt::format("VLR {}", i));
+      throw header_fault(input, "the file ends too early").at(fmt::format("VLR {}", i));
     LasVlr record{.user = text_of_field(head.data() + 2, kUserBytes),
                   .id = load_little_endian<std::uint16_t>(head.data() + 18),
                   .data = {}};
@@ -81,12 +81,12 @@ void read_vlrs(Input& input, std::uint32_t count, LasHeader& header,
     input.consume(kLasVlrHeaderBytes);
     if (!is_used(record)) {
       if (!input.skip(bytes))
-        throw header_fault(input, "the file ends").at(fmt::format("VLR {}", i));
+        throw header_fault(input, "the file ends too early").at(fmt::format("VLR {}", i));
       continue;
     }
     const std::string_view data = input.fill(bytes);
     if (data.size() < bytes)
-      throw header_fault(input, "the file ends").at(fmt::format("VLR {}", i));
+      throw header_fault(input, "the file ends too early").at(fmt::format("VLR {}", i));
     record.data = data.substr(0, bytes);
     input.consume(bytes);
     header.vlrs.push_back(std::move(record));
@@ -108,7 +108,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
                   .data = {}};
     const auto bytes = load_little_endian<std::uint64_t>(head.data() + 20);
     if (bytes > file.size() - at) {
-      comments.push_back(fmt::format("EVLR {} is cut off", i));
+      comments.push_back(fmt::format("EVLR {} is truncated", i));
       return;
     }
     if (is_used(record) && bytes <= kMaxEvlrBytes) {

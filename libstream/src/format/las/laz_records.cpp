@@ -69,7 +69,7 @@ class LazChunkReader final : public PartReader {
       remaining_ -= step.points;
       if (step.points == 0) throw laz::Corrupt("the chunk ends before its points", consumed_);
       if (remaining_ == 0 && consumed_ != coded_.size()) {
-        throw laz::Corrupt("coded bytes are left over", consumed_);
+        throw laz::Corrupt("bytes follow the last point of the chunk", consumed_);
       }
       return step.points * file_->layout.vlr.record_length();
     } catch (const laz::Corrupt& error) {
@@ -114,8 +114,7 @@ laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
       throw laz_fault(name, error.what()).at("header");
     }
   }
-  throw laz_fault(name, "its points are compressed, but the VLR that describes how is missing")
-      .at("header");
+  throw laz_fault(name, "its points are compressed, but it has no LASzip VLR").at("header");
 }
 
 /// The chunks as the file's table lists them; empty if the writer omitted the table.
@@ -253,7 +252,7 @@ class SequentialLaz final : public RecordReader {
   void end_chunk() {
     const std::uint64_t consumed = input_->offset() - begin_;
     if (chunk_bytes_ && consumed != *chunk_bytes_) {
-      throw fault(laz::Corrupt("coded bytes are left over", consumed));
+      throw fault(laz::Corrupt("bytes follow the last point of the chunk", consumed));
     }
     ++number_;
   }

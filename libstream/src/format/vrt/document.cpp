@@ -55,7 +55,7 @@ class VrtReader {
   static constexpr const char* kAsGeoTiff = "convert it to GeoTIFF: gdal_translate FILE out.tif";
 
   [[nodiscard]] Error fault(std::string cause) const {
-    return Error(file_, std::move(cause)).remedy("make it again: gdalbuildvrt");
+    return Error(file_, std::move(cause)).remedy("rebuild it: gdalbuildvrt");
   }
 
   [[nodiscard]] double number(const std::string& text, const std::string& where) const {
@@ -140,7 +140,7 @@ class VrtReader {
       throw fault("is not supported").at("MaskBand").remedy(kAsGeoTiff);
     if (band_number_ > bands_) {
       throw fault(fmt::format("has no band {}, only {}", band_number_, bands_))
-          .remedy("choose another band, or make it again: gdalbuildvrt");
+          .remedy("choose another band, or rebuild it: gdalbuildvrt");
     }
     int number_of_band = 0;
     for (const XmlElement& element : root.children) {

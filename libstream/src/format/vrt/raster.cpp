@@ -117,7 +117,7 @@ class WholeNumbers final : public Raster {
             info_.files.front(),
             fmt::format("has samples that are not {}, the sample type of the virtual raster",
                         name_of(info_.sample.type)))
-            .remedy("make the virtual raster again: gdalbuildvrt");
+            .remedy("rebuild the virtual raster: gdalbuildvrt");
       }
       const T number = static_cast<T>(real);
       std::memcpy(samples + target * sizeof number, &number, sizeof number);

@@ -233,7 +233,7 @@ class SymbolDecoder {
     const bool met = next_ == end_ - (used_bits_ + 7) / 8;
     if (!met || (used_bits_ % 8 != 0 && (*next_ & (0xff >> used_bits_ % 8)) != 0) ||
         state_ >= 2 * kLow || (state_ < kLow) != (used_bits_ == 0)) {
-      throw Damage("coded bytes do not end with their numbers");
+      throw Damage("coded bytes do not end after their last number");
     }
     return state_ % kLow;
   }
