@@ -76,7 +76,7 @@ bool same_bits(const std::vector<Point3>& a, const std::vector<Point3>& b) {
   });
 }
 
-class GeoJson : public testing::Test {
+class GeoJson : public ::testing::Test {
  protected:
   std::string put(const std::string& name, const std::string& content) {
     std::ofstream(folder_.path() / name, std::ios::binary) << content;

@@ -64,14 +64,14 @@ T at(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-class MeshFile : public ::testing::Test {
+class MeshOutput : public ::testing::Test {
  protected:
   std::string path(const std::string& name) { return (folder_.path() / name).string(); }
 
   TempFolder folder_;
 };
 
-TEST_F(MeshFile, ObjHasExactDoublesAndCountsFromOne) {
+TEST_F(MeshOutput, ObjHasExactDoublesAndCountsFromOne) {
   const Mesh mesh = random_mesh(1, 2500, 4000);
   write(path("m.obj"), mesh, {.attributes = {"level"}, .comments = {"one", "two\nthree"}});
   std::istringstream lines(read_text(path("m.obj")));
@@ -103,7 +103,7 @@ TEST_F(MeshFile, ObjHasExactDoublesAndCountsFromOne) {
   EXPECT_EQ(back.triangles, mesh.triangles);
 }
 
-TEST_F(MeshFile, RoundTripsPlyBitForBit) {
+TEST_F(MeshOutput, RoundTripsPlyBitForBit) {
   const Mesh mesh = random_mesh(2, 2500, 4000);
   for (const std::string format : {"ply", "ply-ascii"}) {
     SCOPED_TRACE(format);
@@ -172,7 +172,7 @@ struct Glb {
   }
 };
 
-TEST_F(MeshFile, GlbStoresPositionsRelativeToItsOrigin) {
+TEST_F(MeshOutput, GlbStoresPositionsRelativeToItsOrigin) {
   const Mesh mesh = random_mesh(3, 3000, 5001);
   Box3 bounds;
   for (const Point3& p : mesh.positions) bounds.include(p);
@@ -230,7 +230,7 @@ TEST_F(MeshFile, GlbStoresPositionsRelativeToItsOrigin) {
   }
 }
 
-TEST_F(MeshFile, GlbIsInMetres) {
+TEST_F(MeshOutput, GlbIsInMetres) {
   Mesh mesh = random_mesh(6, 1000, 300);
   const Point3 far{500, -300, 1000};
   for (Point3& p : mesh.positions) {
@@ -274,7 +274,7 @@ TEST_F(MeshFile, GlbIsInMetres) {
   EXPECT_EQ(mesh_format(path("m.glb"), {.format = "obj"}), "obj");
 }
 
-TEST_F(MeshFile, OtherFormatsDoNotRound) {
+TEST_F(MeshOutput, OtherFormatsDoNotRound) {
   const Box3 bounds{{691000, 5338000, 0}, {692000, 5340000, 500}};
   const Point3 p{691000.1, 5338000.2, 0.3};
   for (const char* name : {"a.ply", "a.obj"}) {
@@ -286,7 +286,7 @@ TEST_F(MeshFile, OtherFormatsDoNotRound) {
   EXPECT_THROW(MeshRounding(path("a.stl"), bounds), Error);
 }
 
-TEST_F(MeshFile, GlbWithoutTrianglesIsACloudAndWithoutVerticesAnEmptyScene) {
+TEST_F(MeshOutput, GlbWithoutTrianglesIsACloudAndWithoutVerticesAnEmptyScene) {
   Mesh mesh = random_mesh(4, 10, 0);
   write(path("cloud.glb"), mesh, {});
   const Glb cloud(read_text(path("cloud.glb")));
@@ -301,7 +301,7 @@ TEST_F(MeshFile, GlbWithoutTrianglesIsACloudAndWithoutVerticesAnEmptyScene) {
   EXPECT_TRUE(empty.binary.empty());
 }
 
-TEST_F(MeshFile, GlbRejectsMeshesTooLargeForItBeforeWriting) {
+TEST_F(MeshOutput, GlbRejectsMeshesTooLargeForItBeforeWriting) {
   for (const MeshHeader& header : {MeshHeader{.vertices = 400'000'000, .triangles = 0},
                                    MeshHeader{.vertices = 3, .triangles = 1ull << 62},
                                    MeshHeader{.vertices = 200'000'000, .triangles = 200'000'000}}) {
@@ -311,7 +311,7 @@ TEST_F(MeshFile, GlbRejectsMeshesTooLargeForItBeforeWriting) {
   EXPECT_TRUE(std::filesystem::is_empty(folder_.path()));
 }
 
-TEST_F(MeshFile, BytesDoNotDependOnThePieces) {
+TEST_F(MeshOutput, BytesDoNotDependOnThePieces) {
   const Mesh mesh = random_mesh(5, 900, 1700);
   for (const std::string ending : {".ply", ".obj", ".glb"}) {
     SCOPED_TRACE(ending);
@@ -325,7 +325,7 @@ TEST_F(MeshFile, BytesDoNotDependOnThePieces) {
   }
 }
 
-TEST_F(MeshFile, ChoosesFormatsByNameThenByEnding) {
+TEST_F(MeshOutput, ChoosesFormatsByNameThenByEnding) {
   const auto refusal = [&](const std::string& file, const WriterOptions& options = {}) {
     return error_of([&] { open_mesh_writer(file, {}, options); });
   };

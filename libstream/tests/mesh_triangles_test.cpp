@@ -24,7 +24,7 @@ namespace {
 
 using Corners = std::array<Point3, 3>;
 
-class MeshTriangles : public testing::Test {
+class MeshTriangles : public ::testing::Test {
  protected:
   std::string put(const std::string& name, const std::string& content) {
     std::ofstream(folder_.path() / name, std::ios::binary) << content;

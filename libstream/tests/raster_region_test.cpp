@@ -43,9 +43,9 @@ struct Reading {
 };
 
 /// A raster whose samples are a function of their place; one in eleven is void.
-class MadeRaster final : public Raster {
+class SyntheticRaster final : public Raster {
  public:
-  MadeRaster(std::uint64_t columns, std::uint64_t rows, const WorldTransform& world,
+  SyntheticRaster(std::uint64_t columns, std::uint64_t rows, const WorldTransform& world,
              Reading& reading)
       : reading_(reading) {
     info_.files = {"made"};
@@ -128,7 +128,7 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
     options.memory_bytes = round % 2 == 0 ? 64u << 20 : 100'000;  // many windows
     Reading reading;
     const auto whole =
-        points_of(std::make_unique<MadeRaster>(columns, rows, world, reading), options);
+        points_of(std::make_unique<SyntheticRaster>(columns, rows, world, reading), options);
     const Box3 extent = world_box(whole->info(), {{0, 0, 0}, {double(columns), double(rows), 0}});
     std::array<std::array<double, 2>, 2> sides{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -147,7 +147,7 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
     reading = {};
     options.selection.region = region;
     const auto part =
-        points_of(std::make_unique<MadeRaster>(columns, rows, world, reading), options);
+        points_of(std::make_unique<SyntheticRaster>(columns, rows, world, reading), options);
     const std::vector<Point3> found = world_points(*part);
     EXPECT_EQ(inside(found, region), wanted);
     EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
@@ -202,7 +202,7 @@ std::size_t damage_tiles(const std::filesystem::path& file,
   return left;
 }
 
-class RegionOfFiles : public testing::Test {
+class RegionOfFiles : public ::testing::Test {
  protected:
   static constexpr std::uint32_t kSide = 640, kTile = 64;
 

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// Checks the statements of FORMAT.md about the hierarchy one by one: a store that violates one of
+// them, with good checksums, is refused when it is opened or read, or reported by verify.
+#include <algorithm>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "store_invariants_testing.hpp"
+
+namespace terrace::stream {
+namespace {
+
+using store::Entry;
+using testing::OwnedBlock;
+using testing::StoreFiles;
+using testing::TemporaryFolder;
+
+TEST(StoreInvariants, MendingASoundStoreChangesNothing) {
+  for (StoreFiles files : {testing::grid_files(), testing::cloud_files()}) {
+    const StoreFiles before = files;
+    testing::mend(files);
+    EXPECT_TRUE(files == before);
+    testing::edit_page(files, 0, 1, [](std::vector<Entry>&, std::uint64_t&) {});
+    EXPECT_TRUE(files == before);
+    const TemporaryFolder folder;
+    testing::write_files(folder.path(), files);
+    EXPECT_EQ(testing::problems_of(Store::open(folder.path())), "");
+  }
+}
+
+/// Returns the store of testing::small_blocks(), written from its hierarchy after `edit`.
+StoreFiles edited_store(const std::function<void(std::vector<OwnedBlock>&)>& edit) {
+  std::vector<std::vector<Point3>> blocks;
+  for (const auto& block : testing::small_blocks()) blocks.push_back(block.positions);
+  std::vector<OwnedBlock> recorded = testing::recorded_hierarchy(blocks, testing::kSmallOptions);
+  edit(recorded);
+  const TemporaryFolder folder;
+  StoreWriter writer(folder.path() / "s", testing::small_grid());
+  for (const OwnedBlock& block : recorded) {
+    if (block.representatives[0] == kNoRepresentative) {
+      writer.finish(block.view());
+    } else {
+      writer.append(writer.encode(block.view()));
+    }
+  }
+  return testing::read_files(folder.path() / "s");
+}
+
+OwnedBlock& block_of(std::vector<OwnedBlock>& blocks, unsigned level) {
+  return *std::find_if(blocks.begin(), blocks.end(),
+                       [&](const OwnedBlock& block) { return block.level == level; });
+}
+
+TEST(StoreInvariants, VerifyFindsInvalidHierarchies) {
+  EXPECT_TRUE(edited_store([](auto&) {}) == testing::grid_files());
+  // Returns a point of the first block of level 1 that does not represent a cluster there.
+  const auto plain_member = [](const OwnedBlock& block) {
+    std::uint32_t point = 0;
+    while (std::find(block.representatives.begin(), block.representatives.end(), point) !=
+           block.representatives.end()) {
+      ++point;
+    }
+    return point;
+  };
+  testing::expect_problem(edited_store([&](auto& blocks) {
+                            OwnedBlock& block = block_of(blocks, 1);
+                            const std::uint32_t point = plain_member(block);
+                            block.children[point] = block.children[point + 1];
+                          }),
+                          "is headed twice");
+  testing::expect_problem(edited_store([&](auto& blocks) {
+                            OwnedBlock& block = block_of(blocks, 1);
+                            const std::uint32_t point = plain_member(block);
+                            block.children[point] = block.children[point + 1];
+                          }),
+                          "no point above heads it");
+  testing::expect_unreadable(edited_store([&](auto& blocks) {
+                               OwnedBlock& block = block_of(blocks, 1);
+                               block.children[plain_member(block)] = 1000000;
+                             }),
+                             "heads a cluster that does not exist");
+  testing::expect_problem(edited_store([&](auto& blocks) {
+                            OwnedBlock& block = block_of(blocks, 1);
+                            block.positions[plain_member(block)][2] += 1;
+                          }),
+                          "are not the points above that head its clusters");
+  // A representative whose children differ from those of the point above.
+  testing::expect_problem(edited_store([](auto& blocks) {
+                            OwnedBlock& block = block_of(blocks, 1);
+                            std::swap(block.children[block.representatives[0]],
+                                      block.children[block.representatives[1]]);
+                          }),
+                          "are not the points above that head its clusters");
+  testing::expect_problem(
+      edited_store([](auto& blocks) { --block_of(blocks, 1).summaries[0].descendants; }),
+      "the descendants do not add up");
+  testing::expect_problem(edited_store([](auto& blocks) {
+                            OwnedBlock& block = block_of(blocks, 1);
+                            const Point3 at = block.positions[block.representatives[0]];
+                            block.summaries[0].box = {at, at};
+                          }),
+                          "a cluster below exceeds its box");
+}
+
+/// Boxes of 32 columns from a multiple of 32 on look as if they had been enlarged to that size. The
+/// box above must still contain the points themselves.
+TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
+  for (const int missed : {0, 1, 31}) {
+    const TemporaryFolder folder;
+    StoreWriter writer(folder.path() / "s", testing::grid_schema(ScalarType::i16));
+    std::vector<Point3> positions;
+    std::vector<std::uint32_t> order;
+    for (std::uint32_t i = 0; i < 64; ++i) {
+      positions.push_back({32.0 + i, 0, 0});
+      order.push_back(i);
+    }
+    const std::vector<std::uint32_t> first{0, 32, 64}, heads{31, 60}, all{0, 2},
+        none{kNoRepresentative};
+    const std::vector<ClusterSummary> summaries{{{positions[0], positions[31]}, 40, 32},
+                                                {{positions[32], positions[63]}, 40, 32}};
+    const std::vector<Point3> top{positions[31], positions[60]};
+    const std::vector<std::uint64_t> children{0, 1};
+    const auto low = static_cast<std::size_t>(missed);
+    const std::vector<ClusterSummary> root{{{positions[low], positions[63]}, 40, 64}};
+    writer.append(writer.encode({.level = 0,
+                                 .positions = positions,
+                                 .payload = {},
+                                 .children = {},
+                                 .first = first,
+                                 .order = order,
+                                 .representatives = heads,
+                                 .summaries = summaries}));
+    writer.finish({.level = 1,
+                   .positions = top,
+                   .payload = {},
+                   .children = children,
+                   .first = all,
+                   .order = std::span(order).first(2),
+                   .representatives = none,
+                   .summaries = root});
+    const std::string problems = testing::problems_of(Store::open(folder.path() / "s"));
+    if (missed == 0) {
+      EXPECT_EQ(problems, "");
+    } else {
+      EXPECT_EQ(problems, "cluster 1/0: a cluster below exceeds its box\n");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::stream
