@@ -115,8 +115,8 @@ void read_windows(benchmark::State& state, stream::GeoTiffCompression compressio
 }
 
 void write_file(benchmark::State& state, stream::GeoTiffCompression compression) {
-  const std::string from = inputs().file(stream::GeoTiffCompression::none, false);
-  const auto raster = stream::open_geotiff(from);
+  const std::string source = inputs().file(stream::GeoTiffCompression::none, false);
+  const auto raster = stream::open_geotiff(source);
   const std::uint64_t columns = raster->info().columns, rows = raster->info().rows;
   std::vector<std::byte> samples(columns * rows * 2);
   std::vector<std::uint8_t> valid(columns * rows);
@@ -127,11 +127,11 @@ void write_file(benchmark::State& state, stream::GeoTiffCompression compression)
   options.compression = compression;
   options.replace = true;
   for (auto _ : state) {
-    stream::GeoTiffWriter writer(from + ".out", options);
+    stream::GeoTiffWriter writer(source + ".out", options);
     writer.write_rows(samples);
     writer.commit();
   }
-  std::filesystem::remove(from + ".out");
+  std::filesystem::remove(source + ".out");
   state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations()) *
                           static_cast<std::int64_t>(columns * rows));
 }

@@ -51,10 +51,10 @@ class Survey {
 
   void write(const std::string& path, const std::string& format) {
     const auto writer = open_point_writer(path, header_, {.format = format, .replace = true});
-    for (std::size_t left = point_count(); left > 0;) {
-      const PointBlock& block = make(std::min<std::size_t>(left, 10'000));
+    for (std::size_t remaining = point_count(); remaining > 0;) {
+      const PointBlock& block = make(std::min<std::size_t>(remaining, 10'000));
       writer->append(block);
-      left -= block.size();
+      remaining -= block.size();
     }
     writer->finish();
   }

@@ -30,14 +30,14 @@ struct Input {
 
 const Input& input(bool grid) {
   const auto make = [](bool of_grid) {
-    Input made;
+    Input input;
     std::vector<std::vector<Point3>> blocks;
     StandInHierarchy::Options options;
-    made.schema.grid = of_grid;
+    input.schema.grid = of_grid;
     if (of_grid) {
-      made.schema.coordinates[2].type = ScalarType::i16;
+      input.schema.coordinates[2].type = ScalarType::i16;
       const int side = is_small() ? 256 : 2048;
-      made.schema.columns = made.schema.rows = static_cast<std::uint64_t>(side);
+      input.schema.columns = input.schema.rows = static_cast<std::uint64_t>(side);
       const auto heights = testing::fractal_heights(side, 2.65, 1);
       for (int y = 0; y < side; y += 100) {
         for (int x = 0; x < side; x += 100) {
@@ -50,9 +50,9 @@ const Input& input(bool grid) {
       for (int p = 0; p < patches; ++p) blocks.push_back(testing::scan_patch(p, 10000));
       options.cluster_points = 100;
     }
-    for (const auto& block : blocks) made.points += block.size();
-    made.blocks = testing::recorded_hierarchy(blocks, options);
-    return made;
+    for (const auto& block : blocks) input.points += block.size();
+    input.blocks = testing::recorded_hierarchy(blocks, options);
+    return input;
   };
   static const Input grid_input = make(true), cloud_input = make(false);
   return grid ? grid_input : cloud_input;

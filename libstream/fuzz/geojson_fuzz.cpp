@@ -15,12 +15,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const auto source =
           open_source(std::vector{file.name()}, {.format = "geojson", .entities = entities});
       const SourceInfo& info = source->info();
-      std::uint64_t seen = 0;
+      std::uint64_t vertex_count = 0;
       for (PointBlock block; source->next(block);) {
         require(block.payload.size() == block.size() * info.payload_size(),
                 "each point has a record");
         if (entities == Entities::points) {
-          seen += block.size();
+          vertex_count += block.size();
           continue;
         }
         const std::size_t column = info.attributes.size() - 4;
@@ -28,11 +28,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         const auto count = info.view<std::uint8_t>(block.payload, column + 2);
         for (std::size_t i = 0; i < block.size(); ++i) {
           require(count[i] >= 2 && count[i] <= kPolylineVertices, "a piece has 2 to 4 vertices");
-          seen += count[i] - (part[i] == 0 ? 0u : 1u);
+          vertex_count += count[i] - (part[i] == 0 ? 0u : 1u);
         }
       }
-      require(seen <= size, "positions fit the file's size");
-      vertices.push_back(seen + source->progress().excluded);
+      require(vertex_count <= size, "positions fit the file's size");
+      vertices.push_back(vertex_count + source->progress().excluded);
     } catch (const Error& error) {
       require(!error.parts().cause.empty(), "errors have a cause");
     }

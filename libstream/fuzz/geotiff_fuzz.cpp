@@ -10,8 +10,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     const RasterOptions raster{.memory_bytes = 4u << 20};
     SourceOptions options{.block_points = 1000, .memory_bytes = 4u << 20};
-    const auto whole = points_of(open_geotiff(file.name(), raster), options);
-    const SourceInfo& info = whole->info();
+    const auto raster_points = points_of(open_geotiff(file.name(), raster), options);
+    const SourceInfo& info = raster_points->info();
     const auto columns = static_cast<double>(info.columns), rows = static_cast<double>(info.rows);
     options.selection.region =
         world_box(info, {{columns / 3, rows / 3, 0}, {columns / 2, rows / 2, 0}});
@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const std::uint64_t cells = info.columns * info.rows;
     require(*part->info().points + part->progress().excluded == cells, "all cells are counted");
     read_cells(*part, options.block_points);
-    read_cells(*whole, options.block_points);
+    read_cells(*raster_points, options.block_points);
   } catch (const Error& error) {
     require(!error.parts().cause.empty(), "errors have a cause");
   }

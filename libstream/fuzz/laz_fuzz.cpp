@@ -72,16 +72,16 @@ struct Coders {
 };
 
 Coders& coders(unsigned format, unsigned choice) {
-  static std::map<std::pair<unsigned, unsigned>, Coders> made;
-  const auto known = made.find({format, choice});
-  if (known != made.end()) return known->second;
+  static std::map<std::pair<unsigned, unsigned>, Coders> cache;
+  const auto known = cache.find({format, choice});
+  if (known != cache.end()) return known->second;
   Vlr vlr = Vlr::of(format, kLengths[format] + choice % 4);
   for (Item& item : vlr.items) {
     if (item.type != ItemType::wave_packet13) {
       item.version = static_cast<std::uint16_t>((format < 6 ? 1 : 3) + choice / 4);
     }
   }
-  return made.try_emplace({format, choice}, vlr).first->second;
+  return cache.try_emplace({format, choice}, vlr).first->second;
 }
 
 void fuzz_chunk(std::span<const std::byte> bytes, unsigned format, unsigned choice) {

@@ -38,8 +38,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         for (const std::uint32_t v : triangle) require(v < vertices, "corners are vertices");
       }
       // The nodes of a GLB may place one mesh many times.
-      const std::size_t most = std::string_view(format) == "glb" ? size * size : size;
-      require(vertices <= most && mesh->triangles.size() <= most, "the mesh fits the file's size");
+      const std::size_t max_items = std::string_view(format) == "glb" ? size * size : size;
+      require(vertices <= max_items && mesh->triangles.size() <= max_items,
+              "the mesh fits the file's size");
     } catch (const Error& error) {
       require(!error.parts().cause.empty(), "errors have a cause");
     }

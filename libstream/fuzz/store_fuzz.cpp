@@ -53,8 +53,8 @@ Tables even_tables(const Layout& layout, ColumnKind kind, bool guided) {
 }
 
 const DecodingTables& tables_of(ColumnKind kind, bool guided) {
-  static std::map<std::pair<ColumnKind, bool>, DecodingTables> made;
-  return made.try_emplace({kind, guided}, even_tables(Layout(schema_for(false), 0), kind, guided))
+  static std::map<std::pair<ColumnKind, bool>, DecodingTables> cache;
+  return cache.try_emplace({kind, guided}, even_tables(Layout(schema_for(false), 0), kind, guided))
       .first->second;
 }
 
@@ -130,7 +130,7 @@ void read_tables(ByteReader in) {
 }
 
 /// Sets the checksum, which a fuzzer cannot guess, to test the parser after it.
-void mend_manifest(std::string& text) {
+void update_manifest_checksum(std::string& text) {
   constexpr std::size_t kDigitsFromEnd = 12;  // eight digits, a quote, newline, brace, newline
   if (text.size() < kDigitsFromEnd) return;
   text.replace(text.size() - kDigitsFromEnd, 8, "00000000");
@@ -186,7 +186,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         break;
       default: {
         std::string text(reinterpret_cast<const char*>(data + 1), size - 1);
-        mend_manifest(text);
+        update_manifest_checksum(text);
         const Manifest manifest = parse_manifest(text, "manifest.json");
         // It is the same after rewriting, with its keys in order.
         const std::string again = to_text(manifest);

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string_view>
 
-#include "../tests/store_mending.hpp"
+#include "../tests/store_editing.hpp"
 #include "fuzz_points.hpp"
 #include "terrace/stream/store.hpp"
 #include "terrace/stream/store_query.hpp"
@@ -96,7 +96,7 @@ class Promises {
 
 void read_all(const Store& store) {
   Promises promises(store);
-  bool whole = true;
+  bool readable = true;
   for (const LevelInfo& level : store.levels()) {
     std::uint64_t members = 0;
     try {
@@ -108,7 +108,7 @@ void read_all(const Store& store) {
                      });
       require(members == level.members, "members agree with the manifest");
     } catch (const Error&) {
-      whole = false;
+      readable = false;
     }
   }
   // One by one in reverse, so that the readable parts of a damaged store are read.
@@ -121,7 +121,7 @@ void read_all(const Store& store) {
         store.read(id, points);
         promises.check_cluster(id, record, points);
       } catch (const Error&) {
-        whole = false;
+        readable = false;
       }
     }
   }
@@ -138,9 +138,9 @@ void read_all(const Store& store) {
         "nearest points are found");
     require(query.within(store.bounds().max, 1).size() <= store.points(),
             "points within a radius are points of the store");
-    if (found != store.points()) whole = false;
+    if (found != store.points()) readable = false;
   } catch (const Error&) {
-    whole = false;
+    readable = false;
   }
   std::size_t problems = 0;
   const bool good = store.verify([&problems](const Problem& problem) {
@@ -148,7 +148,7 @@ void read_all(const Store& store) {
     ++problems;
   });
   require(good == (problems == 0), "verify() returns whether there were problems");
-  require(!good || whole, "a sound store can be read");
+  require(!good || readable, "a sound store can be read");
   require(!good || counted == store.points(), "a sound store is counted completely");
 }
 
@@ -157,7 +157,7 @@ void read_all(const Store& store) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Folder folder;
   testing::StoreFiles files = files_of({reinterpret_cast<const char*>(data), size});
-  testing::mend(files);
+  testing::update_checksums(files);
   testing::write_files(folder.path(), files);
   try {
     read_all(Store::open(folder.path()));

@@ -161,7 +161,7 @@ TEST(CopcOctree, NodesComeDepthFirstInMortonOrder) {
 }
 
 TEST(CopcOctree, KeepsNodesInTheRegionDownToTheResolution) {
-  const auto kept = [](const std::optional<Box3>& region, double resolution) {
+  const auto node_count = [](const std::optional<Box3>& region, double resolution) {
     Octree octree = octree_of({{{0, 0, 0, 0, 110, 10, 1},
                                 {1, 0, 0, 0, 120, 10, 2},
                                 {1, 1, 1, 1, 130, 10, 4},
@@ -172,19 +172,19 @@ TEST(CopcOctree, KeepsNodesInTheRegionDownToTheResolution) {
     for (const OctreeNode& node : octree.nodes) points += node.points;
     return points;
   };
-  EXPECT_EQ(kept({}, 0), 15u);
-  EXPECT_EQ(kept({}, 2), 1u);
-  EXPECT_EQ(kept({}, 1), 1u);
-  EXPECT_EQ(kept({}, 0.9), 7u);
-  EXPECT_EQ(kept({}, 0.3), 15u);
-  EXPECT_EQ(kept({}, 0.01), 15u);
-  EXPECT_EQ(kept(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0), 13u);
-  EXPECT_EQ(kept(Box3{{5, 5, -7}, {6, 6, -6}}, 0), 1u);
-  EXPECT_EQ(kept(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0.5), 5u);
+  EXPECT_EQ(node_count({}, 0), 15u);
+  EXPECT_EQ(node_count({}, 2), 1u);
+  EXPECT_EQ(node_count({}, 1), 1u);
+  EXPECT_EQ(node_count({}, 0.9), 7u);
+  EXPECT_EQ(node_count({}, 0.3), 15u);
+  EXPECT_EQ(node_count({}, 0.01), 15u);
+  EXPECT_EQ(node_count(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0), 13u);
+  EXPECT_EQ(node_count(Box3{{5, 5, -7}, {6, 6, -6}}, 0), 1u);
+  EXPECT_EQ(node_count(Box3{{5, 5, -kInfinity}, {6, 6, kInfinity}}, 0.5), 5u);
   // A cube's points may be rounded across its sides.
-  EXPECT_EQ(kept(Box3{{-1, -1, -1}, {-0.005, -0.005, -0.005}}, 0), 7u);
+  EXPECT_EQ(node_count(Box3{{-1, -1, -1}, {-0.005, -0.005, -0.005}}, 0), 7u);
   // The root is read for any region, because its points check its cube.
-  EXPECT_EQ(kept(Box3{{9, 9, 9}, {10, 10, 10}}, 0), 1u);
+  EXPECT_EQ(node_count(Box3{{9, 9, 9}, {10, 10, 10}}, 0), 1u);
 }
 
 TEST(CopcOctree, RejectsInvalidHierarchies) {

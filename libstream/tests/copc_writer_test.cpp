@@ -81,14 +81,14 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
   EXPECT_TRUE(nodes == built(places, std::size_t{1} << 19, 5)) << "threads make a difference";
   EXPECT_TRUE(nodes == built(places, 1, 3)) << "both make a difference";
 
-  std::vector<bool> seen(places.size());
+  std::vector<bool> found_numbers(places.size());
   std::set<std::string> names;
   for (const BuiltNode& node : nodes) {
     EXPECT_TRUE(names.insert(name_of(node.node)).second);
     std::uint32_t last = 0;
     for (const auto& [place, number] : node.points) {
-      EXPECT_FALSE(seen[number]);
-      seen[number] = true;
+      EXPECT_FALSE(found_numbers[number]);
+      found_numbers[number] = true;
       EXPECT_EQ(place, places[number]);
       EXPECT_GE(number, last) << "not in the order in which they came";
       last = number;
@@ -98,7 +98,8 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
       }
     }
   }
-  EXPECT_EQ(std::count(seen.begin(), seen.end(), true), std::ssize(seen));
+  EXPECT_EQ(std::count(found_numbers.begin(), found_numbers.end(), true),
+            std::ssize(found_numbers));
 
   // Leaves are the nodes with few points in their cube, not counting those promoted to parents.
   unsigned depths = 0;
@@ -106,7 +107,7 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
   for (unsigned depth = 0; depth < depths; ++depth) {
     std::map<Place, std::size_t> in_cubes;
     for (const Place& place : places) ++in_cubes[cell_of(place, depth, 0)];
-    std::map<Place, std::size_t> taken;  // points of each cell in nodes down to this depth
+    std::map<Place, std::size_t> cell_counts;  // points of each cell in nodes down to this depth
     std::set<Place> all, leaves;
     for (const BuiltNode& node : nodes) {
       const Place at{static_cast<std::int32_t>(node.node.place[0]),
@@ -123,12 +124,12 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
         }
         const Place cell = cell_of(place, depth, 7);
         all.insert(cell);
-        if (node.node.depth <= depth) ++taken[cell];
+        if (node.node.depth <= depth) ++cell_counts[cell];
       }
     }
     // Each cell of the other nodes has exactly one point.
-    EXPECT_EQ(taken.size(), all.size()) << "depth " << depth;
-    for (const auto& [cell, count] : taken) EXPECT_EQ(count, 1u);
+    EXPECT_EQ(cell_counts.size(), all.size()) << "depth " << depth;
+    for (const auto& [cell, count] : cell_counts) EXPECT_EQ(count, 1u);
   }
   return nodes;
 }
@@ -164,13 +165,13 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
   const std::vector<BuiltNode> nodes = built(places, 1);
   EXPECT_TRUE(nodes == built(places, std::size_t{1} << 19));
   EXPECT_TRUE(nodes == built(places, 1, 3));
-  std::size_t found = 0, most = 0;
+  std::size_t found = 0, largest = 0;
   for (const BuiltNode& node : nodes) {
     found += node.points.size();
-    most = std::max(most, node.points.size());
+    largest = std::max(largest, node.points.size());
   }
   EXPECT_EQ(found, places.size());
-  EXPECT_GT(most, 39'000u);
+  EXPECT_GT(largest, 39'000u);
 }
 
 TEST(OctreeBuilder, RejectsTooManyPointsInOnePlace) {
@@ -218,8 +219,8 @@ std::string write_copc(const std::string& path, const AllPoints& all, std::size_
   for (std::size_t at = 0; at < all.points.size(); at += block) {
     const std::size_t count = std::min(block, all.points.size() - at);
     PointBlock part;
-    const auto from = all.points.positions.begin() + static_cast<std::ptrdiff_t>(at);
-    part.positions.assign(from, from + static_cast<std::ptrdiff_t>(count));
+    const auto first = all.points.positions.begin() + static_cast<std::ptrdiff_t>(at);
+    part.positions.assign(first, first + static_cast<std::ptrdiff_t>(count));
     const std::byte* const payload = all.points.payload.data() + at * bytes;
     part.payload.assign(payload, payload + count * bytes);
     to_world(all.info, part);
@@ -276,10 +277,10 @@ TEST(CopcWriter, OctreesHaveTheRecordsThatWereWritten) {
     });
     const AllPoints all = made_scan(50'000, attributes);
     const std::string file = write_copc((folder.path() / "a.copc.laz").string(), all);
-    SourceOptions kept;
-    kept.selection.keep.emplace();
-    for (const Channel& c : attributes) kept.selection.keep->push_back(c.name);
-    const AllPoints found = read_file(file, kept);
+    SourceOptions selection_options;
+    selection_options.selection.keep.emplace();
+    for (const Channel& c : attributes) selection_options.selection.keep->push_back(c.name);
+    const AllPoints found = read_file(file, selection_options);
     EXPECT_EQ(found.info.format, "copc");
     EXPECT_EQ(found.info.attributes, attributes);
     EXPECT_TRUE(found.info.comments.empty());

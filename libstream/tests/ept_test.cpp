@@ -154,12 +154,12 @@ TEST(Ept, RejectsLazNodesThatDisagree) {
 }
 
 /// A copy of the data set with nodes of plain records.
-std::string write_by_schema(const fs::path& from, const fs::path& folder, bool zstandard) {
-  Json metadata = Json::parse(read_text(from / "ept.json"));
+std::string write_by_schema(const fs::path& source, const fs::path& folder, bool zstandard) {
+  Json metadata = Json::parse(read_text(source / "ept.json"));
   metadata["dataType"] = zstandard ? "zstandard" : "binary";
   fs::create_directories(folder / "ept-data");
-  fs::copy(from / "ept-hierarchy", folder / "ept-hierarchy");
-  for (const auto& entry : fs::directory_iterator(from / "ept-data")) {
+  fs::copy(source / "ept-hierarchy", folder / "ept-hierarchy");
+  for (const auto& entry : fs::directory_iterator(source / "ept-data")) {
     const AllPoints node = read_file(entry.path());
     // The headers' offsets differ from those of the schema.
     const Lattice lattice = lattice_of(node.info).value();
@@ -258,18 +258,18 @@ TEST(Ept, ReadsLoneStarInAllThreeEncodings) {
   EXPECT_TRUE(values_of(all, shared) ==
               values_of(read_file(folder.parent_path() / "lone-star.copc.laz"), shared));
 
-  const auto most = {"intensity",         "return_number",
-                     "number_of_returns", "scan_direction_flag",
-                     "classification",    "edge_of_flight_line",
-                     "user_data",         "point_source_id",
-                     "gps_time",          "OriginId"};
-  const TempFolder made;
+  const auto common = {"intensity",         "return_number",
+                       "number_of_returns", "scan_direction_flag",
+                       "classification",    "edge_of_flight_line",
+                       "user_data",         "point_source_id",
+                       "gps_time",          "OriginId"};
+  const TempFolder output;
   for (const bool zstandard : {false, true}) {
     const std::string file =
-        write_by_schema(folder, made.path() / (zstandard ? "zst" : "bin"), zstandard);
+        write_by_schema(folder, output.path() / (zstandard ? "zst" : "bin"), zstandard);
     const AllPoints other = read_file(file, {.threads = 2});
     EXPECT_EQ(other.info.attributes.size(), 11u);
-    EXPECT_TRUE(values_of(other, most) == values_of(all, most));
+    EXPECT_TRUE(values_of(other, common) == values_of(all, common));
     EXPECT_TRUE(other.points.payload == read_file(file).points.payload);
   }
 }

@@ -24,8 +24,11 @@ TEST(Error, LeavesOutPartsThatAreNotGiven) {
 }
 
 TEST(Error, TakesTheLastOfEachPart) {
-  const Error error =
-      Error("a.las", "is truncated").at("header").remedy("export it").at_byte(7).remedy("restore it");
+  const Error error = Error("a.las", "is truncated")
+                          .at("header")
+                          .remedy("export it")
+                          .at_byte(7)
+                          .remedy("restore it");
   EXPECT_STREQ(error.what(), "a.las: byte 7: is truncated; restore it");
 }
 

@@ -107,11 +107,11 @@ class GeoJson : public ::testing::Test {
                                                    std::uint64_t* excluded = nullptr) {
     const auto source = open_source(files, options(entities));
     const SourceInfo& info = source->info();
-    const std::size_t most = entities == Entities::segments ? 2 : kPolylineVertices;
-    const std::size_t numbers = 3 * (most - 1);
+    const std::size_t corners = entities == Entities::segments ? 2 : kPolylineVertices;
+    const std::size_t numbers = 3 * (corners - 1);
     EXPECT_EQ(info.attributes.size(), numbers + 4);
     EXPECT_EQ(info.attributes[numbers].name, "line");
-    EXPECT_EQ(info.attributes[numbers - 1].name, "z" + std::to_string(most));
+    EXPECT_EQ(info.attributes[numbers - 1].name, "z" + std::to_string(corners));
     std::vector<std::vector<Point3>> lines;
     std::uint64_t pieces = 0;
     for (PointBlock block; source->next(block);) {
@@ -121,7 +121,7 @@ class GeoJson : public ::testing::Test {
         const auto line = info.view<std::uint32_t>(block.payload, numbers)[i];
         const auto part = info.view<std::uint32_t>(block.payload, numbers + 1)[i];
         const auto vertices = info.view<std::uint8_t>(block.payload, numbers + 2)[i];
-        EXPECT_TRUE(vertices >= 2 && vertices <= most);
+        EXPECT_TRUE(vertices >= 2 && vertices <= corners);
         if (part == 0) {
           EXPECT_EQ(line, lines.size());
           lines.push_back({block.positions[i]});
@@ -129,7 +129,7 @@ class GeoJson : public ::testing::Test {
           EXPECT_EQ(line, lines.size() - 1);
           EXPECT_EQ(block.positions[i], lines.back().back());
         }
-        for (std::size_t v = 0; v + 1 < most; ++v) {
+        for (std::size_t v = 0; v + 1 < corners; ++v) {
           Point3 corner{};
           for (std::size_t axis = 0; axis < 3; ++axis) {
             corner[axis] = info.view<double>(block.payload, 3 * v + axis)[i];
@@ -147,20 +147,20 @@ class GeoJson : public ::testing::Test {
     return lines;
   }
 
-  static void expect_as_walked(const std::string& file, const Walked& wanted) {
-    EXPECT_TRUE(same_bits(points_of({file}), wanted.positions));
+  static void expect_as_walked(const std::string& file, const Walked& expected) {
+    EXPECT_TRUE(same_bits(points_of({file}), expected.positions));
     for (const Entities entities : {Entities::segments, Entities::polylines}) {
       std::uint64_t excluded = 0;
       const auto lines = lines_of({file}, entities, &excluded);
-      EXPECT_EQ(excluded, wanted.single);
-      ASSERT_EQ(lines.size(), wanted.lines.size());
+      EXPECT_EQ(excluded, expected.single);
+      ASSERT_EQ(lines.size(), expected.lines.size());
       for (std::size_t i = 0; i < lines.size(); ++i) {
-        EXPECT_TRUE(same_bits(lines[i], wanted.lines[i])) << i;
+        EXPECT_TRUE(same_bits(lines[i], expected.lines[i])) << i;
       }
     }
   }
 
-  void expect_error(const std::string& content, const std::string& wanted,
+  void expect_error(const std::string& content, const std::string& expected,
                     Entities entities = Entities::segments) {
     const std::string file = put("bad.geojson", content);
     try {
@@ -169,7 +169,7 @@ class GeoJson : public ::testing::Test {
       }
       ADD_FAILURE() << "read: " << content.substr(0, 200);
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(wanted), std::string::npos) << error.what();
+      EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
       EXPECT_NE(std::string(error.what()).find("byte"), std::string::npos) << error.what();
     }
   }
@@ -199,20 +199,20 @@ class Maker {
         "Point",   "MultiPoint",   "LineString",        "MultiLineString",
         "Polygon", "MultiPolygon", "GeometryCollection"};
     const std::size_t type = random_() % (depth < 3 ? 7 : 6);
-    Json made{{"type", kGeometries[type]}};
+    Json geometry_json{{"type", kGeometries[type]}};
     if (type == 6) {
-      made["geometries"] = Json::array();
+      geometry_json["geometries"] = Json::array();
       for (std::uint64_t i = random_() % 4; i > 0; --i)
-        made["geometries"].push_back(geometry(depth + 1));
-      return made;
+        geometry_json["geometries"].push_back(geometry(depth + 1));
+      return geometry_json;
     }
-    made["coordinates"] = coordinates(std::array{1, 2, 2, 3, 3, 4}[type], type >= 2);
+    geometry_json["coordinates"] = coordinates(std::array{1, 2, 2, 3, 3, 4}[type], type >= 2);
     if (random_() % 2 == 0) {  // members in another order
-      Json turned{{"coordinates", made["coordinates"]}, {"note", nullptr}};
-      turned["type"] = made["type"];
-      return turned;
+      Json reordered{{"coordinates", geometry_json["coordinates"]}, {"note", nullptr}};
+      reordered["type"] = geometry_json["type"];
+      return reordered;
     }
-    return made;
+    return geometry_json;
   }
 
  private:
@@ -315,9 +315,9 @@ TEST_F(GeoJson, ReadsTheCrs) {
   const std::string late =
       R"({"type":"FeatureCollection","features":[],)" + named("EPSG:2056") + R"("a":1})";
   expect_error(late, "too late");
-  SourceOptions given = options(Entities::points);
-  given.crs.emplace().epsg = 3857;
-  const auto source = open_source(std::vector{put("late.geojson", late)}, given);
+  SourceOptions source_options = options(Entities::points);
+  source_options.crs.emplace().epsg = 3857;
+  const auto source = open_source(std::vector{put("late.geojson", late)}, source_options);
   PointBlock block;
   EXPECT_FALSE(source->next(block));
   EXPECT_EQ(source->info().crs.epsg, 3857);

@@ -93,7 +93,7 @@ void expect_samples(const std::string& path, const TiffSpec& spec,
   options.block_points = 1 + random() % 500;
   options.memory_bytes = 100000 + random() % 100000;
   const auto source = points_of(open_geotiff(path, {.band = band}), options);
-  std::vector<std::byte> seen(expected.size());
+  std::vector<std::byte> delivered(expected.size());
   std::vector<int> times(std::size_t{spec.columns} * spec.rows);
   PointBlock block;
   while (source->next(block)) {
@@ -105,7 +105,7 @@ void expect_samples(const std::string& path, const TiffSpec& spec,
           static_cast<std::size_t>(p[1]) * spec.columns + static_cast<std::size_t>(p[0]);
       ++times.at(cell);
       if (exact) {
-        std::memcpy(seen.data() + cell * size, block.payload.data() + i * size, size);
+        std::memcpy(delivered.data() + cell * size, block.payload.data() + i * size, size);
       } else {
         ASSERT_EQ(p[2], whole.value(cell));
       }
@@ -116,7 +116,7 @@ void expect_samples(const std::string& path, const TiffSpec& spec,
   ASSERT_EQ(source->progress().points, times.size());
   ASSERT_EQ(source->progress().fraction, 1.0);
   if (!source->info().attributes.empty()) {
-    ASSERT_EQ(seen, expected);
+    ASSERT_EQ(delivered, expected);
   }
 }
 
@@ -366,7 +366,7 @@ TEST(GeoTiffEncodings, ReadsIntegersOfOddWidths) {
 TEST(GeoTiffEncodings, ReadsOddWidthsThatGdalWrites) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   const TempFolder folder;
-  const std::string from = (folder.path() / "a.tif").string();
+  const std::string source = (folder.path() / "a.tif").string();
   const std::string path = (folder.path() / "x.tif").string();
   std::mt19937_64 random(9);
   constexpr std::uint32_t kColumns = 21, kRows = 19, kBands = 2;
@@ -380,7 +380,7 @@ TEST(GeoTiffEncodings, ReadsOddWidthsThatGdalWrites) {
     spec.rows = kRows;
     spec.bands = kBands;
     spec.type = ScalarType::u32;
-    write_tiff(from, spec, as_samples(values));
+    write_tiff(source, spec, as_samples(values));
     const auto one_of = [&](const char* a, const char* b) { return random() % 2 == 0 ? a : b; };
     const std::string type = bits <= 8 ? "Byte" : bits <= 16 ? "UInt16" : "UInt32";
     const std::string options = "-ot " + type + " -co NBITS=" + std::to_string(bits) +
@@ -390,7 +390,7 @@ TEST(GeoTiffEncodings, ReadsOddWidthsThatGdalWrites) {
                                 one_of("", " -co TILED=YES -co BLOCKXSIZE=16 -co BLOCKYSIZE=16");
     SCOPED_TRACE(options);
     std::filesystem::remove(path);
-    ASSERT_EQ(std::system(("gdal_translate -q " + options + " '" + from + "' '" + path +
+    ASSERT_EQ(std::system(("gdal_translate -q " + options + " '" + source + "' '" + path +
                            "' >/dev/null 2>&1")
                               .c_str()),
               0);
@@ -406,13 +406,13 @@ TEST(GeoTiffEncodings, ReadsOddWidthsThatGdalWrites) {
 /// The definition of the IEEE 754 formats, in powers of two.
 double small_float(std::uint32_t bits, int exponent_bits, int mantissa_bits) {
   const std::uint32_t mantissa = bits & ((1u << mantissa_bits) - 1);
-  const int most = (1 << exponent_bits) - 1;
-  const int exponent = static_cast<int>(bits >> mantissa_bits) & most;
+  const int max_exponent = (1 << exponent_bits) - 1;
+  const int exponent = static_cast<int>(bits >> mantissa_bits) & max_exponent;
   const double sign = (bits >> (mantissa_bits + exponent_bits)) != 0 ? -1 : 1;
-  if (exponent == most) {
+  if (exponent == max_exponent) {
     return mantissa != 0 ? std::nan("") : sign * std::numeric_limits<double>::infinity();
   }
-  const int bias = most / 2;
+  const int bias = max_exponent / 2;
   if (exponent == 0) return sign * std::ldexp(mantissa, 1 - bias - mantissa_bits);
   return sign * std::ldexp(mantissa + (1u << mantissa_bits), exponent - bias - mantissa_bits);
 }

@@ -49,13 +49,13 @@ int checksum(const WholeRaster& raster, double without_data) {
   int sum = 0;
   for (std::size_t i = 0; i < raster.cells(); ++i) {
     double value = raster.valid[i] != 0 ? raster.value(i) : without_data;
-    std::int32_t whole = std::numeric_limits<std::int32_t>::min();
+    std::int32_t raster_value = std::numeric_limits<std::int32_t>::min();
     if (std::isfinite(value)) {
       if (is_float) value = std::floor(value + 0.5);
-      whole =
+      raster_value =
           static_cast<std::int32_t>(std::min(std::max(value, is_float ? -kMax : -kMax - 1), kMax));
     }
-    sum = (sum + whole % kPrimes[i % 11]) & 0xffff;
+    sum = (sum + raster_value % kPrimes[i % 11]) & 0xffff;
   }
   return sum;
 }
@@ -78,30 +78,30 @@ TEST(GeoTiffReal, SamplesMatchGdal) {
       ADD_FAILURE() << error.what();
       continue;
     }
-    const WholeRaster whole = read_whole(*raster);
+    const WholeRaster raster_value = read_whole(*raster);
     ++files;
-    EXPECT_EQ(whole.info.columns, f.columns);
-    EXPECT_EQ(whole.info.rows, f.rows);
-    EXPECT_EQ(name_of(whole.info.sample.type), f.type);
+    EXPECT_EQ(raster_value.info.columns, f.columns);
+    EXPECT_EQ(raster_value.info.rows, f.rows);
+    EXPECT_EQ(name_of(raster_value.info.sample.type), f.type);
     std::size_t count = 0;
     double min = std::numeric_limits<double>::infinity(), max = -min, sum = 0;
-    for (std::size_t i = 0; i < whole.cells(); ++i) {
-      if (whole.valid[i] == 0) continue;
-      const double value = whole.value(i);
+    for (std::size_t i = 0; i < raster_value.cells(); ++i) {
+      if (raster_value.valid[i] == 0) continue;
+      const double value = raster_value.value(i);
       ++count;
       sum += value;
       min = std::min(min, value);
       max = std::max(max, value);
     }
-    EXPECT_NEAR(100.0 * static_cast<double>(count) / static_cast<double>(whole.cells()), f.percent,
-                0.0051);
+    EXPECT_NEAR(100.0 * static_cast<double>(count) / static_cast<double>(raster_value.cells()),
+                f.percent, 0.0051);
     if (f.min != "-") {
       EXPECT_EQ(min, std::stod(f.min));
       EXPECT_EQ(max, std::stod(f.max));
       EXPECT_NEAR(sum / static_cast<double>(count), std::stod(f.mean), 1e-6 * (max - min));
     }
     // GDAL's sum takes the nodata value for cells without data, or NaN unchanged.
-    EXPECT_EQ(checksum(whole, whole.info.nodata.value_or(std::nan(""))), f.checksum);
+    EXPECT_EQ(checksum(raster_value, raster_value.info.nodata.value_or(std::nan(""))), f.checksum);
   }
   EXPECT_GT(files, 100u);
 }

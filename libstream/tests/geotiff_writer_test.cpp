@@ -82,12 +82,14 @@ TEST(GeoTiffWriter, ReadsBackWhatItWrote) {
       for (std::uint32_t down = 0; down * options.tile < options.rows; ++down) {
         for (std::uint32_t across = 0; across * options.tile < options.columns; ++across) {
           std::vector<std::byte> tile(std::size_t{options.tile} * options.tile * size);
-          const std::size_t left = std::size_t{across} * options.tile;
-          const std::size_t width = std::min<std::size_t>(options.tile, options.columns - left);
+          const std::size_t first_column = std::size_t{across} * options.tile;
+          const std::size_t width =
+              std::min<std::size_t>(options.tile, options.columns - first_column);
           for (std::size_t r = 0; r < options.tile && down * options.tile + r < options.rows; ++r) {
-            std::memcpy(tile.data() + r * options.tile * size,
-                        samples.data() + (down * options.tile + r) * row_bytes + left * size,
-                        width * size);
+            std::memcpy(
+                tile.data() + r * options.tile * size,
+                samples.data() + (down * options.tile + r) * row_bytes + first_column * size,
+                width * size);
           }
           writer.write_tile(across, down, tile);
         }
@@ -189,14 +191,14 @@ struct ReadLevel {
     samples.assign(std::size_t{columns} * rows, missing);
     std::vector<T> tile(std::size_t{side} * side);
     for (std::uint32_t top = 0; top < rows; top += side) {
-      for (std::uint32_t left = 0; left < columns; left += side) {
-        const std::uint32_t number = TIFFComputeTile(tiff, left, top, 0, 0);
+      for (std::uint32_t first_column = 0; first_column < columns; first_column += side) {
+        const std::uint32_t number = TIFFComputeTile(tiff, first_column, top, 0, 0);
         if (TIFFGetStrileByteCount(tiff, number) == 0) continue;
         EXPECT_EQ(TIFFReadEncodedTile(tiff, number, tile.data(), -1),
                   static_cast<tmsize_t>(tile.size() * sizeof(T)));
         for (std::uint32_t r = 0; r < std::min(side, rows - top); ++r) {
-          std::copy_n(tile.data() + r * side, std::min(side, columns - left),
-                      samples.data() + std::size_t{top + r} * columns + left);
+          std::copy_n(tile.data() + r * side, std::min(side, columns - first_column),
+                      samples.data() + std::size_t{top + r} * columns + first_column);
         }
       }
     }

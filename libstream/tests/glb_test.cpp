@@ -166,8 +166,8 @@ struct Placement3 {
 
 TEST_F(GlbFiles, AppliesTheTransformsOfNodes) {
   std::mt19937_64 random(41);
-  const auto number = [&](double most) {
-    return most * (static_cast<double>(random() % 2001) / 1000 - 1);
+  const auto number = [&](double limit) {
+    return limit * (static_cast<double>(random() % 2001) / 1000 - 1);
   };
   for (int round = 0; round < 60; ++round) {
     SCOPED_TRACE("seed 41, round " + std::to_string(round));

@@ -43,18 +43,18 @@ std::string some_text(std::size_t size, std::mt19937_64& random) {
 // up to max_out.
 std::string unpacked(const std::string& bytes, std::size_t max_in, std::size_t max_out,
                      std::mt19937_64& random) {
-  std::size_t given = std::min<std::size_t>(bytes.size(), random() % 30);
-  GzipStream stream("x.gz", std::string_view(bytes).substr(0, given));
-  const auto more = [&](char* to, std::size_t most) {
-    const std::size_t count = std::min({most, bytes.size() - given, 1 + random() % max_in});
-    std::memcpy(to, bytes.data() + given, count);
-    given += count;
+  std::size_t offset = std::min<std::size_t>(bytes.size(), random() % 30);
+  GzipStream stream("x.gz", std::string_view(bytes).substr(0, offset));
+  const auto read_more = [&](char* to, std::size_t max_bytes) {
+    const std::size_t count = std::min({max_bytes, bytes.size() - offset, 1 + random() % max_in});
+    std::memcpy(to, bytes.data() + offset, count);
+    offset += count;
     return count;
   };
   std::string out;
   std::vector<char> room(max_out);
   for (;;) {
-    const std::size_t got = stream.read(room.data(), 1 + random() % max_out, more);
+    const std::size_t got = stream.read(room.data(), 1 + random() % max_out, read_more);
     if (got == 0) return out;
     out.append(room.data(), got);
   }

@@ -123,9 +123,9 @@ TEST_F(Grids, ReadsArchivesOfSeveralTilesAsMosaics) {
     std::sort(points.begin(), points.end());
     return points;
   };
-  const std::vector<Point3> wanted = read(files);
-  EXPECT_EQ(wanted.size(), 4u * 11 * 11 - 4 - 2 * 11);
-  EXPECT_EQ(read({path("srtm.zip")}), wanted);
+  const std::vector<Point3> expected = read(files);
+  EXPECT_EQ(expected.size(), 4u * 11 * 11 - 4 - 2 * 11);
+  EXPECT_EQ(read({path("srtm.zip")}), expected);
   EXPECT_EQ(open_one(path("srtm.zip"))->info().files, std::vector<std::string>{path("srtm.zip")});
   SourceOptions part;
   part.selection.region = Box3{{8.5, 46.5, -1e9}, {9.5, 46.7, 1e9}};
@@ -133,7 +133,7 @@ TEST_F(Grids, ReadsArchivesOfSeveralTilesAsMosaics) {
 
   // With another archive and an unpacked file.
   run("zip -q more.zip srtm/N46E009.hgt srtm/N48E010.hgt && zip -q first.zip srtm/N46E008.hgt");
-  EXPECT_EQ(read({path("first.zip"), path("srtm/N47E008.hgt"), path("more.zip")}), wanted);
+  EXPECT_EQ(read({path("first.zip"), path("srtm/N47E008.hgt"), path("more.zip")}), expected);
 
   // Errors name tiles of another size or without a place.
   put("srtm/N50E008.hgt", tile_of(21, 21));
@@ -163,12 +163,12 @@ TEST_F(Grids, ReadsArchivesOfVeryManyTilesOnce) {
                                  << "):\n"
                                     "        archive.writestr(f'{i}/N46E008.hgt', bytes(8))\n";
   run("python3 make.py");
-  const std::uint64_t before = bytes_read();
+  const std::uint64_t initial = bytes_read();
   const auto source = open_one(path("many.zip"));
   PointBlock block;
   ASSERT_TRUE(source->next(block));
   EXPECT_EQ(block.size(), 4u);
-  EXPECT_LT(bytes_read() - before, 100 * std::filesystem::file_size(path("many.zip")));
+  EXPECT_LT(bytes_read() - initial, 100 * std::filesystem::file_size(path("many.zip")));
 }
 
 TEST_F(Grids, RejectsDamagedArchives) {

@@ -30,10 +30,11 @@ std::filesystem::path data_folder() {
 }
 
 /// Reads a file and writes it again, which must not move anything.
-void copy_points(const std::string& from, const std::string& to, unsigned threads = 1) {
-  const auto source = open_source(std::span(&from, 1), {.threads = threads});
+void copy_points(const std::string& source_path, const std::string& target_path,
+                 unsigned threads = 1) {
+  const auto source = open_source(std::span(&source_path, 1), {.threads = threads});
   const auto writer = open_point_writer(
-      to, {.attributes = source->info().attributes, .lattice = lattice_of(source->info())},
+      target_path, {.attributes = source->info().attributes, .lattice = lattice_of(source->info())},
       {.replace = true});
   PointBlock block;
   while (source->next(block)) {
@@ -56,14 +57,14 @@ TEST(LasReal, RoundTripsEveryRecord) {
   const std::filesystem::path folder = data_folder();
   if (!std::filesystem::is_directory(folder)) GTEST_SKIP() << "no TERRACE_DATA";
   const TempFolder temp;
-  std::size_t seen = 0;
+  std::size_t files_read = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.path().extension() != ".las") continue;
     SCOPED_TRACE(entry.path().filename());
     EXPECT_EQ(records_through(entry.path(), temp), records_of(entry.path()));
-    ++seen;
+    ++files_read;
   }
-  EXPECT_GT(seen, 30U);
+  EXPECT_GT(files_read, 30U);
 }
 
 struct Survey {
@@ -122,10 +123,10 @@ TEST(LasReal, CompressedRecordsMatchLaszip) {
   std::ifstream table(TERRACE_TEST_DATA "/laz_facts.tsv");
   std::string name;
   std::uint64_t points = 0, hash = 0;
-  std::size_t seen = 0;
+  std::size_t files_read = 0;
   while (table >> name >> std::dec >> points >> std::hex >> hash) {
     SCOPED_TRACE(name);
-    ++seen;
+    ++files_read;
     std::filesystem::path file = folder / name;
     if (name.ends_with(".copc.laz")) {
       // Remove the mark of COPC, so that the file is read in its own order, not by its octree.
@@ -146,7 +147,7 @@ TEST(LasReal, CompressedRecordsMatchLaszip) {
     EXPECT_EQ(fnv1a(records_through("/proc/self/fd/" + std::to_string(fileno(pipe)), temp)), hash);
     pclose(pipe);
   }
-  EXPECT_EQ(seen, 26U);
+  EXPECT_EQ(files_read, 26U);
 }
 
 TEST(LasReal, CompressedTwinsHaveTheSameRecords) {

@@ -110,9 +110,9 @@ TEST_F(Las, ReadsTheCrsFromGeoTiffKeys) {
   const Crs crs = read_file(put_file("wkt.las", parts)).info.crs;
   EXPECT_EQ(crs.epsg, 0);
   EXPECT_EQ(crs.wkt, "PROJCS[\"x\"]");
-  Crs given;
-  given.epsg = 4326;
-  EXPECT_EQ(read_file(put_file("wkt.las", parts), {.crs = given}).info.crs, given);
+  Crs override_crs;
+  override_crs.epsg = 4326;
+  EXPECT_EQ(read_file(put_file("wkt.las", parts), {.crs = override_crs}).info.crs, override_crs);
 }
 
 TEST_F(Las, ReportsDamageInOneLine) {
@@ -177,14 +177,14 @@ TEST_F(Las, JoinsFilesWithEquivalentCrsIfTheCallerAgrees) {
   }
   const auto read = [&](const SourceOptions& options) { read_all(files, options); };
   EXPECT_NE(error_of([&] { read({}); }).find("1.las"), std::string::npos);
-  int asked = 0;
+  int calls = 0;
   SourceOptions options;
-  options.same_crs = [&asked](const Crs& a, const Crs& b) {
-    ++asked;
+  options.same_crs = [&calls](const Crs& a, const Crs& b) {
+    ++calls;
     return a.wkt.find("\"a\"") != a.wkt.npos && b.wkt.find("\"c\"") == b.wkt.npos;
   };
   EXPECT_NE(error_of([&] { read(options); }).find("3.las"), std::string::npos);
-  EXPECT_EQ(asked, 2);  // once per definition
+  EXPECT_EQ(calls, 2);  // once per definition
   files.pop_back();
   EXPECT_EQ(read_all(files, options).points.size(), 3u);
 }

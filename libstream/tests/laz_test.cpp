@@ -365,12 +365,13 @@ std::vector<Vlr> all_codings() {
 
 /// Decodes as from a pipe, giving `feed` more bytes and requesting up to `most` records at a time.
 ByteVector decoded_in_steps(Decoder& decoder, std::span<const std::byte> chunk, std::size_t length,
-                            std::size_t points, std::size_t feed, std::size_t most, bool layered) {
+                            std::size_t points, std::size_t feed, std::size_t max_points,
+                            bool layered) {
   ByteVector records(points * length);
   decoder.start(points);
   std::size_t used = 0, known = 0, done = 0;
   while (done < points) {
-    const std::size_t room = std::min(most, points - done);
+    const std::size_t room = std::min(max_points, points - done);
     const Decoder::Step step =
         decoder.step(chunk.subspan(used, known - used), known == chunk.size(),
                      std::span(records).subspan(done * length, room * length));
@@ -469,10 +470,10 @@ TEST(LazChunk, OmittedLayersKeepTheFirstPointsValue) {
   ByteVector chunk;
   Encoder(vlr).encode_chunk(records, chunk);
   parts.push_back({0, 0, 0});  // X, Y, returns and channel only
-  for (const Part& wanted : parts) {
+  for (const Part& selected : parts) {
     ByteVector expected = records;
     for (const Part& part : parts) {
-      if (part.attribute == wanted.attribute) continue;
+      if (part.attribute == selected.attribute) continue;
       for (std::size_t i = 1; i < count; ++i) {
         for (std::size_t b = part.at; b < part.at + part.size; ++b) {
           std::byte& byte = expected[i * length + b];
@@ -482,8 +483,8 @@ TEST(LazChunk, OmittedLayersKeepTheFirstPointsValue) {
       }
     }
     ByteVector decoded(records.size());
-    Decoder(vlr, wanted.attribute).decode_chunk(chunk, decoded);
-    EXPECT_TRUE(decoded == expected) << wanted.attribute;
+    Decoder(vlr, selected.attribute).decode_chunk(chunk, decoded);
+    EXPECT_TRUE(decoded == expected) << selected.attribute;
   }
 }
 

@@ -64,7 +64,7 @@ struct LazFile {
     point_format = at<std::uint8_t>(104) & 0x3f;
     points = minor >= 4 ? at<std::uint64_t>(247) : at<std::uint32_t>(107);
     std::size_t vlr_at = header_size;
-    for (auto left = at<std::uint32_t>(100); left > 0; --left) {
+    for (auto remaining = at<std::uint32_t>(100); remaining > 0; --remaining) {
       const std::size_t size = at<std::uint16_t>(vlr_at + 20);
       const auto* user = reinterpret_cast<const char*>(bytes.data() + vlr_at + 2);
       if (at<std::uint16_t>(vlr_at + 18) == Vlr::kRecordId &&

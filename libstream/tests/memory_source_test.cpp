@@ -62,16 +62,16 @@ TEST(MemorySource, DeliversPointsInOrderWithTheirAttributes) {
         open_memory(points_of_rows(rows), {.block_points = 1000, .blocks_ahead = ahead});
     EXPECT_EQ(source->info().points, rows.size());
     PointBlock block;
-    std::size_t seen = 0;
+    std::size_t row_number = 0;
     while (source->next(block)) {
       ASSERT_LE(block.size(), 1000U);
-      for (std::size_t i = 0; i < block.size(); ++i, ++seen) {
-        const PackedRow row = rows[seen];
+      for (std::size_t i = 0; i < block.size(); ++i, ++row_number) {
+        const PackedRow row = rows[row_number];
         EXPECT_EQ(block.positions[i], (Point3{double(row.x), double(row.y), row.z}));
         EXPECT_EQ(static_cast<std::uint8_t>(block.payload[i]), row.kind);
       }
     }
-    EXPECT_EQ(seen, rows.size());
+    EXPECT_EQ(row_number, rows.size());
   }
 }
 
@@ -89,17 +89,17 @@ TEST(MemorySource, SelectsPointsAndReadsColumnsBackwards) {
   const auto source = open_memory(std::move(points), options);
   EXPECT_EQ(source->info().crs.epsg, 32632);
   PointBlock block;
-  std::size_t seen = 0;
+  std::size_t row_number = 0;
   double last = std::numeric_limits<double>::infinity();
   while (source->next(block)) {
     for (const Point3& p : block.positions) {
       EXPECT_EQ(static_cast<int>(p[0]) % 7, 3);
       EXPECT_LT(p[0], last);
       last = p[0];
-      ++seen;
+      ++row_number;
     }
   }
-  EXPECT_EQ(seen, 357U);
+  EXPECT_EQ(row_number, 357U);
 }
 
 TEST(MemorySource, SkipsAndCountsPointsWithNaN) {

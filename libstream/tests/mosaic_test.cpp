@@ -97,16 +97,16 @@ TEST(Mosaic, TheLastValidSampleWinsAndEachCellIsOnePoint) {
     EXPECT_EQ(info.files, files.names());
     EXPECT_NEAR(info.world.xy[2], 7 + (static_cast<double>(left) + 0.5) * cell, 1e-9);
     EXPECT_NEAR(info.world.xy[5], 50 - (static_cast<double>(top) + 0.5) * cell, 1e-9);
-    Cells seen;
+    Cells cells;
     PointBlock block;
     while (source->next(block)) {
       for (const Point3& p : block.positions) {
         const auto c = static_cast<std::int64_t>(p[0]) + left;
         const auto r = static_cast<std::int64_t>(p[1]) + top;
-        ASSERT_TRUE(seen.insert({{c, r}, p[2]}).second) << "twice: " << c << ", " << r;
+        ASSERT_TRUE(cells.insert({{c, r}, p[2]}).second) << "twice: " << c << ", " << r;
       }
     }
-    ASSERT_EQ(seen, expected);
+    ASSERT_EQ(cells, expected);
     EXPECT_EQ(source->progress().points + source->progress().nodata, info.columns * info.rows);
   }
 }
@@ -153,10 +153,10 @@ class CountedRaster final : public Raster {
 TEST(Mosaic, KeepsFilesOpenWithinItsMemory) {
   for (const std::size_t room : {0u, 1u, 2u, 5u, 40u}) {
     SCOPED_TRACE(room);
-    std::size_t open = 0, most = 0;
+    std::size_t open = 0, max_open = 0;
     const RasterOpener opener = [&](const std::string& name) {
       auto raster = std::make_unique<CountedRaster>(name, open);
-      most = std::max(most, open);
+      max_open = std::max(max_open, open);
       return raster;
     };
     const auto mosaic = open_mosaic({"0", "1", "2", "3", "4", "5", "6", "7"}, opener, std::nullopt,
@@ -168,7 +168,7 @@ TEST(Mosaic, KeepsFilesOpenWithinItsMemory) {
     for (int round = 0; round < 3; ++round) {
       mosaic->read_over({.column = 0, .row = 0, .columns = 64, .rows = 8}, out);
     }
-    EXPECT_EQ(most, std::clamp<std::size_t>(room, 1, 8));
+    EXPECT_EQ(max_open, std::clamp<std::size_t>(room, 1, 8));
   }
 }
 
@@ -257,9 +257,9 @@ TEST(Mosaic, CrsMustAgreeUnlessTheCallerGivesIt) {
 }
 
 TEST(Mosaic, JoinsFilesOnBothSidesOfTheAntimeridian) {
-  std::list<Files> kept;
-  const auto joined = [&kept](const std::vector<double>& wests, bool degrees) {
-    Files& files = kept.emplace_back();
+  std::list<Files> all_files;
+  const auto joined = [&all_files](const std::vector<double>& wests, bool degrees) {
+    Files& files = all_files.emplace_back();
     for (const double west : wests) {
       TiffSpec spec = at(west, 20, 0.125);
       spec.more = [=](TIFF* tiff) {

@@ -46,7 +46,7 @@ struct Reading {
 class SyntheticRaster final : public Raster {
  public:
   SyntheticRaster(std::uint64_t columns, std::uint64_t rows, const WorldTransform& world,
-             Reading& reading)
+                  Reading& reading)
       : reading_(reading) {
     info_.files = {"made"};
     info_.columns = columns;
@@ -127,9 +127,10 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
     SourceOptions options{.block_points = 1 + random() % 900};
     options.memory_bytes = round % 2 == 0 ? 64u << 20 : 100'000;  // many windows
     Reading reading;
-    const auto whole =
+    const auto full_source =
         points_of(std::make_unique<SyntheticRaster>(columns, rows, world, reading), options);
-    const Box3 extent = world_box(whole->info(), {{0, 0, 0}, {double(columns), double(rows), 0}});
+    const Box3 extent =
+        world_box(full_source->info(), {{0, 0, 0}, {double(columns), double(rows), 0}});
     std::array<std::array<double, 2>, 2> sides{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const auto place = [&] {
@@ -140,16 +141,16 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
       if (sides[axis][0] > sides[axis][1]) std::swap(sides[axis][0], sides[axis][1]);
     }
     const Box3 region = flat_box(sides[0][0], sides[1][0], sides[0][1], sides[1][1]);
-    const std::vector<Point3> wanted = inside(world_points(*whole), region);
-    in_all += wanted.size();
-    without += wanted.empty() ? 1 : 0;
+    const std::vector<Point3> expected = inside(world_points(*full_source), region);
+    in_all += expected.size();
+    without += expected.empty() ? 1 : 0;
 
     reading = {};
     options.selection.region = region;
     const auto part =
         points_of(std::make_unique<SyntheticRaster>(columns, rows, world, reading), options);
     const std::vector<Point3> found = world_points(*part);
-    EXPECT_EQ(inside(found, region), wanted);
+    EXPECT_EQ(inside(found, region), expected);
     EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
     const Progress progress = part->progress();
     EXPECT_EQ(progress.points, found.size());
@@ -172,12 +173,12 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
 /// Overwrites the tiles of a GeoTIFF except those for which `kept` is true, so that reading them
 /// fails. Returns the number of tiles left.
 std::size_t damage_tiles(const std::filesystem::path& file,
-                         const std::function<bool(std::uint32_t, std::uint32_t)>& kept) {
+                         const std::function<bool(std::uint32_t, std::uint32_t)>& keeps) {
   struct Place {
     std::uint64_t offset, bytes;
   };
   std::vector<Place> damaged;
-  std::size_t left = 0;
+  std::size_t kept_tiles = 0;
   TIFFSetWarningHandler(nullptr);  // libtiff warns of tags that it does not know
   TIFF* const tiff = TIFFOpen(file.c_str(), "r");
   EXPECT_NE(tiff, nullptr);
@@ -186,8 +187,8 @@ std::size_t damage_tiles(const std::filesystem::path& file,
   TIFFGetField(tiff, TIFFTAG_TILEWIDTH, &side);
   const std::uint32_t across = (columns + side - 1) / side;
   for (std::uint32_t tile = 0; tile < TIFFNumberOfTiles(tiff); ++tile) {
-    if (kept(tile % across, tile / across)) {
-      ++left;
+    if (keeps(tile % across, tile / across)) {
+      ++kept_tiles;
     } else {
       damaged.push_back({TIFFGetStrileOffset(tiff, tile), TIFFGetStrileByteCount(tiff, tile)});
     }
@@ -199,7 +200,7 @@ std::size_t damage_tiles(const std::filesystem::path& file,
     bytes << std::string(place.bytes, '\xff');
   }
   EXPECT_TRUE(bytes.good());
-  return left;
+  return kept_tiles;
 }
 
 class RegionOfFiles : public ::testing::Test {
@@ -233,29 +234,29 @@ class RegionOfFiles : public ::testing::Test {
 TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAGeoTiff) {
   const std::string file = write("a.tif", 0);
   const Box3 region = flat_box(130, 400, 250, 500);  // columns 130 to 249, rows 140 to 239
-  const std::vector<Point3> wanted = inside(read({file}), region);
-  EXPECT_EQ(wanted.size(), 120u * 100);
-  const std::size_t left = damage_tiles(file, [](std::uint32_t across, std::uint32_t down) {
+  const std::vector<Point3> expected = inside(read({file}), region);
+  EXPECT_EQ(expected.size(), 120u * 100);
+  const std::size_t kept_tiles = damage_tiles(file, [](std::uint32_t across, std::uint32_t down) {
     return across >= 2 && across <= 3 && down >= 2 && down <= 3;
   });
-  EXPECT_EQ(left, 4u);
+  EXPECT_EQ(kept_tiles, 4u);
   EXPECT_THROW(read({file}), Error);
-  EXPECT_EQ(read({file}, region), wanted);
+  EXPECT_EQ(read({file}, region), expected);
 }
 
 TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAMosaic) {
   const std::vector<std::string> files{write("a.tif", 0), write("b.tif", kSide),
                                        write("c.tif", 2 * kSide)};
   const Box3 region = flat_box(kSide - 10, 600, kSide + 10, 620);
-  const std::vector<Point3> wanted = inside(read(files), region);
-  EXPECT_EQ(wanted.size(), 400u);
+  const std::vector<Point3> expected = inside(read(files), region);
+  EXPECT_EQ(expected.size(), 400u);
   damage_tiles(files[0],
                [](std::uint32_t across, std::uint32_t down) { return across == 9 && down == 0; });
   damage_tiles(files[1],
                [](std::uint32_t across, std::uint32_t down) { return across == 0 && down == 0; });
   damage_tiles(files[2], [](std::uint32_t, std::uint32_t) { return false; });
   EXPECT_THROW(read(files), Error);
-  EXPECT_EQ(read(files, region), wanted);
+  EXPECT_EQ(read(files, region), expected);
 }
 
 TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAVrtAndACog) {
@@ -264,8 +265,8 @@ TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAVrtAndACog) {
   const std::string vrt = (folder_.path() / "ab.vrt").string();
   output_of("gdalbuildvrt '" + vrt + "' '" + a + "' '" + b + "'");
   const Box3 region = flat_box(kSide - 10, 600, kSide + 10, 620);
-  const std::vector<Point3> wanted = inside(read({vrt}), region);
-  EXPECT_EQ(wanted.size(), 400u);
+  const std::vector<Point3> expected = inside(read({vrt}), region);
+  EXPECT_EQ(expected.size(), 400u);
 
   const std::string cog = (folder_.path() / "cog.tif").string();
   output_of("gdal_translate -of COG -co BLOCKSIZE=128 -co COMPRESS=DEFLATE '" + vrt + "' '" + cog +
@@ -277,14 +278,14 @@ TEST_F(RegionOfFiles, ReadsOnlyTheNecessaryTilesOfAVrtAndACog) {
                          }),
             2u);
   EXPECT_THROW(read({cog}), Error);
-  EXPECT_EQ(read({cog}, region), wanted);
+  EXPECT_EQ(read({cog}, region), expected);
 
   damage_tiles(a,
                [](std::uint32_t across, std::uint32_t down) { return across == 9 && down == 0; });
   damage_tiles(b,
                [](std::uint32_t across, std::uint32_t down) { return across == 0 && down == 0; });
   EXPECT_THROW(read({vrt}), Error);
-  EXPECT_EQ(read({vrt}, region), wanted);
+  EXPECT_EQ(read({vrt}, region), expected);
 }
 
 TEST(RasterRegion, AsciiGridGivesThePointsInside) {

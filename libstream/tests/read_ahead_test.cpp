@@ -24,8 +24,8 @@ namespace {
 /// Blocks of one point each, numbered; then the end, or an Error.
 class Counting final : public PointSource {
  public:
-  Counting(int blocks, bool fails, std::atomic<int>* made = nullptr)
-      : blocks_(blocks), fails_(fails), made_(made) {
+  Counting(int blocks, bool fails, std::atomic<int>* blocks_read = nullptr)
+      : blocks_(blocks), fails_(fails), blocks_read_(blocks_read) {
     info_.format = "counting";
   }
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
@@ -36,7 +36,7 @@ class Counting final : public PointSource {
       return false;
     }
     block.positions.push_back({static_cast<double>(next_++), 0, 0});
-    if (made_ != nullptr) *made_ = next_;
+    if (blocks_read_ != nullptr) *blocks_read_ = next_;
     return true;
   }
   [[nodiscard]] Progress progress() const override {
@@ -46,7 +46,7 @@ class Counting final : public PointSource {
  private:
   int blocks_, next_ = 0;
   bool fails_;
-  std::atomic<int>* made_;
+  std::atomic<int>* blocks_read_;
   SourceInfo info_;
 };
 
@@ -79,13 +79,13 @@ TEST(ReadAhead, ErrorsFollowTheBlocksBeforeThem) {
 }
 
 TEST(ReadAhead, ReadsNoFurtherThanRequestedAndStopsImmediately) {
-  std::atomic<int> made = 0;
+  std::atomic<int> blocks_read = 0;
   {
-    const auto source = read_ahead(std::make_unique<Counting>(1 << 30, false, &made), 4);
+    const auto source = read_ahead(std::make_unique<Counting>(1 << 30, false, &blocks_read), 4);
     PointBlock block;
     ASSERT_TRUE(source->next(block));
   }
-  EXPECT_LE(made, 1 + 4 + 1);
+  EXPECT_LE(blocks_read, 1 + 4 + 1);
 }
 
 /// Delivers a block, then waits until it is stopped.

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "read_pieces.hpp"
-#include "store_mending.hpp"
+#include "store_editing.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/store.hpp"

@@ -62,11 +62,11 @@ TEST(ScanReal, PointsMatchThePublishedFacts) {
   const auto folder = std::filesystem::path(data == nullptr ? "" : data) / "scan";
   if (data == nullptr || !std::filesystem::is_directory(folder)) GTEST_SKIP() << "no TERRACE_DATA";
   const TempFolder temp;
-  std::size_t seen = 0;
+  std::size_t files_read = 0;
   for (const Scan& scan : kScans) {
     SCOPED_TRACE(scan.file);
     if (!std::filesystem::exists(folder / scan.file)) continue;
-    ++seen;
+    ++files_read;
     const AllPoints all = read_scan(folder / scan.file);
     EXPECT_EQ(all.info.format, "ply");
     EXPECT_EQ(all.points.size(), scan.points);
@@ -93,7 +93,7 @@ TEST(ScanReal, PointsMatchThePublishedFacts) {
       EXPECT_EQ(copy.points.payload, all.points.payload);
     }
   }
-  EXPECT_GT(seen, 0u);
+  EXPECT_GT(files_read, 0u);
 }
 
 }  // namespace

@@ -119,16 +119,16 @@ TEST_F(Sidecars, WorldFilesGeoreferenceRastersThatAreNot) {
 
 TEST_F(Sidecars, InternalGeoreferencingOverridesAWorldFile) {
   put_full();
-  const std::array<double, 6> own{10, 0, 105, 0, -10, 195};
+  const std::array<double, 6> embedded{10, 0, 105, 0, -10, 195};
   put("f.tfw", "10\n0\n0\n-10\n105.0001\n195\n");
-  EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);
+  EXPECT_EQ(read_file(path("f.tif")).info.world.xy, embedded);
   EXPECT_EQ(read_file(path("f.tif")).info.note, "");
   put("f.tfw", "10\n0\n0\n-10\n115\n195\n");
-  EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);
+  EXPECT_EQ(read_file(path("f.tif")).info.world.xy, embedded);
   EXPECT_NE(read_file(path("f.tif")).info.note.find("f.tfw is ignored"), std::string::npos);
   // One that is ignored may be damaged.
   put("f.tfw", "10\n");
-  EXPECT_EQ(read_file(path("f.tif")).info.world.xy, own);
+  EXPECT_EQ(read_file(path("f.tif")).info.world.xy, embedded);
 }
 
 TEST_F(Sidecars, RejectsADamagedWorldFileThatIsNeeded) {

@@ -248,10 +248,11 @@ TEST_F(Source, ReadsStandardInputAndPipes) {
     int ends[2];
     ASSERT_EQ(pipe(ends), 0);
     std::thread writer([&] {
-      for (std::string_view left = text; !left.empty();) {
-        const ssize_t n = ::write(ends[1], left.data(), std::min<std::size_t>(left.size(), 777));
+      for (std::string_view unwritten = text; !unwritten.empty();) {
+        const ssize_t n =
+            ::write(ends[1], unwritten.data(), std::min<std::size_t>(unwritten.size(), 777));
         if (n <= 0) break;
-        left.remove_prefix(static_cast<std::size_t>(n));
+        unwritten.remove_prefix(static_cast<std::size_t>(n));
       }
       close(ends[1]);
     });

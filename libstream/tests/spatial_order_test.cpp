@@ -267,10 +267,10 @@ TEST(SpatialOrderTest, HoldsSmallBlocksTogether) {
        {std::pair{squares(100), Order::automatic}, std::pair{shuffled(1024), Order::automatic},
         std::pair{squares(100), Order::spatial}}) {
     for (const std::size_t block_points : {std::size_t{1}, std::size_t{600}}) {
-      auto made = std::make_unique<MadePoints>(kCount, place);
-      made->block_points(block_points);
+      auto points_source = std::make_unique<MadePoints>(kCount, place);
+      points_source->block_points(block_points);
       const auto source =
-          in_spatial_order(std::move(made), {.order = order, .block_points = kBlock});
+          in_spatial_order(std::move(points_source), {.order = order, .block_points = kBlock});
       Read found;
       std::uint64_t points = 0, room = 0;
       for (PointBlock block; source->next(block); block = {}) {
@@ -315,20 +315,20 @@ TEST(SpatialOrderTest, AStatedBoxAvoidsDividingTheOutermostBuckets) {
   Box3 box;
   for (std::uint64_t i = 0; i < kCount; i += 511) box.include(place(i));
   const auto ordered = [&](std::optional<Box3> stated) {
-    auto made = std::make_unique<MadePoints>(kCount, place);
-    made->state(kCount, stated);
-    const auto source =
-        in_spatial_order(std::move(made), {.order = Order::spatial, .block_points = kBlock});
+    auto points_source = std::make_unique<MadePoints>(kCount, place);
+    points_source->state(kCount, stated);
+    const auto source = in_spatial_order(std::move(points_source),
+                                         {.order = Order::spatial, .block_points = kBlock});
     Read read;
     for (PointBlock block; source->next(block);) read.blocks.push_back(block);
     expect_all(read, kCount, place);
     read.report = source->report();
     return read;
   };
-  const Read blind = ordered(std::nullopt), told = ordered(box);
-  EXPECT_LT(told.width(), 1.05 * blind.width());
+  const Read blind = ordered(std::nullopt), with_box = ordered(box);
+  EXPECT_LT(with_box.width(), 1.05 * blind.width());
   EXPECT_GT(blind.report.written_twice, kCount / 2);
-  EXPECT_LT(told.report.written_twice, kCount / 10);
+  EXPECT_LT(with_box.report.written_twice, kCount / 10);
   // A wrong or invalid box does no harm.
   Box3 far;
   far.include(Point3{1e9, 1e9, 1e9});

@@ -96,8 +96,8 @@ class StandInHierarchy {
       cluster(level);
     }
     Points& next = levels_[level];
-    const auto join = [](auto& to, const auto& from) {
-      to.insert(to.end(), from.begin(), from.end());
+    const auto join = [](auto& target, const auto& source) {
+      target.insert(target.end(), source.begin(), source.end());
     };
     join(next.positions, points.positions);
     join(next.payload, points.payload);

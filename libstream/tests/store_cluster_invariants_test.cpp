@@ -241,15 +241,15 @@ TEST(StoreInvariants, RefusesClustersThatTakeMuchMemory) {
   for (int i = 0; i < 4096; ++i) {
     schema.attributes.push_back(testing::channel(std::to_string(i)));
   }
-  const std::uint64_t most = store::Layout(schema, 0).max_points();
-  EXPECT_LE(most * schema.payload_size(), std::uint64_t{1} << 28);
+  const std::uint64_t max_points = store::Layout(schema, 0).max_points();
+  EXPECT_LE(max_points * schema.payload_size(), std::uint64_t{1} << 28);
   const TemporaryFolder folder;
   StoreWriter writer(folder.path() / "s", schema);
-  const std::vector<Point3> positions(most + 1);
-  std::vector<std::uint32_t> order(most + 1);
+  const std::vector<Point3> positions(max_points + 1);
+  std::vector<std::uint32_t> order(max_points + 1);
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const std::vector<std::byte> payload(positions.size() * schema.payload_size());
-  const std::vector<std::uint32_t> first{0, static_cast<std::uint32_t>(most + 1)},
+  const std::vector<std::uint32_t> first{0, static_cast<std::uint32_t>(max_points + 1)},
       none{kNoRepresentative};
   EXPECT_THROW(writer.finish({.level = 0,
                               .positions = positions,

@@ -18,10 +18,10 @@ using testing::OwnedBlock;
 using testing::StoreFiles;
 using testing::TemporaryFolder;
 
-TEST(StoreInvariants, MendingASoundStoreChangesNothing) {
+TEST(StoreInvariants, UpdatingTheChecksumsOfASoundStoreChangesNothing) {
   for (StoreFiles files : {testing::grid_files(), testing::cloud_files()}) {
     const StoreFiles before = files;
-    testing::mend(files);
+    testing::update_checksums(files);
     EXPECT_TRUE(files == before);
     testing::edit_page(files, 0, 1, [](std::vector<Entry>&, std::uint64_t&) {});
     EXPECT_TRUE(files == before);

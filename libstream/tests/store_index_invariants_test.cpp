@@ -126,11 +126,11 @@ TEST(StoreInvariants, FindsClustersThatAreNotContiguous) {
   testing::expect_unreadable(files, "beyond the end of the file");
   files = testing::grid_files();
   files["level-0.0.clusters"] += "more";
-  testing::mend(files);
+  testing::update_checksums(files);
   testing::expect_problem(files, "the clusters do not end where the file does");
 }
 
-/// Returns the store of a raster after edit(level 0) and mending.
+/// Returns the store of a raster after edit(level 0) and updating the checksums.
 StoreFiles with_edited_index(const std::function<void(testing::LevelBytes&)>& edit) {
   StoreFiles files = testing::grid_files();
   auto manifest = ordered_json::parse(files["manifest.json"]);
@@ -141,16 +141,17 @@ StoreFiles with_edited_index(const std::function<void(testing::LevelBytes&)>& ed
     segment["directory_bytes"] = level.directory_bytes;
   });
   files["manifest.json"] = manifest.dump(2) + "\n";
-  testing::mend(files);
+  testing::update_checksums(files);
   return files;
 }
 
-/// Returns the store of a raster after edit(parts of the index of level 0) and mending.
+/// Returns the store of a raster after edit(parts of the index of level 0) and updating the
+/// checksums.
 StoreFiles with_edited_parts(const std::function<void(testing::IndexParts&)>& edit) {
   return with_edited_index([&](testing::LevelBytes& level) {
     testing::IndexParts parts(level);
     edit(parts);
-    parts.put_together(level);
+    parts.assemble(level);
   });
 }
 
@@ -174,7 +175,7 @@ TEST(StoreInvariants, RefusesInvalidDirectories) {
     return [edit](testing::LevelBytes& level) {
       testing::IndexParts found(level);
       edit(found);
-      found.put_together(level);
+      found.assemble(level);
     };
   };
   const auto more = [](std::size_t bytes) -> Edit {

@@ -7,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "store_editing.hpp"
 #include "store_inputs.hpp"
-#include "store_mending.hpp"
 #include "store_testing.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/store.hpp"

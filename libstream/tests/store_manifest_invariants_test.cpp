@@ -171,7 +171,7 @@ TEST(StoreInvariants, VerifyFindsManifestsWithWrongKeysOrSummaries) {
     testing::edit_manifest(files, c.edit);
     testing::expect_problem(files, c.expected);
   }
-  // mend() recomputes these, so they are changed as text.
+  // update_checksums() recomputes these, so they are changed as text.
   StoreFiles files = testing::grid_files();
   std::string& text = files["manifest.json"];
   const std::size_t at = text.find("\"crc32\": \"") + 10;

@@ -322,12 +322,12 @@ TEST(StoreQuery, FindsOnlyPointsThatMeetTheCondition) {
   SCOPED_TRACE("seed " + std::to_string(seed));
   std::mt19937_64 random(seed);
   for (const double share : {0.0, 0.001, 0.5, 0.999, 1.0}) {
-    const double least =
+    const double threshold =
         sums[static_cast<std::size_t>(share * static_cast<double>(sums.size() - 1))];
-    const Store view = queried.store().where("sum > " + std::to_string(least));
+    const Store view = queried.store().where("sum > " + std::to_string(threshold));
     StoreQuery query(view, 1 << 16);
     const auto meets = [&](const Point3& p) {
-      return p[0] + p[1] + p[2] > std::stod(std::to_string(least));
+      return p[0] + p[1] + p[2] > std::stod(std::to_string(threshold));
     };
     for (int round = 0; round < 20; ++round) {
       const Box3 all = queried.store().bounds();

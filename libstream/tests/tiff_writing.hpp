@@ -84,12 +84,13 @@ inline void write_tiff(const std::filesystem::path& path, const TiffSpec& spec,
   std::uint32_t number = 0;
   for (std::uint32_t plane = 0; plane < planes; ++plane) {
     for (std::uint32_t top = 0; top < spec.rows; top += br) {
-      for (std::uint32_t left = 0; left < spec.columns; left += bc, ++number) {
+      for (std::uint32_t first_column = 0; first_column < spec.columns;
+           first_column += bc, ++number) {
         const std::uint32_t rows = tiled ? br : std::min(br, spec.rows - top);
         std::vector<std::byte> block(std::size_t{rows} * bc * side_by_side * size);
         for (std::uint32_t r = 0; r < rows && top + r < spec.rows; ++r) {
-          for (std::uint32_t c = 0; c < bc && left + c < spec.columns; ++c) {
-            const std::size_t cell = std::size_t{top + r} * spec.columns + left + c;
+          for (std::uint32_t c = 0; c < bc && first_column + c < spec.columns; ++c) {
+            const std::size_t cell = std::size_t{top + r} * spec.columns + first_column + c;
             std::memcpy(block.data() + (std::size_t{r} * bc + c) * side_by_side * size,
                         samples.data() + (cell * spec.bands + plane) * size, side_by_side * size);
           }

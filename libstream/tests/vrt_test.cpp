@@ -32,7 +32,7 @@ class Vrt : public ::testing::Test {
   }
   /// A GeoTIFF of random samples below `most`; nodata: its tag, if not empty.
   void put_tiff(const std::string& name, std::int64_t column, std::int64_t row,
-                std::uint32_t columns, std::uint32_t rows, const std::string& nodata, int most,
+                std::uint32_t columns, std::uint32_t rows, const std::string& nodata, int limit,
                 std::mt19937_64& random) const {
     TiffSpec spec;
     spec.columns = columns;
@@ -46,7 +46,7 @@ class Vrt : public ::testing::Test {
     };
     std::vector<std::int16_t> values(std::size_t{columns} * rows);
     for (std::int16_t& value : values) {
-      value = static_cast<std::int16_t>(random() % static_cast<unsigned>(most));
+      value = static_cast<std::int16_t>(random() % static_cast<unsigned>(limit));
     }
     write_tiff(path(name), spec, as_samples(values));
   }
@@ -63,8 +63,9 @@ class Vrt : public ::testing::Test {
     return "<SimpleSource><SourceFilename relativeToVRT=\"1\">" + name +
            "</SourceFilename><SourceBand>1</SourceBand>" + more + "</SimpleSource>";
   }
-  [[nodiscard]] static std::string rects(const std::string& from, const std::string& to) {
-    return "<SrcRect " + from + "/><DstRect " + to + "/>";
+  [[nodiscard]] static std::string rects(const std::string& source_rect,
+                                         const std::string& target_rect) {
+    return "<SrcRect " + source_rect + "/><DstRect " + target_rect + "/>";
   }
   TempFolder folder_;
 };
@@ -97,20 +98,20 @@ TEST_F(Vrt, CellsMatchGdal) {
               0);
     ASSERT_EQ(
         std::system(("gdal_translate -q '" + vrt + "' '" + tif + "' >/dev/null 2>&1").c_str()), 0);
-    const AllPoints wanted = read_file(tif);
+    const AllPoints expected = read_file(tif);
     AllPoints found = read_file(vrt, {.block_points = 1 + random() % 500});
     EXPECT_EQ(found.info.format, "vrt");
-    EXPECT_EQ(found.info.columns, wanted.info.columns);
-    EXPECT_EQ(found.info.rows, wanted.info.rows);
-    EXPECT_EQ(found.info.world.xy, wanted.info.world.xy);
+    EXPECT_EQ(found.info.columns, expected.info.columns);
+    EXPECT_EQ(found.info.rows, expected.info.rows);
+    EXPECT_EQ(found.info.world.xy, expected.info.world.xy);
     // Cells without a source are 0 in GDAL if the VRT has no nodata value; here they have no data.
-    std::vector<Point3> all = sorted_cells(wanted), some = sorted_cells(std::move(found));
-    if (wanted.info.nodata) {
-      EXPECT_EQ(some, all) << options;
+    std::vector<Point3> all = sorted_cells(expected), others = sorted_cells(std::move(found));
+    if (expected.info.nodata) {
+      EXPECT_EQ(others, all) << options;
     } else {
       std::erase_if(all, [](const Point3& cell) { return cell[2] == 0; });
-      std::erase_if(some, [](const Point3& cell) { return cell[2] == 0; });
-      EXPECT_EQ(some, all) << options;
+      std::erase_if(others, [](const Point3& cell) { return cell[2] == 0; });
+      EXPECT_EQ(others, all) << options;
     }
   }
 }
@@ -124,9 +125,9 @@ TEST_F(Vrt, ItsNodataOverridesThatOfItsFiles) {
   const std::vector<Point3> all = cells(path("all.tif"));
   ASSERT_EQ(all.size(), 200U);
   const auto without = [&](double value) {
-    std::vector<Point3> some = all;
-    std::erase_if(some, [&](const Point3& cell) { return cell[2] == value; });
-    return some;
+    std::vector<Point3> others = all;
+    std::erase_if(others, [&](const Point3& cell) { return cell[2] == value; });
+    return others;
   };
   const std::string body = "<SourceFilename relativeToVRT=\"1\">a.tif</SourceFilename>";
   // As gdalbuildvrt -srcnodata 5 writes it, with and without a nodata value of the VRT.
@@ -147,12 +148,13 @@ TEST_F(Vrt, MovesSlightlyMisalignedSourcesToTheNearestCells) {
   if (!has_gdal()) GTEST_SKIP() << "no GDAL here";
   std::mt19937_64 random(12);
   put_tiff("a.tif", 0, 0, 20, 10, "", 99, random);
-  for (const auto& [from, to] : std::vector<std::pair<std::string, std::string>>{
+  for (const auto& [source_rect, target_rect] : std::vector<std::pair<std::string, std::string>>{
            {"xOff='0' yOff='0' xSize='9' ySize='7'",
             "xOff='3.003' yOff='2.003' xSize='9' ySize='7'"},
            {"xOff='2.01' yOff='0' xSize='9' ySize='7'",
             "xOff='3' yOff='-0.02' xSize='9.001' ySize='7'"}}) {
-    const std::string vrt = put_vrt("<NoDataValue>-1</NoDataValue>" + source(rects(from, to)));
+    const std::string vrt =
+        put_vrt("<NoDataValue>-1</NoDataValue>" + source(rects(source_rect, target_rect)));
     ASSERT_EQ(
         std::system(("gdal_translate -q '" + vrt + "' '" + path("whole.tif") + "' >/dev/null 2>&1")
                         .c_str()),
@@ -165,8 +167,8 @@ TEST_F(Vrt, MovesSlightlyMisalignedSourcesToTheNearestCells) {
     EXPECT_TRUE(std::includes(all.begin(), all.end(), cells.begin(), cells.end()));
     EXPECT_NE(found.info.note.find("nearest"), std::string::npos) << found.info.note;
   }
-  const std::string whole = "xOff='1' yOff='0' xSize='9' ySize='7'";
-  EXPECT_EQ(read_file(put_vrt(source(rects(whole, whole)))).info.note, "");
+  const std::string full = "xOff='1' yOff='0' xSize='9' ySize='7'";
+  EXPECT_EQ(read_file(put_vrt(source(rects(full, full)))).info.note, "");
 }
 
 TEST_F(Vrt, ReadsACodeAsCrs) {
@@ -189,7 +191,7 @@ TEST_F(Vrt, ReadsACodeAsCrs) {
 TEST_F(Vrt, ReadsPartsOfSourcesScaleAndOffset) {
   std::mt19937_64 random(7);
   put_tiff("a.tif", 0, 0, 12, 10, "", 99, random);
-  const std::vector<Point3> whole = sorted_cells(read_file(path("a.tif")));
+  const std::vector<Point3> full = sorted_cells(read_file(path("a.tif")));
   const std::string file = put_vrt(
       "<NoDataValue>5</NoDataValue><Scale>0.5</Scale><Offset>100</Offset><UnitType>m</UnitType>" +
       source(rects("xOff='2' yOff='1' xSize='7' ySize='6'",
@@ -199,13 +201,13 @@ TEST_F(Vrt, ReadsPartsOfSourcesScaleAndOffset) {
   EXPECT_EQ(all.info.coordinates[2].offset, 100);
   EXPECT_EQ(all.info.coordinates[2].unit, "metre");
   EXPECT_EQ(all.info.nodata, 5);
-  std::vector<Point3> wanted;
-  for (const Point3& p : whole) {
+  std::vector<Point3> expected;
+  for (const Point3& p : full) {
     if (p[0] >= 2 && p[0] < 9 && p[1] >= 1 && p[1] < 7 && p[2] != 5) {
-      wanted.push_back({p[0] + 9, p[1] + 2, p[2]});
+      expected.push_back({p[0] + 9, p[1] + 2, p[2]});
     }
   }
-  EXPECT_EQ(sorted_cells(all), wanted);
+  EXPECT_EQ(sorted_cells(all), expected);
   EXPECT_EQ(world_point(all.info, {0, 0, 0}), (Point3{1005, 4995, 100}));
 }
 

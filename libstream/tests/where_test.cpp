@@ -115,9 +115,9 @@ class RandomExpressions {
     // Parentheses where needed, and sometimes elsewhere.
     const bool compares = op.precedence == 3 || op.precedence == 4;
     const auto side = [&](const Expression& e, bool right) {
-      const bool needed =
+      const bool needs_parentheses =
           e.precedence < op.precedence || (e.precedence == op.precedence && (right || compares));
-      return needed || below(5) == 0 ? "( " + e.text + " )" : e.text;
+      return needs_parentheses || below(5) == 0 ? "( " + e.text + " )" : e.text;
     };
     return {
         side(a, false) + op.sign + side(b, true), op.precedence,
@@ -172,7 +172,7 @@ TEST(Where, EvaluatesRandomConditions) {
 // If a point meets the condition, possible() must be true for its box and the ranges of its
 // attributes; otherwise it is often false.
 TEST(Where, ExcludesByRangesOnlyWhatIsImpossible) {
-  std::size_t told = 0, none = 0;
+  std::size_t excluded = 0, none = 0;
   for (std::uint64_t seed = 1; seed <= 3000; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Cloud cloud(1 + seed % 5, seed);
@@ -199,10 +199,10 @@ TEST(Where, ExcludesByRangesOnlyWhatIsImpossible) {
     ASSERT_TRUE(possible || !any);
     ASSERT_TRUE(where.possible(box, {}) || !possible);
     none += any ? 0 : 1;
-    told += possible ? 0 : 1;
+    excluded += possible ? 0 : 1;
   }
   EXPECT_GT(none, 500u);
-  EXPECT_GT(told, none / 2);
+  EXPECT_GT(excluded, none / 2);
 }
 
 TEST(Where, EvaluatesUsualConditions) {

@@ -19,8 +19,8 @@
 #include "store/read/directory.hpp"
 #include "store/read/index_page.hpp"
 
-/// Stores as bytes in memory that tests and fuzzers modify. mend() recomputes all checksums, so
-/// that the code after their checks is reached.
+/// Stores as bytes in memory that tests and fuzzers modify. update_checksums() recomputes all
+/// checksums, so that the code after their checks is reached.
 
 namespace terrace::stream::testing {
 
@@ -104,8 +104,8 @@ struct LevelBytes {
   }
 
  private:
-  Part part(std::uint64_t begin, std::uint64_t bytes, std::uint64_t least) const {
-    if (bytes < least || begin > index.size() || bytes > index.size() - begin)
+  Part part(std::uint64_t begin, std::uint64_t bytes, std::uint64_t min_bytes) const {
+    if (bytes < min_bytes || begin > index.size() || bytes > index.size() - begin)
       throw store::Damage("not in the file");
     return {static_cast<std::size_t>(begin), static_cast<std::size_t>(begin + bytes)};
   }
@@ -122,7 +122,7 @@ struct LevelBytes {
       contents.push_back(part(at, size, 4));
       at += size;
     }
-    for (auto left = in.varint(); left > 0; --left) {
+    for (auto remaining = in.varint(); remaining > 0; --remaining) {
       set_firsts.push_back(in.varint());
       sets.push_back(part(at, in.varint() + 4, 4));
       at = sets.back().end;
@@ -172,7 +172,7 @@ struct IndexParts {
     }
   }
   /// Sets the index and directory_bytes of `level`.
-  void put_together(LevelBytes& level) const {
+  void assemble(LevelBytes& level) const {
     std::string all_pages, all_contents, all_sets;
     store::Bytes directory;
     const auto append = [](std::string& to, const store::Bytes& bytes) {
@@ -209,29 +209,29 @@ struct IndexParts {
   }
 };
 
-inline void mend_cluster_checksums(LevelBytes& level, std::size_t page) {
+inline void update_cluster_checksums(LevelBytes& level, std::size_t page) {
   const Part part = level.page_parts[page];
   try {
     const store::Tables tables = level.tables_of(page);
     const store::DecodingTables decoding(tables);
     const std::uint32_t clusters = level.clusters_of(page);
     store::CodedPage coded = store::read_page(level.bytes(part), clusters, level.layout, decoding);
-    std::uint64_t from = coded.offset;
+    std::uint64_t begin = coded.offset;
     for (std::uint32_t i = 0; i < clusters; ++i) {
       const std::uint64_t size = coded.entries.column(store::PageColumns::kBytes)[i];
-      const bool there = from <= level.data.size() && size <= level.data.size() - from;
+      const bool exists = begin <= level.data.size() && size <= level.data.size() - begin;
       const auto* const bytes = reinterpret_cast<const std::uint8_t*>(level.data.data());
       coded.entries.column(store::PageColumns::kChecksum)[i] =
-          there ? level.layout.checksum({bytes + from, static_cast<std::size_t>(size)})
-                : std::uint16_t{0};
-      from += size;
+          exists ? level.layout.checksum({bytes + begin, static_cast<std::size_t>(size)})
+                 : std::uint16_t{0};
+      begin += size;
     }
-    store::Bytes fresh;
+    store::Bytes encoded;
     store::PageContent{coded.offset, coded.entries,
                        store::read_ranges(coded.ranges, clusters, level.layout, decoding)}
-        .write(level.layout, store::EncodingTables(tables), fresh);
-    if (fresh.size() == part.end - part.begin) {
-      std::memcpy(&level.index[part.begin], fresh.data(), fresh.size());
+        .write(level.layout, store::EncodingTables(tables), encoded);
+    if (encoded.size() == part.end - part.begin) {
+      std::memcpy(&level.index[part.begin], encoded.data(), encoded.size());
     }
   } catch (const store::Damage&) {
     return;  // not a page
@@ -276,14 +276,14 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
 
 /// Corrects sizes and checksums: of clusters, pages, directories, files and the manifest. Files too
 /// damaged to locate their parts stay as they are.
-inline void mend(StoreFiles& files) {
+inline void update_checksums(StoreFiles& files) {
   std::string& text = files[kManifestName];
   auto manifest = nlohmann::ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!manifest.is_object()) return;
   for_each_level(files, manifest, [](LevelBytes& level, nlohmann::ordered_json& segment) {
     for (std::size_t page = 0; page < level.page_parts.size(); ++page) {
       level.sign_page(page);
-      mend_cluster_checksums(level, page);
+      update_cluster_checksums(level, page);
     }
     for (const Part& part : level.contents) sign(level.index, part.begin, part.end);
     for (const Part& part : level.sets) sign(level.index, part.begin, part.end);
@@ -302,17 +302,17 @@ inline void mend(StoreFiles& files) {
   text.replace(text.size() - kDigitsFromEnd, 8, checksum);
 }
 
-/// Calls edit(manifest) and mends the store.
+/// Calls edit(manifest) and updates the checksums.
 inline void edit_manifest(StoreFiles& files,
                           const std::function<void(nlohmann::ordered_json&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
   edit(manifest);
   files[kManifestName] = manifest.dump(2) + "\n";
-  mend(files);
+  update_checksums(files);
 }
 
 /// Calls edit(entries, offset of the first in the data file) for a page of a level, writes the
-/// result, moves the bytes after it, and mends the store.
+/// result, moves the bytes after it, and updates the checksums.
 inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
                       const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
@@ -327,16 +327,16 @@ inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
     for (std::uint32_t i = 0; i < old.clusters(); ++i) entries.push_back(old.entry(i));
     std::uint64_t offset = old.offset(0);
     edit(entries, offset);
-    store::Bytes fresh;
+    store::Bytes encoded;
     store::PageContent{offset, store::PageColumns(entries), old.ranges(bytes.layout, decoding)}
-        .write(bytes.layout, store::EncodingTables(tables), fresh);
+        .write(bytes.layout, store::EncodingTables(tables), encoded);
     IndexParts parts(bytes);
-    parts.pages[page].bytes.assign(fresh.begin(), fresh.end());
-    parts.put_together(bytes);
+    parts.pages[page].bytes.assign(encoded.begin(), encoded.end());
+    parts.assemble(bytes);
     segment["directory_bytes"] = bytes.directory_bytes;
   });
   files[kManifestName] = manifest.dump(2) + "\n";
-  mend(files);
+  update_checksums(files);
 }
 
 }  // namespace terrace::stream::testing
