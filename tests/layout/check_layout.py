@@ -53,7 +53,6 @@ SHORT_FILES = {
     'libmatching/src/assignment/scan_kernels_avx512.cpp': VECTORS,
     'libmatching/src/assignment/scan_kernels_portable.cpp': VECTORS,
     'libstream/include/terrace/stream/point.hpp': 'the type that all public headers share',
-    'libstream/src/format/chain.hpp': 'how formats open several files',
     'libstream/src/format/input_files.hpp': EXPANSION,
     'libstream/src/format/mesh/triangles.hpp': 'the triangles of all mesh formats',
     'libstream/src/format/raster_points.hpp': 'how raster formats open files',
