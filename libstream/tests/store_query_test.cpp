@@ -418,7 +418,7 @@ TEST(StoreView, CountsOnlyPointsThatMeetTheCondition) {
     EXPECT_EQ(text == "sum == sum" && left_out > 0, false);
     EXPECT_EQ(text == "sum > 150 && sum < 150.5" && left_out == 0, false);
   }
-  // A view of a view; an empty condition; one that no point meets; and an invalid one.
+  // A view of a view, an empty condition, a condition that no point meets, and an invalid one.
   const Store both = store.where("sum > 150 || x < 5").where("y < 30 || z < 1");
   EXPECT_EQ(
       StoreQuery(both).count(store.bounds()),

@@ -37,8 +37,9 @@ struct Axis {
   double scale = 1, offset = 0;
 };
 
-/// The number of parts into which to divide the first scale so that the values of all axes are
-/// multiples of the result, counted from the first offset; nullopt if more than kMaxParts.
+/// Returns the number of parts into which to divide the first scale so that the values of all axes
+/// are multiples of the result, counted from the first offset. Returns nullopt if it is more than
+/// kMaxParts.
 std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
   const Axis& first = axes.front();
   std::uint64_t parts = 1;

@@ -45,8 +45,8 @@ const Format* format_of_name(const std::string& file);
 
 /// Determines the format by options.format, else by content, else by ending. A file with a known
 /// ending but unknown content goes to that ending's reader, which can best report what is wrong.
-/// Throws: Error for other formats, with a remedy for common ones; std::invalid_argument for an
-/// unknown options.format; Stopped.
+/// Throws: Error for other formats, with a remedy for common ones. Throws: std::invalid_argument
+/// for an unknown options.format. Throws: Stopped.
 const Format& format_of(const std::string& file, const SourceOptions& options);
 /// The format that unpacks files itself and has this file's double ending, such as ".hgt.zip";
 /// nullptr if none.

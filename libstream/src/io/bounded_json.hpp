@@ -17,8 +17,8 @@ struct JsonLimits {
 };
 
 /// Parses JSON in time linear in its bytes. (nlohmann's parser with a callback walks a whole list
-/// at the end of each of its objects.) refuse: called with the cause if a limit is exceeded; must
-/// throw. Throws: nlohmann::json::parse_error, and out_of_range for a number too large for a
+/// at the end of each of its objects.) refuse: called with the cause if a limit is exceeded, and
+/// must throw. Throws: nlohmann::json::parse_error, and out_of_range for a number too large for a
 /// double.
 nlohmann::json parse_bounded_json(std::string_view text, const JsonLimits& limits,
                                   const std::function<void(const char* cause)>& refuse);

@@ -389,8 +389,8 @@ class Layered {
   }
 
   /// Determines the channels whose models and last values the items after the point use. Version 3
-  /// keeps two errors of the original software: if the channel does not change, it uses channel 0's
-  /// models; if it changes, it reads and replaces the last value of the previous channel.
+  /// keeps two errors of the original software. If the channel does not change, it uses channel 0's
+  /// models. If it changes, it reads and replaces the last value of the previous channel.
   void place_items(Point& point, bool channel_changed) {
     const bool is_fixed = layout_.version >= 4;
     const auto model_channel =

@@ -20,8 +20,8 @@ struct NodataRule {
   std::int64_t low_integer = 1, high_integer = 0;  ///< of integers except u64
   std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< of u64
 
-  /// Parses a file's text (GDAL_NODATA) for samples of `type`, as GDAL does: accepts "nan", "inf"
-  /// and "-inf" in any case and decimals for integer samples ("-9999.0"); floats match within two
+  /// Parses a file's text (GDAL_NODATA) for samples of `type`, as GDAL does. Accepts "nan", "inf"
+  /// and "-inf" in any case, and decimals for integer samples ("-9999.0"). Floats match within two
   /// units in the last place. Returns an empty range for an empty or unreadable text.
   static NodataRule parse(const std::string& text, ScalarType type);
 };

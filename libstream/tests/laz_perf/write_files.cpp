@@ -18,8 +18,8 @@
 
 namespace {
 
-/// Writes a wavy surface with the attributes of a point format to a file, whose ending determines
-/// the format; or to COPC with a given number of nodes per page.
+/// Writes a wavy surface with the attributes of a point format to a file. The ending determines the
+/// format, and COPC gets a given number of nodes per page.
 void write_scan(const std::filesystem::path& file, unsigned format, std::size_t points,
                 std::size_t page_nodes = 0) {
   using namespace terrace::stream;

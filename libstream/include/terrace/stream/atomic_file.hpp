@@ -84,7 +84,7 @@ struct Naming {
 ///     file.commit();
 ///
 /// Every failure throws an Error that names the target, including a full disk and a file size limit
-/// (SIGXFSZ is blocked); some are found only by `commit()`. Not thread-safe.
+/// (SIGXFSZ is blocked). Some are found only by `commit()`. Not thread-safe.
 class AtomicFile {
  public:
   /// Throws: Error if `target` exists and may not be replaced, if it exists and is not a regular

@@ -49,8 +49,8 @@ std::uint64_t geotiff_table_bytes(const GeoTiffOptions& options);
 /// (see AtomicFile). Memory: the table of tiles, one row of tiles if written by rows, and with
 /// several threads two uncompressed tiles for each.
 ///
-/// With overviews it is a Cloud Optimized GeoTIFF (OGC 21-026): each overview has half the columns
-/// and rows of the one below, down to 512 x 512 cells; all directories precede the tiles, and the
+/// With overviews it is a Cloud Optimized GeoTIFF (OGC 21-026). Each overview has half the columns
+/// and rows of the one below, down to 512 x 512 cells. All directories precede the tiles, and the
 /// smallest overview comes first. Until commit() ends, the tiles are kept in an unnamed temporary
 /// file next to the target, which takes the same disk space again. Unfinished tiles of overviews
 /// are held in memory: one per overview if tiles are written in quadtree order, half a row of tiles

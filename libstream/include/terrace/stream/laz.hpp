@@ -15,7 +15,7 @@
 ///
 /// A LAZ file (point format byte + 128) has a LASzip VLR among its VLRs. Where the records of a LAS
 /// file would begin, it has 8 bytes with the chunk table's position in the file (int64), then the
-/// chunks without gaps, then the table; with Compressor::pointwise it has the chunk only. A
+/// chunks without gaps, then the table. With Compressor::pointwise it has only the chunk. A
 /// position of -1 means that the table's position is in the last 8 bytes of the file instead. The
 /// field's own position means that the writer stopped before it wrote the table.
 ///

@@ -40,8 +40,8 @@ class OverlayWriter {
   OverlayWriter& operator=(OverlayWriter&&) noexcept;
 
   /// Adds a value. Values must come in ascending order of cluster ids, and of indices within a
-  /// cluster. Throws: std::invalid_argument if out of order, for a value that is not finite, and
-  /// for a point that the store does not have; Error if the file cannot be written or the store is
+  /// cluster. Throws: std::invalid_argument if the value is out of order or not finite, or if the
+  /// store does not have the point. Throws: Error if the file cannot be written or the store is
   /// damaged.
   void add(ClusterId cluster, std::uint32_t index, double value);
   /// Values added so far.

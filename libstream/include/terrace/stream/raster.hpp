@@ -79,7 +79,7 @@ struct RasterOptions {
 };
 
 /// Fractions of a cell. A mosaic's member whose cells are off those of the whole by up to
-/// kNearestCell is placed on the nearest cells; a note says so if they are off by more than
+/// kNearestCell is placed on the nearest cells. A note reports it if they are off by more than
 /// kSameCell.
 inline constexpr double kNearestCell = 0.05, kSameCell = 1e-3;
 
@@ -87,9 +87,9 @@ inline constexpr double kNearestCell = 0.05, kSameCell = 1e-3;
 /// integers and floats of up to 64 bits, any band. Overviews are skipped. Never maps the file.
 ///
 /// `world` maps to the sample's position, which is the centre of the cell for PixelIsArea. A file
-/// without georeferencing is placed by its world file (.tfw, .tifw, .wld); without that it is a
-/// plain grid of unit cells with y = -row, which a comment reports. A file whose georeferencing is
-/// only several tie points is refused. Throws: Error.
+/// without georeferencing is placed by its world file (.tfw, .tifw, .wld). Without a world file it
+/// is a plain grid of unit cells with y = -row, which a comment reports. A file whose
+/// georeferencing is only several tie points is refused. Throws: Error.
 std::unique_ptr<Raster> open_geotiff(const std::string& file, const RasterOptions& options = {});
 
 /// Reopens a member of a mosaic.
@@ -112,7 +112,7 @@ std::unique_ptr<Raster> open_mosaic(const std::vector<std::string>& files,
 /// Delivers the cells of a raster as points (see Schema::grid), in tiles that are square on the
 /// ground, of at most `options.block_points` cells, one block each. The raster is read in windows
 /// of at least about 16 x 16 tiles, fewer if they would not fit into three quarters of
-/// `options.memory_bytes`; within a window the tiles follow a Hilbert curve. Memory beyond 64 MiB
+/// `options.memory_bytes`. Within a window the tiles follow a Hilbert curve. Memory beyond 64 MiB
 /// does not enlarge the window, so more memory does not change the order. 64-bit integers have the
 /// attribute "sample".
 std::unique_ptr<PointSource> points_of(std::unique_ptr<Raster> raster,

@@ -165,9 +165,9 @@ struct Schema : Placement {
   }
 };
 
-/// Returns how far a region is widened on each side along x and y, in units of the CRS: for a
-/// raster a millionth of a cell, because the computed positions of its columns and rows are
-/// rounded; for points 0.
+/// Returns how far a region is widened on each side along x and y, in units of the CRS. It is 0 for
+/// points, and a millionth of a cell for a raster, because the computed positions of columns and
+/// rows are rounded.
 [[nodiscard]] std::array<double, 2> border_tolerance(const Schema& schema);
 
 }  // namespace terrace::stream

@@ -126,8 +126,9 @@ struct Selection {
 enum class HeightsOfColour : std::uint8_t { none, mapbox, terrarium };
 
 /// Called for each damaged part of a LAS, LAZ, COPC or EPT that is left out (a chunk, a node, the
-/// missing end of a truncated file), with the number of points it should have had; 0 if it holds no
-/// points. Called by the thread that reads. Damage that affects all points is still thrown.
+/// missing end of a truncated file), with the number of points that it should have had, which is 0
+/// for a part without points. Called by the thread that reads. Damage that affects all points is
+/// still thrown.
 using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
 /// The parts of a file that a source delivers. Entities of several corners are delivered as points:

@@ -66,8 +66,8 @@ class OrderedSource : public PointSource {
 ///
 /// The result depends only on the points, their order, the stated box and the options. Memory,
 /// which reading_bytes() includes: 262,144 points of the window or the next part, with at most 32
-/// additional bytes each; a quarter as many on their way to the buckets, or 262,144 for each part
-/// ahead; and 8 MiB for the buckets. Cost: O(n log n); points are written and read once, beyond
+/// additional bytes each. A quarter as many are on their way to the buckets, or 262,144 for each
+/// part ahead. The buckets take 8 MiB. Cost: O(n log n); points are written and read once, beyond
 /// some 60 million twice. next() throws Error (of the source, or of the temporary file, for example
 /// if the disk is full) and Stopped.
 [[nodiscard]] std::unique_ptr<OrderedSource> in_spatial_order(std::unique_ptr<PointSource> source,

@@ -171,10 +171,10 @@ class Store {
   /// Returns a view: the same store restricted to the points that meet a condition (see Where).
   /// bounds() is their bounding box, read() and for_each() mark them, and StoreQuery finds only
   /// them; numbers of points, clusters and bytes are still those of the whole store. The points of
-  /// a level of a view are the level's points that meet the condition; a representative that does
-  /// not is left out, even if points below it do. Called on a view, combines both conditions; an
-  /// empty condition gives the same store. Copies share the bounds once they are known. Throws:
-  /// Error that names the character of a bad condition.
+  /// a level of a view are the level's points that meet the condition. A representative that does
+  /// not meet it is left out, even if points below it do. Called on a view, combines both
+  /// conditions; an empty condition gives the same store. Copies share the bounds once they are
+  /// known. Throws: Error that names the character of a bad condition.
   [[nodiscard]] Store where(const std::string& condition) const;
   /// The condition of a view, otherwise null. Valid as long as a copy of the view exists.
   [[nodiscard]] const Where* condition() const;

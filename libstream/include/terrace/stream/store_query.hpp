@@ -147,9 +147,9 @@ class StoreQuery {
 
   /// Cuts the hierarchy below the root at the border of a box. Calls take(head, branch) for
   /// clusters that are completely inside and for those of level 0 on the border, until it returns
-  /// false; head is null if the point does not meet the condition of a view. Opens a cluster on the
-  /// border only if opens(branch) is true. In a store of one block, every point is a branch without
-  /// other descendants.
+  /// false. `head` is null if the point does not meet the condition of a view. Opens a cluster on
+  /// the border only if opens(branch) is true. In a store of one block, every point is a branch
+  /// without other descendants.
   template <class Take, class Opens>
   void cut(const Box3& box, const Take& take, const Opens& opens);
 

@@ -20,10 +20,10 @@ inline constexpr std::uint16_t kCopcInfo = 1, kCopcHierarchy = 1000;
 /// Sizes of the info and of a node's entry in the hierarchy.
 inline constexpr std::size_t kCopcInfoBytes = 160, kCopcEntryBytes = 32;
 
-/// Reads the whole hierarchy. info: the payload of the info VLR; first_chunk: offset of the first
-/// chunk in the file; points: how many its header promises. Memory: 56 bytes per node.
-/// Throws: Error unless pages and nodes are inside the file, no page is referred to twice, no two
-/// nodes have the same key or share bytes, and the nodes have exactly that many points.
+/// Reads the whole hierarchy. info: the payload of the info VLR. first_chunk: offset of the first
+/// chunk in the file. points: the number in the header. Memory: 56 bytes per node. Throws: Error
+/// unless pages and nodes are inside the file, no page is referred to twice, no two nodes have the
+/// same key or share bytes, and the nodes have exactly that many points.
 Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::uint64_t first_chunk,
                            std::uint64_t points);
 

@@ -16,8 +16,8 @@
 namespace terrace::stream {
 
 /// A TIFF file opened for reading by libtiff, without memory mapping and without output on standard
-/// error, with bounded allocations; positioned at the first directory that is not an overview or a
-/// mask.
+/// error, with bounded allocations. It is positioned at the first directory that is not an overview
+/// or a mask.
 class GeoTiffHandle {
  public:
   /// `memory_bytes`: limit of a single allocation by libtiff for decoding.

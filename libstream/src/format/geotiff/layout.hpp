@@ -60,7 +60,7 @@ bool is_native(const PackedSamples& packed);
 
 /// Widens `count` packed samples to native values; the first is sample number `first` of the row
 /// `from`, each further one `step` samples later. Integers of odd widths are packed from the
-/// highest bit on, as in GDAL; so are those of 24 bits, although libtiff swaps their bytes in files
+/// highest bit on, as in GDAL. That includes 24 bits, although libtiff swaps their bytes in files
 /// of the other byte order. Floats of 16 and 24 bits are in native byte order.
 void unpack_samples(const PackedSamples& packed, const std::byte* from, std::size_t first,
                     std::size_t step, std::size_t count, std::byte* out);

@@ -21,9 +21,9 @@ struct GeoTiffLevel {
   [[nodiscard]] std::size_t tiles() const { return std::size_t{across} * down; }
 };
 
-/// The raster and its overviews, each with half the columns and rows of the previous one (rounded
-/// up), down to the first with at most 512 x 512 cells; only the raster if options.overviews is
-/// GeoTiffOverviews::none.
+/// Returns the raster and its overviews, each with half the columns and rows of the previous one
+/// (rounded up), down to the first with at most 512 x 512 cells. Returns only the raster if
+/// options.overviews is GeoTiffOverviews::none.
 std::vector<GeoTiffLevel> levels_of(const GeoTiffOptions& options);
 
 /// Computes the tiles of overviews from those of the raster, which may come in any order. Holds the

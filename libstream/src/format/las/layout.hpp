@@ -27,7 +27,7 @@ enum class LasFormats : std::uint8_t { all, newer };
 
 /// Assigns attributes to the fields of the same name, and other attributes to extra bytes. The
 /// point format is the smallest suitable one of 6, 7 and 8, or of 0 to 3 if the angles are ranks as
-/// in LAS 1.0 to 1.3; either way, records that were read are reproduced exactly. If only newer
+/// in LAS 1.0 to 1.3. Either way, records that were read are reproduced exactly. If only newer
 /// formats are allowed, ranks become scan angles. Wave packets become extra bytes too, because the
 /// waveforms are not copied. Throws: Error naming `file` for more attributes than fit.
 LasLayout las_layout(std::span<const Channel> attributes, const std::string& file,

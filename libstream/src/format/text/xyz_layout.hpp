@@ -29,7 +29,8 @@ struct TextLayout {
 /// The fields of a line. If tabs do not give as many fields as there are columns, runs of blanks
 /// and tabs separate them, as in a table aligned by hand.
 std::vector<std::string_view> split_row(std::string_view line, const TextLayout& layout);
-/// ';' if the line has one, else ',' if it has one, else ' '; text in double quotes is ignored.
+/// Returns ';' if the line has one, else ',' if it has one, else ' '. Ignores text in double
+/// quotes.
 char separator_of(std::string_view line);
 /// True for a line that starts with '#' or "//" (after trim_left).
 bool is_comment(std::string_view line);

@@ -159,8 +159,8 @@ class SymbolEncoder {
   void numbers(unsigned first, std::span<const std::uint64_t> numbers, const std::uint8_t* classes,
                const std::uint32_t* slots);
   /// Appends the byte string. last: a number below 2^16 that the decoder finds in its final state,
-  /// which is kLow + last; without raw bits it is `last` itself, because the end of the string then
-  /// shows that no words are left.
+  /// which is kLow + last. Without raw bits the state is `last` itself, because the end of the
+  /// string shows that no words are left.
   void finish(std::uint32_t last, Bytes& out) { finish({this, 1}, {&last, 1}, out); }
   /// Number of clusters that are best finished together.
   static constexpr std::size_t kBatch = 4;

@@ -82,9 +82,9 @@ inline constexpr unsigned kHeight = kSplitWide + 24;
 inline constexpr unsigned kHeightSteps = 32;
 inline constexpr unsigned kAttribute = kHeight + 2 * kHeightSteps;
 /// Contexts of an attribute: its head (number form, several values or one), its first value, and
-/// eight by magnitude, or for ColumnKind::recent four by position and four by magnitude; then four
-/// for differences between lines and four for points of one pulse, of which the guide uses three
-/// for its steps.
+/// eight by magnitude. ColumnKind::recent uses four of these by position and four by magnitude.
+/// Four more are for differences between lines and four for points of one pulse, of which the guide
+/// uses three for its steps.
 inline constexpr unsigned kPerAttribute = 18;
 inline constexpr unsigned kBetweenLines = 10;
 inline constexpr unsigned kWithinPulse = 14;

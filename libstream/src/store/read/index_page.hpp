@@ -12,8 +12,8 @@
 namespace terrace::stream::store {
 
 /// Returns the maximum bytes of a page of thirteen columns and two for each attribute. A column has
-/// a shift and a number per cluster, each of at most 81 bits; two varints, the states of two
-/// strings of symbols and a checksum take the rest.
+/// a shift and a number per cluster, each of at most 81 bits. The rest is for two varints, the
+/// states of two strings of symbols and a checksum.
 constexpr std::uint64_t max_page_bytes(std::size_t attributes) {
   return 32 + (13 + 2 * std::uint64_t{attributes}) * 11 * (1 + kMaxPageClusters);
 }
