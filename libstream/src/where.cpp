@@ -379,7 +379,7 @@ class Ranges {
   static ValueRange comparison(const ValueRange& a, const ValueRange& b, bool sure, bool never) {
     return truth(!sure || a.nan || b.nan, !never);
   }
-  /// The smallest range with these ends; any value if one of them is not finite.
+  /// Returns the smallest range with these ends; any value if one of them is not finite.
   static ValueRange hull(std::initializer_list<double> ends, bool nan) {
     ValueRange range{std::min(ends), std::max(ends), nan};
     for (const double end : ends) {

@@ -57,7 +57,7 @@ std::string info_of(std::uint64_t page_bytes, double half_size = 8, double spaci
   return info;
 }
 
-/// The octree of a file with these consecutive pages.
+/// Returns the octree of a file with these consecutive pages.
 Octree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uint64_t points,
                  const std::string& info = {}) {
   std::string file(kFirstPage, '\0');

@@ -153,7 +153,7 @@ TEST(Ept, RejectsLazNodesThatDisagree) {
   EXPECT_NE(read(3, 0.5).find("scale or offset"), std::string::npos);
 }
 
-/// A copy of the data set with nodes of plain records.
+/// Returns a copy of the data set with nodes of plain records.
 std::string write_by_schema(const fs::path& source, const fs::path& folder, bool zstandard) {
   Json metadata = Json::parse(read_text(source / "ept.json"));
   metadata["dataType"] = zstandard ? "zstandard" : "binary";

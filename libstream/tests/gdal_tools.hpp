@@ -17,7 +17,7 @@ inline bool has_gdal() {
   return found;
 }
 
-/// The output of a command.
+/// Returns the output of a command.
 inline std::string output_of(const std::string& command) {
   std::string text;
   FILE* const pipe = popen((command + " 2>/dev/null").c_str(), "r");

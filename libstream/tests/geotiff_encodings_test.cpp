@@ -403,7 +403,7 @@ TEST(GeoTiffEncodings, ReadsOddWidthsThatGdalWrites) {
   }
 }
 
-/// The definition of the IEEE 754 formats, in powers of two.
+/// Returns the value of a small float by the definition of IEEE 754, in powers of two.
 double small_float(std::uint32_t bits, int exponent_bits, int mantissa_bits) {
   const std::uint32_t mantissa = bits & ((1u << mantissa_bits) - 1);
   const int max_exponent = (1 << exponent_bits) - 1;

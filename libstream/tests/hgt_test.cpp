@@ -34,7 +34,7 @@ TEST_F(Grids, SrtmTilesMatchGdal) {
   EXPECT_EQ(open_one(path("N48W125.hgt.gz"))->info().format, "hgt");
 }
 
-/// A square tile of side n, sample = column + 100 * row, with a void in the middle.
+/// Returns a square tile of side n, sample = column + 100 * row, with a void in the middle.
 std::string tile_of(int columns, int rows) {
   std::string bytes;
   for (int r = 0; r < rows; ++r) {

@@ -61,7 +61,7 @@ struct LasParts {
   }
 };
 
-/// The point records of a LAS file.
+/// Returns the point records of a LAS file.
 inline std::string records_of(const std::filesystem::path& file) {
   const std::string bytes = read_text(file);
   std::uint32_t offset = 0, old_points = 0;

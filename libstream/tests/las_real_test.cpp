@@ -45,7 +45,7 @@ void copy_points(const std::string& source_path, const std::string& target_path,
   EXPECT_EQ(writer->rounding(), 0.0);
 }
 
-/// The records of a file that was read and written again.
+/// Returns the records of a file that was read and written again.
 std::string records_through(const std::filesystem::path& file, const TempFolder& temp,
                             unsigned threads = 1) {
   const std::string path = temp.path() / "copy.las";

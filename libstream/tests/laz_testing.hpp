@@ -136,7 +136,7 @@ inline ByteVector scanned_records(unsigned format, std::size_t length, std::size
   return records;
 }
 
-/// A complete LAZ file of records, in chunks of vlr.chunk_size points.
+/// Returns a complete LAZ file of records, in chunks of vlr.chunk_size points.
 inline ByteVector laz_file(unsigned format, const Vlr& vlr, std::span<const std::byte> records) {
   const std::size_t header_size = format >= 6 ? 375 : 227, length = vlr.record_length();
   const ByteVector payload = vlr.serialise();

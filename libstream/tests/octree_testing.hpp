@@ -28,7 +28,8 @@ inline constexpr Box3 kEverywhere{{-kInfinity, -kInfinity, -kInfinity},
 /// A place in the CRS and a hash of the packed attributes.
 using Record = std::pair<Point3, std::size_t>;
 
-/// The records inside a region, sorted, so that they are equal for the same points in any order.
+/// Returns the records inside a region, sorted, so that they are equal for the same points in any
+/// order.
 inline std::vector<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
   std::vector<Record> found;
   const std::size_t bytes = all.info.payload_size();

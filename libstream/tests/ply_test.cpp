@@ -117,8 +117,8 @@ TEST_F(Ply, ReadsEveryTypeInEveryEncoding) {
   }
 }
 
-/// A file with everything that must be skipped: elements of fixed size and with lists before the
-/// vertices, a list among the vertices' properties, and faces after them.
+/// Returns a file with everything that must be skipped: elements of fixed size and with lists
+/// before the vertices, a list among the vertices' properties, and faces after them.
 std::string crowded(const std::string& encoding) {
   PlyText ply(encoding);
   ply.header("element camera 2").header("property float fov").header("property uchar id");

@@ -65,7 +65,7 @@ inline std::string read_text(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// The message of the Error thrown by `act`; empty if there is none.
+/// Returns the message of the Error thrown by `act`; empty if there is none.
 template <class Act>
 std::string error_of(Act&& act) {
   try {
@@ -82,7 +82,7 @@ inline bool same_bits(std::span<const Point3> a, std::span<const Point3> b) {
          (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
 }
 
-/// A double of any finite bit pattern, or one with few decimals, as people write them.
+/// Returns a double of any finite bit pattern, or one with few decimals, as people write them.
 inline double any_double(std::mt19937_64& random) {
   switch (random() % 4) {
     case 0:

@@ -79,7 +79,7 @@ struct LevelBytes {
     const auto* const begin = reinterpret_cast<const std::uint8_t*>(index.data());
     return {begin + part.begin, begin + part.end};
   }
-  /// The tables of the page's first cluster. Throws: Damage.
+  /// Returns the tables of the page's first cluster. Throws: Damage.
   [[nodiscard]] store::Tables tables_of(std::size_t page) const {
     std::size_t set = 0;
     while (set + 1 < sets.size() && set_firsts[set + 1] <= layout.page_clusters() * page) ++set;

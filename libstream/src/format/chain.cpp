@@ -181,7 +181,8 @@ class Chain final : public PointSource {
     std::uint64_t bytes = 0;
   };
 
-  /// The source with only the attributes that the selection needs, in the order of the first file.
+  /// Returns the source with only the attributes that the selection needs, in the order of the
+  /// first file.
   [[nodiscard]] std::unique_ptr<PointSource> with_needed_attributes(
       std::unique_ptr<PointSource> source) const {
     // Select before the flags of withheld points are dropped, so that those points are counted.

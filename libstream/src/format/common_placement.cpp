@@ -23,7 +23,8 @@ constexpr std::uint64_t kMaxParts = 10'000;
 
 bool is_whole(double steps) { return std::abs(steps - std::round(steps)) <= kSameStep; }
 
-/// The smallest number of parts for which near(steps * parts) holds; nullopt beyond kMaxParts.
+/// Returns the smallest number of parts for which near(steps * parts) holds; nullopt beyond
+/// kMaxParts.
 template <class Near>
 std::optional<std::uint64_t> parts_of(double steps, const Near& near) {
   for (std::uint64_t parts = 1; parts <= kMaxParts; ++parts) {
@@ -59,8 +60,8 @@ std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
   return parts;
 }
 
-/// The first axis with its scale divided into parts. The quotient is rounded, so an equal scale of
-/// another axis is used in its place.
+/// Returns the first axis with its scale divided into parts. The quotient is rounded, so an equal
+/// scale of another axis is used in its place.
 Axis cut(std::span<const Axis> axes, std::uint64_t parts) {
   Axis cut = axes.front();
   cut.scale /= static_cast<double>(parts);
@@ -106,7 +107,7 @@ std::optional<Lattice> common_lattice(std::span<const Lattice> lattices, const B
   return common;
 }
 
-/// The lattice of int32 coordinates, which can be moved; nullopt for other types.
+/// Returns the lattice of int32 coordinates, which can be moved; nullopt for other types.
 std::optional<Lattice> movable_lattice(const Placement& placement) {
   for (const Channel& coordinate : placement.coordinates) {
     if (coordinate.type != ScalarType::i32) return std::nullopt;

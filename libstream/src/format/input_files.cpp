@@ -66,7 +66,7 @@ Error unlisted(const std::string& pattern) {
   return {pattern, "the folders of the pattern cannot be listed"};
 }
 
-/// The paths that match a pattern without "**".
+/// Returns the paths that match a pattern without "**".
 std::vector<std::string> matches_of(const std::string& pattern) {
   std::vector<std::string> names;
   ::glob_t found{};
@@ -77,7 +77,7 @@ std::vector<std::string> matches_of(const std::string& pattern) {
   return names;
 }
 
-/// The position of a path component "**"; npos if there is none.
+/// Returns the position of a path component "**"; npos if there is none.
 std::size_t find_stars(const std::string& pattern) {
   for (std::size_t at = pattern.find("**"); at != pattern.npos; at = pattern.find("**", at + 1)) {
     const std::size_t end = at + 2;
@@ -98,8 +98,8 @@ std::string literal(const std::string& name) {
   return pattern;
 }
 
-/// The paths that match in a folder and in the folders below it, except in hidden ones. folder:
-/// ends with '/', or is empty for the current folder.
+/// Returns the paths that match in a folder and in the folders below it, except in hidden ones.
+/// folder: ends with '/', or is empty for the current folder.
 std::vector<std::string> matches_below(const std::string& folder, const std::string& pattern) {
   std::vector<std::string> names = matches_of(literal(folder) + pattern);
   std::error_code error;

@@ -44,7 +44,7 @@ struct Octree {
 
   [[nodiscard]] Box3 box(const OctreeNode& node) const;
   [[nodiscard]] std::uint64_t points() const;
-  /// The public description of the nodes.
+  /// Returns the public description of the nodes.
   [[nodiscard]] OctreeInfo info() const;
   /// Sorts the nodes. Returns a duplicate node, or nullptr if there is none.
   const OctreeNode* arrange();

@@ -24,7 +24,8 @@ void decode_coordinate(const PackedColumn& column, Point3* points, std::size_t a
 /// `target` may be the rows themselves.
 void decode_values(const PackedColumn& column, std::byte* target, std::size_t target_stride);
 
-/// The value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to negative.
+/// Returns the value of an integer type at `raw`; negative ones keep their sign, uint64 wraps to
+/// negative.
 std::int64_t to_integer(const std::byte* raw, ScalarType type);
 
 /// Reads the number that starts at `at` as `type` and stores it at `raw`. Integers may be written

@@ -39,9 +39,9 @@ struct RecordParts {
   std::function<std::unique_ptr<PartReader>()> make_reader{};
 };
 
-/// The records of the parts, in order, read by up to options.threads threads, a few parts ahead of
-/// the current one and within options.memory_bytes. Null if several threads would not help and
-/// there is no handler for damage, or if the memory does not suffice.
+/// Returns the records of the parts, in order, read by up to options.threads threads, a few parts
+/// ahead of the current one and within options.memory_bytes. Null if several threads would not help
+/// and there is no handler for damage, or if the memory does not suffice.
 std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const SourceOptions& options);
 /// Like parts_ahead(), but on the caller's thread and in small pieces: a part's records are never
 /// all in memory, however many points it has.

@@ -218,7 +218,7 @@ class RecordSource final : public PointSource {
     for (std::size_t i = 0; i < marks.size(); ++i) withheld_ += marks[i] != 0 ? 1 : 0;
   }
 
-  /// The scale and offset from stored coordinates to the CRS.
+  /// Returns the scale and offset from stored coordinates to the CRS.
   [[nodiscard]] std::array<double, 2> scale_and_offset(std::size_t axis) const {
     const std::array<double, 6>& xy = stream_.info.world.xy;
     const Channel& z = stream_.info.coordinates[2];

@@ -142,7 +142,7 @@ bool has_word(std::string_view words, std::string_view word) {
   return false;
 }
 
-/// The format recognised by the first bytes of a file (4,096 or all); nullptr if none.
+/// Returns the format recognised by the first bytes of a file (4,096 or all); nullptr if none.
 const ForeignFormat* foreign_format_of_content(std::string_view head) {
   // Text may begin with the byte order mark of UTF-8 and may be indented.
   std::string_view text = head;
@@ -156,7 +156,7 @@ const ForeignFormat* foreign_format_of_content(std::string_view head) {
   return nullptr;
 }
 
-/// The format of an ending in lower case such as ".laz"; nullptr if none.
+/// Returns the format of an ending in lower case such as ".laz"; nullptr if none.
 const ForeignFormat* foreign_format_of_ending(std::string_view ending) {
   if (ending.empty()) return nullptr;
   for (const ForeignRow& row : kForeignFormats) {
@@ -169,7 +169,7 @@ std::string ending_of(const std::filesystem::path& file) {
   return lower_case(file.extension().string());
 }
 
-/// The format with that file ending; nullptr if there is none.
+/// Returns the format with that file ending; nullptr if there is none.
 const Format* format_of_ending(const std::string& ending) {
   for (const Format& format : formats()) {
     const auto& known = format.endings;

@@ -5,7 +5,7 @@
 
 #include "terrace/stream/source.hpp"
 
-/// The registry of formats. Its entries are each defined in the source file of their format.
+/// The registry of formats. Each entry is defined in the source file of its format.
 
 namespace terrace::stream {
 
@@ -40,7 +40,7 @@ const Format& png_format();
 /// Text with one point per line: XYZ, CSV and the like.
 const Format& xyz_format();
 
-/// The format of a file's ending (".csv.gz" counts as ".csv"); nullptr if none.
+/// Returns the format of a file's ending (".csv.gz" counts as ".csv"); nullptr if none.
 const Format* format_of_name(const std::string& file);
 
 /// Determines the format by options.format, else by content, else by ending. A file with a known
@@ -48,10 +48,10 @@ const Format* format_of_name(const std::string& file);
 /// Throws: Error for other formats, with a remedy for common ones. Throws: std::invalid_argument
 /// for an unknown options.format. Throws: Stopped.
 const Format& format_of(const std::string& file, const SourceOptions& options);
-/// The format that unpacks files itself and has this file's double ending, such as ".hgt.zip";
-/// nullptr if none.
+/// Returns the format that unpacks files itself and has this file's double ending, such as
+/// ".hgt.zip"; nullptr if none.
 const Format* packed_format_of(const std::string& file);
-/// The names of all formats, or of those with a capability, with commas.
+/// Returns the names of all formats, or of those with a capability, with commas.
 std::string names_of_formats(bool Format::*capability = nullptr);
 
 }  // namespace terrace::stream

@@ -16,12 +16,12 @@ namespace terrace::stream {
 std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
                                           const SourceOptions& options);
 
-/// The source with only the attributes among `names`, in the order of `names`.
+/// Returns the source with only the attributes among `names`, in the order of `names`.
 std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source,
                                              const std::vector<std::string>& names,
                                              std::size_t block_points);
 
-/// The attributes that are kept or named by the condition: no others need to be read.
+/// Returns the attributes that are kept or named by the condition: no others need to be read.
 /// Throws: Error for an invalid condition.
 std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& wanted);
 

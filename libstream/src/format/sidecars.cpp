@@ -109,7 +109,7 @@ XmlElement read_pam(const std::string& file) {
   });
 }
 
-/// A sidecar's element for the band; nullptr if it has none.
+/// Returns a sidecar's element for the band; nullptr if it has none.
 const XmlElement* band_of(const XmlElement& root, const RasterOptions& options) {
   // The sidecar describes the colours, not the heights that are decoded from them.
   if (options.heights_of_colour != HeightsOfColour::none) return nullptr;

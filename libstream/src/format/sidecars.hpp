@@ -23,8 +23,9 @@ struct WorldFile {
   WorldTransform world;
 };
 
-/// The world file of a raster, under the names that GDAL looks for: NAME.tfw, NAME.tifw or NAME.wld
-/// for NAME.tif, in lower or upper case. nullopt if there is none. Throws: Error if it is damaged.
+/// Returns the world file of a raster, under the names that GDAL looks for: NAME.tfw, NAME.tifw or
+/// NAME.wld for NAME.tif, in lower or upper case. nullopt if there is none. Throws: Error if it is
+/// damaged.
 std::optional<WorldFile> world_file_of(const std::string& file);
 
 /// Georeferences a raster that is not georeferenced itself (see kNoGeoreferencing) by its world

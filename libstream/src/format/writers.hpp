@@ -58,7 +58,7 @@ std::unique_ptr<MeshWriter> open_obj_writer(const std::string& path, const MeshH
 std::unique_ptr<MeshWriter> open_glb_writer(const std::string& path, const MeshHeader& header,
                                             const WriterOptions& options);
 
-/// The local origin of a GLB file whose vertices are in `bounds`.
+/// Returns the local origin of a GLB file whose vertices are in `bounds`.
 Point3 glb_origin(const Box3& bounds);
 /// Returns the value that a GLB file stores for a coordinate whose unit is `metres` long. Not
 /// inline: where GCC 12 vectorises it and widens the result again immediately, it drops the

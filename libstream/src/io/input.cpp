@@ -101,7 +101,7 @@ class Input::Descriptor {
   [[nodiscard]] bool skip(std::uint64_t count) const {
     return ::lseek(fd_, static_cast<off_t>(count), SEEK_CUR) >= 0;
   }
-  /// The size of a regular file; otherwise nullopt.
+  /// Returns the size of a regular file; otherwise nullopt.
   [[nodiscard]] std::optional<std::uint64_t> size() const { return size_; }
 
  private:

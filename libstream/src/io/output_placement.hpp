@@ -59,7 +59,8 @@ void publish_all(std::span<OutputPlacement* const> outputs);
 /// Returns the Error for an output that may not replace the existing file or folder of its name.
 Error already_exists(std::string file);
 
-/// The remedy for an error of a system call that creates or writes a file; empty if none is known.
+/// Returns the remedy for an error of a system call that creates or writes a file; empty if none is
+/// known.
 std::string remedy_for(int error_number);
 
 /// Syncs a folder. Does nothing if the folder cannot be read, or if its file system does not

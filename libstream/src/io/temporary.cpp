@@ -55,7 +55,7 @@ bool is_number_of_writer(std::string_view text) {
          (attempt.empty() || std::all_of(attempt.begin() + 1, attempt.end(), is_digit));
 }
 
-/// The temporary files of `target`, complete or partial, without their endings.
+/// Returns the temporary files of `target`, complete or partial, without their endings.
 std::set<std::string> temporaries_of(const fs::path& target) {
   const std::string prefix = prefix_of(target);
   std::set<std::string> names;
@@ -75,7 +75,7 @@ fs::path with_ending(const fs::path& path, const char* ending) {
   return fs::path(path).concat(ending);
 }
 
-/// The lock of a temporary file; not exclusive if its writer is or may be alive.
+/// Returns the lock of a temporary file; not exclusive if its writer is or may be alive.
 FileLock lock_of_dead(const fs::path& temporary) {
   std::error_code error;
   const fs::file_status status = fs::symlink_status(temporary, error);

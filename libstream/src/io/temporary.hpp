@@ -16,9 +16,10 @@ inline constexpr const char* kManifestName = "manifest.json";
 inline constexpr const char* kLockEnding = ".lock";
 inline constexpr const char* kReplacedEnding = "-old";
 
-/// The folder that contains or will contain `target`, a path that does not end in a symbolic link.
+/// Returns the folder that contains or will contain `target`, a path that does not end in a
+/// symbolic link.
 std::filesystem::path folder_of(const std::filesystem::path& target);
-/// The name of this process's temporary file for `target`; `attempt` distinguishes several.
+/// Returns the name of this process's temporary file for `target`; `attempt` distinguishes several.
 std::string temporary_name(const std::filesystem::path& target, int attempt);
 
 /// Cleans up after dead writers of `target`: a folder that was moved aside and whose name is still

@@ -160,7 +160,7 @@ struct GpsTime {
   std::uint64_t advance(std::int32_t delta) {
     return time[current] += static_cast<std::uint64_t>(static_cast<std::int64_t>(delta));
   }
-  /// The nearest multiple, rounded as in LASzip, so that the bytes are the same.
+  /// Returns the nearest multiple, rounded as in LASzip, so that the bytes are the same.
   static unsigned multiple_symbol(std::int32_t delta, std::int32_t step) {
     const double ratio = static_cast<float>(delta) / static_cast<float>(step);
     const double bounded = std::clamp(ratio, kMinMultiple - 1.0, kMaxMultiple + 1.0);

@@ -311,7 +311,8 @@ class Layered {
     return (number == 1 ? 1 : 0) + (number >= returns ? 2 : 0) + (models.time_changed ? 4 : 0);
   }
 
-  /// The changes of a record to encode; 0 in decoding. last: the previous record of any channel.
+  /// Returns the changes of a record to encode; 0 in decoding. last: the previous record of any
+  /// channel.
   TERRACE_LAZ_INLINE unsigned input_changes(Record record, const std::uint8_t* last) const {
     if constexpr (Coder::kDecoding) return 0;
     unsigned mask = 0;

@@ -19,7 +19,8 @@ class JsonValue {
   static JsonValue parse(std::string_view text);
 
   [[nodiscard]] Kind kind() const { return kind_; }
-  /// The value of a key, of the last one if there are several. Throws: Damage if there is none.
+  /// Returns the value of a key, of the last one if there are several. Throws: Damage if there is
+  /// none.
   [[nodiscard]] const JsonValue& at(std::string_view key) const;
 
   // These throw Damage if the value is of another kind.
@@ -27,9 +28,9 @@ class JsonValue {
   [[nodiscard]] const std::vector<JsonValue>& items() const;
   [[nodiscard]] const std::string& string() const;
   [[nodiscard]] bool boolean() const;
-  /// A number, correctly rounded; also throws if it is too large for a double.
+  /// Returns the number, correctly rounded. Also throws if it is too large for a double.
   [[nodiscard]] double number() const;
-  /// A number written as an integer from 0 to 2^64 - 1.
+  /// Returns the number. Also throws unless it is written as an integer from 0 to 2^64 - 1.
   [[nodiscard]] std::uint64_t count() const;
 
  private:

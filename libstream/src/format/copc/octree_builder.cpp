@@ -24,7 +24,7 @@ constexpr unsigned kDeepestLeaf = kCellBits - kSpanBits;
 constexpr unsigned kDepthsAtOnce = 2;
 constexpr std::size_t kChildren = 8;
 
-/// The number of the child that contains the cell, in a node at `depth`.
+/// Returns the number of the child that contains the cell, in a node at `depth`.
 std::size_t child_of(const std::array<std::uint32_t, 3>& cell, unsigned depth) {
   const unsigned shift = kCellBits - 1 - depth;
   return ((cell[0] >> shift) & 1U) | ((cell[1] >> shift) & 1U) << 1U |

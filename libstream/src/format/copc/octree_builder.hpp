@@ -65,7 +65,7 @@ class OctreeBuilder {
   struct Subtree;
 
   [[nodiscard]] std::array<std::uint32_t, 3> cell_of(const std::byte* record) const;
-  /// The record of an item, followed by its number.
+  /// Returns the record of an item, followed by its number.
   [[nodiscard]] std::span<const std::byte> record_of(const NodePoints& points,
                                                      const Item& item) const;
   /// Takes the records out of a bucket and computes their items.

@@ -34,7 +34,7 @@ std::string_view text_of_bytes(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-/// The smallest cube around the records' points, starting at their lowest corner.
+/// Returns the smallest cube around the records' points, starting at their lowest corner.
 Octree cube_around(const LasRecords& records) {
   const Lattice& lattice = records.lattice();
   Box3 box;

@@ -109,7 +109,7 @@ struct EptNodes {
   LasHeader first;
 };
 
-/// The file of a node's points.
+/// Returns the file of a node's points.
 std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData data,
                                     const OctreeNode& node) {
   const char* const ending = data == EptData::laszip   ? ".laz"

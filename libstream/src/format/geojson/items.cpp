@@ -59,7 +59,7 @@ Error GeoJsonItems::fault(std::string cause, std::size_t ahead) const {
       .remedy("the file is damaged or not GeoJSON: export it again, e.g. by ogr2ogr");
 }
 
-/// The byte at a position of the window, which grows as needed; 0 at the end of the input.
+/// Returns the byte at a position of the window, which grows as needed; 0 at the end of the input.
 char GeoJsonItems::at(std::size_t place) {
   window_ = input_->window();
   if (place < window_.size()) return window_[place];

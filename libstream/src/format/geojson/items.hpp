@@ -23,13 +23,13 @@ class GeoJsonItems {
   /// feature. Throws: Error, Stopped.
   GeoJsonItems(Input& input, std::size_t max_bytes, bool wants_crs);
 
-  /// The text of the next object; nullopt at the end. Valid until the next call. Throws: Error
-  /// naming file and byte, Stopped.
+  /// Returns the text of the next object; nullopt at the end. Valid until the next call. Throws:
+  /// Error naming file and byte, Stopped.
   [[nodiscard]] std::optional<std::string_view> next();
   /// Offset in the file of the object last returned by next().
   [[nodiscard]] std::uint64_t offset() const { return input_->offset(); }
-  /// The collection's member "crs" (GeoJSON of 2008), otherwise longitude and latitude of WGS 84.
-  /// A different member after the features is an error, because it comes too late.
+  /// Returns the collection's member "crs" (GeoJSON of 2008), otherwise longitude and latitude of
+  /// WGS 84. A different member after the features is an error, because it comes too late.
   [[nodiscard]] const Crs& crs() const { return crs_; }
 
  private:

@@ -34,7 +34,7 @@ void append_size(std::string& out, bool big, std::uint64_t value) {
   }
 }
 
-/// The shortest text that reads back as the same number.
+/// Returns the shortest text that reads back as the same number.
 std::string shortest(double value) {
   if (std::isnan(value)) return "nan";
   std::array<char, 32> text{};

@@ -22,9 +22,9 @@ class TiffDirectory {
   void add(std::uint32_t tag, const std::vector<double>& values);
   void add(std::uint32_t tag, const std::string& text);
 
-  /// The directory for offset `at`, which must be even, followed by its values. next: offset of the
-  /// next directory, 0 after the last. The length is even and depends only on the numbers of
-  /// values. Unless `big`, all offsets must fit 32 bits.
+  /// Returns the directory for offset `at`, which must be even, followed by its values. next:
+  /// offset of the next directory, 0 after the last. The length is even and depends only on the
+  /// numbers of values. Unless `big`, all offsets must fit 32 bits.
   [[nodiscard]] std::string bytes(bool big, std::uint64_t at, std::uint64_t next) const;
 
  private:
@@ -39,11 +39,12 @@ class TiffDirectory {
   std::map<std::uint16_t, Entry> entries_;  ///< in ascending order, as TIFF requires
 };
 
-/// The header of a TIFF whose first directory is at offset `first`: 8 bytes, or 16 if `big`.
+/// Returns the header of a TIFF whose first directory is at offset `first`: 8 bytes, or 16 if
+/// `big`.
 std::string tiff_head(bool big, std::uint64_t first);
 
-/// The tags of the raster (level 0) or of an overview of that size, without those that say where
-/// its tiles are.
+/// Returns the tags of the raster (level 0) or of an overview of that size, without those that say
+/// where its tiles are.
 TiffDirectory tags_of(const GeoTiffOptions& options, unsigned level, std::uint32_t columns,
                       std::uint32_t rows);
 

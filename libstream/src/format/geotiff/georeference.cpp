@@ -29,7 +29,7 @@ WorldTransform shifted(WorldTransform world, double shift) {
   return world;
 }
 
-/// The value of attribute `name` in the text of an XML tag.
+/// Returns the value of attribute `name` in the text of an XML tag.
 std::string_view attribute(std::string_view tag, std::string_view name) {
   const std::string pattern = std::string(" ").append(name).append("=\"");
   const std::size_t begin = tag.find(pattern);
@@ -53,7 +53,7 @@ std::optional<double> number_in(std::string_view text) {
   return value;
 }
 
-/// The file's own georeferencing; nullopt if it has none, or only ground control points.
+/// Returns the file's own georeferencing; nullopt if it has none, or only ground control points.
 std::optional<WorldTransform> embedded_transform(const GeoTiffHandle& handle, const GeoKeys& keys,
                                                  std::vector<std::string>& comments) {
   const auto matrix = handle.doubles(kModelTransformation);

@@ -46,7 +46,7 @@ class GeoTiffHandle {
   [[nodiscard]] std::vector<double> doubles(std::uint32_t tag) const;
   [[nodiscard]] std::vector<std::uint16_t> shorts(std::uint32_t tag) const;
   [[nodiscard]] std::string text(std::uint32_t tag) const;
-  /// A scalar field, or its default value according to the TIFF specification.
+  /// Returns a scalar field, or its default value according to the TIFF specification.
   template <class T>
   [[nodiscard]] T value_or(std::uint32_t tag, T otherwise) const {
     T value = otherwise;

@@ -36,7 +36,7 @@ class GeoKeys {
   std::vector<std::string> faults_;
 };
 
-/// The coordinate reference system named by the keys; user-defined codes count as none.
+/// Returns the coordinate reference system named by the keys; user-defined codes count as none.
 Crs crs_of(const GeoKeys& keys);
 
 /// Collects GeoKeys to write; they must be added in ascending order.
@@ -59,9 +59,9 @@ class GeoKeyDirectory {
   std::string ascii_;
 };
 
-/// The keys that describe a CRS and its units. raster_type: kPixelIsArea or kPixelIsPoint for a
-/// raster, nullopt for points. A vertical unit without a vertical CRS is written only for points,
-/// because the samples of a raster state their own unit.
+/// Returns the keys that describe a CRS and its units. raster_type: kPixelIsArea or kPixelIsPoint
+/// for a raster, nullopt for points. A vertical unit without a vertical CRS is written only for
+/// points, because the samples of a raster state their own unit.
 GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type);
 
 }  // namespace terrace::stream

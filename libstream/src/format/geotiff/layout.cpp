@@ -46,7 +46,7 @@ const char* name_of_codec(std::uint16_t compression) {
   }
 }
 
-/// The type in memory of a stored sample; nullopt if it is not supported.
+/// Returns the type in memory of a stored sample; nullopt if it is not supported.
 std::optional<ScalarType> type_in_memory(std::uint16_t format, unsigned bits) {
   if (format == SAMPLEFORMAT_IEEEFP) {
     if (bits == 16 || bits == 24 || bits == 32) return ScalarType::f32;

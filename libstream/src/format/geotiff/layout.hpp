@@ -36,7 +36,7 @@ struct GeoTiffLayout {
   [[nodiscard]] std::uint32_t rows_in_image(std::uint32_t down) const {
     return std::min(block_rows, rows - down * block_rows);
   }
-  /// The index of a block in the file's tables.
+  /// Returns the index of a block in the file's tables.
   [[nodiscard]] std::uint32_t block(std::uint32_t across, std::uint32_t down) const {
     return (separate ? band * blocks_across * blocks_down : 0) + down * blocks_across + across;
   }
@@ -65,7 +65,8 @@ bool is_native(const PackedSamples& packed);
 void unpack_samples(const PackedSamples& packed, const std::byte* from, std::size_t first,
                     std::size_t step, std::size_t count, std::byte* out);
 
-/// The exact value of a float of 16 bits (IEEE) or 24 bits (1 sign, 7 exponent, 16 mantissa).
+/// Returns the exact value of a float of 16 bits (IEEE) or 24 bits (1 sign, 7 exponent, 16
+/// mantissa).
 float float_from_16(std::uint16_t bits);
 float float_from_24(std::uint32_t bits);
 

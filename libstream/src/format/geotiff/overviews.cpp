@@ -24,7 +24,7 @@ void fill(std::vector<std::byte>& samples, std::size_t bytes, T value) {
   }
 }
 
-/// The nodata value as a sample; nullopt if no sample can have it.
+/// Returns the nodata value as a sample; nullopt if no sample can have it.
 template <class T>
 std::optional<T> sample_of(const std::optional<double>& nodata) {
   if (!nodata) return std::nullopt;
@@ -38,7 +38,8 @@ std::optional<T> sample_of(const std::optional<double>& nodata) {
   return static_cast<T>(*nodata);
 }
 
-/// The mean of up to four samples, rounded; the first of them if the mean is the nodata value.
+/// Returns the mean of up to four samples, rounded; the first of them if the mean is the nodata
+/// value.
 template <class T>
 T average(std::span<const T> values, const std::optional<T>& nodata) {
   double sum = 0;

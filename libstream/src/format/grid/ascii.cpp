@@ -67,8 +67,8 @@ class Words {
  public:
   explicit Words(Input& input) : input_(input) { refuse_utf16(input); }
 
-  /// The next word, valid until the next call; empty at the end. Throws: Error if it is longer than
-  /// any number.
+  /// Returns the next word, valid until the next call; empty at the end. Throws: Error if it is
+  /// longer than any number.
   std::string_view next() {
     for (;;) {
       while (at_ != end_ && is_white_space(*at_)) ++at_;
@@ -105,7 +105,7 @@ class Words {
   bool ended_ = false;
 };
 
-/// A number with a decimal point or, as some countries write it, a comma.
+/// Parses a number with a decimal point or, as some countries write it, a comma.
 const char* parse_sample(std::string_view word, double& value) {
   const char* const end = word.data() + word.size();
   const char* const rest = parse_real(word.data(), end, value);
@@ -116,7 +116,8 @@ const char* parse_sample(std::string_view word, double& value) {
   return copied == nullptr ? nullptr : word.data() + (copied - copy);
 }
 
-/// A coordinate in GRASS's header: a number, or degrees like 45:30:15.5N. nullopt if it is neither.
+/// Parses a coordinate in GRASS's header: a number, or degrees like 45:30:15.5N. nullopt if it is
+/// neither.
 std::optional<double> grass_coordinate(std::string_view text) {
   double value = 0;
   if (parse_real(text.data(), text.data() + text.size(), value) == text.data() + text.size()) {

@@ -66,7 +66,8 @@ std::endian order_of(const GridHeader& header) {
       .at("byteorder");
 }
 
-/// The product of two sizes. Throws: Error if it is too large, because headers may claim anything.
+/// Returns the product of two sizes. Throws: Error if it is too large, because headers may claim
+/// anything.
 std::uint64_t product(const GridHeader& header, const std::string& key, std::uint64_t a,
                       std::uint64_t b) {
   if (b != 0 && a > (std::uint64_t{1} << 62) / b) throw header.fault("is too large").at(key);

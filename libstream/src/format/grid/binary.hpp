@@ -15,12 +15,12 @@ namespace terrace::stream {
 std::unique_ptr<Raster> open_binary_grid(const std::string& file,
                                          const RasterOptions& options = {});
 
-/// The header file next to a binary grid; empty if there is none.
+/// Returns the header file next to a binary grid; empty if there is none.
 std::filesystem::path binary_header_of(const std::string& file);
 
-/// The keys and values of a header's lines. file: for messages.
+/// Returns the keys and values of a header's lines. file: for messages.
 GridHeader read_binary_header(const std::string& file, std::string_view text);
-/// The grid described by the header. floats: samples are 32-bit floats, as in a .flt.
+/// Returns the grid described by the header. floats: samples are 32-bit floats, as in a .flt.
 PlainGrid describe_binary_grid(const std::string& file, const GridHeader& header, bool floats,
                                int band);
 

@@ -32,10 +32,10 @@ class GridHeader {
   /// `otherwise`.
   [[nodiscard]] std::uint64_t count(const std::string& key,
                                     std::optional<std::uint64_t> otherwise = {}) const;
-  /// The transform to the centres of cells, from the lower left corner (xllcorner), the lower left
-  /// cell (xllcenter) or the upper left cell (ulxmap). Without any of these it is kPlainWorld,
-  /// which is added to the comments. Throws: Error if only x or only y is given, or if the cell
-  /// size is not positive.
+  /// Returns the transform to the centres of cells, from the lower left corner (xllcorner), the
+  /// lower left cell (xllcenter) or the upper left cell (ulxmap). Without any of these it is
+  /// kPlainWorld, which is added to the comments. Throws: Error if only x or only y is given, or if
+  /// the cell size is not positive.
   [[nodiscard]] WorldTransform world(std::uint64_t rows, std::vector<std::string>& comments) const;
 
   [[nodiscard]] Error fault(std::string cause) const;

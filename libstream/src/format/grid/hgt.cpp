@@ -49,8 +49,9 @@ class ZipArchive {
   ZipArchive(const ZipArchive&) = delete;
   ZipArchive& operator=(const ZipArchive&) = delete;
 
-  /// The files with that ending, in lower or upper case, in the order of the archive. Throws: Error
-  /// if there is none, or if one states more bytes than its packed bytes could ever unpack to.
+  /// Returns the files with that ending, in lower or upper case, in the order of the archive.
+  /// Throws: Error if there is none, or if one states more bytes than its packed bytes could ever
+  /// unpack to.
   [[nodiscard]] std::vector<PackedFile> find(std::string_view ending) const;
   /// Unpacks a file to a temporary file. Throws: Error if it is damaged or encrypted, or if it does
   /// not have its stated size.
@@ -155,8 +156,8 @@ std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {
   }
 }
 
-/// The file in a gzip file with one member. Its stated size is modulo 2^32.
-/// Throws: Error if it states more bytes than its packed bytes could ever unpack to.
+/// Returns the file in a gzip file with one member. Its stated size is modulo 2^32. Throws: Error
+/// if it states more bytes than its packed bytes could ever unpack to.
 PackedFile find_in_gzip(const std::string& file) {
   const std::unique_ptr<ByteSource> bytes = open_file(file);
   constexpr std::uint64_t kMin = 18;  // a header of 10 bytes and a trailer of 8
@@ -214,7 +215,7 @@ struct Corner {
   int longitude = 0, latitude = 0;
 };
 
-/// The corner in a file name that begins with "N46E008" or the like, in any case.
+/// Returns the corner in a file name that begins with "N46E008" or the like, in any case.
 std::optional<Corner> corner_of(const std::string& path) {
   const std::string name = std::filesystem::path(path).filename().string();
   if (name.size() < 7) return std::nullopt;
@@ -255,8 +256,8 @@ std::pair<std::uint64_t, std::uint64_t> size_of_tile(const std::string& file, st
   return {side, side};
 }
 
-/// packed_name: the tile's name in its archive. If it does not give the corner, the name of the file
-/// must.
+/// packed_name: the tile's name in its archive. If it does not give the corner, the name of the
+/// file must.
 PlainGrid describe_tile(const std::string& file, const std::string& packed_name,
                         std::uint64_t bytes) {
   std::optional<Corner> corner = corner_of(packed_name);

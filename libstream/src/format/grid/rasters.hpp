@@ -26,8 +26,8 @@ std::unique_ptr<Raster> open_ascii_grid(const std::string& file, const std::stop
                                         std::optional<ScalarType> known = {},
                                         const std::optional<std::string>& nodata = {});
 
-/// The type that open_ascii_grid() would determine; reads no further than necessary. Throws: as
-/// open_ascii_grid().
+/// Returns the type that open_ascii_grid() would determine; reads no further than necessary.
+/// Throws: as open_ascii_grid().
 ScalarType type_of_ascii_grid(const std::string& file, const std::stop_token& stop = {});
 
 /// Opens a USGS digital elevation model in ASCII: a record A of fixed columns, then one profile

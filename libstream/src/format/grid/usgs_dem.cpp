@@ -45,7 +45,7 @@ std::optional<std::int32_t> integer_in(std::string_view field) {
   return value;
 }
 
-/// A number as Fortran writes it: the exponent may begin with D.
+/// Parses a number as Fortran writes it: the exponent may begin with D.
 std::optional<double> real_in(std::string_view field) {
   field = trim(field);
   if (field.empty() || field.size() > kReal) return std::nullopt;

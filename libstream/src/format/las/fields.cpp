@@ -49,7 +49,7 @@ constexpr std::array kExtraTypes{ScalarType::u8,  ScalarType::i8,  ScalarType::u
                                  ScalarType::u32, ScalarType::i32, ScalarType::u64, ScalarType::i64,
                                  ScalarType::f32, ScalarType::f64};
 
-/// The text up to a NUL, with control characters replaced so that headers can contain it.
+/// Returns the text up to a NUL, with control characters replaced so that headers can contain it.
 std::string plain_text(std::string_view text) {
   std::string out(text.substr(0, text.find('\0')));
   for (char& c : out) {
@@ -75,7 +75,7 @@ class ExtraBytes {
   [[nodiscard]] std::size_t count() const { return count_; }
   [[nodiscard]] std::size_t bytes() const { return count_ * size_of(type_); }
 
-  /// The i-th of count() channels.
+  /// Returns the i-th of count() channels.
   [[nodiscard]] Channel channel(std::size_t i, std::vector<std::string>& comments) const {
     Channel channel{.name = undocumented_ || count_ > 1 ? fmt::format("{}_{}", name_, i) : name_,
                     .type = type_};

@@ -30,14 +30,14 @@ struct LasField {
 /// Bytes of a record of a point format, without extra bytes.
 std::size_t las_record_bytes(unsigned point_format);
 
-/// The fields of a point format after the coordinates, in the order of the record. Bit fields are
-/// separate numbers. Names are those of laspy. The scale of `scan_angle` converts it to degrees.
-/// adjusted_time: from the header.
+/// Returns the fields of a point format after the coordinates, in the order of the record. Bit
+/// fields are separate numbers. Names are those of laspy. The scale of `scan_angle` converts it to
+/// degrees. adjusted_time: from the header.
 std::vector<LasField> las_fields(unsigned point_format, bool adjusted_time = false);
 
-/// The fields in the extra bytes: those described by `descriptions` (the data of the VLR, 192 bytes
-/// each), then each remaining byte as uint8. Names are made distinct from each other and from those
-/// in `other_fields`. Nodata values are listed in `comments`.
+/// Returns the fields in the extra bytes: those described by `descriptions` (the data of the VLR,
+/// 192 bytes each), then each remaining byte as uint8. Names are made distinct from each other and
+/// from those in `other_fields`. Nodata values are listed in `comments`.
 std::vector<LasField> las_extra_fields(const std::string& descriptions, std::size_t first,
                                        std::size_t record_bytes,
                                        std::span<const LasField> other_fields,

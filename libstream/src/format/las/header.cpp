@@ -120,7 +120,7 @@ void read_evlrs(const ByteSource& file, std::uint64_t at, std::uint32_t count, L
   }
 }
 
-/// A record's data as an array of numbers.
+/// Returns a record's data as an array of numbers.
 template <class T>
 std::vector<T> array_of(const std::string& data) {
   std::vector<T> values(data.size() / sizeof(T));
@@ -228,7 +228,7 @@ Crs recorded_crs(const LasHeader& header, std::vector<std::string>& comments) {
   return names_something(by_keys) ? by_keys : by_wkt;
 }
 
-/// The header's bytes, after checks of signature, version and size; sets the version.
+/// Returns the header's bytes, after checks of signature, version and size; sets the version.
 std::string_view read_bytes(Input& input, LasHeader& header) {
   const std::string_view first = input.fill(kLasFirstBytes);
   if (!first.starts_with("LASF")) {

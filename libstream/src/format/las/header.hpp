@@ -65,22 +65,22 @@ LasHeader read_las_header(Input& input, const std::string& file, std::vector<std
 /// is not LAS, or has an impossible scale or offset.
 std::optional<LasHeader> peek_las_header(std::string_view head);
 
-/// The coordinate reference system named by the records. Throws: Error if it cannot be reached in a
-/// pipe.
+/// Returns the coordinate reference system named by the records. Throws: Error if it cannot be
+/// reached in a pipe.
 Crs las_crs(const LasHeader& header, const std::string& name, std::vector<std::string>& comments);
 
 /// Returns the user's `crs`, which overrides that of a file. If it has no vertical part, it gets
 /// the unit of heights of `file_crs`, from its WKT if necessary.
 Crs with_own_height_unit(Crs crs, const Crs& file_crs);
-/// The same for a LAS file.
+/// Returns with_own_height_unit() for the CRS of a LAS file.
 Crs las_crs_overridden(const LasHeader& header, const Crs& crs);
 
-/// The placement of the records' coordinates, without a CRS.
+/// Returns the placement of the records' coordinates, without a CRS.
 Placement las_placement(const LasHeader& header);
 
-/// The header's description of the points: their lattice, attributes and the positions of these in
-/// the records. Adds `comments` to the stream's. Throws: Error naming `name` for too many extra
-/// bytes.
+/// Returns the header's description of the points: their lattice, attributes and the positions of
+/// these in the records. Adds `comments` to the stream's. Throws: Error naming `name` for too many
+/// extra bytes.
 RecordStream las_stream(const LasHeader& header, const std::string& name,
                         std::vector<std::string> comments);
 

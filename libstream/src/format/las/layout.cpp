@@ -36,7 +36,7 @@ unsigned point_format_of(std::span<const Channel> attributes, LasFormats formats
   return !colour ? 6 : has(attributes, "nir") ? 8 : 7;
 }
 
-/// The number of a type in the specification's table of extra bytes.
+/// Returns the number of a type in the specification's table of extra bytes.
 char extra_type(ScalarType type) {
   constexpr std::array<char, 10> kNumbers{2, 1, 4, 3, 6, 5, 8, 7, 9, 10};
   return kNumbers[static_cast<std::size_t>(type)];
@@ -66,7 +66,7 @@ constexpr std::array<double, kMaxDecimals + 1> kPowers{1e0, 1e1, 1e2, 1e3, 1e4,
 /// One step less than the range of 32 bits, so that rounding stays within it.
 constexpr double kReach = std::numeric_limits<std::int32_t>::max() - 1.0;
 
-/// The fewest decimals, at least `decimals`, that reproduce every coordinate of the axis.
+/// Returns the fewest decimals, at least `decimals`, that reproduce every coordinate of the axis.
 int decimals_of(std::span<const Point3> points, std::size_t axis, int decimals) {
   for (const Point3& p : points) {
     while (decimals < kMaxDecimals &&

@@ -117,7 +117,7 @@ laz::Vlr laz_vlr(const LasHeader& header, const std::string& name) {
   throw laz_fault(name, "its points are compressed, but it has no LASzip VLR").at("header");
 }
 
-/// The chunks as the file's table lists them; empty if the writer omitted the table.
+/// Returns the chunks as the file's table lists them; empty if the writer omitted the table.
 std::vector<laz::Chunk> read_table(const ByteSource& file, const LazLayout& layout,
                                    std::uint64_t points) {
   constexpr std::size_t kHeadBytes = 8;

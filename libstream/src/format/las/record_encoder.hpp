@@ -48,11 +48,11 @@ class LasRecords {
   [[nodiscard]] const LasLayout& layout() const { return layout_; }
   [[nodiscard]] const std::vector<Channel>& attributes() const { return attributes_; }
   [[nodiscard]] const Crs& crs() const { return crs_; }
-  /// The lattice of the records; arbitrary before the first point.
+  /// Returns the lattice of the records; arbitrary before the first point.
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   /// True if the point format existed before LAS 1.4.
   [[nodiscard]] bool legacy() const { return layout_.point_format < 6; }
-  /// The summary of all records taken so far.
+  /// Returns the summary of all records taken so far.
   [[nodiscard]] const LasSums& sums() const { return sums_; }
 
  private:
@@ -90,12 +90,12 @@ struct LasFile {
   std::uint32_t evlrs = 0;
 };
 
-/// The header of LAS 1.4.
+/// Returns the header of LAS 1.4.
 std::string las_header_text(const LasRecords& records, const LasFile& file);
 
 /// Appends a VLR. Requires data of at most 65,535 bytes.
 void append_vlr(std::string& out, std::string_view user, std::uint16_t id, std::string_view data);
-/// The head of an EVLR with this many bytes of data, which must follow.
+/// Returns the head of an EVLR with this many bytes of data, which must follow.
 std::string evlr_head(std::string_view user, std::uint16_t id, std::uint64_t bytes);
 /// Appends the VLRs of a CRS and of extra bytes, and counts them in `file`. Throws: Error naming
 /// `path` for WKT that is too long.

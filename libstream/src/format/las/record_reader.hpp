@@ -22,7 +22,7 @@ class RecordReader {
   virtual std::string_view read(std::uint64_t max_records) = 0;
   /// Number of records in damaged parts so far (see SourceOptions::on_damage).
   [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
-  /// The memory in bytes that this file needs in addition to the fixed minimum.
+  /// Returns the memory in bytes that this file needs in addition to the fixed minimum.
   [[nodiscard]] virtual std::uint64_t held_bytes() const { return 0; }
 };
 

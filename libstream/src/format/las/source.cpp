@@ -130,8 +130,8 @@ bool recognise_las(std::span<const std::byte> head) {
       .starts_with("LASF");
 }
 
-/// The common placement according to the headers of the files, including pipes; nullopt for a
-/// single file. Ignores invalid headers, which are refused when their files are opened.
+/// Returns the common placement according to the headers of the files, including pipes; nullopt for
+/// a single file. Ignores invalid headers, which are refused when their files are opened.
 std::optional<Placement> placement_of_all(std::span<const std::string> files,
                                           const std::stop_token& stop) {
   if (files.size() == 1) return std::nullopt;

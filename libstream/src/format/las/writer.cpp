@@ -76,9 +76,9 @@ class LazChunks {
   LazEncoders encoders_;
 };
 
-/// The number of threads, at most options.threads, whose chunks fit into memory: one chunk being
-/// filled, and the records and coded bytes of one per thread and one more. Throws: Error if the
-/// memory does not suffice for one thread.
+/// Returns the number of threads, at most options.threads, whose chunks fit into memory: one chunk
+/// being filled, and the records and coded bytes of one per thread and one more. Throws: Error if
+/// the memory does not suffice for one thread.
 unsigned thread_count(const WriterOptions& options, const laz::Vlr& vlr, const std::string& path) {
   const std::uint64_t chunk = vlr.chunk_size * vlr.record_length();
   const std::uint64_t chunks = options.memory_bytes / chunk;

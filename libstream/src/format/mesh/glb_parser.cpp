@@ -36,7 +36,7 @@ constexpr const char* kPlainRemedy = "export it as plain glTF 2.0 in one .glb fi
 using Transform = std::array<double, 12>;
 constexpr Transform kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 
-/// The transform that applies b, then a.
+/// Returns the transform that applies b, then a.
 Transform product(const Transform& a, const Transform& b) {
   Transform out{};
   for (std::size_t row = 0; row < 3; ++row) {
@@ -66,7 +66,7 @@ class Elements {
   Elements(const ByteSource& source, const Accessor& accessor)
       : source_(&source), accessor_(accessor) {}
 
-  /// The bytes of the next element; nullptr after the last. Valid until the next call.
+  /// Returns the bytes of the next element; nullptr after the last. Valid until the next call.
   const char* next() {
     if (done_ == accessor_.count) return nullptr;
     if (done_ == end_) fill();
@@ -208,7 +208,7 @@ class GlbParser final : public MeshParser {
 
   // Access to the JSON.
 
-  /// The list of that name; an empty one if there is none.
+  /// Returns the list of that name; an empty one if there is none.
   const Json& list(const Json& object, const char* name) const {
     static const Json none = Json::array();
     const auto found = object.find(name);
@@ -254,7 +254,8 @@ class GlbParser final : public MeshParser {
     return true;
   }
 
-  /// An accessor (3.6.2); its elements must be entirely in the binary chunk.
+  /// Returns an accessor (3.6.2). Throws: Error unless its elements are entirely in the binary
+  /// chunk.
   Accessor accessor(std::uint64_t index, const char* type, std::uint64_t& component) const {
     const std::string where = fmt::format("accessors {}", index);
     const Json& json = entry("accessors", index);
@@ -336,7 +337,8 @@ class GlbParser final : public MeshParser {
     return out;
   }
 
-  /// The root nodes: those of the default scene, or all without a parent if there are no scenes.
+  /// Returns the root nodes: those of the default scene, or all without a parent if there are no
+  /// scenes.
   std::vector<std::uint64_t> roots() const {
     std::vector<std::uint64_t> out;
     const auto add = [&](const Json& nodes) {

@@ -29,8 +29,8 @@ std::array<Number, 3> y_up(const std::array<Number, 3>& p) {
   return {p[0], p[2], -p[1]};
 }
 
-/// The name of an application-specific attribute: it must begin with an underscore, and is upper
-/// case by convention.
+/// Returns the name of an application-specific attribute: it must begin with an underscore, and is
+/// upper case by convention.
 std::string attribute_name(const std::string& name) {
   std::string out = "_";
   for (const char c : name) {
@@ -225,7 +225,7 @@ class GlbWriter final : public MeshWriter {
     return out;
   }
 
-  /// The vertices, then the corners of triangles.
+  /// Returns the vertices, then the corners of triangles.
   [[nodiscard]] Json buffer_views() const {
     const std::uint64_t vertex_bytes = header_.vertices * stride_;
     Json out = Json::array();

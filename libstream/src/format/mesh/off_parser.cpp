@@ -74,7 +74,7 @@ class OffParser final : public MeshParser {
     return Error(input_->name(), std::move(cause)).at_line(lines_.number()).remedy(kOffRemedy);
   }
 
-  /// The next line that is neither blank nor a comment.
+  /// Reads the next line that is neither blank nor a comment.
   bool next_line(std::string_view& line) {
     while (lines_.next(line)) {
       line = trim(line.substr(0, line.find('#')));

@@ -26,24 +26,24 @@ class MeshParser {
   enum class Item : std::uint8_t { end, vertex, face };
 
   virtual ~MeshParser() = default;
-  /// The next item, to be read by vertex() or face(). Throws: Error naming file and position,
-  /// Stopped.
+  /// Returns the next item, to be read by vertex() or face(). Throws: Error naming file and
+  /// position, Stopped.
   virtual Item next() = 0;
 
-  /// The current vertex; its coordinates are finite or NaN (see is_missing()).
+  /// Returns the current vertex; its coordinates are finite or NaN (see is_missing()).
   [[nodiscard]] const Point3& vertex() const { return vertex_; }
-  /// The current face: three or more indices, from 0, of vertices that have been read.
+  /// Returns the current face: three or more indices, from 0, of vertices that have been read.
   [[nodiscard]] const std::vector<std::uint32_t>& face() const { return face_; }
-  /// The format's name in the registry.
+  /// Returns the format's name in the registry.
   [[nodiscard]] virtual const char* format() const = 0;
-  /// The input, for its name and progress.
+  /// Returns the input, for its name and progress.
   [[nodiscard]] virtual const Input& input() const = 0;
   /// True if each face has its own vertices, so that coincident ones are merged (STL).
   [[nodiscard]] virtual bool is_soup() const { return false; }
-  /// The number of vertices, if the file states it before them.
+  /// Returns the number of vertices, if the file states it before them.
   [[nodiscard]] virtual std::optional<std::uint64_t> vertices() const { return std::nullopt; }
   [[nodiscard]] virtual ScalarType type() const { return ScalarType::f64; }
-  /// The comments read so far.
+  /// Returns the comments read so far.
   [[nodiscard]] const std::vector<std::string>& comments() const { return comments_; }
 
  protected:

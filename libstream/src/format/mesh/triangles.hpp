@@ -15,8 +15,8 @@ struct OpenMesh {
   std::unique_ptr<MeshParser> parser;
 };
 
-/// The triangles of a mesh as described in SourceOptions::entities; polygons are split into fans.
-/// Memory: 17 MiB; vertices referenced by index are kept in a temporary file, 24 bytes each.
+/// Returns the triangles of a mesh as described in SourceOptions::entities; polygons are split into
+/// fans. Memory: 17 MiB; vertices referenced by index are kept in a temporary file, 24 bytes each.
 std::unique_ptr<PointSource> triangles_of(OpenMesh mesh, const SourceOptions& options);
 
 }  // namespace terrace::stream

@@ -43,8 +43,8 @@ struct PlyHeader {
 /// hold.
 PlyHeader read_ply_header(Input& input);
 
-/// The name of a type in the header of a PLY file: the old names, which every reader supports. PLY
-/// has no names for 64-bit integers; we write "int64" and "uint64".
+/// Returns the name of a type in the header of a PLY file: the old names, which every reader
+/// supports. PLY has no names for 64-bit integers; we write "int64" and "uint64".
 std::string ply_type_name(ScalarType type);
 
 /// "ply", the format and the comments: the first lines of a header.

@@ -301,7 +301,8 @@ class PlySource final : public PointSource {
     if (!line.empty()) throw line_fault("has more values than the vertex has properties");
   }
 
-  /// The property with the vertices of an element's items; null if they are not faces or strips.
+  /// Returns the property with the vertices of an element's items; null if they are not faces or
+  /// strips.
   static const PlyProperty* corners_of(const PlyElement& element) {
     if (element.name != "face" && element.name != "tristrips") return nullptr;
     for (const PlyProperty& p : element.properties) {
@@ -346,7 +347,7 @@ class PlySource final : public PointSource {
       throw line_fault("has more values than the " + element.name + " has properties");
   }
 
-  /// The number of a vertex; negative ones end a strip.
+  /// Returns the number of a vertex; negative ones end a strip.
   std::int64_t corner(ScalarType type, const std::byte* raw, const PlyElement& element,
                       std::uint64_t item) const {
     const double number = to_double(type, raw);

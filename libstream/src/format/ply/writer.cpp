@@ -16,7 +16,7 @@ namespace {
 /// Digits of the largest count, for which the header has room.
 constexpr std::size_t kCountWidth = 20;
 
-/// A count, padded with blanks to that width.
+/// Returns `count`, padded with blanks to that width.
 std::string count_field(std::uint64_t count) {
   std::string text = fmt::format("{}", count);
   text.resize(kCountWidth, ' ');

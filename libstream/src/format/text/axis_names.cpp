@@ -25,7 +25,7 @@ bool is_suffix_unit(std::string_view word) {
                          "ftus", "km", "cm", "mm"});
 }
 
-/// The longest prefix of the words that is a unit.
+/// Returns the longest prefix of the words that is a unit.
 std::string unit_of_words(std::string_view words) {
   if (is_degree(words)) return "degree";
   for (std::size_t end = words.size(); end != 0 && end != words.npos;
@@ -43,8 +43,8 @@ bool is_decoration(std::string_view word) {
          is_suffix_unit(word);
 }
 
-/// The name in lower case without brackets, decorations and separators of words. decorated: set to
-/// true if it had any of these.
+/// Returns the name in lower case without brackets, decorations and separators of words. decorated:
+/// set to true if it had any of these.
 std::string bare_name(std::string_view name, bool& decorated) {
   std::string bare, word;
   const auto end_word = [&] {
@@ -70,7 +70,7 @@ std::string bare_name(std::string_view name, bool& decorated) {
   return bare;
 }
 
-/// The letter of an axis in names such as "pointx" or "xcoord"; empty for other names.
+/// Returns the letter of an axis in names such as "pointx" or "xcoord"; empty for other names.
 std::string_view letter_within(std::string_view bare) {
   for (const std::string_view before : {"point", "coord", "coordinate", "pos", "position"}) {
     if (bare.size() == before.size() + 1 && bare.starts_with(before)) {

@@ -175,7 +175,7 @@ struct Preamble {
   std::uint64_t header_line = 0;  ///< 0: there is no header
 
   [[nodiscard]] bool has_header() const { return header_line != 0; }
-  /// The line that may name the columns.
+  /// Returns the line that may name the columns.
   [[nodiscard]] const std::string& title() const { return has_header() ? header : last_comment; }
 };
 
@@ -200,7 +200,7 @@ Preamble read_preamble(LineReader& lines, const std::string& file, std::string_v
       .remedy("each line needs three numbers: x, y and z");
 }
 
-/// The separator of the first row of numbers.
+/// Returns the separator of the first row of numbers.
 char row_separator(std::string_view line, const Preamble& preamble) {
   const char separator = separator_of(line);
   const std::string& title = preamble.title();

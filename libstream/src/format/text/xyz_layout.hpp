@@ -26,8 +26,8 @@ struct TextLayout {
   std::vector<std::string> comments;        ///< before the first point
 };
 
-/// The fields of a line. If tabs do not give as many fields as there are columns, runs of blanks
-/// and tabs separate them, as in a table aligned by hand.
+/// Returns the fields of a line. If tabs do not give as many fields as there are columns, runs of
+/// blanks and tabs separate them, as in a table aligned by hand.
 std::vector<std::string_view> split_row(std::string_view line, const TextLayout& layout);
 /// Returns ';' if the line has one, else ',' if it has one, else ' '. Ignores text in double
 /// quotes.

@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-/// A name as a field of a CSV header (RFC 4180).
+/// Returns `name` as a field of a CSV header (RFC 4180).
 std::string csv_field(const std::string& name) {
   if (name.find_first_of(",;\"") == std::string::npos) return name;
   std::string out = "\"";

@@ -17,9 +17,9 @@ struct XmlElement {
   std::string text{};  ///< between its tags, without the text of children
   std::vector<XmlElement> children{};
 
-  /// The first child of that name; nullptr if there is none.
+  /// Returns the first child of that name; nullptr if there is none.
   [[nodiscard]] const XmlElement* child(std::string_view name) const;
-  /// The value of an attribute; empty if there is none.
+  /// Returns the value of an attribute; empty if there is none.
   [[nodiscard]] std::string attribute(const std::string& name) const;
 };
 

@@ -160,7 +160,7 @@ class Lines {
 
   [[nodiscard]] Step operator[](std::uint32_t i) const { return steps_[i]; }
   [[nodiscard]] const Step* steps() const { return steps_.data(); }
-  /// The point before; where a line begins, the first of the line before.
+  /// Returns the previous point or, where a line begins, the first point of the previous line.
   [[nodiscard]] std::uint32_t reference(std::uint32_t i) const { return references_[i]; }
 
  private:

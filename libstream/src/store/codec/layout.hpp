@@ -71,12 +71,12 @@ struct Layout {
     const auto ends = 2 * static_cast<unsigned>(attributes.size());
     return index_context() + context::kIndexRange + ends;
   }
-  /// The first contexts of borders and of the index.
+  /// Return the first contexts of borders and of the index.
   [[nodiscard]] unsigned border_context() const { return first_context(columns()); }
   [[nodiscard]] unsigned index_context() const { return border_context() + context::kBorders; }
   /// Whether points that are not split are coded as columns instead of rows of a raster.
   [[nodiscard]] bool has_point_columns() const { return !grid || level > 0; }
-  /// The first context of a column.
+  /// Returns the first context of a column.
   [[nodiscard]] unsigned first_context(unsigned column) const {
     return context::kAttribute + column * context::kPerAttribute;
   }

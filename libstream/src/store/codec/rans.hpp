@@ -40,7 +40,7 @@ class EncodeTables {
 
   /// Appends the table of the next context.
   void append(const Frequencies& frequencies);
-  /// The entries, indexed by *slot*: context * kSymbols + symbol.
+  /// Returns the entries, indexed by *slot*: context * kSymbols + symbol.
   [[nodiscard]] const Entry* entries() const { return entries_.data(); }
   [[nodiscard]] std::size_t contexts() const { return entries_.size() / kSymbols; }
 

@@ -90,16 +90,16 @@ class Directory {
   struct Range {
     std::uint64_t begin = 0, end = 0;
   };
-  /// The position of a page in the index. Throws: Damage, Error.
+  /// Returns the position of a page in the index. Throws: Damage, Error.
   [[nodiscard]] Range page_range(std::uint64_t page) const;
-  /// A box around all points of the page's clusters and below them. Throws: Damage, Error.
+  /// Returns a box around all points of the page's clusters and below them. Throws: Damage, Error.
   [[nodiscard]] Box3 page_box(std::uint64_t page) const;
   /// Like page_box(), but without reading: the chapter's box until the chapter's contents have been
   /// read.
   [[nodiscard]] Box3 coarse_box(std::uint64_t page) const;
-  /// The sets of tables, in the order of clusters.
+  /// Returns the sets of tables, in the order of clusters.
   [[nodiscard]] const std::vector<TablesPosition>& tables() const { return tables_; }
-  /// The bytes of a set. Throws: Damage, Error.
+  /// Returns the bytes of a set. Throws: Damage, Error.
   [[nodiscard]] Bytes read_tables(const TablesPosition& at) const;
 
  private:

@@ -70,7 +70,7 @@ struct RangeColumns : NumberColumns {
   /// represent them.
   RangeColumns(std::span<const KeyRange> ranges, std::span<const ScalarType> types);
 
-  /// The range of an attribute in cluster i.
+  /// Returns the range of an attribute in cluster i.
   [[nodiscard]] KeyRange range(std::uint32_t i, std::size_t attribute) const {
     return {column(2 * attribute)[i], column(2 * attribute + 1)[i]};
   }

@@ -108,7 +108,7 @@ class LevelReader {
   [[nodiscard]] const ByteSource& data() const { return *data_; }
   [[nodiscard]] const ByteSource& index() const { return *index_; }
   [[nodiscard]] std::uint64_t pages() const { return directory_->pages(); }
-  /// The offset of a page. Throws: Error.
+  /// Returns the offset of a page. Throws: Error.
   [[nodiscard]] std::uint64_t page_offset(std::uint64_t page) const;
 
   /// See Store::coarse_box(). Requires that the cluster exists.

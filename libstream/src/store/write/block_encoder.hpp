@@ -64,7 +64,8 @@ class BlockEncoder {
   void load_numbers(Attribute& attribute);
   Entry enter(std::size_t cluster);
   void find_relative();
-  /// The representative's position in the order of coding, centred(); 0 without a representative.
+  /// Returns the representative's position in the order of coding, centred(); 0 without a
+  /// representative.
   [[nodiscard]] std::uint32_t place_of_representative(std::size_t cluster) const;
   void gather(const Attribute& attribute);
   /// Returns where to code the form; null for integers.

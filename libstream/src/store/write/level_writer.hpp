@@ -100,7 +100,7 @@ class LevelWriter {
   LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
               Layout layout, base::ThreadTeam& team);
 
-  /// The tables to encode blocks with now; null if there are none.
+  /// Returns the tables to encode blocks with now; null if there are none.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::uint64_t clusters() const { return clusters_; }
