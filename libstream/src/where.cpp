@@ -113,8 +113,8 @@ class Where::Parser {
 
   void emit(const Step& step) {
     where_->steps_.push_back(step);
-    held_ = held_ + 1 - step.operands;
-    where_->depth_ = std::max(where_->depth_, held_);
+    stack_depth_ = stack_depth_ + 1 - step.operands;
+    where_->depth_ = std::max(where_->depth_, stack_depth_);
   }
 
   void expression(unsigned least) {
@@ -216,7 +216,7 @@ class Where::Parser {
   Where* where_;
   const Schema* schema_;
   std::string_view text_;
-  std::size_t at_ = 0, held_ = 0;
+  std::size_t at_ = 0, stack_depth_ = 0;
   unsigned nested_ = 0;
 };
 

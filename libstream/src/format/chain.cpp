@@ -35,11 +35,11 @@ std::string list_of(const std::vector<Channel>& channels, const std::vector<Chan
 /// Describes how the attributes of `other` differ from those of `first`.
 std::string difference(const SourceInfo& first, const SourceInfo& other) {
   const std::string& name = first.files.front();
-  const std::string more = list_of(other.attributes, first.attributes);
-  const std::string less = list_of(first.attributes, other.attributes);
-  if (less.empty()) return fmt::format("it has attributes that {} lacks: {}", name, more);
-  if (more.empty()) return fmt::format("it lacks attributes that {} has: {}", name, less);
-  return fmt::format("it has the attributes {} where {} has {}", more, name, less);
+  const std::string added = list_of(other.attributes, first.attributes);
+  const std::string missing = list_of(first.attributes, other.attributes);
+  if (missing.empty()) return fmt::format("it has attributes that {} lacks: {}", name, added);
+  if (added.empty()) return fmt::format("it lacks attributes that {} has: {}", name, missing);
+  return fmt::format("it has the attributes {} where {} has {}", added, name, missing);
 }
 
 void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreement& crs) {

@@ -44,31 +44,31 @@ struct Axis {
 std::optional<std::uint64_t> common_parts(std::span<const Axis> axes) {
   const Axis& first = axes.front();
   std::uint64_t parts = 1;
-  const auto cut = [&](std::optional<std::uint64_t> more) {
-    if (more) parts *= *more;
-    return more && parts <= kMaxParts;
+  const auto divide = [&](std::optional<std::uint64_t> factor) {
+    if (factor) parts *= *factor;
+    return factor && parts <= kMaxParts;
   };
   for (const Axis& axis : axes) {
     const auto step = [&] { return first.scale / static_cast<double>(parts); };
-    if (!cut(parts_of(axis.scale / step(), [](double ratio) {
+    if (!divide(parts_of(axis.scale / step(), [](double ratio) {
           return ratio >= 0.5 && std::abs(ratio - std::round(ratio)) <= kSameRatio * ratio;
         }))) {
       return std::nullopt;
     }
-    if (!cut(parts_of((axis.offset - first.offset) / step(), is_whole))) return std::nullopt;
+    if (!divide(parts_of((axis.offset - first.offset) / step(), is_whole))) return std::nullopt;
   }
   return parts;
 }
 
 /// Returns the first axis with its scale divided into parts. The quotient is rounded, so an equal
 /// scale of another axis is used in its place.
-Axis cut(std::span<const Axis> axes, std::uint64_t parts) {
-  Axis cut = axes.front();
-  cut.scale /= static_cast<double>(parts);
+Axis divided_axis(std::span<const Axis> axes, std::uint64_t parts) {
+  Axis divided = axes.front();
+  divided.scale /= static_cast<double>(parts);
   for (const Axis& axis : axes) {
-    if (std::abs(axis.scale / cut.scale - 1) <= kSameRatio) return {axis.scale, cut.offset};
+    if (std::abs(axis.scale / divided.scale - 1) <= kSameRatio) return {axis.scale, divided.offset};
   }
-  return cut;
+  return divided;
 }
 
 /// Moves the offset by whole steps, if necessary, so that 32 bits cover `low` to `high`. Returns
@@ -99,7 +99,7 @@ std::optional<Lattice> common_lattice(std::span<const Lattice> lattices, const B
   }
   Lattice common;
   for (std::size_t i = 0; i < 3; ++i) {
-    Axis axis = cut(axes[i], parts[i]);
+    Axis axis = divided_axis(axes[i], parts[i]);
     if (!reach(bounds.min[i], bounds.max[i], axis)) return std::nullopt;
     common.scale[i] = axis.scale;
     common.offset[i] = axis.offset;

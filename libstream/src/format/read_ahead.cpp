@@ -18,7 +18,7 @@ class ReadAhead final : public PointSource {
   ReadAhead(std::unique_ptr<PointSource> source, std::size_t blocks,
             const std::stop_source& reading, const std::stop_token& stop)
       : source_(std::move(source)),
-        most_(std::max<std::size_t>(blocks, 1)),
+        max_blocks_(std::max<std::size_t>(blocks, 1)),
         info_(source_->info()),
         reading_(reading),
         on_stop_(stop, Forward{reading}),
@@ -50,7 +50,7 @@ class ReadAhead final : public PointSource {
     // or set to zero. If reading is slow, few blocks have buffers.
     {
       const std::lock_guard lock(mutex_);
-      if (spare_.size() < most_) spare_.push_back(std::move(ahead.block));
+      if (free_blocks_.size() < max_blocks_) free_blocks_.push_back(std::move(ahead.block));
     }
     ahead_.give({});
     return true;
@@ -73,7 +73,7 @@ class ReadAhead final : public PointSource {
   };
 
   void give_blocks() {
-    while (ahead_.size() < most_) ahead_.give({});
+    while (ahead_.size() < max_blocks_) ahead_.give({});
   }
 
   /// After the end or an error the source is not asked again; the error is thrown every time.
@@ -95,21 +95,21 @@ class ReadAhead final : public PointSource {
   PointBlock spare() {
     PointBlock block;
     const std::lock_guard lock(mutex_);
-    if (!spare_.empty()) {
-      block = std::move(spare_.back());
-      spare_.pop_back();
+    if (!free_blocks_.empty()) {
+      block = std::move(free_blocks_.back());
+      free_blocks_.pop_back();
     }
     return block;
   }
 
   const std::unique_ptr<PointSource> source_;  // used only by the thread once it runs
-  const std::size_t most_;
+  const std::size_t max_blocks_;
   const SourceInfo info_;
   std::stop_source reading_;
   std::stop_callback<Forward> on_stop_;
   Progress progress_;  // used only by the caller
   std::mutex mutex_;
-  std::vector<PointBlock> spare_;  // with buffers for further blocks; guarded by mutex_
+  std::vector<PointBlock> free_blocks_;  // with buffers for further blocks; guarded by mutex_
   base::WorkAhead<Ahead> ahead_;
 };
 

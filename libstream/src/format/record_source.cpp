@@ -160,8 +160,8 @@ class RecordSource final : public PointSource {
     block.positions.resize(max_records);
     block.payload.resize(max_records * payload_bytes_);
     std::size_t done = 0;
-    for (std::size_t some = 1; done < max_records && some > 0; done += some) {
-      some = unpack(block, done, max_records - done);
+    for (std::size_t unpacked = 1; done < max_records && unpacked > 0; done += unpacked) {
+      unpacked = unpack(block, done, max_records - done);
     }
     block.positions.resize(done);
     block.payload.resize(done * payload_bytes_);
@@ -279,11 +279,11 @@ class RecordSource final : public PointSource {
     }
     if (!info.stated_bounds) return;
     Box3 box;
-    box.include(moved(info.stated_bounds->min));
-    box.include(moved(info.stated_bounds->max));
+    box.include(move_point(info.stated_bounds->min));
+    box.include(move_point(info.stated_bounds->max));
     info.stated_bounds = box;
   }
-  [[nodiscard]] Point3 moved(const Point3& stored) const {
+  [[nodiscard]] Point3 move_point(const Point3& stored) const {
     Point3 point;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       point[axis] = stored[axis] * move_->factor[axis] + move_->shift[axis];
@@ -297,7 +297,7 @@ class RecordSource final : public PointSource {
                              : std::numeric_limits<double>::max();
     for (std::size_t i = 0; i < block.size(); ++i) {
       Point3& point = block.positions[i];
-      point = moved(point);
+      point = move_point(point);
       for (const double value : point) {
         if (value < -limit - 1 || value > limit) {
           throw fault(i, "is out of range of the lattice chosen from the headers of all files")

@@ -220,7 +220,7 @@ void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
     unwritten_.resize((pages_ - unwritten_page_) * kPageBytes);
     bytes = {};
     if (unwritten_.size() >= kMinWriteBytes) {
-      full.swap(spare_);
+      full.swap(free_buffer_);
       full.swap(unwritten_);
       page = std::exchange(unwritten_page_, pages_);
       bytes = full;
@@ -231,7 +231,7 @@ void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
   if (!full.empty()) {
     full.clear();
     lock.lock();
-    spare_.swap(full);
+    free_buffer_.swap(full);
   }
   bucket.chunks.push_back(chunk);
   bucket.tail.clear();

@@ -122,11 +122,11 @@ class BucketFile {
   Spool file_;
   RecordPacker packer_;
   std::vector<std::byte> packed_;
-  std::mutex mutex_;                  ///< guards the members below
-  std::uint32_t pages_ = 0;           ///< of the file, including chunks to be written
-  std::uint64_t unwritten_page_ = 0;  ///< end of the pages written
-  std::vector<std::byte> unwritten_;  ///< to be written from there on
-  std::vector<std::byte> spare_;      ///< an empty buffer
+  std::mutex mutex_;                    ///< guards the members below
+  std::uint32_t pages_ = 0;             ///< of the file, including chunks to be written
+  std::uint64_t unwritten_page_ = 0;    ///< end of the pages written
+  std::vector<std::byte> unwritten_;    ///< to be written from there on
+  std::vector<std::byte> free_buffer_;  ///< an empty buffer
   std::map<std::uint32_t, std::vector<std::uint32_t>> free_;  ///< free positions, by size in pages
 };
 

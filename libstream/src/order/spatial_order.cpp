@@ -78,10 +78,10 @@ class SpatialSource final : public OrderedSource {
   SpatialSource(std::unique_ptr<PointSource> source, SpatialOrderOptions options)
       : source_(std::move(source)),
         options_(std::move(options)),
-        state_(options_.order == Order::stream || source_->info().grid ? State::passing
+        state_(options_.order == Order::stream || source_->info().grid ? State::unordered
                                                                        : State::opening),
         ordering_bytes_(
-            state_ == State::passing ? 0 : bytes_to_order(source_->info(), options_.parts_ahead)),
+            state_ == State::unordered ? 0 : bytes_to_order(source_->info(), options_.parts_ahead)),
         team_(options_.threads) {}
 
   [[nodiscard]] const SourceInfo& info() const override { return source_->info(); }
@@ -118,7 +118,7 @@ class SpatialSource final : public OrderedSource {
   }
 
  private:
-  enum class State : std::uint8_t { opening, passing, judging, gathering, delivering };
+  enum class State : std::uint8_t { opening, unordered, judging, gathering, delivering };
 
   /// Reads the next block of the source.
   bool next_block(PointBlock& block) {

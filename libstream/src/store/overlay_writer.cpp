@@ -55,10 +55,10 @@ struct OverlayWriter::Impl {
     page.clear();
   }
 
-  [[noreturn]] void refuse(ClusterId cluster, std::uint32_t index, const std::string& why) const {
+  [[noreturn]] void refuse(ClusterId cluster, std::uint32_t index, const std::string& cause) const {
     throw std::invalid_argument(fmt::format("value {} of the overlay, cluster {}/{}, point {}: {}",
                                             values, level_of(cluster), ordinal_of(cluster), index,
-                                            why));
+                                            cause));
   }
 
   void look_up(ClusterId cluster, std::uint32_t index) {

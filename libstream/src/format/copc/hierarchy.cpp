@@ -115,8 +115,8 @@ void check_disjoint(const ByteSource& file, Octree& octree) {
       throw damaged(file, nodes[i].offset, "two nodes of the COPC hierarchy share points");
     }
   }
-  if (const OctreeNode* const twice = octree.arrange()) {
-    throw damaged(file, twice->offset, "a node of the COPC hierarchy is listed twice");
+  if (const OctreeNode* const duplicate = octree.arrange()) {
+    throw damaged(file, duplicate->offset, "a node of the COPC hierarchy is listed twice");
   }
 }
 

@@ -172,9 +172,9 @@ OctreeBuilder::NodePoints OctreeBuilder::build(const OctreeNode& node, Bucket bu
 /// buckets: one for each of the node's descendants at some depth, in Morton order.
 OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span<Bucket> buckets) {
   if (buckets.size() == 1) return build(node, std::move(buckets.front()));
-  const auto records = [this](std::span<const Bucket> some) {
+  const auto records = [this](std::span<const Bucket> child_items) {
     std::uint64_t sum = 0;
-    for (const Bucket& bucket : some) sum += file_.records(bucket);
+    for (const Bucket& bucket : child_items) sum += file_.records(bucket);
     return sum;
   };
   if (records(buckets) <= batch_records_) {
@@ -185,10 +185,10 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
   Bucket promoted;
   const std::size_t each = buckets.size() / kChildren;
   for (std::size_t i = 0; i < kChildren; ++i) {
-    const std::span<Bucket> some = buckets.subspan(i * each, each);
-    if (records(some) == 0) continue;
+    const std::span<Bucket> child_items = buckets.subspan(i * each, each);
+    if (records(child_items) == 0) continue;
     promote(
-        visit(child(node, i), some), *write_,
+        visit(child(node, i), child_items), *write_,
         [&](const Item&, std::span<const std::byte> record) { file_.append(promoted, record); });
   }
   // The promoted points are in Morton order, because the children are.
@@ -316,8 +316,8 @@ void OctreeBuilder::plan(const OctreeNode& node, std::span<const Item> items, co
     tasks.push_back({.node = node, .items = items});
     return;
   }
-  for_each_child(node, items, [&](const OctreeNode& child, std::span<const Item> some) {
-    plan(child, some, stop, tasks);
+  for_each_child(node, items, [&](const OctreeNode& child, std::span<const Item> child_items) {
+    plan(child, child_items, stop, tasks);
   });
 }
 
@@ -327,8 +327,8 @@ OctreeBuilder::NodePoints OctreeBuilder::combine(const OctreeNode& node,
                                                  const Leaf& leaf, const Write& write) const {
   if (stop(node, items)) return leaf(node, items);
   NodePoints points{.node = node};
-  for_each_child(node, items, [&](const OctreeNode& child, std::span<const Item> some) {
-    promote(combine(child, some, stop, leaf, write), write,
+  for_each_child(node, items, [&](const OctreeNode& child, std::span<const Item> child_items) {
+    promote(combine(child, child_items, stop, leaf, write), write,
             [&](Item item, std::span<const std::byte> record) { points.add(item, record); });
   });
   return points;

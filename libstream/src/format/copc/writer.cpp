@@ -38,7 +38,7 @@ std::string_view text_of_bytes(std::span<const std::byte> bytes) {
 Octree cube_around(const LasRecords& records) {
   const Lattice& lattice = records.lattice();
   Box3 box;
-  for (const auto& corner : {records.sums().least, records.sums().most}) {
+  for (const auto& corner : {records.sums().lowest, records.sums().highest}) {
     if (records.sums().points == 0) continue;
     Point3 place{};
     for (std::size_t axis = 0; axis < 3; ++axis) {

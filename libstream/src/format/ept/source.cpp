@@ -215,14 +215,14 @@ LasHeader read_node_header(const std::filesystem::path& file, EptMetadata& metad
 }
 
 std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceOptions& options,
-                                          const Placement* onto) {
+                                          const Placement* placement) {
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
   EptMetadata metadata = read_ept_metadata(file);
   Octree& octree = metadata.octree;
   octree.nodes = read_ept_hierarchy(folder, metadata.points);
-  if (const OctreeNode* const twice = octree.arrange()) {
+  if (const OctreeNode* const duplicate = octree.arrange()) {
     throw ept_fault((folder / "ept-hierarchy").string(), "is listed twice")
-        .at("node " + name_of(*twice));
+        .at("node " + name_of(*duplicate));
   }
   LasHeader header;
   if (metadata.data == EptData::laszip && !octree.nodes.empty()) {
@@ -239,7 +239,7 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   RecordParts parts = ept_parts(folder, metadata, header);
   if (options.selection.region) parts = parts_in_cubes(std::move(parts), octree, stream, file);
   stream.records = records_of_parts(std::move(parts), options);
-  return source_of_records(std::move(stream), options.block_points, onto);
+  return source_of_records(std::move(stream), options.block_points, placement);
 }
 
 std::unique_ptr<PointSource> open_ept(std::span<const std::string> files,

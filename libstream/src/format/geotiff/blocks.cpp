@@ -220,12 +220,14 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
                             counted(rows, "row"), counted(row_bytes, "byte")));
   }
   const std::uint64_t pixel_bytes = layout_.samples_per_pixel() * size_of(layout_.type);
-  // Read whole rows, unless the part is so narrow that most bytes of a row would not be used.
-  const bool whole = part.columns >= layout_.block_columns / 4 && row_bytes <= memory_bytes_ / 4;
-  const std::uint64_t piece_bytes = whole ? row_bytes : part.columns * pixel_bytes;
-  const std::uint64_t skip = whole ? 0 : part.column * pixel_bytes;
+  // Read reads_whole_rows rows, unless the part is so narrow that most bytes of a row would not be
+  // used.
+  const bool reads_whole_rows =
+      part.columns >= layout_.block_columns / 4 && row_bytes <= memory_bytes_ / 4;
+  const std::uint64_t piece_bytes = reads_whole_rows ? row_bytes : part.columns * pixel_bytes;
+  const std::uint64_t skip = reads_whole_rows ? 0 : part.column * pixel_bytes;
   const auto at_once = static_cast<std::uint32_t>(
-      whole ? std::clamp<std::uint64_t>(kRawBytes / row_bytes, 1, part.rows) : 1);
+      reads_whole_rows ? std::clamp<std::uint64_t>(kRawBytes / row_bytes, 1, part.rows) : 1);
   bool any = false;
   for (std::uint32_t row = 0; row < part.rows; row += at_once) {
     const std::uint32_t n = std::min(at_once, part.rows - row);
@@ -237,8 +239,8 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
       swap_bytes(raw_.data(), size_of(layout_.type), piece.size() / size_of(layout_.type));
     }
     for (std::uint32_t i = 0; i < n; ++i) {
-      any |= overlay_part_row(part, raw_.data() + i * piece_bytes, whole ? part.column : 0, row + i,
-                              out);
+      any |= overlay_part_row(part, raw_.data() + i * piece_bytes,
+                              reads_whole_rows ? part.column : 0, row + i, out);
     }
   }
   return any;
@@ -367,8 +369,8 @@ void GeoTiffBlocks::decode(const Part& part, std::uint64_t offset, std::uint64_t
   if (!handle_.read(offset, std::span(raw_.data(), bytes))) {
     throw fault(part, offset, "extends beyond the end of the file");
   }
-  const std::uint64_t whole = layout_.row_bytes() * layout_.block_rows;
-  if (block_.size() != whole) block_.assign(whole, std::byte{0});
+  const std::uint64_t block_bytes = layout_.row_bytes() * layout_.block_rows;
+  if (block_.size() != block_bytes) block_.assign(block_bytes, std::byte{0});
   const std::uint32_t number = layout_.block(part.across, part.down);
   if (TIFFReadFromUserBuffer(handle_.tiff(), number, raw_.data(), static_cast<tmsize_t>(bytes),
                              block_.data(), static_cast<tmsize_t>(expected_bytes)) != 1) {

@@ -190,8 +190,8 @@ float widen(std::uint32_t bits) {
                               (mantissa << (23 - kMantissaBits)));
 }
 
-std::uint32_t native_24(const std::byte* from) {
-  const auto byte = [&](int i) { return std::to_integer<std::uint32_t>(from[i]); };
+std::uint32_t native_24(const std::byte* bytes) {
+  const auto byte = [&](int i) { return std::to_integer<std::uint32_t>(bytes[i]); };
   if constexpr (std::endian::native == std::endian::little) {
     return byte(0) | byte(1) << 8 | byte(2) << 16;
   } else {
@@ -200,11 +200,11 @@ std::uint32_t native_24(const std::byte* from) {
 }
 
 /// `bits` bits beginning at bit `position`, counted from the highest bit of the first byte.
-std::uint32_t bits_at(const std::byte* from, std::uint64_t position, unsigned bits) {
+std::uint32_t bits_at(const std::byte* bytes, std::uint64_t position, unsigned bits) {
   std::uint64_t value = 0;
   const std::uint64_t first = position / 8, last = (position + bits - 1) / 8;
   for (std::uint64_t i = first; i <= last; ++i) {
-    value = value << 8 | std::to_integer<std::uint64_t>(from[i]);
+    value = value << 8 | std::to_integer<std::uint64_t>(bytes[i]);
   }
   const std::uint64_t below = 8 * (last + 1) - (position + bits);
   return static_cast<std::uint32_t>((value >> below) & ((std::uint64_t{1} << bits) - 1));
@@ -236,7 +236,7 @@ float float_from_24(std::uint32_t bits) { return widen<7, 16>(bits); }
 
 bool is_native(const PackedSamples& packed) { return packed.bits == 8 * size_of(packed.type); }
 
-void unpack_samples(const PackedSamples& packed, const std::byte* from, std::size_t first,
+void unpack_samples(const PackedSamples& packed, const std::byte* bytes, std::size_t first,
                     std::size_t step, std::size_t count, std::byte* out) {
   const bool is_float = packed.sample_format == SAMPLEFORMAT_IEEEFP;
   with_type(packed.type, [&](auto sample) {
@@ -246,12 +246,12 @@ void unpack_samples(const PackedSamples& packed, const std::byte* from, std::siz
       T value{};
       if (is_float && packed.bits == 16) {
         std::uint16_t half = 0;
-        std::memcpy(&half, from + 2 * number, sizeof half);
+        std::memcpy(&half, bytes + 2 * number, sizeof half);
         value = static_cast<T>(float_from_16(half));
       } else if (is_float) {
-        value = static_cast<T>(float_from_24(native_24(from + 3 * number)));
+        value = static_cast<T>(float_from_24(native_24(bytes + 3 * number)));
       } else {
-        const std::uint32_t raw = bits_at(from, std::uint64_t{number} * packed.bits, packed.bits);
+        const std::uint32_t raw = bits_at(bytes, std::uint64_t{number} * packed.bits, packed.bits);
         if (packed.sample_format == SAMPLEFORMAT_INT) {  // the highest bit is the sign
           const unsigned unused = 32 - packed.bits;
           value = static_cast<T>(static_cast<std::int32_t>(raw << unused) >> unused);

@@ -58,11 +58,11 @@ struct PackedSamples {
 /// True if libtiff already delivers the samples as native values of `packed.type`.
 bool is_native(const PackedSamples& packed);
 
-/// Widens `count` packed samples to native values; the first is sample number `first` of the row
-/// `from`, each further one `step` samples later. Integers of odd widths are packed from the
+/// Widens `count` packed samples to native values. The first is sample number `first` of the row
+/// `bytes`, each further one `step` samples later. Integers of odd widths are packed from the
 /// highest bit on, as in GDAL. That includes 24 bits, although libtiff swaps their bytes in files
 /// of the other byte order. Floats of 16 and 24 bits are in native byte order.
-void unpack_samples(const PackedSamples& packed, const std::byte* from, std::size_t first,
+void unpack_samples(const PackedSamples& packed, const std::byte* bytes, std::size_t first,
                     std::size_t step, std::size_t count, std::byte* out);
 
 /// Returns the exact value of a float of 16 bits (IEEE) or 24 bits (1 sign, 7 exponent, 16

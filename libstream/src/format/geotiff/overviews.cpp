@@ -94,9 +94,9 @@ void Overviews::add(std::size_t level, std::uint32_t across, std::uint32_t down,
       reduce<decltype(sample)>(level, across, down, samples, parent.samples);
     });
   }
-  const GeoTiffLevel& here = levels_[level];
-  const auto children =
-      std::min(2u, here.across - 2 * place.first) * std::min(2u, here.down - 2 * place.second);
+  const GeoTiffLevel& current_level = levels_[level];
+  const auto children = std::min(2u, current_level.across - 2 * place.first) *
+                        std::min(2u, current_level.down - 2 * place.second);
   if (++parent.children < children) return;
   auto complete_tile = open_[level + 1].extract(place);
   complete(level + 1, place, std::move(complete_tile.mapped()));
@@ -125,9 +125,9 @@ void Overviews::reduce(std::size_t level, std::uint32_t across, std::uint32_t do
   // Readers interpret missing cells as nodata, or as 0 without a nodata value.
   const T missing = nodata.value_or(T{});
   if (parent.empty()) fill(parent, side * side * sizeof(T), missing);
-  const GeoTiffLevel& here = levels_[level];
-  const std::size_t columns = std::min<std::size_t>(side, here.columns - across * side);
-  const std::size_t rows = std::min<std::size_t>(side, here.rows - down * side);
+  const GeoTiffLevel& current_level = levels_[level];
+  const std::size_t columns = std::min<std::size_t>(side, current_level.columns - across * side);
+  const std::size_t rows = std::min<std::size_t>(side, current_level.rows - down * side);
   std::byte* const quarter =
       parent.data() + ((down % 2) * side + across % 2) * (side / 2) * sizeof(T);
   for (std::size_t row = 0; row < rows; row += 2) {
@@ -142,9 +142,9 @@ void Overviews::reduce(std::size_t level, std::uint32_t across, std::uint32_t do
         }
       }
       if (valid == 0 && nodata) continue;
-      const std::span<const T> some = std::span(values).first(std::max<std::size_t>(valid, 1));
-      const T result =
-          options_.overviews == GeoTiffOverviews::average ? average(some, nodata) : some.front();
+      const std::span<const T> present = std::span(values).first(std::max<std::size_t>(valid, 1));
+      const T result = options_.overviews == GeoTiffOverviews::average ? average(present, nodata)
+                                                                       : present.front();
       std::memcpy(quarter + (row / 2 * side + column / 2) * sizeof(T), &result, sizeof(T));
     }
   }

@@ -61,8 +61,8 @@ void difference_row(std::byte* row, std::size_t columns) {
   for (std::size_t i = 0; i < columns; ++i) {
     Bits value;
     std::memcpy(&value, row + i * sizeof value, sizeof value);
-    const auto less = static_cast<Bits>(value - left);
-    std::memcpy(row + i * sizeof less, &less, sizeof less);
+    const auto difference = static_cast<Bits>(value - left);
+    std::memcpy(row + i * sizeof difference, &difference, sizeof difference);
     left = value;
   }
 }
@@ -73,8 +73,10 @@ void difference_floats(std::byte* row, std::size_t columns, std::size_t size,
                        std::vector<std::byte>& scratch) {
   scratch.assign(row, row + columns * size);
   for (std::size_t byte = 0; byte < size; ++byte) {
-    const std::size_t from = std::endian::native == std::endian::little ? size - 1 - byte : byte;
-    for (std::size_t i = 0; i < columns; ++i) row[byte * columns + i] = scratch[i * size + from];
+    const std::size_t source_index =
+        std::endian::native == std::endian::little ? size - 1 - byte : byte;
+    for (std::size_t i = 0; i < columns; ++i)
+      row[byte * columns + i] = scratch[i * size + source_index];
   }
   for (std::size_t i = columns * size; i-- > 1;) {
     row[i] = static_cast<std::byte>(std::to_integer<unsigned>(row[i]) -
@@ -180,8 +182,8 @@ struct GeoTiffWriter::Impl {
   std::uint32_t next_row = 0;   ///< of write_rows
   bool by_rows = false;
 
-  Impl(const std::filesystem::path& path, const GeoTiffOptions& wanted)
-      : options(wanted),
+  Impl(const std::filesystem::path& path, const GeoTiffOptions& geotiff_options)
+      : options(geotiff_options),
         levels(levels_of(options)),
         tiles(levels.begin(), levels.end()),
         big(needs_big(options, levels)),
@@ -255,9 +257,9 @@ void GeoTiffWriter::Impl::flush_band(std::uint32_t rows) {
     const std::size_t first = across * side;
     const std::size_t width = std::min<std::size_t>(side, options.columns - first);
     for (std::size_t row = 0; row < side; ++row) {
-      const std::size_t from = std::min<std::size_t>(row, rows - 1);
+      const std::size_t source_index = std::min<std::size_t>(row, rows - 1);
       std::byte* const out = tile.data() + row * side * size;
-      std::memcpy(out, band.data() + from * row_bytes + first * size, width * size);
+      std::memcpy(out, band.data() + source_index * row_bytes + first * size, width * size);
       for (std::size_t i = width; i < side; ++i) {
         std::memcpy(out + i * size, out + (width - 1) * size, size);
       }

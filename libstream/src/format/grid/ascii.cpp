@@ -148,7 +148,11 @@ class AsciiReader {
   /// nodata: see RasterOptions.
   AsciiReader(const std::string& file, const std::stop_token& stop,
               const std::optional<std::string>& nodata)
-      : input_(file, stop), stop_(stop), words_(input_), header_(input_.name()), given_(nodata) {
+      : input_(file, stop),
+        stop_(stop),
+        words_(input_),
+        header_(input_.name()),
+        nodata_text_(nodata) {
     constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
     word_ = words_.next();
     if (word_.starts_with(kByteOrderMark)) word_.remove_prefix(kByteOrderMark.size());
@@ -186,7 +190,7 @@ class AsciiReader {
   }
   [[nodiscard]] NodataRule nodata() const {
     NodataRule rule =
-        NodataRule::parse(given_.value_or(header_.text("nodata_value")), ScalarType::f64);
+        NodataRule::parse(nodata_text_.value_or(header_.text("nodata_value")), ScalarType::f64);
     // Programs that compute with floats often use the lowest float as nodata value, which may have
     // another number of digits in the header than in the cells.
     constexpr double kNoHeight = 1e38;
@@ -277,7 +281,7 @@ class AsciiReader {
   std::stop_token stop_;
   Words words_;
   GridHeader header_;
-  std::optional<std::string> given_;
+  std::optional<std::string> nodata_text_;
   double scale_ = 1;
   std::string_view word_;
   std::uint64_t columns_ = 0, rows_ = 0;
@@ -330,12 +334,12 @@ class SampleSpool {
     const std::unique_ptr<Spool> floats =
         std::exchange(spool_, std::make_unique<Spool>(spool_->name()));
     type_ = ScalarType::f64;
-    std::vector<float> some(kPieceBytes / sizeof(float));
+    std::vector<float> piece(kPieceBytes / sizeof(float));
     for (std::uint64_t at = 0; at < floats->size();) {
       const auto bytes =
           static_cast<std::size_t>(std::min<std::uint64_t>(kPieceBytes, floats->size() - at));
-      floats->read(at, std::as_writable_bytes(std::span(some)).first(bytes));
-      for (std::size_t i = 0; i < bytes / sizeof(float); ++i) put(static_cast<double>(some[i]));
+      floats->read(at, std::as_writable_bytes(std::span(piece)).first(bytes));
+      for (std::size_t i = 0; i < bytes / sizeof(float); ++i) put(static_cast<double>(piece[i]));
       at += bytes;
     }
   }
@@ -397,8 +401,8 @@ std::unique_ptr<Raster> open_ascii_grid(const std::string& file, const std::stop
     grid.info.files = {file};
     place_by_world_file(file, grid.info);
     return open_packed_grid(std::move(grid), [file, stop, type = *known, nodata] {
-      AsciiReader again(file, stop, nodata);
-      return spooled_samples(again, type).first;
+      AsciiReader second_reader(file, stop, nodata);
+      return spooled_samples(second_reader, type).first;
     });
   }
   auto [bytes, type] = spooled_samples(reader, ScalarType::f32);

@@ -308,9 +308,9 @@ std::unique_ptr<ByteSource> read_profiles(Input& input, const Head& head, const 
 bool recognise_usgs(std::span<const std::byte> head) {
   const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
   if (text.size() < kOldEnd) return false;
-  const auto integer = [&](std::size_t at, int least, int max_characters) {
+  const auto integer = [&](std::size_t at, int low, int high) {
     const auto value = integer_in(text.substr(at, kInteger));
-    return value && *value >= least && *value <= max_characters;
+    return value && *value >= low && *value <= high;
   };
   return integer(kLevel, 1, 4) && integer(kPattern, 1, 2) && integer(kSystem, 0, 20) &&
          integer(kGroundUnit, 0, 3) && integer(kHeightUnit, 1, 2) && integer(kSides, 4, 4);

@@ -243,12 +243,12 @@ std::string_view read_bytes(Input& input, LasHeader& header) {
         .remedy("convert it, e.g. 'pdal translate FILE out.las'");
   }
   const std::size_t bytes = load_little_endian<std::uint16_t>(first.data() + 94);
-  const std::size_t least = header.minor == 4   ? kLas14HeaderBytes
-                            : header.minor == 3 ? std::size_t{235}
-                                                : kLasFirstBytes;
-  if (bytes < least) {
+  const std::size_t min_bytes = header.minor == 4   ? kLas14HeaderBytes
+                                : header.minor == 3 ? std::size_t{235}
+                                                    : kLasFirstBytes;
+  if (bytes < min_bytes) {
     throw header_fault(input, fmt::format("says that it has {}; LAS 1.{} has {}",
-                                          counted(bytes, "byte"), header.minor, least));
+                                          counted(bytes, "byte"), header.minor, min_bytes));
   }
   const std::string_view all = input.fill(bytes);
   if (all.size() < bytes) throw header_fault(input, "the file ends in its header");

@@ -91,9 +91,9 @@ LasLayout las_layout(std::span<const Channel> attributes, const std::string& fil
   for (const Channel& channel : attributes) {
     const bool is_angle = formats == LasFormats::newer && channel.name == "scan_angle_rank" &&
                           !has(attributes, "scan_angle");
-    const std::string_view wanted = is_angle ? std::string_view("scan_angle") : channel.name;
+    const std::string_view field_name = is_angle ? std::string_view("scan_angle") : channel.name;
     const auto field = std::find_if(standard.begin(), standard.end(), [&](const LasField& each) {
-      return each.channel.name == wanted;
+      return each.channel.name == field_name;
     });
     if (field != standard.end()) {
       layout.fields.push_back(*field);
@@ -134,10 +134,10 @@ Lattice decimal_lattice(std::span<const Point3> points, const std::optional<Box3
   }
   half[0] = half[1] = std::max(half[0], half[1]);
   const int planar = decimals_of(points, 1, decimals_of(points, 0, 0));
-  const std::array<int, 3> wanted{planar, planar, decimals_of(points, 2, 0)};
+  const std::array<int, 3> needed_decimals{planar, planar, decimals_of(points, 2, 0)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const int usual = degrees && axis < 2 ? 7 : 3;
-    int decimals = std::max(wanted[axis], usual);
+    int decimals = std::max(needed_decimals[axis], usual);
     const auto reach = [&] {  // measured from the offset, which is rounded to a whole number
       return half[axis] * (bounds ? 1 : decimals > usual ? 1000 : 20) + 1;
     };

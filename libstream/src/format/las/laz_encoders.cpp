@@ -13,21 +13,21 @@ LazEncoders::LazEncoders(const laz::Vlr& vlr, unsigned threads, Write write)
           encoder->encode_chunk(chunk.records, chunk.coded);
         };
       }) {
-  if (threads <= 1) own_.emplace(vlr);
+  if (threads <= 1) encoder_.emplace(vlr);
 }
 
 void LazEncoders::encode(std::span<const std::byte> records) {
-  if (own_) {
+  if (encoder_) {
     coded_.clear();
-    own_->encode_chunk(records, coded_);
+    encoder_->encode_chunk(records, coded_);
     write_(coded_);
     return;
   }
   while (ahead_.threads() > 0 && ahead_.size() > ahead_.threads()) deliver_oldest();
   Chunk chunk;
-  if (!spare_.empty()) {
-    chunk = std::move(spare_.back());
-    spare_.pop_back();
+  if (!free_chunks_.empty()) {
+    chunk = std::move(free_chunks_.back());
+    free_chunks_.pop_back();
   }
   chunk.records.assign(records.begin(), records.end());
   ahead_.give(std::move(chunk));
@@ -41,7 +41,7 @@ void LazEncoders::finish() {
 void LazEncoders::deliver_oldest() {
   Chunk chunk = ahead_.take();
   write_(chunk.coded);
-  spare_.push_back(std::move(chunk));
+  free_chunks_.push_back(std::move(chunk));
 }
 
 }  // namespace terrace::stream

@@ -35,9 +35,9 @@ class LazEncoders {
   void deliver_oldest();
 
   Write write_;
-  std::optional<laz::Encoder> own_;  ///< with one thread, which needs no copy of the records
-  std::vector<std::byte> coded_;     ///< by own_
-  std::vector<Chunk> spare_;         ///< their buffers are used again
+  std::optional<laz::Encoder> encoder_;  ///< with one thread, which needs no copy of the records
+  std::vector<std::byte> coded_;         ///< by own_
+  std::vector<Chunk> free_chunks_;       ///< their buffers are used again
   base::WorkAhead<Chunk> ahead_;
 };
 

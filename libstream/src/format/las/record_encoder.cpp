@@ -49,8 +49,8 @@ bool fits(Value value, const LasField& field) {
 void LasSums::include(const LasSums& other) {
   points += other.points;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    least[axis] = std::min(least[axis], other.least[axis]);
-    most[axis] = std::max(most[axis], other.most[axis]);
+    lowest[axis] = std::min(lowest[axis], other.lowest[axis]);
+    highest[axis] = std::max(highest[axis], other.highest[axis]);
   }
   for (std::size_t i = 0; i < kReturns; ++i) returns[i] += other.returns[i];
   rounding = std::max(rounding, other.rounding);
@@ -98,9 +98,9 @@ PointWriter::EncodedPtr LasRecords::encode(const PointBlock& block) const {
 }
 
 std::string_view LasRecords::take(PointWriter::EncodedPtr points) {
-  if (taken_ != nullptr) spares_.put(std::move(taken_));
-  taken_.reset(static_cast<Records*>(points.release()));
-  Records& records = *taken_;
+  if (current_ != nullptr) spares_.put(std::move(current_));
+  current_.reset(static_cast<Records*>(points.release()));
+  Records& records = *current_;
   if (records.unpacked) {
     if (!has_lattice_) {
       lattice_ = decimal_lattice(records.unpacked->positions, bounds_, crs_.geographic);
@@ -120,12 +120,12 @@ void LasRecords::pack(const PointBlock& block, Records& out) const {
   out.sums.points = block.size();
   for (std::size_t axis = 0; axis < 3; ++axis) put_coordinate(block, axis, out);
   bool has_return = false, has_returns = false;
-  const std::byte* from = block.payload.data();
+  const std::byte* values = block.payload.data();
   for (std::size_t i = 0; i < attributes_.size(); ++i) {
-    put_attribute(from, attributes_[i], layout_.fields[i], out);
+    put_attribute(values, attributes_[i], layout_.fields[i], out);
     has_return = has_return || layout_.fields[i].channel.name == "return_number";
     has_returns = has_returns || layout_.fields[i].channel.name == "number_of_returns";
-    from += size_of(attributes_[i].type);
+    values += size_of(attributes_[i].type);
   }
   if (!has_return && !has_returns) set_single_returns(out.bytes);
   count_returns(out);
@@ -137,7 +137,7 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
                    kMax = std::numeric_limits<std::int32_t>::max();
   // Adding and subtracting it rounds numbers below 2^51 to the nearest integer, ties to even.
   constexpr double kToInteger = 0x1.8p52;
-  std::int32_t least = INT32_MAX, most = INT32_MIN;
+  std::int32_t lowest = INT32_MAX, highest = INT32_MIN;
   double rounding = 0;
   char* target = out.bytes.data() + 4 * axis;
   for (std::size_t i = 0; i < block.size(); ++i, target += layout_.record_bytes) {
@@ -152,20 +152,20 @@ void LasRecords::put_coordinate(const PointBlock& block, std::size_t axis, Recor
     const auto stored = static_cast<std::int32_t>(step);
     std::memcpy(target, &stored, sizeof stored);
     const double read = step * scale + offset;
-    const double moved = std::abs(read - value);
-    if (moved > 0x1p-50 * (std::abs(value) + std::abs(offset))) {
-      rounding = std::max(rounding, moved);
+    const double error = std::abs(read - value);
+    if (error > 0x1p-50 * (std::abs(value) + std::abs(offset))) {
+      rounding = std::max(rounding, error);
     }
-    least = std::min(least, stored);
-    most = std::max(most, stored);
+    lowest = std::min(lowest, stored);
+    highest = std::max(highest, stored);
   }
-  out.sums.least[axis] = least;
-  out.sums.most[axis] = most;
+  out.sums.lowest[axis] = lowest;
+  out.sums.highest[axis] = highest;
   out.sums.rounding = std::max(out.sums.rounding, rounding);
 }
 
-void LasRecords::put_attribute(const std::byte* from, const Channel& channel, const LasField& field,
-                               Records& out) const {
+void LasRecords::put_attribute(const std::byte* values, const Channel& channel,
+                               const LasField& field, Records& out) const {
   const auto count = static_cast<std::size_t>(out.sums.points);
   char* const target = out.bytes.data() + field.offset;
   const bool same = channel.type == field.channel.type && channel.scale == field.channel.scale &&
@@ -173,7 +173,7 @@ void LasRecords::put_attribute(const std::byte* from, const Channel& channel, co
   if (same && field.bits == 0) {
     with_type(channel.type, [&](auto value) {
       for (std::size_t i = 0; i < count; ++i) {
-        std::memcpy(&value, from + i * payload_bytes_, sizeof value);
+        std::memcpy(&value, values + i * payload_bytes_, sizeof value);
         std::memcpy(target + i * layout_.record_bytes, &value, sizeof value);
       }
     });
@@ -184,9 +184,9 @@ void LasRecords::put_attribute(const std::byte* from, const Channel& channel, co
     // A rank represents all angles that round to it.
     const double exact = channel.name == "scan_angle_rank" ? 0.5 : 1e-6;
     for (std::size_t i = 0; i < count; ++i) {
-      if (same) std::memcpy(&value, from + i * payload_bytes_, sizeof value);
+      if (same) std::memcpy(&value, values + i * payload_bytes_, sizeof value);
       if (!same || !fits(value, field)) {
-        value = converted<Value>(from + i * payload_bytes_, channel, field, exact, out.first + i);
+        value = convert<Value>(values + i * payload_bytes_, channel, field, exact, out.first + i);
       }
       char* const at = target + i * layout_.record_bytes;
       if (field.bits == 0) {
@@ -201,18 +201,19 @@ void LasRecords::put_attribute(const std::byte* from, const Channel& channel, co
 
 /// Converts a value to the type of the field. exact: the tolerance, in steps of the field.
 template <class Value>
-Value LasRecords::converted(const std::byte* from, const Channel& channel, const LasField& field,
-                            double exact, std::uint64_t point) const {
-  const double real = to_double(channel.type, from) * channel.scale + channel.offset;
+Value LasRecords::convert(const std::byte* values, const Channel& channel, const LasField& field,
+                          double exact, std::uint64_t point) const {
+  const double real = to_double(channel.type, values) * channel.scale + channel.offset;
   if constexpr (std::is_floating_point_v<Value>) {
     return static_cast<Value>(real);
   } else {
     const double step = (real - field.channel.offset) / field.channel.scale;
     const double rounded = std::nearbyint(step);
-    const double most = field.bits == 0 ? static_cast<double>(std::numeric_limits<Value>::max())
-                                        : static_cast<double>((1U << field.bits) - 1);
-    if (!(rounded >= static_cast<double>(std::numeric_limits<Value>::min()) && rounded <= most &&
-          std::abs(step - rounded) <= exact)) {
+    const double max_value = field.bits == 0
+                                 ? static_cast<double>(std::numeric_limits<Value>::max())
+                                 : static_cast<double>((1U << field.bits) - 1);
+    if (!(rounded >= static_cast<double>(std::numeric_limits<Value>::min()) &&
+          rounded <= max_value && std::abs(step - rounded) <= exact)) {
       throw Error(path_, fmt::format("{} does not fit into the field {} of LAS", text_of(real),
                                      field.channel.name))
           .at(fmt::format("point {}", point))
@@ -269,7 +270,7 @@ std::string las_header_text(const LasRecords& records, const LasFile& file) {
   for (const double scale : lattice.scale) append_little_endian(out, scale);
   for (const double offset : lattice.offset) append_little_endian(out, offset);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    for (const std::int32_t bound : {sums.most[axis], sums.least[axis]}) {
+    for (const std::int32_t bound : {sums.highest[axis], sums.lowest[axis]}) {
       append_little_endian(
           out, sums.points == 0 ? 0.0 : bound * lattice.scale[axis] + lattice.offset[axis]);
     }

@@ -22,9 +22,9 @@ struct LasSums {
   static constexpr std::size_t kReturns = 15;
 
   std::uint64_t points = 0;
-  /// In steps of the lattice; without points `least` exceeds `most`.
-  std::array<std::int32_t, 3> least{INT32_MAX, INT32_MAX, INT32_MAX},
-      most{INT32_MIN, INT32_MIN, INT32_MIN};
+  /// In steps of the lattice; without points `lowest` exceeds `highest`.
+  std::array<std::int32_t, 3> lowest{INT32_MAX, INT32_MAX, INT32_MAX},
+      highest{INT32_MIN, INT32_MIN, INT32_MIN};
   std::array<std::uint64_t, kReturns> returns{};
   double rounding = 0.0;  ///< as PointWriter::rounding()
 
@@ -60,11 +60,11 @@ class LasRecords {
 
   void pack(const PointBlock& block, Records& out) const;
   void put_coordinate(const PointBlock& block, std::size_t axis, Records& out) const;
-  void put_attribute(const std::byte* from, const Channel& channel, const LasField& field,
+  void put_attribute(const std::byte* values, const Channel& channel, const LasField& field,
                      Records& out) const;
   template <class Value>
-  Value converted(const std::byte* from, const Channel& channel, const LasField& field,
-                  double exact, std::uint64_t point) const;
+  Value convert(const std::byte* values, const Channel& channel, const LasField& field,
+                double exact, std::uint64_t point) const;
   void set_single_returns(std::string& records) const;
   void count_returns(Records& out) const;
 
@@ -77,7 +77,7 @@ class LasRecords {
   std::atomic<bool> has_lattice_;  ///< if false, the first points determine it
   Lattice lattice_;
   LasSums sums_;
-  std::unique_ptr<Records> taken_;
+  std::unique_ptr<Records> current_;
   mutable Spares<Records> spares_;
 };
 

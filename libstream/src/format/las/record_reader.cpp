@@ -14,7 +14,7 @@ std::string_view PlainRecords::read(std::uint64_t max_records) {
   /// cache.
   constexpr std::size_t kPieceBytes = 64u << 10;
   input_->consume(std::exchange(used_, 0));
-  if (left_ == 0) return {};
+  if (remaining_ == 0) return {};
   auto records =
       std::min<std::uint64_t>(max_records, std::max<std::size_t>(1, kPieceBytes / record_bytes_));
   const std::string_view window = input_->fill(static_cast<std::size_t>(records) * record_bytes_);
@@ -26,12 +26,12 @@ std::string_view PlainRecords::read(std::uint64_t max_records) {
     if (!on_damage_) throw damage;
     records = window.size() / record_bytes_;
     if (records == 0) {
-      lost_ = std::exchange(left_, 0);
+      lost_ = std::exchange(remaining_, 0);
       on_damage_(damage, lost_);
       return {};
     }
   }
-  left_ -= records;
+  remaining_ -= records;
   used_ = static_cast<std::size_t>(records) * record_bytes_;
   return window.substr(0, used_);
 }

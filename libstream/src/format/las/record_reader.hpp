@@ -34,7 +34,7 @@ class PlainRecords final : public RecordReader {
                OnDamage on_damage = {})
       : input_(&input),
         record_bytes_(record_bytes),
-        left_(points),
+        remaining_(points),
         on_damage_(std::move(on_damage)) {}
   std::string_view read(std::uint64_t max_records) override;
   [[nodiscard]] std::uint64_t lost() const override { return lost_; }
@@ -42,7 +42,7 @@ class PlainRecords final : public RecordReader {
  private:
   Input* input_;
   std::size_t record_bytes_, used_ = 0;
-  std::uint64_t left_, lost_ = 0;
+  std::uint64_t remaining_, lost_ = 0;
   OnDamage on_damage_;
 };
 

@@ -77,11 +77,11 @@ class LasOpener {
 
   /// Opens the records that the selection needs, as far as the file's structure allows.
   void open_records() {
-    const Selection& wanted = options_.selection;
+    const Selection& selection = options_.selection;
     stream_.info.points = stream_.points;
     open_nodes();
     if (stream_.info.octree) return;
-    if (wanted.resolution > 0) {
+    if (selection.resolution > 0) {
       throw Error(stream_.input->name(),
                   message("it has no octree, so {resolution} does not apply"))
           .remedy(message("name a COPC file, not piped, or EPT, or leave {resolution} out"));
@@ -100,20 +100,20 @@ class LasOpener {
     const bool is_copc = header_.compressed && header_.minor == 4 && !header_.vlrs.empty() &&
                          header_.vlrs.front().is(kCopcUser, kCopcInfo);
     if (!is_copc || !is_seekable(file_)) return;
-    const Selection& wanted = options_.selection;
+    const Selection& selection = options_.selection;
     try {
       std::unique_ptr<ByteSource> bytes = open_file(file_);
       Octree octree = read_copc_hierarchy(*bytes, header_.vlrs.front().data, header_.points_offset,
                                           header_.points);
-      octree.keep(wanted.region, wanted.resolution, steps_of(stream_.info));
+      octree.keep(selection.region, selection.resolution, steps_of(stream_.info));
       RecordParts parts = laz_node_parts(std::move(bytes), header_, octree);
-      if (wanted.region) parts = parts_in_cubes(std::move(parts), octree, stream_, file_);
+      if (selection.region) parts = parts_in_cubes(std::move(parts), octree, stream_, file_);
       stream_.records = records_of_parts(std::move(parts), options_);
       stream_.info.points = octree.points();
       stream_.info.octree = octree.info();
       stream_.info.format = "copc";
     } catch (const Error& error) {
-      if (wanted.resolution > 0) throw;
+      if (selection.resolution > 0) throw;
       stream_.info.comments.push_back("read in the order of the file: " +
                                       error.parts().cause.text());
     }

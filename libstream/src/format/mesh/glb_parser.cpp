@@ -364,7 +364,7 @@ class GlbParser final : public MeshParser {
   }
 
   void read_scene() {
-    std::vector<bool> seen(list(json_, "nodes").size());
+    std::vector<bool> visited(list(json_, "nodes").size());
     std::vector<std::pair<std::uint64_t, Transform>> stack;
     for (const std::uint64_t root : roots()) stack.emplace_back(root, kIdentity);
     std::reverse(stack.begin(), stack.end());
@@ -372,8 +372,8 @@ class GlbParser final : public MeshParser {
       const auto [index, above] = stack.back();
       stack.pop_back();
       const Json& node = entry("nodes", index);
-      if (seen[index]) throw fault("is in the scene twice").at(fmt::format("nodes {}", index));
-      seen[index] = true;
+      if (visited[index]) throw fault("is in the scene twice").at(fmt::format("nodes {}", index));
+      visited[index] = true;
       const Transform transform = product(above, transform_of(node));
       if (const auto mesh = count(node, "mesh")) add_mesh(*mesh, transform);
       const Json& children = list(node, "children");
@@ -501,8 +501,8 @@ class GlbParser final : public MeshParser {
       }
       // Every second triangle of a strip has the opposite orientation.
       face_ = {last_[0], last_[1], corner};
-      const bool turned = part.mode == glb::kStrip && number % 2 == 1;
-      if (turned != part.mirrored) std::swap(face_[1], face_[2]);
+      const bool is_reversed = part.mode == glb::kStrip && number % 2 == 1;
+      if (is_reversed != part.mirrored) std::swap(face_[1], face_[2]);
       if (part.mode == glb::kStrip) last_[0] = last_[1];
       last_[1] = corner;
       // Triangles without area connect strips; skip them.

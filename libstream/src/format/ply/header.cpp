@@ -108,20 +108,20 @@ void check_counts(const PlyHeader& header, const Input& input) {
   std::uint64_t remaining = *input.size() - std::min(*input.size(), input.offset());
   if (header.encoding == PlyEncoding::ascii) ++remaining;
   for (const PlyElement& element : header.elements) {
-    const std::uint64_t least = header.encoding == PlyEncoding::ascii
-                                    ? 2 * element.properties.size()
-                                    : element.binary_bytes();
-    if (least == 0) continue;
-    if (element.count > remaining / least) {
+    const std::uint64_t min_bytes = header.encoding == PlyEncoding::ascii
+                                        ? 2 * element.properties.size()
+                                        : element.binary_bytes();
+    if (min_bytes == 0) continue;
+    if (element.count > remaining / min_bytes) {
       throw Error(input.name(),
                   fmt::format("the header promises {} of {} of at least {}, but only {}{} left",
                               counted(element.count, "item"), in_quotes(element.name),
-                              counted(least, "byte"), counted(remaining, "byte"),
+                              counted(min_bytes, "byte"), counted(remaining, "byte"),
                               remaining == 1 ? " is" : " are"))
           .at_byte(input.offset())
           .remedy("the file is truncated or its header is wrong: download it again");
     }
-    remaining -= element.count * least;
+    remaining -= element.count * min_bytes;
   }
 }
 

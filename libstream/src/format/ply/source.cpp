@@ -217,29 +217,29 @@ class PlySource final : public PointSource {
   }
 
   void read_block(PointBlock& block) {
-    const auto wanted =
+    const auto count =
         static_cast<std::size_t>(std::min<std::uint64_t>(block_points_, count_ - read_));
-    block.positions.resize(wanted);
-    block.payload.resize(wanted * record_bytes_);
+    block.positions.resize(count);
+    block.payload.resize(count * record_bytes_);
     if (header_.encoding == PlyEncoding::ascii) {
-      for (std::size_t i = 0; i < wanted; ++i) read_line(block, i);
+      for (std::size_t i = 0; i < count; ++i) read_line(block, i);
     } else if (has_lists_) {
-      for (std::size_t i = 0; i < wanted; ++i) read_row(block, i);
+      for (std::size_t i = 0; i < count; ++i) read_row(block, i);
     } else {
-      read_rows(block, wanted);
+      read_rows(block, count);
     }
     if (!is_finite(block)) {
       check_infinite(block);
       if (!keeps_missing_) nodata_ += remove_missing(block, record_bytes_);
     }
-    read_ += wanted;
+    read_ += count;
   }
 
   /// Reads vertices of fixed size in a binary file.
-  void read_rows(PointBlock& block, std::size_t wanted) {
-    for (std::size_t first = 0; first < wanted;) {
+  void read_rows(PointBlock& block, std::size_t count) {
+    for (std::size_t first = 0; first < count;) {
       const std::size_t rows =
-          std::min(wanted - first, std::max<std::size_t>(1, kChunkBytes / stride_));
+          std::min(count - first, std::max<std::size_t>(1, kChunkBytes / stride_));
       const std::string_view window = input_.fill(rows * stride_);
       if (window.size() < rows * stride_) {
         throw early_end("vertex", read_ + first + window.size() / stride_);
@@ -311,8 +311,8 @@ class PlySource final : public PointSource {
     return nullptr;
   }
 
-  /// Reads a face or a strip; stores its property `wanted` in corners_.
-  void read_corners(const PlyElement& element, const PlyProperty& wanted, std::uint64_t item) {
+  /// Reads a face or a strip; stores its property `selected` in corners_.
+  void read_corners(const PlyElement& element, const PlyProperty& selected, std::uint64_t item) {
     const bool is_ascii = header_.encoding == PlyEncoding::ascii;
     std::string_view line;
     while (is_ascii && line.empty()) {
@@ -336,11 +336,11 @@ class PlySource final : public PointSource {
             .at(fmt::format("{} {}", element.name, item))
             .remedy("the file is damaged: export it again");
       }
-      const bool is_wanted = &property == &wanted;
-      if (is_wanted) corners_.clear();
+      const bool is_selected = &property == &selected;
+      if (is_selected) corners_.clear();
       for (std::int64_t k = 0; k < length; ++k) {
         next(property.type, property);
-        if (is_wanted) corners_.push_back(corner(property.type, raw.data(), element, item));
+        if (is_selected) corners_.push_back(corner(property.type, raw.data(), element, item));
       }
     }
     if (!line.empty())

@@ -87,8 +87,8 @@ std::optional<AxisName> axis_named(std::string_view name) {
   bool decorated = false;
   const std::string bare = bare_name(name, decorated);
   std::string_view letter = bare;
-  if (const std::string_view within = letter_within(bare); !within.empty()) {
-    letter = within;
+  if (const std::string_view inner_letter = letter_within(bare); !inner_letter.empty()) {
+    letter = inner_letter;
     decorated = true;
   }
   if (is_among(letter, {"x", "y", "z"})) {

@@ -34,10 +34,12 @@ struct NamedAxes {
   std::array<std::optional<std::size_t>, 3> columns;
   std::array<bool, 3> angle{};
   /// A second column for an axis with a name of the same kind; only heights may have several words.
-  std::optional<std::size_t> twice;
+  std::optional<std::size_t> duplicate;
 
   [[nodiscard]] bool none() const { return !columns[0] && !columns[1] && !columns[2]; }
-  [[nodiscard]] bool complete() const { return columns[0] && columns[1] && columns[2] && !twice; }
+  [[nodiscard]] bool complete() const {
+    return columns[0] && columns[1] && columns[2] && !duplicate;
+  }
 };
 
 /// Letters take precedence over words, so that in "x,y,z,lat,lon" the last two are attributes. Of
@@ -52,7 +54,7 @@ NamedAxes named_axes(const std::vector<std::string_view>& names) {
       auto& column = found.columns[name->axis];
       if (column) {
         const bool height = name->axis == 2 && name->kind != AxisNameKind::letter;
-        if (!height && !found.twice) found.twice = i;
+        if (!height && !found.duplicate) found.duplicate = i;
         continue;
       }
       column = i;
@@ -67,11 +69,11 @@ NamedAxes named_axes(const std::vector<std::string_view>& names) {
 void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
                const std::string& file, const std::string& where) {
   const NamedAxes found = named_axes(names);
-  if (found.twice) {
-    const std::size_t axis = axis_named(names[*found.twice])->axis;
-    throw Error(file,
-                fmt::format("columns {} and {} name the same coordinate",
-                            in_quotes(names[*found.columns[axis]]), in_quotes(names[*found.twice])))
+  if (found.duplicate) {
+    const std::size_t axis = axis_named(names[*found.duplicate])->axis;
+    throw Error(file, fmt::format("columns {} and {} name the same coordinate",
+                                  in_quotes(names[*found.columns[axis]]),
+                                  in_quotes(names[*found.duplicate])))
         .at(where)
         .remedy("rename one of them");
   }

@@ -59,12 +59,13 @@ class CoordinateText {
     char digits[kMaxNumber];
     auto [end, error] =
         std::to_chars(digits, digits + sizeof digits, value, std::chars_format::fixed, decimals_);
-    double meant = 0.0;
-    if (error != std::errc{} || parse_real(digits, end, meant) != end) return;
+    double decimal_value = 0.0;
+    if (error != std::errc{} || parse_real(digits, end, decimal_value) != end) return;
     while (decimals_ > 0 && end[-1] == '0') --end;
     if (end[-1] == '.') --end;
     // Equal except for the rounding of the product and the sum.
-    const bool same = std::abs(value - meant) <= 0x1p-51 * (std::abs(value) + std::abs(offset_));
+    const bool same =
+        std::abs(value - decimal_value) <= 0x1p-51 * (std::abs(value) + std::abs(offset_));
     if (same && static_cast<std::size_t>(end - digits) < text.size() - begin) {
       text.replace(begin, std::string::npos, std::string_view(digits, end));
     }

@@ -247,23 +247,24 @@ class VrtReader {
       return r;
     };
     const auto columns = static_cast<double>(info_.columns), rows = static_cast<double>(info_.rows);
-    const Rect whole{0, 0, columns, rows};
-    const Rect from = rect("SrcRect").value_or(whole), to = rect("DstRect").value_or(whole);
-    if (from[2] != to[2] || from[3] != to[3]) {
+    const Rect all_cells{0, 0, columns, rows};
+    const Rect source_rect = rect("SrcRect").value_or(all_cells),
+               target_rect = rect("DstRect").value_or(all_cells);
+    if (source_rect[2] != target_rect[2] || source_rect[3] != target_rect[3]) {
       throw fault("is not as large as its SrcRect, so its source would be resampled")
           .at("DstRect")
           .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
     }
-    if (to[0] + to[2] > columns || to[1] + to[3] > rows) {
+    if (target_rect[0] + target_rect[2] > columns || target_rect[1] + target_rect[3] > rows) {
       throw fault("is outside the raster").at("DstRect").remedy(kAsGeoTiff);
     }
     const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
-    source.source_column = cells(from[0]);
-    source.source_row = cells(from[1]);
-    source.column = cells(to[0]);
-    source.row = cells(to[1]);
-    source.columns = cells(to[2]);
-    source.rows = cells(to[3]);
+    source.source_column = cells(source_rect[0]);
+    source.source_row = cells(source_rect[1]);
+    source.column = cells(target_rect[0]);
+    source.row = cells(target_rect[1]);
+    source.columns = cells(target_rect[2]);
+    source.rows = cells(target_rect[3]);
   }
 
   static constexpr std::string_view kBand = "VRTRasterBand";

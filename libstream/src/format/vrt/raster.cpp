@@ -86,9 +86,9 @@ class WholeNumbers final : public Raster {
   void set_open_bytes(std::uint64_t bytes) override { raster_->set_open_bytes(bytes); }
 
   bool read_over(const CellWindow& window, const CellBuffer& out) override {
-    const ScalarType from = raster_->info().sample.type;
+    const ScalarType source_type = raster_->info().sample.type;
     const auto columns = static_cast<std::size_t>(window.columns);
-    reals_.resize(columns * size_of(from));
+    reals_.resize(columns * size_of(source_type));
     bool any = false;
     for (std::uint64_t row = 0; row < window.rows; ++row) {
       valid_.assign(columns, 0);
@@ -98,7 +98,7 @@ class WholeNumbers final : public Raster {
       for (std::size_t i = 0; i < columns; ++i) {
         if (valid_[i] == 0) continue;
         const std::size_t target = static_cast<std::size_t>(row) * out.stride + i;
-        put(to_double(from, reals_.data() + i * size_of(from)), out.samples, target);
+        put(to_double(source_type, reals_.data() + i * size_of(source_type)), out.samples, target);
         out.valid[target] = 1;
         any = true;
       }
@@ -138,13 +138,13 @@ class VrtRaster final : public Raster {
     info_ = std::move(document.info);
     sources_ = std::move(document.sources);
     nodata_ = document.nodata;
-    held_.resize(sources_.size());
+    source_bytes_.resize(sources_.size());
     options_.cache_bytes /= kOpenAtOnce / 4;  // few of them overlap one window
     for (std::size_t i = 0; i < sources_.size(); ++i) {
       const std::unique_ptr<Raster> raster = open(sources_[i], std::nullopt);
-      held_[i] = raster->info().held_bytes;
+      source_bytes_[i] = raster->info().held_bytes;
       direct_ = direct_ && is_direct(sources_[i], raster->info());
-      info_.held_bytes = std::max(info_.held_bytes, held_[i]);
+      info_.held_bytes = std::max(info_.held_bytes, source_bytes_[i]);
       note_own_nodata(sources_[i], raster->info());
       if (i == 0 && info_.crs.wkt.empty() && info_.crs.epsg == 0) {
         const std::string unit = info_.crs.vertical_unit;
@@ -274,14 +274,14 @@ class VrtRaster final : public Raster {
       return *open_.front().raster;
     }
     while (!open_.empty() &&
-           (open_.size() >= kOpenAtOnce || held_bytes_ + held_[source] > open_bytes_)) {
-      held_bytes_ -= held_[open_.back().source];
+           (open_.size() >= kOpenAtOnce || held_bytes_ + source_bytes_[source] > open_bytes_)) {
+      held_bytes_ -= source_bytes_[open_.back().source];
       open_.pop_back();
     }
     std::optional<std::string> nodata = sources_[source].nodata;
     if (!nodata && nodata_.value) nodata = "";  // nodata_ is applied to all sources
     open_.push_front({source, open(sources_[source], nodata)});
-    held_bytes_ += held_[source];
+    held_bytes_ += source_bytes_[source];
     return *open_.front().raster;
   }
 
@@ -358,8 +358,8 @@ class VrtRaster final : public Raster {
   RasterInfo info_;
   std::vector<VrtSource> sources_;
   NodataRule nodata_;
-  std::vector<std::uint64_t> held_;  ///< bytes, by source
-  std::list<Open> open_;             ///< most recently used first
+  std::vector<std::uint64_t> source_bytes_;  ///< bytes, by source
+  std::list<Open> open_;                     ///< most recently used first
   std::uint64_t open_bytes_, held_bytes_ = 0;
   bool noted_ = false;  ///< see note_own_nodata()
   bool direct_ = true;  ///< all sources are direct: see is_direct()

@@ -47,11 +47,11 @@ std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts) {
   return bits;
 }
 
-Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::uint32_t least) {
+Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::uint32_t min_count) {
   std::uint64_t total = 0, rare = 0;
   for (unsigned s = 0; s < kClasses; ++s) {
-    if (counts[s] >= least) total += counts[s];
-    if (counts[s] <= std::max(least - 1, 1u)) rare += counts[s];
+    if (counts[s] >= min_count) total += counts[s];
+    if (counts[s] <= std::max(min_count - 1, 1u)) rare += counts[s];
   }
   if (total == 0) return escape_only();
   // The expected number of unseen symbols is the number of those seen once (Good-Turing).
@@ -63,7 +63,7 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::u
   frequencies[kEscape] = static_cast<std::uint16_t>(escape);
   std::uint64_t sum = 0;
   for (unsigned s = 0; s < kClasses; ++s) {
-    if (counts[s] < std::max(least, 1u)) continue;
+    if (counts[s] < std::max(min_count, 1u)) continue;
     const std::uint64_t share = std::max<std::uint64_t>(1, counts[s] * available / total);
     frequencies[s] = static_cast<std::uint16_t>(share);
     sum += share;

@@ -22,15 +22,16 @@ using Counts = std::vector<std::array<std::uint32_t, kSymbols>>;
 /// Returns the raw bits of the symbols' classes.
 [[nodiscard]] std::uint64_t open_bits_of(const std::array<std::uint32_t, kSymbols>& counts);
 /// Returns frequencies for `counts`. Every symbol stays codable: those that occur less often than
-/// `least` by the escape.
-Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::uint32_t least = 1);
+/// `min_count` by the escape.
+Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts,
+                       std::uint32_t min_count = 1);
 
 /// The attribute that shows where scan lines begin, the time of the pulses.
 struct Guide {
   static constexpr unsigned kNone = UINT32_MAX;
 
   unsigned attribute = kNone;
-  std::uint64_t min_jump = 0;  ///< a difference of at least this begins a line; not stored
+  std::uint64_t min_jump = 0;  ///< a difference of at min_count this begins a line; not stored
 
   [[nodiscard]] bool exists() const { return attribute != kNone; }
 };

@@ -181,15 +181,15 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
   }
   // The memory of a dropped node is reused for the new one. The new node is not in a map until it
   // is complete, so damage leaves no trace.
-  Nodes fresh, dropped;
+  Nodes new_nodes, dropped;
   if (cache.held_bytes >= cache.max_bytes && !cache.nodes.empty()) {
-    cache.drop(fresh);
+    cache.drop(new_nodes);
   } else {
-    fresh.emplace_front();
+    new_nodes.emplace_front();
   }
-  fill(fresh.front(), id);
-  cache.held_bytes += fresh.front().bytes;
-  cache.nodes.splice(cache.nodes.begin(), fresh);
+  fill(new_nodes.front(), id);
+  cache.held_bytes += new_nodes.front().bytes;
+  cache.nodes.splice(cache.nodes.begin(), new_nodes);
   cache.by_id[key] = cache.nodes.begin();
   while (cache.held_bytes > cache.max_bytes && cache.nodes.size() > 1) cache.drop(dropped);
   return cache.nodes.front();

@@ -26,8 +26,8 @@ struct QuantisedBox {
   [[nodiscard]] Box3 in(const Box3& outer) const {
     Box3 box;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      box.min[axis] = between(outer.min[axis], outer.max[axis], low[axis]);
-      box.max[axis] = between(outer.min[axis], outer.max[axis], high[axis]);
+      box.min[axis] = interpolate(outer.min[axis], outer.max[axis], low[axis]);
+      box.max[axis] = interpolate(outer.min[axis], outer.max[axis], high[axis]);
     }
     return box;
   }
@@ -44,17 +44,17 @@ struct QuantisedBox {
       // Rounding may have moved an end inside.
       Number& first = found.low[axis];
       first = place(box.min[axis]);
-      while (first > 0 && !(between(low, high, first) <= box.min[axis])) --first;
+      while (first > 0 && !(interpolate(low, high, first) <= box.min[axis])) --first;
       Number& last = found.high[axis];
       last = place(box.max[axis]);
-      while (last < kMax && !(between(low, high, last) >= box.max[axis])) ++last;
+      while (last < kMax && !(interpolate(low, high, last) >= box.max[axis])) ++last;
     }
     return found;
   }
 
  private:
   /// Interpolates; exact at both ends.
-  static double between(double low, double high, Number place) {
+  static double interpolate(double low, double high, Number place) {
     const double share = place / static_cast<double>(kMax);
     return low * (1 - share) + high * share;
   }

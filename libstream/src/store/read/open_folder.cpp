@@ -62,8 +62,8 @@ Ownership Store::ownership_of(const fs::path& folder) {
   const std::set<std::string> ours = files_of_store(folder);
   if (ours.empty()) return false;
   return ownership_of_entries(folder, [&](const fs::directory_entry& entry) {
-    std::error_code gone;
-    return fs::is_regular_file(entry.symlink_status(gone)) &&
+    std::error_code ignored;
+    return fs::is_regular_file(entry.symlink_status(ignored)) &&
            (ours.contains(entry.path().filename().string()) || is_overlay(entry.path()));
   });
 }

@@ -190,22 +190,24 @@ void BlockEncoder::measure(std::size_t axis) {
   const std::size_t clusters = block_->representatives.size();
   const std::int64_t* const values = axes_[axis].data();
   extents_[axis].resize(clusters);
-  Extent whole;
+  Extent block_extent;
   for (std::size_t c = 0; c < clusters; ++c) {
     const Extent extent =
         extent_of({values + block_->first[c], block_->first[c + 1] - block_->first[c]});
     extents_[axis][c] = extent;
-    whole.low = std::min(whole.low, extent.low);
-    whole.high = std::max(whole.high, extent.high);
+    block_extent.low = std::min(block_extent.low, extent.low);
+    block_extent.high = std::max(block_extent.high, extent.high);
   }
   for (const ClusterSummary& summary : block_->summaries) {
     if (summary.box.empty()) continue;
-    whole.low = std::min(whole.low, to_integer(summary.box.min[axis], forms_[axis]));
-    whole.high = std::max(whole.high, to_integer(summary.box.max[axis], forms_[axis]));
+    block_extent.low = std::min(block_extent.low, to_integer(summary.box.min[axis], forms_[axis]));
+    block_extent.high =
+        std::max(block_extent.high, to_integer(summary.box.max[axis], forms_[axis]));
   }
-  const auto extent = whole.low > whole.high ? 0
-                                             : static_cast<std::uint64_t>(whole.high) -
-                                                   static_cast<std::uint64_t>(whole.low);
+  const auto extent = block_extent.low > block_extent.high
+                          ? 0
+                          : static_cast<std::uint64_t>(block_extent.high) -
+                                static_cast<std::uint64_t>(block_extent.low);
   const auto bits = static_cast<unsigned>(std::bit_width(extent));
   shifts_[axis] = std::min(bits > kBoxBits ? bits - kBoxBits : 0, max_shift(forms_[axis]));
 }
@@ -298,8 +300,8 @@ Entry BlockEncoder::enter(std::size_t cluster) {
     entry_box_.size[axis] = entry.size[axis];
     coded_box_.low[axis] = unsigned_of(low) - unsigned_of(outer_low);
     coded_box_.size[axis] = unsigned_of(high) - unsigned_of(low) + 1;
-    const std::uint64_t spare = entry.size[axis] - coded_box_.size[axis];
-    own_box_ |= spare > 2 * step && spare > coded_box_.size[axis] / 16;
+    const std::uint64_t slack = entry.size[axis] - coded_box_.size[axis];
+    own_box_ |= slack > 2 * step && slack > coded_box_.size[axis] / 16;
   }
   if (!own_box_) coded_box_ = entry_box_;
   for (std::size_t axis = 0; axis < 3; ++axis) {

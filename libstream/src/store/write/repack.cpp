@@ -52,27 +52,27 @@ std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
       extents[axis] += share(box.max[axis], axis) - share(box.min[axis], axis);
     }
   }
-  double least = std::numeric_limits<double>::infinity();
+  double shortest = std::numeric_limits<double>::infinity();
   for (const double extent : extents) {
-    if (extent > 0) least = std::min(least, extent);
+    if (extent > 0) shortest = std::min(shortest, extent);
   }
 
   // Keys with the position on the curve in the bits above the ordinal.
   const auto ordinal_bits = static_cast<unsigned>(std::bit_width(clusters));
   const unsigned curve_bits = bits * static_cast<unsigned>(axes);
-  const unsigned lost = curve_bits + ordinal_bits > 64 ? curve_bits + ordinal_bits - 64 : 0;
+  const unsigned dropped_bits = curve_bits + ordinal_bits > 64 ? curve_bits + ordinal_bits - 64 : 0;
   std::vector<std::uint64_t> order(clusters);
   for (std::uint64_t i = 0; i < clusters; ++i) {
     const Box3 box = store.record(cluster_id(level, i)).summary.box;
     std::array<std::uint32_t, 3> cell{};
     for (std::size_t axis = 0; axis < axes; ++axis) {
-      const double scale = extents[axis] > 0 ? least / extents[axis] : 1.0;
+      const double scale = extents[axis] > 0 ? shortest / extents[axis] : 1.0;
       const double place = share(0.5 * box.min[axis] + 0.5 * box.max[axis], axis) * scale;
       cell[axis] = static_cast<std::uint32_t>(place * static_cast<double>((1u << bits) - 1));
     }
     const std::uint64_t place = axes == 2 ? base::hilbert_index<28>(cell[0], cell[1])
                                           : base::hilbert_index<20>(cell[0], cell[1], cell[2]);
-    order[i] = place >> lost << ordinal_bits | i;
+    order[i] = place >> dropped_bits << ordinal_bits | i;
   }
   std::sort(order.begin(), order.end());
   for (std::uint64_t& place : order) place &= (std::uint64_t{1} << ordinal_bits) - 1;
@@ -80,12 +80,12 @@ std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
 }
 
 /// Adds a cluster with the new ordinals of the clusters that its points head.
-void add(const Store& store, ClusterId id, const Ordinals& moved, RawBlock& block) {
+void add(const Store& store, ClusterId id, const Ordinals& new_ordinals, RawBlock& block) {
   ClusterPoints points;
   store.read(id, points);
   for (auto* const children : {&points.children, &points.representative_children}) {
     for (std::size_t i = 0; i < children->size(); ++i) {
-      (*children)[i] = moved[i % block.level][(*children)[i]];
+      (*children)[i] = new_ordinals[i % block.level][(*children)[i]];
     }
   }
   block.add(points);
@@ -101,7 +101,7 @@ std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool
   StoreWriter writer(path, store.schema(), replace, threads);
   base::ThreadTeam team(threads);
   const std::uint64_t block_points = store.schema().grid ? kRasterBlock : kCloudBlock;
-  Ordinals moved;
+  Ordinals new_ordinals;
   for (unsigned level = 0; level < store.top(); ++level) {
     const std::vector<std::uint64_t> order = along_curve(store, level);
     for (std::uint64_t next = 0; next < order.size();) {
@@ -118,18 +118,18 @@ std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool
         RawBlock block;
         block.level = level;
         for (std::uint64_t i = begins[b]; i < begins[b + 1]; ++i) {
-          add(store, cluster_id(level, order[i]), moved, block);
+          add(store, cluster_id(level, order[i]), new_ordinals, block);
         }
         blocks[b] = writer.encode(block.view());
       });
       for (StoreWriter::EncodedPtr& block : blocks) writer.append(std::move(block));
     }
-    std::vector<std::uint64_t>& to = moved.emplace_back(order.size());
-    for (std::uint64_t i = 0; i < order.size(); ++i) to[order[i]] = i;
+    std::vector<std::uint64_t>& ordinals = new_ordinals.emplace_back(order.size());
+    for (std::uint64_t i = 0; i < order.size(); ++i) ordinals[order[i]] = i;
   }
   RawBlock root;
   root.level = store.top();
-  add(store, store.root(), moved, root);
+  add(store, store.root(), new_ordinals, root);
   return writer.finish(root.view());
 }
 

@@ -54,8 +54,9 @@ Naming naming_of(bool replace) {
 }  // namespace
 
 struct StoreWriter::Impl {
-  Impl(const std::filesystem::path& path, StoreSchema given, bool replace_old, unsigned threads)
-      : schema(std::move(given)),
+  Impl(const std::filesystem::path& path, StoreSchema store_schema, bool replace_old,
+       unsigned threads)
+      : schema(std::move(store_schema)),
         team(threads),
         staging(path, kManifestName, naming_of(replace_old)) {}
 
