@@ -363,7 +363,8 @@ std::vector<Vlr> all_codings() {
   return all;
 }
 
-/// Decodes as from a pipe, giving `feed` more bytes and requesting up to `most` records at a time.
+/// Decodes as from a pipe, giving `feed` more bytes and requesting up to `max_points` records at a
+/// time.
 ByteVector decoded_in_steps(Decoder& decoder, std::span<const std::byte> chunk, std::size_t length,
                             std::size_t points, std::size_t feed, std::size_t max_points,
                             bool layered) {

@@ -170,7 +170,7 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
   EXPECT_GT(without, 2u);
 }
 
-/// Overwrites the tiles of a GeoTIFF except those for which `kept` is true, so that reading them
+/// Overwrites the tiles of a GeoTIFF except those for which `keeps` is true, so that reading them
 /// fails. Returns the number of tiles left.
 std::size_t damage_tiles(const std::filesystem::path& file,
                          const std::function<bool(std::uint32_t, std::uint32_t)>& keeps) {

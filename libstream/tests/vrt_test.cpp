@@ -30,7 +30,7 @@ class Vrt : public ::testing::Test {
   [[nodiscard]] std::string path(const std::string& name) const {
     return (folder_.path() / name).string();
   }
-  /// A GeoTIFF of random samples below `most`; nodata: its tag, if not empty.
+  /// A GeoTIFF of random samples below `limit`. nodata: its tag, if not empty.
   void put_tiff(const std::string& name, std::int64_t column, std::int64_t row,
                 std::uint32_t columns, std::uint32_t rows, const std::string& nodata, int limit,
                 std::mt19937_64& random) const {

@@ -10,9 +10,10 @@
 namespace terrace::stream {
 namespace {
 
-class PartsInTurn final : public RecordReader {
+/// Reads one part after another on the caller's thread, in pieces.
+class SequentialParts final : public RecordReader {
  public:
-  explicit PartsInTurn(RecordParts parts)
+  explicit SequentialParts(RecordParts parts)
       : parts_(std::move(parts)),
         reader_(parts_.make_reader()),
         records_(std::max<std::size_t>(1, kPieceBytes / parts_.record_bytes) *
@@ -48,6 +49,7 @@ class PartsInTurn final : public RecordReader {
   std::uint64_t remaining_ = 0;  ///< points of it that have not been read
 };
 
+/// Reads the next parts in advance, and delivers each when it is complete.
 class PartsAhead final : public RecordReader {
  public:
   /// Holds up to `slots` parts, coded and decoded, and a reader per thread. threads: 0 to read on
@@ -81,11 +83,12 @@ class PartsAhead final : public RecordReader {
     std::vector<std::byte> records{};
   };
 
-  /// Takes the next part, unless it is damaged and may be left out, and gives another in its place.
+  /// Makes the next part current, unless it is damaged and may be left out, and starts reading
+  /// another one.
   void take_next() {
     at_ = 0;
-    // The first parts are given here, not on construction, because files are also opened just for
-    // their header.
+    // Reading starts here, not on construction, because files are also opened just for their
+    // header.
     for (std::size_t free = slots_ - ahead_.size(); free > 0; --free) {
       if (next_part_ < parts_.parts.size()) {
         ahead_.give({.number = next_part_++, .records = std::exchange(current_.records, {})});
@@ -106,8 +109,8 @@ class PartsAhead final : public RecordReader {
     return [this, reader = std::shared_ptr<PartReader>(parts_.make_reader())](Part& part) {
       part.records.resize(parts_.parts[part.number].points * parts_.record_bytes);
       reader->start(part.number);
-      for (std::size_t done = 0; done < part.records.size();) {
-        done += reader->read(std::span(part.records).subspan(done));
+      for (std::size_t filled = 0; filled < part.records.size();) {
+        filled += reader->read(std::span(part.records).subspan(filled));
       }
     };
   }
@@ -119,11 +122,11 @@ class PartsAhead final : public RecordReader {
   Part current_;               ///< the part being read
   std::size_t at_ = 0;         ///< bytes of it that were read
   std::size_t number_ = 0;     ///< of the part after it
-  std::size_t next_part_ = 0;  ///< of the next part to give
+  std::size_t next_part_ = 0;  ///< of the next part to start
   base::WorkAhead<Part> ahead_;
 };
 
-/// How many readers, and how many parts at once, fit into memory.
+/// Numbers of readers and of parts that fit into memory together.
 struct Ahead {
   std::size_t readers = 0, slots = 0;
 };
@@ -162,7 +165,7 @@ std::unique_ptr<RecordReader> parts_ahead(const RecordParts& parts, const Source
 }
 
 std::unique_ptr<RecordReader> parts_in_sequence(RecordParts parts) {
-  return std::make_unique<PartsInTurn>(std::move(parts));
+  return std::make_unique<SequentialParts>(std::move(parts));
 }
 
 std::unique_ptr<RecordReader> records_of_parts(RecordParts parts, const SourceOptions& options) {

@@ -194,7 +194,7 @@ class RecordSource final : public PointSource {
     return Error(file(), std::move(cause)).at(fmt::format("point {}", delivered_ + point));
   }
 
-  /// Unpacks some of the next `wanted` records to the points from `done` on; returns how many.
+  /// Unpacks some of the next `max_records` records to the points from `done` on; returns how many.
   std::size_t unpack(PointBlock& block, std::size_t done, std::size_t max_records) {
     const std::string_view rows = stream_.records->read(max_records);
     if (rows.empty()) return 0;

@@ -126,7 +126,7 @@ bool is_overridden(const RasterInfo& info) { return info.format == "geotiff"; }
 
 class WithAuxXml final : public Raster {
  public:
-  /// own_nodata: the file's own value, even if `raster` was opened with the sidecar's. band: the
+  /// file_nodata: the file's own value, even if `raster` was opened with the sidecar's. band: the
   /// element in `root`, or null.
   WithAuxXml(std::unique_ptr<Raster> raster, std::string sidecar, const XmlElement& root,
              std::optional<double> file_nodata, const XmlElement* band)

@@ -18,8 +18,8 @@ constexpr std::size_t kMinGap = 3;
 /// Records that are processed together, once per run; few enough to stay in the first-level cache.
 constexpr std::size_t kBatchRecords = 256;
 
-/// Copies bytes of records, or of one record if `from_stride` is 0. Their number is a compile-time
-/// constant.
+/// Copies bytes of records, or of one record if `source_stride` is 0. Their number is a
+/// compile-time constant.
 template <std::size_t kBytes>
 void copy_run(const std::byte* source, std::size_t source_stride, std::byte* target,
               std::size_t target_stride, std::size_t count) {

@@ -60,7 +60,7 @@ struct OctreeBuilder::Item {
   std::uint64_t rank = 0;   ///< the lowest-ranked point of a cell is promoted
   std::uint64_t number = 0;
 
-  [[nodiscard]] bool goes_before(const Item& other) const {
+  [[nodiscard]] bool precedes(const Item& other) const {
     return std::tie(rank, number) < std::tie(other.rank, other.number);
   }
 };
@@ -172,9 +172,9 @@ OctreeBuilder::NodePoints OctreeBuilder::build(const OctreeNode& node, Bucket bu
 /// buckets: one for each of the node's descendants at some depth, in Morton order.
 OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span<Bucket> buckets) {
   if (buckets.size() == 1) return build(node, std::move(buckets.front()));
-  const auto records = [this](std::span<const Bucket> child_items) {
+  const auto records = [this](std::span<const Bucket> child_buckets) {
     std::uint64_t sum = 0;
-    for (const Bucket& bucket : child_items) sum += file_.records(bucket);
+    for (const Bucket& bucket : child_buckets) sum += file_.records(bucket);
     return sum;
   };
   if (records(buckets) <= batch_records_) {
@@ -185,10 +185,10 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
   Bucket promoted;
   const std::size_t each = buckets.size() / kChildren;
   for (std::size_t i = 0; i < kChildren; ++i) {
-    const std::span<Bucket> child_items = buckets.subspan(i * each, each);
-    if (records(child_items) == 0) continue;
+    const std::span<Bucket> child_buckets = buckets.subspan(i * each, each);
+    if (records(child_buckets) == 0) continue;
     promote(
-        visit(child(node, i), child_items), *write_,
+        visit(child(node, i), child_buckets), *write_,
         [&](const Item&, std::span<const std::byte> record) { file_.append(promoted, record); });
   }
   // The promoted points are in Morton order, because the children are.
@@ -349,14 +349,14 @@ void OctreeBuilder::promote(NodePoints child, const Write& write, const Add& add
   for (std::size_t i = 0; i < items.size(); ++i) {
     if (i == 0 || !same_cell(items[i - 1], items[i])) {
       chosen.push_back(i);
-    } else if (items[i].goes_before(items[chosen.back()])) {
+    } else if (items[i].precedes(items[chosen.back()])) {
       chosen.back() = i;
     }
   }
   if (chosen.size() > kMaxPromoted) {
     const auto end = chosen.begin() + static_cast<std::ptrdiff_t>(kMaxPromoted);
     std::nth_element(chosen.begin(), end, chosen.end(),
-                     [&](std::size_t a, std::size_t b) { return items[a].goes_before(items[b]); });
+                     [&](std::size_t a, std::size_t b) { return items[a].precedes(items[b]); });
     chosen.erase(end, chosen.end());
     std::sort(chosen.begin(), chosen.end());
   }

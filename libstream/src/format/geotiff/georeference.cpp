@@ -16,7 +16,7 @@
 namespace terrace::stream {
 namespace {
 
-constexpr char kSetAgain[] = "set the georeferencing again (gdal_edit.py -a_ullr)";
+constexpr char kGeoreferenceRemedy[] = "set the georeferencing again (gdal_edit.py -a_ullr)";
 
 bool all_finite(const std::vector<double>& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
@@ -65,10 +65,10 @@ std::optional<WorldTransform> embedded_transform(const GeoTiffHandle& handle, co
   // As in GDAL, scale and tie point override the matrix if a file has both, which is not allowed.
   if (scale.size() >= 2 && tie.size() >= 6) {
     if (!all_finite(scale) || !all_finite(tie)) {
-      throw handle.fault("is not finite").at("ModelPixelScale").remedy(kSetAgain);
+      throw handle.fault("is not finite").at("ModelPixelScale").remedy(kGeoreferenceRemedy);
     }
     if (scale[0] == 0 || scale[1] == 0)
-      throw handle.fault("is zero").at("ModelPixelScale").remedy(kSetAgain);
+      throw handle.fault("is zero").at("ModelPixelScale").remedy(kGeoreferenceRemedy);
     if (scale[1] < 0) {
       comments.emplace_back("the pixel scale's negative y is read as positive, as in GDAL");
     }
@@ -81,7 +81,7 @@ std::optional<WorldTransform> embedded_transform(const GeoTiffHandle& handle, co
     if (!all_finite(matrix) || !std::isfinite(determinant) || determinant == 0) {
       throw handle.fault("does not map cells to distinct places")
           .at("ModelTransformation")
-          .remedy(kSetAgain);
+          .remedy(kGeoreferenceRemedy);
     }
     return shifted(world, to_sample);
   }

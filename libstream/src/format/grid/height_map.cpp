@@ -33,7 +33,7 @@ constexpr std::uint32_t kNoColour = std::numeric_limits<std::uint32_t>::max();
 
 /// State of a reading by libpng. That is C and reports errors by longjmp, so exceptions must not
 /// pass through it; exceptions of the functions that it calls are kept here.
-struct PngReading {
+struct PngReadState {
   const ByteSource* bytes = nullptr;
   std::uint64_t at = 0;
   std::exception_ptr error{};
@@ -41,7 +41,7 @@ struct PngReading {
 };
 
 void on_png_read(png_structp png, png_bytep out, std::size_t count) {
-  auto* reading = static_cast<PngReading*>(png_get_io_ptr(png));
+  auto* reading = static_cast<PngReadState*>(png_get_io_ptr(png));
   try {
     if (count <= reading->bytes->size() - reading->at) {
       reading->bytes->read(reading->at, std::as_writable_bytes(std::span(out, count)));
@@ -55,7 +55,7 @@ void on_png_read(png_structp png, png_bytep out, std::size_t count) {
 }
 
 [[noreturn]] void on_png_error(png_structp png, png_const_charp message) {
-  auto* reading = static_cast<PngReading*>(png_get_error_ptr(png));
+  auto* reading = static_cast<PngReadState*>(png_get_error_ptr(png));
   std::size_t i = 0;
   for (; message[i] != '\0' && i + 1 < sizeof reading->message; ++i)
     reading->message[i] = message[i];
@@ -75,7 +75,7 @@ struct PngHead {
 /// Collects decoded rows in a temporary file.
 class RowSpool {
  public:
-  RowSpool(const std::string& file, std::uint64_t row_bytes, PngReading& reading)
+  RowSpool(const std::string& file, std::uint64_t row_bytes, PngReadState& reading)
       : spool_(std::make_unique<Spool>(file)), row_(row_bytes), reading_(reading) {}
 
   [[nodiscard]] std::span<unsigned char> row() { return row_; }
@@ -104,13 +104,13 @@ class RowSpool {
 
   std::unique_ptr<Spool> spool_;
   std::vector<unsigned char> row_;
-  PngReading& reading_;
+  PngReadState& reading_;
 };
 
 /// Reads the header, and also the rows if `spool` is not null: grey unchanged, colours as RGBA with
 /// 8 bits each. Returns false if libpng failed. Must not have objects with destructors: longjmp
 /// skips them.
-bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
+bool read_image(PngReadState& reading, PngHead& image, RowSpool* spool) {
   png_structp png =
       png_create_read_struct(PNG_LIBPNG_VER_STRING, &reading, &on_png_error, &on_png_warning);
   png_infop info = png == nullptr ? nullptr : png_create_info_struct(png);
@@ -160,7 +160,7 @@ bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
   return true;
 }
 
-[[noreturn]] void complain(const std::string& file, const PngReading& reading) {
+[[noreturn]] void complain(const std::string& file, const PngReadState& reading) {
   if (reading.error) std::rethrow_exception(reading.error);
   throw grid_fault(file, std::string("cannot be read as PNG: ") +
                              (reading.message[0] == '\0' ? "out of memory" : reading.message));
@@ -168,7 +168,7 @@ bool read_image(PngReading& reading, PngHead& image, RowSpool* spool) {
 
 std::unique_ptr<Spool> decode_rows(const std::string& file, std::uint64_t row_bytes) {
   const std::unique_ptr<ByteSource> bytes = open_file(file);
-  PngReading reading{.bytes = bytes.get()};
+  PngReadState reading{.bytes = bytes.get()};
   PngHead image;
   RowSpool spool(file, row_bytes, reading);
   if (!read_image(reading, image, &spool)) complain(file, reading);
@@ -228,7 +228,7 @@ std::unique_ptr<PointSource> open_png_points(std::span<const std::string> files,
 std::unique_ptr<Raster> open_height_map(const std::string& file, const RasterOptions& options) {
   check_band(file, options.band, 1);
   const std::unique_ptr<ByteSource> bytes = open_file(file);
-  PngReading reading{.bytes = bytes.get()};
+  PngReadState reading{.bytes = bytes.get()};
   PngHead image;
   if (!read_image(reading, image, nullptr)) complain(file, reading);
 

@@ -88,7 +88,7 @@ class PlainRaster final : public Raster {
 }  // namespace
 
 Error grid_fault(std::string file, std::string cause) {
-  return Error(std::move(file), std::move(cause)).remedy(kFetchAgain);
+  return Error(std::move(file), std::move(cause)).remedy(kDownloadRemedy);
 }
 
 PlainGrid plain_grid(std::string format, const std::string& file, std::uint64_t columns,

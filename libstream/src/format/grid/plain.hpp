@@ -27,11 +27,12 @@ struct PlainGrid {
 };
 
 /// The remedy for a damaged file.
-inline constexpr const char* kFetchAgain = "the file is damaged or truncated: download it again";
+inline constexpr const char* kDownloadRemedy =
+    "the file is damaged or truncated: download it again";
 /// Maximum expansion factor of Deflate.
 inline constexpr std::uint64_t kDeflateGrowth = 1032;
 
-/// Returns an Error with the remedy kFetchAgain.
+/// Returns an Error with the remedy kDownloadRemedy.
 Error grid_fault(std::string file, std::string cause);
 
 /// Describes a grid of one file: format, name, size, sample type and nodata (as the file's text).

@@ -46,6 +46,7 @@ struct LazFile {
   LazLayout layout;
 };
 
+/// Decodes chunks of a file whose table is known.
 class LazChunkReader final : public PartReader {
  public:
   explicit LazChunkReader(std::shared_ptr<const LazFile> file)
@@ -212,7 +213,9 @@ class SequentialLaz final : public RecordReader {
       try {
         const laz::Chunk chunk = laz::layered_chunk(layout_.vlr, std::as_bytes(std::span(window)));
         if (chunk.points == 0 || chunk.points > remaining_) {
-          throw laz::Corrupt("the chunk has " + counted(chunk.points, "point"), 0);
+          throw laz::Corrupt(fmt::format("the chunk has {}, but {} remain in the file",
+                                         counted(chunk.points, "point"), remaining_),
+                             0);
         }
         chunk_remaining_ = chunk.points;
         chunk_bytes_ = chunk.bytes;
@@ -222,11 +225,12 @@ class SequentialLaz final : public RecordReader {
     } else if (layout_.vlr.compressor == laz::Compressor::pointwise_chunked) {
       chunk_remaining_ = std::min<std::uint64_t>(remaining_, layout_.vlr.chunk_size);
     }
-    if (chunk_remaining_ == 0) throw fault(laz::Corrupt("the chunks end before the points", 0));
+    if (chunk_remaining_ == 0)
+      throw fault(laz::Corrupt("the chunks have fewer points than the header promises", 0));
     decoder_.start(chunk_remaining_);
   }
 
-  /// Decodes from a window of `need` bytes, or as many as the chunk has.
+  /// Decodes from a window of `min_bytes` bytes, or the rest of the chunk if that is smaller.
   laz::Decoder::Step decode(std::size_t min_bytes, std::span<std::byte> room) {
     std::uint64_t window_bytes = min_bytes;
     if (chunk_bytes_)

@@ -52,7 +52,8 @@ class VrtReader {
   }
 
  private:
-  static constexpr const char* kAsGeoTiff = "convert it to GeoTIFF: gdal_translate FILE out.tif";
+  static constexpr const char* kConvertRemedy =
+      "convert it to GeoTIFF: gdal_translate FILE out.tif";
 
   [[nodiscard]] Error fault(std::string cause) const {
     return Error(file_, std::move(cause)).remedy("rebuild it: gdalbuildvrt");
@@ -98,7 +99,7 @@ class VrtReader {
     if (const std::string kind = root.attribute("subClass"); !kind.empty()) {
       throw fault("is a " + in_quotes(kind) + ", which computes its samples")
           .at("VRTDataset")
-          .remedy(kAsGeoTiff);
+          .remedy(kConvertRemedy);
     }
     info_.columns = size_of_side(root, "rasterXSize");
     info_.rows = size_of_side(root, "rasterYSize");
@@ -137,7 +138,7 @@ class VrtReader {
 
   void read_band(const XmlElement& root) {
     if (root.child("MaskBand") != nullptr)
-      throw fault("is not supported").at("MaskBand").remedy(kAsGeoTiff);
+      throw fault("is not supported").at("MaskBand").remedy(kConvertRemedy);
     if (band_number_ > bands_) {
       throw fault(fmt::format("has no band {}, only {}", band_number_, bands_))
           .remedy("choose another band, or rebuild it: gdalbuildvrt");
@@ -155,7 +156,7 @@ class VrtReader {
     if (const std::string kind = band.attribute("subClass"); !kind.empty()) {
       throw fault("is a " + in_quotes(kind) + ", which computes its samples")
           .at("VRTRasterBand")
-          .remedy(kAsGeoTiff);
+          .remedy(kConvertRemedy);
     }
     info_.sample.name = "height";
     info_.sample.type = type_of(band.attribute("dataType"));
@@ -177,12 +178,14 @@ class VrtReader {
       if (name == known) return type;
     }
     if (name.empty()) return ScalarType::u8;  // GDAL's default
-    throw fault(in_quotes(name) + " is not a type of heights").at("dataType").remedy(kAsGeoTiff);
+    throw fault(in_quotes(name) + " is not a type of heights")
+        .at("dataType")
+        .remedy(kConvertRemedy);
   }
 
   void read_part(const XmlElement& part) {
     if (part.name.ends_with("Source") || part.name == "MaskBand") {
-      throw fault("is not supported").at(part.name).remedy(kAsGeoTiff);
+      throw fault("is not supported").at(part.name).remedy(kConvertRemedy);
     } else if (part.name == "NoDataValue") {
       nodata_ = NodataRule::parse(std::string(trim(part.text)), info_.sample.type);
     } else if (part.name == "Scale") {
@@ -214,7 +217,9 @@ class VrtReader {
         continue;
       } else if (part.name != "SrcRect" && part.name != "DstRect" &&
                  part.name != "SourceProperties") {
-        throw fault(in_quotes(part.name) + " is not supported").at(element.name).remedy(kAsGeoTiff);
+        throw fault(in_quotes(part.name) + " is not supported")
+            .at(element.name)
+            .remedy(kConvertRemedy);
       }
     }
     if (source.file.empty()) throw fault("names no file").at(element.name);
@@ -241,7 +246,7 @@ class VrtReader {
         }
         farthest_ = std::max(farthest_, distance);
         if (!(r[i] >= (i < 2 ? 0 : 1)) || r[i] >= static_cast<double>(kMaxVrtCells)) {
-          throw fault("is outside the raster").at(name).remedy(kAsGeoTiff);
+          throw fault("is outside the raster").at(name).remedy(kConvertRemedy);
         }
       }
       return r;
@@ -256,7 +261,7 @@ class VrtReader {
           .remedy("align the files: gdalbuildvrt -tap -tr, or make a GeoTIFF: gdal_translate");
     }
     if (target_rect[0] + target_rect[2] > columns || target_rect[1] + target_rect[3] > rows) {
-      throw fault("is outside the raster").at("DstRect").remedy(kAsGeoTiff);
+      throw fault("is outside the raster").at("DstRect").remedy(kConvertRemedy);
     }
     const auto cells = [](double value) { return static_cast<std::uint64_t>(value); };
     source.source_column = cells(source_rect[0]);

@@ -27,8 +27,8 @@ constexpr std::size_t kDeepest = 32;
 /// The size of a node of a map with two short strings.
 constexpr std::size_t kAttributeBytes = 112;
 
-/// The state of parsing. The parser's handlers are called from C and must not throw.
-struct XmlReading {
+/// The state of the parser. Its handlers are called from C and must not throw.
+struct XmlParseState {
   XML_Parser parser = nullptr;
   const TakeElement* take = nullptr;
   XmlElement root{};
@@ -50,28 +50,28 @@ struct XmlReading {
   }
 
   template <class Work>
-  static void safely(void* self, const Work& work) {
-    auto& reading = *static_cast<XmlReading*>(self);
-    reading.parsed = static_cast<std::uint64_t>(XML_GetCurrentByteIndex(reading.parser)) +
-                     static_cast<std::uint64_t>(XML_GetCurrentByteCount(reading.parser));
+  static void guard(void* self, const Work& work) {
+    auto& state = *static_cast<XmlParseState*>(self);
+    state.parsed = static_cast<std::uint64_t>(XML_GetCurrentByteIndex(state.parser)) +
+                   static_cast<std::uint64_t>(XML_GetCurrentByteCount(state.parser));
     try {
-      work(reading);
+      work(state);
     } catch (...) {
-      reading.failure = std::current_exception();
-      reading.stop();
+      state.failure = std::current_exception();
+      state.stop();
     }
   }
 };
 
 void on_start(void* self, const XML_Char* name, const XML_Char** attributes) {
-  XmlReading::safely(self, [&](XmlReading& reading) {
-    if (reading.open.size() == kDeepest) {
-      reading.refusal = "its elements are nested too deeply";
-      return reading.stop();
+  XmlParseState::guard(self, [&](XmlParseState& state) {
+    if (state.open.size() == kDeepest) {
+      state.refusal = "its elements are nested too deeply";
+      return state.stop();
     }
-    if (static_cast<std::uint64_t>(XML_GetCurrentByteCount(reading.parser)) > kMaxTagBytes) {
-      reading.refusal = "has a tag that is too long";
-      return reading.stop();
+    if (static_cast<std::uint64_t>(XML_GetCurrentByteCount(state.parser)) > kMaxTagBytes) {
+      state.refusal = "has a tag that is too long";
+      return state.stop();
     }
     XmlElement element{.name = name};
     std::size_t bytes = sizeof element + element.name.size();
@@ -80,59 +80,59 @@ void on_start(void* self, const XML_Char* name, const XML_Char** attributes) {
       value = attributes[1];
       bytes += kAttributeBytes + value.size();
     }
-    reading.open.push_back(std::move(element));
-    reading.bytes.push_back(0);
-    reading.hold(bytes);
+    state.open.push_back(std::move(element));
+    state.bytes.push_back(0);
+    state.hold(bytes);
   });
 }
 
 void on_end(void* self, const XML_Char* /*name*/) {
-  XmlReading::safely(self, [](XmlReading& reading) {
-    XmlElement done = std::move(reading.open.back());
-    const std::size_t bytes = reading.bytes.back();
-    reading.open.pop_back();
-    reading.bytes.pop_back();
-    if (reading.open.empty()) {
-      reading.root = std::move(done);
-    } else if ((*reading.take)(reading.open, done)) {
-      reading.total_bytes -= bytes;
+  XmlParseState::guard(self, [](XmlParseState& state) {
+    XmlElement done = std::move(state.open.back());
+    const std::size_t bytes = state.bytes.back();
+    state.open.pop_back();
+    state.bytes.pop_back();
+    if (state.open.empty()) {
+      state.root = std::move(done);
+    } else if ((*state.take)(state.open, done)) {
+      state.total_bytes -= bytes;
     } else {
-      reading.bytes.back() += bytes;
-      reading.open.back().children.push_back(std::move(done));
+      state.bytes.back() += bytes;
+      state.open.back().children.push_back(std::move(done));
     }
   });
 }
 
 void on_text(void* self, const XML_Char* text, int size) {
-  XmlReading::safely(self, [&](XmlReading& reading) {
-    if (reading.open.empty()) return;
-    reading.open.back().text.append(text, static_cast<std::size_t>(size));
-    reading.hold(static_cast<std::size_t>(size));
+  XmlParseState::guard(self, [&](XmlParseState& state) {
+    if (state.open.empty()) return;
+    state.open.back().text.append(text, static_cast<std::size_t>(size));
+    state.hold(static_cast<std::size_t>(size));
   });
 }
 
 /// Called for comments and other content.
 void on_other(void* self, const XML_Char*, int) {
-  XmlReading::safely(self, [](XmlReading&) {});
+  XmlParseState::guard(self, [](XmlParseState&) {});
 }
 
 void on_document_type(void* self, const XML_Char*, const XML_Char*, const XML_Char*, int) {
-  auto& reading = *static_cast<XmlReading*>(self);
-  XmlReading::safely(self, [](XmlReading& r) { r.refusal = "it declares a document type"; });
-  reading.stop();
+  auto& state = *static_cast<XmlParseState*>(self);
+  XmlParseState::guard(self, [](XmlParseState& r) { r.refusal = "it declares a document type"; });
+  state.stop();
 }
 
 }  // namespace
 
-const XmlElement* XmlElement::child(std::string_view name_sought) const {
+const XmlElement* XmlElement::child(std::string_view expected_name) const {
   const auto at = std::find_if(children.begin(), children.end(), [&](const XmlElement& element) {
-    return element.name == name_sought;
+    return element.name == expected_name;
   });
   return at == children.end() ? nullptr : &*at;
 }
 
-std::string XmlElement::attribute(const std::string& name_sought) const {
-  const auto at = attributes.find(name_sought);
+std::string XmlElement::attribute(const std::string& expected_name) const {
+  const auto at = attributes.find(expected_name);
   return at == attributes.end() ? std::string() : at->second;
 }
 
@@ -141,14 +141,14 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
   const std::unique_ptr<std::remove_pointer_t<XML_Parser>, void (*)(XML_Parser)> parser(
       XML_ParserCreate(nullptr), &XML_ParserFree);
   if (!parser) throw std::bad_alloc();
-  XmlReading reading{.parser = parser.get(), .take = &take};
+  XmlParseState state{.parser = parser.get(), .take = &take};
   const auto fault = [&](const std::string& cause) {
     return Error(file, cause)
         .at_line(XML_GetCurrentLineNumber(parser.get()))
         .remedy("the file is damaged: export it again");
   };
   if (bytes->size() > kMaxBytes) throw fault("is too large for a description");
-  XML_SetUserData(parser.get(), &reading);
+  XML_SetUserData(parser.get(), &state);
   XML_SetElementHandler(parser.get(), &on_start, &on_end);
   XML_SetCharacterDataHandler(parser.get(), &on_text);
   XML_SetDefaultHandlerExpand(parser.get(), &on_other);
@@ -162,15 +162,15 @@ XmlElement read_xml(const std::string& file, const TakeElement& take) {
     at += size;
     const XML_Status status = XML_Parse(parser.get(), piece.data(), static_cast<int>(size),
                                         at == bytes->size() ? XML_TRUE : XML_FALSE);
-    if (reading.failure) std::rethrow_exception(reading.failure);
-    if (!reading.refusal.empty()) throw fault(reading.refusal);
+    if (state.failure) std::rethrow_exception(state.failure);
+    if (!state.refusal.empty()) throw fault(state.refusal);
     // Some versions of the parser look at an incomplete tag again only when it has doubled.
-    if (at > reading.parsed + 2 * kMaxTagBytes) throw fault("has a tag that is too long");
+    if (at > state.parsed + 2 * kMaxTagBytes) throw fault("has a tag that is too long");
     if (status != XML_STATUS_OK) {
       throw fault(std::string("is not XML: ") + XML_ErrorString(XML_GetErrorCode(parser.get())));
     }
   } while (at < bytes->size());
-  return std::move(reading.root);
+  return std::move(state.root);
 }
 
 }  // namespace terrace::stream

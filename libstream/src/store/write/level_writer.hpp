@@ -107,9 +107,9 @@ class LevelWriter {
 
   /// Appends a block. Returns the ordinal of its first cluster.
   std::uint64_t append(PreparedBlock block, bool root);
-  /// Writes the held blocks, the directory and the tables; syncs and closes the files. `members` of
-  /// the result are the points of all clusters without representatives; `points` is not set.
-  /// bounds: the store's.
+  /// Writes the remaining blocks, the directory and the tables; syncs and closes the files.
+  /// `members` of the result are the points of all clusters without representatives; `points` is
+  /// not set. bounds: the store's.
   LevelEntry finish(bool root, const Box3& bounds);
 
   /// Whether the next block starts a segment, which gets new tables.
