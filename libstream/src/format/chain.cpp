@@ -65,6 +65,8 @@ void check_agreement(const SourceInfo& first, const SourceInfo& other, CrsAgreem
   }
 }
 
+/// Delivers the points of several files one after another. Opens each file again when its turn
+/// comes.
 class Chain final : public PointSource {
  public:
   Chain(std::span<const std::string> files, const SourceOptions& options, const OpenOne& open_one)

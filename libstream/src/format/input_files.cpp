@@ -147,6 +147,7 @@ void add_pattern(const std::string& pattern, std::vector<std::string>& files) {
   files.insert(files.end(), names.begin(), names.end());
 }
 
+/// Collects the files for a list of names.
 class Names {
  public:
   Names(const std::string& format, std::vector<std::string>& files)

@@ -24,6 +24,7 @@ const std::byte* value_of_column(const MemoryColumn& column, std::uint64_t index
   return column.first + static_cast<std::ptrdiff_t>(index) * column.stride;
 }
 
+/// Delivers points from columns in memory.
 class ColumnSource final : public PointSource {
  public:
   ColumnSource(MemoryPoints points, const SourceOptions& options)
@@ -98,6 +99,7 @@ class ColumnSource final : public PointSource {
   std::uint64_t read_ = 0, nodata_ = 0;
 };
 
+/// A raster whose samples are an array in memory.
 class SampleArray final : public Raster {
  public:
   explicit SampleArray(const MemoryRaster& raster) : raster_(raster) {}

@@ -27,6 +27,7 @@ struct CubeCheck {
   std::string file;
 };
 
+/// Checks that the points of each node are in its cube.
 class CubeCheckingReader final : public PartReader {
  public:
   explicit CubeCheckingReader(std::shared_ptr<const CubeCheck> check)

@@ -35,6 +35,7 @@ std::string name_of(const OctreeNode& node);
 /// Orders parents before children, and siblings in Morton order.
 bool precedes(const OctreeNode& a, const OctreeNode& b);
 
+/// The cube of the root, and the nodes that have points.
 struct Octree {
   Point3 centre{};
   double half_size = 0.0;  ///< of the root's cube, in the CRS

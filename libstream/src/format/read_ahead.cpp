@@ -13,6 +13,7 @@
 namespace terrace::stream {
 namespace {
 
+/// Implements read_ahead().
 class ReadAhead final : public PointSource {
  public:
   ReadAhead(std::unique_ptr<PointSource> source, std::size_t blocks,

@@ -27,11 +27,13 @@ class PartReader {
   virtual std::size_t read(std::span<std::byte> room) = 0;
 };
 
+/// The size of a part.
 struct RecordPart {
   std::uint64_t points = 0;
   std::uint64_t bytes = 0;  ///< in the file
 };
 
+/// The parts of a file, and a function that makes a reader for a thread.
 struct RecordParts {
   std::size_t record_bytes = 0;
   std::vector<RecordPart> parts{};

@@ -129,6 +129,7 @@ class PayloadUnpacker {
   std::vector<Bits> bits_;
 };
 
+/// Unpacks records into blocks of points.
 class RecordSource final : public PointSource {
  public:
   RecordSource(RecordStream stream, std::size_t block_points, const Placement* placement)

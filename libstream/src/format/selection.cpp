@@ -27,6 +27,7 @@ bool is_selected(const std::string& name, const Selection& selection) {
   return (!selection.keep || among(*selection.keep)) && !among(selection.drop);
 }
 
+/// Delivers the selected points of a source, with the selected attributes.
 class SelectedSource final : public PointSource {
  public:
   /// selected: the numbers of the attributes to deliver, in their order.

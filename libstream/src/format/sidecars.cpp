@@ -124,6 +124,7 @@ const XmlElement* band_of(const XmlElement& root, const RasterOptions& options) 
 /// unit. Sidecars of other formats only add what their files lack.
 bool is_overridden(const RasterInfo& info) { return info.format == "geotiff"; }
 
+/// A raster to which the values of its sidecar have been applied.
 class WithAuxXml final : public Raster {
  public:
   /// file_nodata: the file's own value, even if `raster` was opened with the sidecar's. band: the

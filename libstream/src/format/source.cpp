@@ -32,6 +32,7 @@ constexpr std::array<std::string_view, 4> kEntityNames{"points", "triangles", "s
 
 constexpr std::size_t kCopyBytes = std::size_t{256} << 10;
 
+/// A source that reads temporary copies of files, and names the original files.
 class SpooledSource final : public PointSource {
  public:
   SpooledSource(const Format& format, std::span<const std::string> files,

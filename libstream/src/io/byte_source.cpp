@@ -15,6 +15,7 @@
 namespace terrace::stream {
 namespace {
 
+/// A regular file, read with pread(2).
 class FileSource final : public ByteSource {
  public:
   explicit FileSource(const std::filesystem::path& path)

@@ -110,7 +110,7 @@ class Layered {
 
   struct LayerCoder {
     Coder coder;
-    /// In decoding, whether the layer exists and is wanted; in encoding, whether it must exist.
+    /// In decoding, whether the layer exists and is selected. In encoding, whether it must exist.
     bool used = false;
   };
   std::vector<LayerCoder> coders;

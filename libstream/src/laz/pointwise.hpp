@@ -70,6 +70,7 @@ struct Point10 {
   }
 };
 
+/// The point of version 2, whose coordinates depend on the returns.
 struct Point10V2 : Point10 {
   std::array<SymbolModel<256>, 2> scan_angle;  ///< by scan direction
   IntegerModels<16, 4> intensity;

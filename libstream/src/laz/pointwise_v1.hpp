@@ -33,6 +33,7 @@ struct Median3 {
   }
 };
 
+/// The point of version 1, whose coordinates are predicted by the last three steps.
 struct Point10V1 : Point10 {
   IntegerModels<8, 2> scan_angle;
   IntegerModels<16, 1> intensity;
@@ -159,6 +160,7 @@ struct GpsTimeV1 {
   }
 };
 
+/// Models of a chunk of version 1; those of extra bytes are separate.
 struct PointwiseV1 {
   Point10V1 point;
   GpsTimeV1 gps_time;

@@ -73,6 +73,7 @@ std::uint64_t bytes_to_order(const SourceInfo& info, unsigned parts_ahead) {
          (std::uint64_t{kBucketBytes} << kDepth);
 }
 
+/// Implements in_spatial_order(). State describes what the next call of next() does.
 class SpatialSource final : public OrderedSource {
  public:
   SpatialSource(std::unique_ptr<PointSource> source, SpatialOrderOptions options)

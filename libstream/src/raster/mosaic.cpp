@@ -47,6 +47,7 @@ std::array<double, 2> cell_of(const WorldTransform& frame, double x, double y) {
   return {(m[4] * dx - m[1] * dy) / determinant, (m[0] * dy - m[3] * dx) / determinant};
 }
 
+/// A raster of the mosaic and its place in the cells of the mosaic.
 struct Member {
   std::string file;
   std::int64_t column = 0, row = 0;  // of its first cell; until unite(), from the first file's
@@ -212,6 +213,7 @@ bool join_around(std::vector<Member>& members, const WorldTransform& world, std:
   return true;
 }
 
+/// Implements open_mosaic(). Keeps the most recently used members open.
 class Mosaic final : public Raster {
  public:
   Mosaic(const std::vector<std::string>& files, RasterOpener opener, const std::optional<Crs>& crs,

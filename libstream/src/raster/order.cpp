@@ -24,6 +24,7 @@ struct Step {
   int x, y;
 };
 
+/// Builds the curve of hilbert_order() recursively.
 class Hilbert {
  public:
   Hilbert(std::uint32_t columns, std::uint32_t rows) : columns_(columns) {
@@ -92,7 +93,7 @@ GridSize ground_square(std::uint64_t cells, double aspect) {
 
 GridSize tiles_of(GridSize window, std::uint64_t cells, double aspect) {
   const GridSize tile = ground_square(cells, aspect);
-  // Even division makes tiles smaller than wanted in one direction, so they may be larger in the
+  // Even division makes tiles smaller than the limit in one direction, so they may be larger in the
   // other.
   if (window.columns * tile.rows < window.rows * tile.columns) {
     const std::uint64_t across = parts_of(window.columns, tile.columns);
@@ -122,7 +123,7 @@ GridSize window_size(const RasterInfo& info, std::uint64_t cells, std::uint64_t 
     return {even_length(columns, info.block_columns, info.columns),
             even_length(min_rows, info.block_rows, info.rows)};
   }
-  // Even with the minimum width, memory is too small for the wanted rows.
+  // Even with the minimum width, memory is too small for the minimum number of rows.
   const std::uint64_t columns = std::min(min_columns, std::max<std::uint64_t>(cells, 1));
   const std::uint64_t max_rows = std::max<std::uint64_t>(cells / columns, 1);
   if (max_rows < info.block_rows) return {columns, max_rows};

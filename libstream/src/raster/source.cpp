@@ -111,6 +111,7 @@ void check_count(const SourceInfo& info, const CellWindow& crop) {
       .remedy(message("select a part ({region}, gdal_translate -srcwin), or correct its size"));
 }
 
+/// Implements points_of(): reads a window, then delivers its tiles.
 class RasterSource final : public PointSource {
  public:
   RasterSource(std::unique_ptr<Raster> raster, const SourceOptions& options)

@@ -9,6 +9,7 @@
 
 namespace terrace::stream::store {
 
+/// A recursive descent parser, whose depth is bounded by kMaxLevels.
 class JsonParser {
  public:
   explicit JsonParser(std::string_view text) : text_(text) {}

@@ -30,6 +30,7 @@ inline constexpr std::string_view kChecksumKey = "\"checksum\": \"";
 inline constexpr std::string_view kClosing = "\"\n}\n";
 inline constexpr std::string_view kZeros = "00000000";
 
+/// A file as the manifest lists it.
 struct FileEntry {
   std::string name;
   std::uint64_t bytes = 0;
@@ -43,6 +44,7 @@ struct LevelEntry {
   std::uint64_t directory_bytes = 0;  ///< at the end of the index file
 };
 
+/// The contents of manifest.json.
 struct Manifest {
   int version = kVersion;
   StoreSchema schema;

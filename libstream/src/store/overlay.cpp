@@ -30,6 +30,7 @@ std::unique_ptr<ByteSource> open_overlay(const std::filesystem::path& path) {
   return open_file(path);
 }
 
+/// An entry of the directory.
 struct PageEntry {
   std::uint64_t first_cluster = 0, offset = 0, values = 0;
 };

@@ -58,6 +58,7 @@ bool holds(const Box3& outer, const Box3& inner) {
   return outer.contains(inner.min) && outer.contains(inner.max);
 }
 
+/// Checks a store: its manifest, the checksums of its files, its levels, and then the hierarchy.
 class Verification {
  public:
   Verification(const Store& store, const ByteSource& manifest_file, const Manifest& manifest,

@@ -58,6 +58,7 @@ enum class ItemType : std::uint16_t {
   byte14 = 14,
 };
 
+/// An item of the LASzip VLR: a part of the record and the version of its coding.
 struct Item {
   ItemType type = ItemType::byte;
   std::uint16_t size = 0;  ///< bytes in the record

@@ -78,6 +78,7 @@ class PointWriter {
   [[nodiscard]] virtual std::uint64_t writing_bytes() const { return 0; }
 };
 
+/// Options of writers of points and meshes.
 struct WriterOptions {
   /// Name of a format; empty: determined by the file's ending. Points: "xyz" (x y z and attributes,
   /// separated by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii",

@@ -66,6 +66,7 @@ class Raster {
   virtual void set_open_bytes(std::uint64_t /*bytes*/) {}
 };
 
+/// Options of opening a raster.
 struct RasterOptions {
   int band = 1;  ///< counted from 1
   /// Maximum size of a decoded block in bytes. Larger strips, and large strips of the usual codecs,

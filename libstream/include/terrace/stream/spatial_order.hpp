@@ -18,6 +18,7 @@ namespace terrace::stream {
 /// already (`automatic`).
 enum class Order : std::uint8_t { automatic, stream, spatial };
 
+/// Options of in_spatial_order().
 struct SpatialOrderOptions {
   Order order = Order::automatic;
   std::size_t block_points = 10000;  ///< maximum points per block after reordering

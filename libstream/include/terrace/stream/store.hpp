@@ -123,6 +123,7 @@ struct ClusterRecord {
   std::uint32_t points = 0;  ///< members
 };
 
+/// The size of a level, as the manifest states it.
 struct LevelInfo {
   unsigned level = 0;
   std::uint64_t points = 0;    ///< points whose highest level is this or a higher one
@@ -132,6 +133,7 @@ struct LevelInfo {
   std::uint64_t index_bytes = 0;
 };
 
+/// A fault that Store::verify() reports: what is wrong, and where.
 struct Problem {
   std::string file;
   std::uint64_t offset = 0;

@@ -29,6 +29,7 @@ struct Page {
   std::uint64_t offset = 0, bytes = 0;
 };
 
+/// Reads the pages of a hierarchy and checks that their nodes are inside the file.
 class HierarchyReader {
  public:
   HierarchyReader(const ByteSource& file, std::uint64_t first_chunk)

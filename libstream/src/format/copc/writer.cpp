@@ -95,6 +95,7 @@ Shares shares_within(std::uint64_t memory_bytes, unsigned threads, std::size_t r
   return shares;
 }
 
+/// Collects all records in an octree; finish() writes its nodes as chunks of LAZ.
 class CopcWriter final : public PointWriter {
  public:
   CopcWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,

@@ -27,6 +27,7 @@
 namespace terrace::stream {
 namespace {
 
+/// A dimension of EPT and the name of the attribute that LAS has for it.
 struct KnownDimension {
   std::string_view ept, name;
 };
@@ -57,6 +58,7 @@ struct Dimension {
   Channel channel;
 };
 
+/// Reads the members of ept.json, and throws errors that name them.
 class EptMetadataReader {
  public:
   explicit EptMetadataReader(const std::string& file) : file_(file) {}

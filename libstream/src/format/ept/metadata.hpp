@@ -26,6 +26,7 @@ enum class EptData : std::uint8_t {
   zstandard  ///< the same, compressed
 };
 
+/// The contents of ept.json.
 struct EptMetadata {
   EptData data = EptData::binary;
   std::uint64_t points = 0;

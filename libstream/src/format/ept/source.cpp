@@ -118,6 +118,7 @@ std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData
   return folder / "ept-data" / (name_of(node) + ending);
 }
 
+/// Reads the records of one node at a time, in any encoding.
 class NodeReader final : public PartReader {
  public:
   explicit NodeReader(std::shared_ptr<const EptNodes> nodes) : nodes_(std::move(nodes)) {}

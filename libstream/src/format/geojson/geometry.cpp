@@ -14,6 +14,7 @@
 namespace terrace::stream {
 namespace {
 
+/// A type of geometry that has coordinates.
 struct GeometryType {
   std::string_view name;
   std::size_t depth;  ///< brackets around a position's numbers

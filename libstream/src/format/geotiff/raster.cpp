@@ -73,6 +73,7 @@ class GeoTiffMask {
   GeoTiffBlocks blocks_;
 };
 
+/// One band of a GeoTIFF.
 class GeoTiffRaster final : public Raster {
  public:
   GeoTiffRaster(const std::string& file, const RasterOptions& options)

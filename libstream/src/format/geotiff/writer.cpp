@@ -217,7 +217,7 @@ struct GeoTiffWriter::Impl {
     added.samples.assign(samples.begin(), samples.end());
     if (queued == queue.size()) write_queue();
   }
-  /// Compresses the waiting tiles on all threads and writes them in the order of arrival.
+  /// Compresses the queued tiles on all threads and writes them in the order of arrival.
   void write_queue() {
     team.run(queued, [this](std::size_t i, std::size_t worker) {
       const std::span<const std::byte> coded = encoders[worker].encode(queue[i].samples);

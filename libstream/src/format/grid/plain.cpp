@@ -20,6 +20,7 @@ constexpr std::uint64_t kMaxGridCells = 1u << 30;
 /// Bytes read at a time.
 constexpr std::uint64_t kReadBytes = 256u << 10;
 
+/// Reads windows of a PlainGrid row by row.
 class PlainRaster final : public Raster {
  public:
   PlainRaster(PlainGrid grid, std::unique_ptr<ByteSource> bytes,

@@ -38,6 +38,7 @@ inline constexpr std::size_t kLasVlrHeaderBytes = 54, kLasEvlrHeaderBytes = 60;
 inline constexpr std::size_t kLas14HeaderBytes = 375;
 inline constexpr std::size_t kLasFirstBytes = 227;  ///< header of LAS 1.0 to 1.2; all begin with it
 
+/// The fields of a header that readers use, and the records around the points.
 struct LasHeader {
   unsigned minor = 0;          ///< of the version 1.minor
   unsigned point_format = 0;   ///< 0 to 10

@@ -41,6 +41,7 @@ Error chunk_fault(std::string file, std::uint64_t chunk, std::uint64_t byte, std
       .at(fmt::format("chunk {}, byte {}", chunk, byte));
 }
 
+/// A file and its chunks, shared by the readers of all threads.
 struct LazFile {
   std::unique_ptr<ByteSource> bytes;
   LazLayout layout;

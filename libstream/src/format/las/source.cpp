@@ -31,6 +31,7 @@
 namespace terrace::stream {
 namespace {
 
+/// Opens one LAS, LAZ or COPC file as a source.
 class LasOpener {
  public:
   LasOpener(const std::string& file, const SourceOptions& options)

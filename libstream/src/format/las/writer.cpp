@@ -92,6 +92,7 @@ unsigned thread_count(const WriterOptions& options, const laz::Vlr& vlr, const s
   return static_cast<unsigned>(std::min<std::uint64_t>(options.threads, max_threads));
 }
 
+/// Writes LAS and LAZ. finish() overwrites the header, which has the sums of all records.
 class LasWriter final : public PointWriter {
  public:
   LasWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,

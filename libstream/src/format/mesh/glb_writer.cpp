@@ -41,6 +41,7 @@ std::string attribute_name(const std::string& name) {
   return out;
 }
 
+/// Writes binary glTF; see MeshWriter for its coordinates.
 class GlbWriter final : public MeshWriter {
  public:
   GlbWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)

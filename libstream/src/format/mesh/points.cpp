@@ -23,6 +23,7 @@ namespace {
 
 using MakeParser = std::unique_ptr<MeshParser> (*)(Input& input, bool faces);
 
+/// Delivers the vertices of a mesh as points, and ignores its faces.
 class MeshPoints final : public PointSource {
  public:
   MeshPoints(const std::string& file, const SourceOptions& options, MakeParser make)

@@ -21,6 +21,7 @@
 namespace terrace::stream {
 namespace {
 
+/// A format whose parser needs only the input.
 struct SimpleFormat {
   const Format& (*format)();
   std::unique_ptr<MeshParser> (*parser)(Input& input, bool faces);

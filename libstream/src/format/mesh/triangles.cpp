@@ -69,6 +69,7 @@ class VertexTable {
   std::uint64_t count_ = 0;
 };
 
+/// Delivers the triangles of a mesh as entities of three corners.
 class TriangleSource final : public PointSource {
  public:
   TriangleSource(OpenMesh mesh, const SourceOptions& options)

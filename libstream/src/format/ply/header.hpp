@@ -14,6 +14,7 @@ namespace terrace::stream {
 
 enum class PlyEncoding { ascii, little_endian, big_endian };
 
+/// A property of an element: a value or a list of values.
 struct PlyProperty {
   std::string name;
   ScalarType type = ScalarType::f32;  ///< of the value, or of a list's items
@@ -21,6 +22,7 @@ struct PlyProperty {
   ScalarType count_type = ScalarType::u8;  ///< of a list's length
 };
 
+/// An element, such as "vertex": items with the same properties.
 struct PlyElement {
   std::string name;
   std::uint64_t count = 0;
@@ -31,6 +33,7 @@ struct PlyElement {
   [[nodiscard]] std::size_t binary_bytes() const;
 };
 
+/// The header of a PLY file.
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::ascii;
   std::vector<PlyElement> elements;

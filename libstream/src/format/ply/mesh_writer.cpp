@@ -26,6 +26,7 @@ std::vector<Channel> float_channels(const std::vector<std::string>& names) {
   return channels;
 }
 
+/// Writes a mesh as PLY, binary or ASCII.
 class PlyMeshWriter final : public MeshWriter {
  public:
   PlyMeshWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options,

@@ -43,6 +43,7 @@ struct Field {
   int attribute = -1;  ///< its offset in a point's record
 };
 
+/// Delivers the vertices of a PLY file. next_triangles() then reads its faces and strips.
 class PlySource final : public PointSource {
  public:
   /// keeps_missing: also delivers vertices with a coordinate that is NaN, because faces count them.

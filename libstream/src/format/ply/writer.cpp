@@ -23,6 +23,7 @@ std::string count_field(std::uint64_t count) {
   return text;
 }
 
+/// Writes points as PLY. finish() writes their number into the header.
 class PlyWriter final : public PlainPointWriter {
  public:
   PlyWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,

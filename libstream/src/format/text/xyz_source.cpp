@@ -147,6 +147,7 @@ ParseRow row_parser(char separator) {
   }
 }
 
+/// Reads points from lines of text.
 class XyzSource final : public PointSource {
  public:
   /// first: the attributes of the first of several files, whose types all files must have.

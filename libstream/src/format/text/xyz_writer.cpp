@@ -79,6 +79,7 @@ class CoordinateText {
   int decimals_ = kMaxDecimals + 1;  ///< of the lattice; above kMaxDecimals: not decimal
 };
 
+/// Writes points as lines of text: XYZ without a header, CSV with one.
 class XyzWriter final : public PlainPointWriter {
  public:
   XyzWriter(const std::string& path, const PointHeader& header, const WriterOptions& options,

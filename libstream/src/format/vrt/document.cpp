@@ -28,6 +28,7 @@ namespace {
 
 constexpr std::uint64_t kMaxVrtCells = 1u << 30;
 
+/// Reads the description of a virtual raster while its XML is parsed.
 class VrtReader {
  public:
   VrtReader(const std::string& file, int band) : file_(file), band_number_(band) {

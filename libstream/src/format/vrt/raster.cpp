@@ -130,6 +130,7 @@ class WholeNumbers final : public Raster {
   std::vector<std::uint8_t> valid_;
 };
 
+/// Composes a window from the sources that overlap it.
 class VrtRaster final : public Raster {
  public:
   VrtRaster(const std::string& file, const RasterOptions& options)

@@ -19,6 +19,7 @@ enum Neighbour : unsigned { kWest, kNorth, kNorthWest, kNorthEast, kWestWest, kN
 inline constexpr unsigned kNeighbours = 6;
 inline constexpr unsigned kPatterns = 1u << kNeighbours;
 
+/// The coefficients of all patterns.
 struct Predictor {
   using Coefficients = std::array<std::int32_t, kNeighbours>;
   std::array<Coefficients, kPatterns> coefficients = defaults();

@@ -40,6 +40,7 @@ TERRACE_STORE_INLINE void code_split(Coder& coder, std::uint32_t n, std::uint32_
   }
 }
 
+/// Decodes the points of a cluster. See the top of this file for the coding.
 class SplitDecoder {
  public:
   /// Decodes n points in `box` into `at`, by coordinate.
@@ -215,6 +216,7 @@ struct WidePoints {
   }
 };
 
+/// Encodes the points of a cluster. Its memory is reused for the next one.
 class SplitEncoder {
  public:
   /// Encodes n points in a box of these sizes, whose low side is 0; at(axis, i) is a coordinate of

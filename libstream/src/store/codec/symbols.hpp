@@ -16,6 +16,7 @@ inline constexpr unsigned kEscape = kClasses;
 inline constexpr unsigned kSymbols = kClasses + 1;
 inline constexpr unsigned kEscapeBits = 8;
 
+/// The numbers of a class: base, plus a number of `bits` raw bits.
 struct ClassRange {
   std::uint64_t base = 0;
   std::uint8_t bits = 0;

@@ -30,7 +30,7 @@ Error failed(const std::filesystem::path& path, const char* action) {
 
 /// Blocks of at most this many bytes are looked up among earlier ones.
 constexpr std::size_t kMaxSharedBytes = 1024;
-/// Maximum number of held blocks that are used to choose how columns are coded. Rasters have
+/// Maximum number of training blocks that are used to choose how columns are coded. Rasters have
 /// columns only above level 0, where the choice matters little.
 constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
 /// All blocks of a level are written in the order that is best for the first ones. Their sizes are

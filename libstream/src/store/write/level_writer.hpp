@@ -116,17 +116,17 @@ class LevelWriter {
   [[nodiscard]] bool at_segment_start() const { return blocks_ % kSegmentBlocks == 0; }
 
  private:
-  /// The counts of held blocks, as if encoded.
+  /// The counts of the training blocks, as if encoded.
   struct Trial {
     Counts counts;
     std::uint64_t raw_bits = 0;
 
     [[nodiscard]] std::uint64_t bits() const;
   };
-  /// Calls `count` with an encoder for every step-th held block.
+  /// Calls `count` with an encoder for every step-th training block.
   template <class Count>
   void each_block(std::size_t step, Count&& count);
-  /// Counts every step-th held block, with each of these columns.
+  /// Counts every step-th training block, with each of these columns.
   std::vector<Trial> count(const Predictor& predictor, std::span<const Columns> columns,
                            std::size_t step);
   [[nodiscard]] std::size_t trial_step() const;
