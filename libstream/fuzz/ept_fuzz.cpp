@@ -62,11 +62,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     folder.write((std::string("ept-data/0-0-0-0.") + ending).c_str(), rest);
     folder.write((std::string("ept-data/1-0-0-0.") + ending).c_str(), rest);
   }
-  const Reading large = read_through(file, {.format = "ept", .block_points = 500});
+  const ReadResult large = read_all_points(file, {.format = "ept", .block_points = 500});
   limit.add(large.points);
-  const Reading small = read_through(file, {.format = "ept", .block_points = 3});
+  const ReadResult small = read_all_points(file, {.format = "ept", .block_points = 3});
   require(large == small, "points do not depend on the block size");
-  const Reading threads = read_through(file, {.format = "ept", .block_points = 500, .threads = 2});
+  const ReadResult threads =
+      read_all_points(file, {.format = "ept", .block_points = 500, .threads = 2});
   require(large == threads, "points do not depend on the threads");
   return 0;
 }

@@ -64,19 +64,19 @@ class MemoryFile {
 };
 
 /// The result of reading a file: a hash of its points, or an Error.
-struct Reading {
+struct ReadResult {
   bool refused = false;
   std::uint64_t points = 0;
   std::uint64_t empty_values = 0;
   std::uint64_t hash = 0;
 
-  friend bool operator==(const Reading&, const Reading&) = default;
+  friend bool operator==(const ReadResult&, const ReadResult&) = default;
 };
 
 /// Reads a complete file and checks the reader's guarantees: blocks and columns of the right size,
 /// finite coordinates, no exceptions except Error.
-inline Reading read_through(const std::string& file, const SourceOptions& options) {
-  Reading reading;
+inline ReadResult read_all_points(const std::string& file, const SourceOptions& options) {
+  ReadResult reading;
   const auto fold = [&](const void* bytes, std::size_t size) {
     const auto* at = static_cast<const unsigned char*>(bytes);
     for (std::size_t i = 0; i < size; ++i) reading.hash = reading.hash * 1099511628211u + at[i];

@@ -6,10 +6,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace terrace::stream;
   WorkLimit limit(size);
   const MemoryFile file(data, size);
-  const Reading large = read_through(file.name(), {.format = "ply", .block_points = 500});
-  const Reading small = read_through(file.name(), {.format = "ply", .block_points = 3});
+  const ReadResult large = read_all_points(file.name(), {.format = "ply", .block_points = 500});
+  const ReadResult small = read_all_points(file.name(), {.format = "ply", .block_points = 3});
   require(large == small, "points do not depend on the block size");
   limit.add(large.points);
-  read_through(file.name(), {});
+  read_all_points(file.name(), {});
   return 0;
 }

@@ -76,7 +76,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const Folder folder;
     const std::string file = folder.put("a.tif", small_tiff());
     folder.put(sidecar, text);
-    read_through(file, {.block_points = 3, .memory_bytes = 4u << 20});
+    read_all_points(file, {.block_points = 3, .memory_bytes = 4u << 20});
     try {
       const auto source = open_source(std::span(&file, 1));
       const SourceInfo& info = source->info();

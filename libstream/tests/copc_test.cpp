@@ -64,7 +64,7 @@ Octree octree_of(const std::vector<std::vector<HierarchyEntry>>& pages, std::uin
   for (const std::vector<HierarchyEntry>& page : pages) file += page_of(page);
   std::vector<std::byte> bytes(file.size());
   std::memcpy(bytes.data(), file.data(), file.size());
-  const auto source = bytes_in_memory("made", std::move(bytes));
+  const auto source = bytes_in_memory("synthetic", std::move(bytes));
   return read_copc_hierarchy(*source, info.empty() ? info_of(pages.front().size() * 32) : info,
                              kFirstChunk, points);
 }
@@ -111,7 +111,7 @@ TEST(CopcHierarchy, PagesContainAllNodesAndAreBounded) {
     for (const char c : written.bytes) bytes.push_back(static_cast<std::byte>(c));
     std::string info = info_of(written.root_bytes);
     put(info, 40, offset);
-    const auto file = bytes_in_memory("made", std::move(bytes));
+    const auto file = bytes_in_memory("synthetic", std::move(bytes));
     const Octree read = read_copc_hierarchy(*file, info, kFirstChunk, octree.points());
     std::vector<OctreeNode> with_points = octree.nodes;
     std::erase_if(with_points, [](const OctreeNode& node) { return node.points == 0; });

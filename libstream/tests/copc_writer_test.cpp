@@ -40,10 +40,10 @@ struct BuiltNode {
 };
 
 /// Builds the octree of places in a cube with a side of kCubeSide steps and its corner at 0.
-std::vector<BuiltNode> built(const std::vector<Place>& places, std::size_t at_once,
-                             unsigned threads = 1) {
+std::vector<BuiltNode> build_nodes(const std::vector<Place>& places, std::size_t batch_records,
+                                   unsigned threads = 1) {
   constexpr std::size_t kRecord = 16;
-  OctreeBuilder builder("made", {}, kRecord, at_once, std::uint64_t{1} << 24, threads);
+  OctreeBuilder builder("synthetic", {}, kRecord, batch_records, std::uint64_t{1} << 24, threads);
   std::vector<std::byte> records;
   for (std::size_t i = 0; i < places.size(); ++i) {
     append_values(records, places[i][0], places[i][1], places[i][2], static_cast<std::uint32_t>(i));
@@ -76,10 +76,10 @@ Place cell_of(const Place& place, unsigned depth, unsigned bits) {
 
 /// Checks what the builder promises, and returns the nodes.
 std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
-  const std::vector<BuiltNode> nodes = built(places, std::size_t{1} << 19);
-  EXPECT_TRUE(nodes == built(places, 1)) << "memory makes a difference";
-  EXPECT_TRUE(nodes == built(places, std::size_t{1} << 19, 5)) << "threads make a difference";
-  EXPECT_TRUE(nodes == built(places, 1, 3)) << "both make a difference";
+  const std::vector<BuiltNode> nodes = build_nodes(places, std::size_t{1} << 19);
+  EXPECT_TRUE(nodes == build_nodes(places, 1)) << "memory makes a difference";
+  EXPECT_TRUE(nodes == build_nodes(places, std::size_t{1} << 19, 5)) << "threads make a difference";
+  EXPECT_TRUE(nodes == build_nodes(places, 1, 3)) << "both make a difference";
 
   std::vector<bool> found_numbers(places.size());
   std::set<std::string> names;
@@ -153,7 +153,7 @@ TEST(OctreeBuilder, SurfacesAreEvenAtEachDepth) {
 }
 
 TEST(OctreeBuilder, KeepsFewPointsInOneNode) {
-  EXPECT_TRUE(built({}, 1).empty());
+  EXPECT_TRUE(build_nodes({}, 1).empty());
   const std::vector<BuiltNode> nodes = expect_octree({{0, 0, 0}, {0, 0, 0}, {kCubeSide - 1, 5, 7}});
   ASSERT_EQ(nodes.size(), 1u);
   EXPECT_EQ(nodes[0].points.size(), 3u);
@@ -162,9 +162,9 @@ TEST(OctreeBuilder, KeepsFewPointsInOneNode) {
 TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
   std::vector<Place> places(40'000, Place{7, 8, 9});
   for (int i = 0; i < 1000; ++i) places.push_back({i * 3, i * 5, i});
-  const std::vector<BuiltNode> nodes = built(places, 1);
-  EXPECT_TRUE(nodes == built(places, std::size_t{1} << 19));
-  EXPECT_TRUE(nodes == built(places, 1, 3));
+  const std::vector<BuiltNode> nodes = build_nodes(places, 1);
+  EXPECT_TRUE(nodes == build_nodes(places, std::size_t{1} << 19));
+  EXPECT_TRUE(nodes == build_nodes(places, 1, 3));
   std::size_t found = 0, largest = 0;
   for (const BuiltNode& node : nodes) {
     found += node.points.size();
@@ -177,7 +177,7 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
 TEST(OctreeBuilder, RejectsTooManyPointsInOnePlace) {
   constexpr std::uint64_t kMax = 50'000;
   const auto build = [](std::uint64_t points) {
-    OctreeBuilder builder("made", {}, 12, 1, kMax);
+    OctreeBuilder builder("synthetic", {}, 12, 1, kMax);
     builder.add(std::vector<std::byte>(12 * points));
     const Octree octree{.centre = {1, 1, 1}, .half_size = 1, .spacing = 1, .nodes = {}};
     std::uint64_t written = 0;
@@ -200,8 +200,8 @@ TEST(OctreeBuilder, BoundsNodesOfCloudsThatFillSpace) {
       coordinate = static_cast<std::int32_t>(random() % kCubeSide);
     }
   }
-  const std::vector<BuiltNode> nodes = built(places, std::size_t{1} << 19);
-  EXPECT_TRUE(nodes == built(places, 1));
+  const std::vector<BuiltNode> nodes = build_nodes(places, std::size_t{1} << 19);
+  EXPECT_TRUE(nodes == build_nodes(places, 1));
   std::size_t found = 0;
   for (const BuiltNode& node : nodes) found += node.points.size();
   EXPECT_EQ(found, places.size());

@@ -48,7 +48,7 @@ class SyntheticRaster final : public Raster {
   SyntheticRaster(std::uint64_t columns, std::uint64_t rows, const WorldTransform& world,
                   Reading& reading)
       : reading_(reading) {
-    info_.files = {"made"};
+    info_.files = {"synthetic"};
     info_.columns = columns;
     info_.rows = rows;
     info_.sample.type = ScalarType::i32;

@@ -26,13 +26,13 @@ namespace {
 constexpr std::size_t kBlock = 1000;
 
 /// A source of points on a surface, each with its number as an attribute.
-class MadePoints final : public PointSource {
+class GeneratedPoints final : public PointSource {
  public:
   using Place = std::function<Point3(std::uint64_t)>;
 
-  MadePoints(std::uint64_t count, Place place, ScalarType type = ScalarType::f64)
+  GeneratedPoints(std::uint64_t count, Place place, ScalarType type = ScalarType::f64)
       : count_(count), place_(std::move(place)) {
-    info_.format = "made";
+    info_.format = "synthetic";
     for (Channel& channel : info_.coordinates) channel.type = type;
     info_.attributes = {{.name = "mark", .type = ScalarType::u8},
                         {.name = "number", .type = ScalarType::u64}};
@@ -67,14 +67,14 @@ class MadePoints final : public PointSource {
 Point3 on_surface(double x, double y) { return {x, y, std::floor(20 * std::sin(x / 90))}; }
 
 /// Returns places in rows of `width`.
-MadePoints::Place rows(std::uint64_t width) {
+GeneratedPoints::Place rows(std::uint64_t width) {
   return [width](std::uint64_t i) {
     return on_surface(static_cast<double>(i % width), static_cast<double>(i / width));
   };
 }
 
 /// Returns the places of a square of `side` x `side`, visited repeatedly in random order.
-MadePoints::Place shuffled(std::uint64_t side) {
+GeneratedPoints::Place shuffled(std::uint64_t side) {
   return [side](std::uint64_t i) {
     // Steps by an odd number visit every place if their number is a power of two.
     const std::uint64_t place = (i * 0x9E3779B97F4A7C15u) % (side * side);
@@ -83,7 +83,7 @@ MadePoints::Place shuffled(std::uint64_t side) {
 }
 
 /// Returns the places of squares of `side` x `side` one after another, along rows of squares.
-MadePoints::Place squares(std::uint64_t side) {
+GeneratedPoints::Place squares(std::uint64_t side) {
   return [side](std::uint64_t i) {
     const std::uint64_t square = i / (side * side), in = i % (side * side);
     return on_surface(static_cast<double>(square % 40 * side + in % side),
@@ -107,9 +107,9 @@ struct Read {
   }
 };
 
-Read read(std::uint64_t count, const MadePoints::Place& place, Order order,
+Read read(std::uint64_t count, const GeneratedPoints::Place& place, Order order,
           ScalarType type = ScalarType::f64) {
-  const auto source = in_spatial_order(std::make_unique<MadePoints>(count, place, type),
+  const auto source = in_spatial_order(std::make_unique<GeneratedPoints>(count, place, type),
                                        {.order = order, .block_points = kBlock});
   Read read;
   PointBlock block;
@@ -124,7 +124,7 @@ Read read(std::uint64_t count, const MadePoints::Place& place, Order order,
 }
 
 /// Expects that every point was delivered once, at its place, with its record.
-void expect_all(const Read& read, std::uint64_t count, const MadePoints::Place& place) {
+void expect_all(const Read& read, std::uint64_t count, const GeneratedPoints::Place& place) {
   std::vector<bool> met(count);
   std::uint64_t points = 0;
   for (const PointBlock& block : read.blocks) {
@@ -250,7 +250,7 @@ TEST(SpatialOrderTest, MeasuresDegreesAndMetresOnTheGround) {
     Point3 p = shuffled(1024)(i);
     return Point3{p[0] * 1e-5, p[1] * 1e-5, static_cast<double>(i * 7919 % 100)};
   };
-  const auto source = in_spatial_order(std::make_unique<MadePoints>(kCount, place),
+  const auto source = in_spatial_order(std::make_unique<GeneratedPoints>(kCount, place),
                                        {.block_points = kBlock, .unit_lengths = [](const Box3&) {
                                           return std::array<double, 3>{1e5, 1e5, 1};
                                         }});
@@ -267,7 +267,7 @@ TEST(SpatialOrderTest, HoldsSmallBlocksTogether) {
        {std::pair{squares(100), Order::automatic}, std::pair{shuffled(1024), Order::automatic},
         std::pair{squares(100), Order::spatial}}) {
     for (const std::size_t block_points : {std::size_t{1}, std::size_t{600}}) {
-      auto points_source = std::make_unique<MadePoints>(kCount, place);
+      auto points_source = std::make_unique<GeneratedPoints>(kCount, place);
       points_source->block_points(block_points);
       const auto source =
           in_spatial_order(std::move(points_source), {.order = order, .block_points = kBlock});
@@ -292,11 +292,11 @@ TEST(SpatialOrderTest, ThreadsDoNotChangeTheOrder) {
   for (const auto& place : {shuffled(1024), rows(1 << 16), squares(100)}) {
     const Read expected = read(kCount, place, Order::spatial);
     for (const auto& [threads, ahead] : {std::pair{2u, 0u}, {2u, 3u}, {5u, 1u}}) {
-      const auto source =
-          in_spatial_order(std::make_unique<MadePoints>(kCount, place), {.order = Order::spatial,
-                                                                         .block_points = kBlock,
-                                                                         .threads = threads,
-                                                                         .parts_ahead = ahead});
+      const auto source = in_spatial_order(std::make_unique<GeneratedPoints>(kCount, place),
+                                           {.order = Order::spatial,
+                                            .block_points = kBlock,
+                                            .threads = threads,
+                                            .parts_ahead = ahead});
       Read found;
       for (PointBlock block; source->next(block);) found.blocks.push_back(block);
       EXPECT_TRUE(same(found, expected)) << threads << " threads, " << ahead << " ahead";
@@ -315,7 +315,7 @@ TEST(SpatialOrderTest, AStatedBoxAvoidsDividingTheOutermostBuckets) {
   Box3 box;
   for (std::uint64_t i = 0; i < kCount; i += 511) box.include(place(i));
   const auto ordered = [&](std::optional<Box3> stated) {
-    auto points_source = std::make_unique<MadePoints>(kCount, place);
+    auto points_source = std::make_unique<GeneratedPoints>(kCount, place);
     points_source->state(kCount, stated);
     const auto source = in_spatial_order(std::move(points_source),
                                          {.order = Order::spatial, .block_points = kBlock});
@@ -344,7 +344,7 @@ TEST(SpatialOrderTest, AStatedBoxAvoidsDividingTheOutermostBuckets) {
 TEST(SpatialOrderTest, EndsWithAStopRequest) {
   std::stop_source stop;
   const auto source = in_spatial_order(
-      std::make_unique<MadePoints>(1u << 20, shuffled(1024)),
+      std::make_unique<GeneratedPoints>(1u << 20, shuffled(1024)),
       {.block_points = kBlock, .stop = stop.get_token(), .reading = [&](const Progress& progress) {
          if (progress.points > 400000) stop.request_stop();
        }});
@@ -354,7 +354,7 @@ TEST(SpatialOrderTest, EndsWithAStopRequest) {
 
 TEST(SpatialOrderTest, NamesAFolderThatDoesNotExist) {
   const TempFolder folder;
-  const auto source = in_spatial_order(std::make_unique<MadePoints>(1u << 20, shuffled(1024)),
+  const auto source = in_spatial_order(std::make_unique<GeneratedPoints>(1u << 20, shuffled(1024)),
                                        {.block_points = kBlock, .folder = folder.path() / "none"});
   PointBlock block;
   try {

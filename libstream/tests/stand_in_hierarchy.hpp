@@ -90,9 +90,9 @@ class StandInHierarchy {
       levels_.resize(level + 1);
       closed_.resize(level + 1);
     }
-    Points& now = levels_[level];
-    if (now.positions.size() + points.positions.size() > options_.block_points &&
-        !now.positions.empty()) {
+    Points& current = levels_[level];
+    if (current.positions.size() + points.positions.size() > options_.block_points &&
+        !current.positions.empty()) {
       cluster(level);
     }
     Points& next = levels_[level];
