@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-/// One record of format 3: 7, -8, 9; intensity 0x1234; return 2 of 3, edge; class 17 withheld; ...
+/// Returns a record of format 3 in which every field has a different value.
 std::string record_of_format_3() {
   std::string record(34, '\0');
   put(record, 0, std::int32_t{7});

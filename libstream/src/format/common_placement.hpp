@@ -12,13 +12,14 @@
 
 namespace terrace::stream {
 
-/// A placement that holds the points of all `placements`, of which there is at least one:
-/// - the first one, if all are equal;
-/// - else the coarsest lattice of 32-bit integers that contains all of theirs to a ten-thousandth
-///   of its step (offsets as doubles resolve a millimetre of projected coordinates to a millionth);
-///   this is the first one's lattice if that suffices;
-/// - else, if the lattices have no common refinement or 32 bits do not cover `bounds`, coordinates
-///   of the CRS as doubles.
+/// Returns a placement that holds the points of all `placements`, of which there is at least one:
+/// 1. The first one, if all are equal.
+/// 2. Otherwise the coarsest lattice of 32-bit integers that contains all of theirs. It may differ
+///    from them by a ten-thousandth of its step, because offsets are doubles.
+/// 3. Coordinates of the CRS as doubles, if the lattices have no common refinement or 32 bits do
+/// not
+///    cover `bounds`.
+///
 /// bounds: of the points, in the CRS; empty if unknown.
 Placement common_placement(std::span<const Placement> placements, const Box3& bounds);
 

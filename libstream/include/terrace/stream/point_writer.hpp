@@ -80,10 +80,13 @@ class PointWriter {
 
 /// Options of writers of points and meshes.
 struct WriterOptions {
-  /// Name of a format; empty: determined by the file's ending. Points: "xyz" (x y z and attributes,
-  /// separated by blanks), "csv" (with a header line), "ply" (binary, little-endian), "ply-ascii",
-  /// "las" and "laz" (LAS 1.4), and "copc" (".copc.laz"; written in finish(), through a temporary
-  /// file next to it). Meshes: "ply", "ply-ascii", "obj", "glb".
+  /// Name of a format; empty: determined by the file's ending. Meshes: "ply", "ply-ascii", "obj",
+  /// "glb". Points:
+  /// - "xyz": x y z and attributes, separated by blanks
+  /// - "csv": with a header line
+  /// - "ply" (binary, little-endian), "ply-ascii"
+  /// - "las", "laz": LAS 1.4
+  /// - "copc": ".copc.laz", written in finish() through a temporary file next to it
   std::string format{};
   Naming replace{};  ///< whether an existing file is replaced; otherwise it is an Error
   /// Makes a wait for the reader of standard output, and PointWriter::finish() of "copc", throw

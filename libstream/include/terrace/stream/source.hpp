@@ -139,10 +139,13 @@ enum class Entities : std::uint8_t {
   /// The triangles of a mesh (GLB, OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
   /// file: "x2", "y2", "z2", "x3", "y3", "z3".
   triangles,
-  /// The segments of lines (GeoJSON, including rings of polygons), in the order of the file: "x2",
-  /// "y2", "z2"; then "line", the line's number, counted from 0 over all files; "part", the
-  /// segment's number in its line; "vertices", which is 2; and "dimensions", 3 if the line has
-  /// heights, otherwise 2. Points are left out and counted as excluded.
+  /// The segments of lines (GeoJSON, including rings of polygons), in the order of the file. Points
+  /// are left out and counted as excluded. The attributes are:
+  /// - "x2", "y2", "z2": the other end of the segment
+  /// - "line": the number of the line, counted from 0 over all files
+  /// - "part": the number of the segment in its line
+  /// - "vertices": 2
+  /// - "dimensions": 3 if the line has heights, otherwise 2
   segments,
   /// Lines in pieces of at most kPolylineVertices vertices, where the last vertex of each piece is
   /// the first of the next: "x2" to "z4" and the other columns of segments. Missing corners of a

@@ -14,12 +14,13 @@ namespace terrace::stream {
 /// A condition on points, such as `classification == 2 && return_number == last`.
 ///
 /// Operands are numbers, names of attributes (in double quotes if the name is not a plain word), x,
-/// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). Operators, from
-/// tightest to loosest: - and !; * and /; + and -; <, <=, > and >=; == and !=; &&; ||. Parentheses
-/// are allowed, and `not`, `and`, `or` as words. Scale and offset of attributes are applied. Values
-/// are computed as doubles, or in extended precision if the condition names 64-bit integers, which
-/// are then exact. Comparisons give 1 or 0; a point meets the condition if its value is a number
-/// other than 0.
+/// y and z in the CRS, `first` (1) and `last` (the attribute number_of_returns). The operators and
+/// their precedence are those of C: unary - and !, then * and /, + and -, < <= > and >=, == and !=,
+/// &&, ||. Parentheses are allowed, and `not`, `and`, `or` as words.
+///
+/// Scale and offset of attributes are applied. Values are computed as doubles. If the condition
+/// names 64-bit integers, they are computed in extended precision, in which these are exact.
+/// Comparisons give 1 or 0. A point meets the condition if its value is a number other than 0.
 ///
 /// Several threads may call const members at once.
 class Where {

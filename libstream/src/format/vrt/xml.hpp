@@ -30,8 +30,8 @@ using TakeElement = std::function<bool(std::span<const XmlElement> open, const X
 /// Returns the document's root, without the elements for which `take` returned true. Documents that
 /// declare a document type are refused, so entities cannot grow and no other file is read.
 /// Throws: Error naming line and cause if the file is not XML, is larger than 256 MiB, is nested
-/// deeper than 32, has a tag of more than 4 MiB, or needs more than 64 MiB for the kept elements;
-/// what `take` throws.
+/// deeper than 32, has a tag of more than 4 MiB, or needs more than 64 MiB for the kept elements.
+/// Throws what `take` throws.
 XmlElement read_xml(const std::string& file, const TakeElement& take);
 
 }  // namespace terrace::stream
