@@ -15,7 +15,7 @@
 namespace terrace::stream {
 namespace {
 
-/// Returns a record of format 3 in which every field has a different value.
+/// Returns a record of format 3 with the values that the next test expects.
 std::string record_of_format_3() {
   std::string record(34, '\0');
   put(record, 0, std::int32_t{7});

@@ -16,9 +16,8 @@ namespace terrace::stream {
 /// 1. The first one, if all are equal.
 /// 2. Otherwise the coarsest lattice of 32-bit integers that contains all of theirs. It may differ
 ///    from them by a ten-thousandth of its step, because offsets are doubles.
-/// 3. Coordinates of the CRS as doubles, if the lattices have no common refinement or 32 bits do
-/// not
-///    cover `bounds`.
+/// 3. Coordinates of the CRS as doubles, if the lattices have no common refinement, or if 32 bits
+///    do not cover `bounds`.
 ///
 /// bounds: of the points, in the CRS; empty if unknown.
 Placement common_placement(std::span<const Placement> placements, const Box3& bounds);
