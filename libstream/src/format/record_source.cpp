@@ -137,11 +137,11 @@ class RecordSource final : public PointSource {
         block_points_(block_points),
         payload_bytes_(stream_.info.payload_size()),
         payload_(stream_.fields, payload_bytes_),
-        wanted_points_(*stream_.info.points) {
+        selected_points_(*stream_.info.points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       ScalarType& type = stream_.info.coordinates[axis].type;
       types_[axis] = type;
-      checked_ = checked_ || size_of(type) == 8 || type == ScalarType::f32;
+      needs_check_ = needs_check_ || size_of(type) == 8 || type == ScalarType::f32;
       check_reach(axis);
       // Coordinates are doubles in memory; check() refuses integers that these cannot hold.
       if (is_wide_integer(type)) type = ScalarType::f64;
@@ -157,32 +157,32 @@ class RecordSource final : public PointSource {
 
   bool next(PointBlock& block) override {
     const auto max_records = static_cast<std::size_t>(std::min<std::uint64_t>(
-        block_points_, wanted_points_ - delivered_ - stream_.records->lost()));
+        block_points_, selected_points_ - delivered_ - stream_.records->lost()));
     block.positions.resize(max_records);
     block.payload.resize(max_records * payload_bytes_);
-    std::size_t done = 0;
-    for (std::size_t unpacked = 1; done < max_records && unpacked > 0; done += unpacked) {
-      unpacked = unpack(block, done, max_records - done);
+    std::size_t count = 0;
+    for (std::size_t unpacked = 1; count < max_records && unpacked > 0; count += unpacked) {
+      unpacked = unpack(block, count, max_records - count);
     }
-    block.positions.resize(done);
-    block.payload.resize(done * payload_bytes_);
+    block.positions.resize(count);
+    block.payload.resize(count * payload_bytes_);
     if (withheld_attribute_) count_withheld(block);
-    if (checked_) check(block);
+    if (needs_check_) check(block);
     if (move_) move(block);
-    delivered_ += done;
-    return done > 0;
+    delivered_ += count;
+    return count > 0;
   }
 
   Progress progress() const override {
     return {.points = delivered_,
             .nodata = 0,
             .withheld = withheld_,
-            .excluded = stream_.points - wanted_points_,
+            .excluded = stream_.points - selected_points_,
             .lost = stream_.records->lost(),
-            .fraction = wanted_points_ == 0
+            .fraction = selected_points_ == 0
                             ? 1.0
                             : static_cast<double>(delivered_ + stream_.records->lost()) /
-                                  static_cast<double>(wanted_points_)};
+                                  static_cast<double>(selected_points_)};
   }
 
   std::uint64_t reading_bytes() const override { return stream_.records->held_bytes(); }
@@ -195,8 +195,9 @@ class RecordSource final : public PointSource {
     return Error(file(), std::move(cause)).at(fmt::format("point {}", delivered_ + point));
   }
 
-  /// Unpacks some of the next `max_records` records to the points from `done` on; returns how many.
-  std::size_t unpack(PointBlock& block, std::size_t done, std::size_t max_records) {
+  /// Unpacks some of the next `max_records` records to the points from `first` on; returns how
+  /// many.
+  std::size_t unpack(PointBlock& block, std::size_t first, std::size_t max_records) {
     const std::string_view rows = stream_.records->read(max_records);
     if (rows.empty()) return 0;
     const std::size_t stride = stream_.record_bytes, count = rows.size() / stride;
@@ -208,9 +209,9 @@ class RecordSource final : public PointSource {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       column.rows = rows.data() + stream_.coordinate_offsets[axis];
       column.type = types_[axis];
-      decode_coordinate(column, block.positions.data() + done, axis);
+      decode_coordinate(column, block.positions.data() + first, axis);
     }
-    payload_.unpack(rows, stride, block.payload.data() + done * payload_bytes_);
+    payload_.unpack(rows, stride, block.payload.data() + first * payload_bytes_);
     return count;
   }
 
@@ -314,9 +315,9 @@ class RecordSource final : public PointSource {
   PayloadUnpacker payload_;
   std::array<ScalarType, 3> types_{};  ///< of the coordinates in the records
   std::optional<Move> move_;           ///< to the placement of all files
-  bool checked_ = false;               ///< coordinates could be out of range
+  bool needs_check_ = false;           ///< coordinates could be out of range
   std::optional<std::size_t> withheld_attribute_;
-  std::uint64_t wanted_points_ = 0, delivered_ = 0, withheld_ = 0;
+  std::uint64_t selected_points_ = 0, delivered_ = 0, withheld_ = 0;
 };
 
 }  // namespace

@@ -100,12 +100,12 @@ bool lacks_crs(const Crs& crs) {
 }
 
 XmlElement read_pam(const std::string& file) {
-  return read_xml(file, [](std::span<const XmlElement> open, const XmlElement& done) {
+  return read_xml(file, [](std::span<const XmlElement> open, const XmlElement& element) {
     if (open.size() == 1) {
-      return done.name != kPamBand && done.name != "SRS" && done.name != "GeoTransform";
+      return element.name != kPamBand && element.name != "SRS" && element.name != "GeoTransform";
     }
     // Statistics and histograms.
-    return open.size() > 2 || !done.children.empty() || done.text.size() > 100;
+    return open.size() > 2 || !element.children.empty() || element.text.size() > 100;
   });
 }
 
@@ -184,8 +184,8 @@ class WithAuxXml final : public Raster {
 
   /// Returns whether to use the sidecar's value of something that the file may state as well. Adds
   /// a note about the choice if the two differ.
-  bool is_applicable(bool file_says_it, bool differs, bool overrides, const std::string& what) {
-    if (!file_says_it) return true;
+  bool is_applicable(bool is_in_file, bool differs, bool overrides, const std::string& what) {
+    if (!is_in_file) return true;
     if (differs) {
       info_.notes.push_back(fmt::format("{}: its {}{}", sidecar_, what,
                                         overrides

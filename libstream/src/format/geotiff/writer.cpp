@@ -211,10 +211,10 @@ struct GeoTiffWriter::Impl {
   void put(std::size_t level, std::uint32_t across, std::uint32_t down,
            std::span<const std::byte> samples) {
     check_stop();
-    QueuedTile& added = queue[queued++];
-    added.level = level;
-    added.number = std::size_t{down} * levels[level].across + across;
-    added.samples.assign(samples.begin(), samples.end());
+    QueuedTile& entry = queue[queued++];
+    entry.level = level;
+    entry.number = std::size_t{down} * levels[level].across + across;
+    entry.samples.assign(samples.begin(), samples.end());
     if (queued == queue.size()) write_queue();
   }
   /// Compresses the queued tiles on all threads and writes them in the order of arrival.
@@ -223,14 +223,14 @@ struct GeoTiffWriter::Impl {
       const std::span<const std::byte> coded = encoders[worker].encode(queue[i].samples);
       queue[i].coded.assign(coded.begin(), coded.end());
     });
-    for (const QueuedTile& done : std::span(queue).first(queued)) {
-      TileIndex& index = tiles[done.level];
-      index.bytes[done.number] = static_cast<std::uint32_t>(done.coded.size());
-      index.offsets[done.number] = spool ? spool->size() : file.size();
+    for (const QueuedTile& entry : std::span(queue).first(queued)) {
+      TileIndex& index = tiles[entry.level];
+      index.bytes[entry.number] = static_cast<std::uint32_t>(entry.coded.size());
+      index.offsets[entry.number] = spool ? spool->size() : file.size();
       if (spool) {
-        spool->append(done.coded);
+        spool->append(entry.coded);
       } else {
-        file.write(done.coded);
+        file.write(entry.coded);
       }
     }
     queued = 0;

@@ -155,21 +155,21 @@ class GlbParser final : public MeshParser {
     if (word(4) != glb::kVersion) {
       throw fault_here(fmt::format("is glTF of version {}, not 2", word(4))).remedy(kPlainRemedy);
     }
-    const std::uint64_t all = word(8), json_bytes = word(12);
-    if (input_->size() && *input_->size() < all) {
+    const std::uint64_t file_bytes = word(8), json_bytes = word(12);
+    if (input_->size() && *input_->size() < file_bytes) {
       throw fault_here(fmt::format("is truncated: its header promises {}, but it has {}",
-                                   counted(all, "byte"), *input_->size()))
+                                   counted(file_bytes, "byte"), *input_->size()))
           .remedy(kTruncatedRemedy);
     }
     if (word(16) != glb::kJson) throw fault_here("its first chunk is not JSON");
-    if (all < kHeaders + json_bytes) throw fault_here("its JSON is larger than the file");
+    if (file_bytes < kHeaders + json_bytes) throw fault_here("its JSON is larger than the file");
     if (json_bytes > kMaxJsonBytes)
       throw fault_here("its JSON is larger than 64 MiB").remedy(kPlainRemedy);
     input_->consume(kHeaders);
     parse(input_->fill(json_bytes).substr(0, json_bytes), json_bytes);
     input_->consume(json_bytes);
 
-    std::uint64_t remaining = all - kHeaders - json_bytes;
+    std::uint64_t remaining = file_bytes - kHeaders - json_bytes;
     if (remaining < glb::kChunkHeaderBytes) return;
     if (input_->fill(glb::kChunkHeaderBytes).size() < glb::kChunkHeaderBytes)
       throw fault_here("ends before its second chunk");
@@ -217,7 +217,7 @@ class GlbParser final : public MeshParser {
     return *found;
   }
 
-  /// Entry `index` of a list at the top level.
+  /// Returns entry `index` of a list at the top level. Throws: Error if it is not an object.
   const Json& entry(const char* name, std::uint64_t index) const {
     const Json& all = list(json_, name);
     if (index >= all.size() || !all[index].is_object()) {

@@ -33,8 +33,8 @@ class VrtReader {
  public:
   VrtReader(const std::string& file, int band) : file_(file), band_number_(band) {
     const XmlElement root =
-        read_xml(file, [this](std::span<const XmlElement> open, const XmlElement& done) {
-          return take(open, done);
+        read_xml(file, [this](std::span<const XmlElement> open, const XmlElement& element) {
+          return take(open, element);
         });
     read_dataset(root);
     read_place(root);
@@ -74,25 +74,25 @@ class VrtReader {
 
   /// Reads the sources as they come, because there may be very many. Drops all elements that do not
   /// concern the samples.
-  bool take(std::span<const XmlElement> open, const XmlElement& done) {
+  bool take(std::span<const XmlElement> open, const XmlElement& element) {
     if (open.size() == 1) {
-      if (done.name == kBand) ++bands_;
-      return done.name != kBand && done.name != "SRS" && done.name != "GeoTransform" &&
-             done.name != "MaskBand";
+      if (element.name == kBand) ++bands_;
+      return element.name != kBand && element.name != "SRS" && element.name != "GeoTransform" &&
+             element.name != "MaskBand";
     }
     if (open[1].name != kBand || bands_ + 1 != band_number_) return true;
     if (open.size() > 2) return !open[2].name.ends_with("Source");
-    if (done.name == "SimpleSource" || done.name == "ComplexSource") {
+    if (element.name == "SimpleSource" || element.name == "ComplexSource") {
       if (sources_.empty()) {
         read_dataset(open[0]);
         read_kind(open[1]);
       }
-      sources_.push_back(source_of(done));
+      sources_.push_back(source_of(element));
       return true;
     }
-    return !done.name.ends_with("Source") && done.name != "MaskBand" &&
-           done.name != "NoDataValue" && done.name != "Scale" && done.name != "Offset" &&
-           done.name != "UnitType";
+    return !element.name.ends_with("Source") && element.name != "MaskBand" &&
+           element.name != "NoDataValue" && element.name != "Scale" && element.name != "Offset" &&
+           element.name != "UnitType";
   }
 
   void read_dataset(const XmlElement& root) {

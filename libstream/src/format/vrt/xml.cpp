@@ -88,17 +88,17 @@ void on_start(void* self, const XML_Char* name, const XML_Char** attributes) {
 
 void on_end(void* self, const XML_Char* /*name*/) {
   XmlParseState::guard(self, [](XmlParseState& state) {
-    XmlElement done = std::move(state.open.back());
+    XmlElement element = std::move(state.open.back());
     const std::size_t bytes = state.bytes.back();
     state.open.pop_back();
     state.bytes.pop_back();
     if (state.open.empty()) {
-      state.root = std::move(done);
-    } else if ((*state.take)(state.open, done)) {
+      state.root = std::move(element);
+    } else if ((*state.take)(state.open, element)) {
       state.total_bytes -= bytes;
     } else {
       state.bytes.back() += bytes;
-      state.open.back().children.push_back(std::move(done));
+      state.open.back().children.push_back(std::move(element));
     }
   });
 }

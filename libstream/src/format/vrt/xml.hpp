@@ -25,7 +25,8 @@ struct XmlElement {
 
 /// Receives a complete element and its ancestors `open`, the root first, which are not yet
 /// complete. Returns true if the element need not be kept. May throw.
-using TakeElement = std::function<bool(std::span<const XmlElement> open, const XmlElement& done)>;
+using TakeElement =
+    std::function<bool(std::span<const XmlElement> open, const XmlElement& element)>;
 
 /// Returns the document's root, without the elements for which `take` returned true. Documents that
 /// declare a document type are refused, so entities cannot grow and no other file is read.
