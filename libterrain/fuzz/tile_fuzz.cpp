@@ -8,10 +8,10 @@
 
 #include "fuzz_target.hpp"
 #include "terrace/stream/error.hpp"
+#include "tile/format/layer.hpp"
 #include "tile/format/quantized_mesh.hpp"
-#include "tile/format/tile_layer.hpp"
-#include "tile/set/tile_journal.hpp"
-#include "tile/verify/tile_mesh_check.hpp"
+#include "tile/set/journal.hpp"
+#include "tile/verify/checks.hpp"
 
 namespace terrace::terrain::fuzz {
 

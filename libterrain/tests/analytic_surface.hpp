@@ -14,7 +14,7 @@
 #include <terrace/base/stop_check.hpp>
 
 #include "base/digest.hpp"
-#include "tile/make/tile_surface.hpp"
+#include "tile/make/surface.hpp"
 
 namespace terrace::terrain {
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contour lines of random lattices with plateaus and holes: each crossing of an edge by a level is
 // on one line, ends are only at borders, and bands do not matter.
-#include "contour/contour_lines.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -14,6 +12,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "contour/lines.hpp"
 
 namespace terrace::terrain {
 namespace {

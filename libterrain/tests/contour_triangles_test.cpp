@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compares contour lines of Delaunay triangulations, in parts and whole, with the segments of every
 // single triangle.
-#include "contour/contour_triangles.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -18,6 +16,8 @@
 
 #include <gtest/gtest.h>
 #include <terrace/tri/delaunay2.hpp>
+
+#include "contour/triangles.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -12,7 +12,7 @@
 
 #include <gtest/gtest.h>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "terrace/terrain/crs.hpp"
 
 namespace terrace::terrain {

@@ -9,7 +9,7 @@
 
 #include <gtest/gtest.h>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"

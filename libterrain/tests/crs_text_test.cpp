@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "earth/crs/crs_definition.hpp"
 #include "earth/crs/datum_change.hpp"
+#include "earth/crs/definition.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"

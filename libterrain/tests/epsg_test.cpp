@@ -15,7 +15,7 @@
 #include <gtest/gtest.h>
 #include <proj.h>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/crs/projection_engine.hpp"
 #include "terrace/terrain/crs.hpp"
 

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <terrace/base/portable_math.hpp>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -15,7 +15,7 @@
 
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
-#include "tile/make/raster_tile_surface.hpp"
+#include "tile/make/raster_surface.hpp"
 #include "tile/make/tiled_raster.hpp"
 
 namespace terrace::terrain {

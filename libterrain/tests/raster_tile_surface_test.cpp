@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/make/raster_tile_surface.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -25,8 +23,9 @@
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "tile/format/quantized_mesh.hpp"
-#include "tile/make/height_cache.hpp"
-#include "tile/make/tile_mesher.hpp"
+#include "tile/make/height_blocks.hpp"
+#include "tile/make/mesher.hpp"
+#include "tile/make/raster_surface.hpp"
 
 namespace terrace::terrain {
 namespace {

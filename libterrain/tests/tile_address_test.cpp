@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/format/tile_address.hpp"
-
 #include <gtest/gtest.h>
 #include <terrace/base/random.hpp>
+
+#include "tile/format/address.hpp"
 
 namespace terrace::terrain {
 namespace {

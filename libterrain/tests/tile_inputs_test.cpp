@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/set/tile_inputs.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -14,6 +12,7 @@
 
 #include "analytic_surface.hpp"
 #include "temporary_folder.hpp"
+#include "tile/set/inputs.hpp"
 
 namespace terrace::terrain {
 

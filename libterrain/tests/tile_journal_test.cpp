@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/set/tile_journal.hpp"
-
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
@@ -10,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "temporary_folder.hpp"
+#include "tile/set/journal.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/format/tile_layer.hpp"
-
 #include <filesystem>
 #include <fstream>
 
@@ -11,6 +9,7 @@
 
 #include "temporary_folder.hpp"
 #include "terrace/terrain/tile_check.hpp"
+#include "tile/format/layer.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tile/make/tile_mesher.hpp"
-
 #include <cmath>
 #include <map>
 #include <set>
@@ -15,8 +13,8 @@
 #include <terrace/tri/point_tin.hpp>
 
 #include "analytic_surface.hpp"
-#include "tile/verify/tile_height_check.hpp"
-#include "tile/verify/tile_mesh_check.hpp"
+#include "tile/make/mesher.hpp"
+#include "tile/verify/checks.hpp"
 
 namespace terrace::terrain {
 namespace {

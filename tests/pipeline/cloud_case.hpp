@@ -21,9 +21,9 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "random.hpp"
+#include "surface/corner.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
-#include "surface/surface_corner.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/region.hpp"
 

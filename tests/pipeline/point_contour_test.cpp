@@ -26,7 +26,7 @@
 
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
-#include "contour/contour_parts.hpp"
+#include "contour/parts.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/error.hpp"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Compares what tiles ask of a store of irregular points with answers computed from all of its
 // points.
-#include "tile/make/point_tile_surface.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -25,10 +23,11 @@
 #include "random.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/crs.hpp"
-#include "tile/make/cloud_spacing.hpp"
+#include "tile/make/cloud_samples.hpp"
 #include "tile/make/crowded_leaf.hpp"
+#include "tile/make/mesher.hpp"
+#include "tile/make/point_surface.hpp"
 #include "tile/make/sample_parts.hpp"
-#include "tile/make/tile_mesher.hpp"
 
 namespace terrace {
 namespace {

@@ -18,7 +18,7 @@
 #include "terrace/terrain/profile.hpp"
 #include "terrace/terrain/raster.hpp"
 #include "terrace/terrain/region.hpp"
-#include "tile/format/tile_address.hpp"
+#include "tile/format/address.hpp"
 
 namespace terrace::terrain::fuzz {
 

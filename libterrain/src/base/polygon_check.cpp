@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/polygon_check.hpp"
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +13,7 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/tri/predicates.hpp>
 
+#include "base/region_shape.hpp"
 #include "base/units.hpp"
 
 namespace terrace::terrain {

@@ -11,7 +11,6 @@
 #include <fmt/core.h>
 #include <geos_c.h>
 
-#include "base/polygon_check.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

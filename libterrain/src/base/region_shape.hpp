@@ -5,6 +5,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -53,5 +54,12 @@ class RegionShape {
 /// Returns the part of the plane inside the polygon by the even-odd rule, as valid polygons; the
 /// polygon itself if it is valid. Empty if it has no area.
 std::vector<Polygon> valid_polygons(const Polygon& polygon);
+
+/// Returns why and where a polygon is invalid by OGC Simple Features; nullopt if it is valid.
+/// Sweeps over the edges; exact, O(n log n) for n corners in any arrangement. Source: M. Shamos, D.
+/// Hoey, Geometric intersection problems, 1976. Requires finite coordinates and at least one ring.
+/// Throws: stream::Stopped.
+[[nodiscard]] std::optional<std::string> fault_of(const Polygon& polygon,
+                                                  const std::stop_token& stop = {});
 
 }  // namespace terrace::terrain

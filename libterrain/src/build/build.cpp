@@ -30,7 +30,7 @@
 #include "build/clustering.hpp"
 #include "build/damage_report.hpp"
 #include "build/joined_longitudes.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
 #include "terrace/terrain/error.hpp"

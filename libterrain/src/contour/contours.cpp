@@ -14,8 +14,8 @@
 #include "base/progress_report.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
-#include "contour/contour_parts.hpp"
-#include "contour/contour_text.hpp"
+#include "contour/parts.hpp"
+#include "contour/text.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {

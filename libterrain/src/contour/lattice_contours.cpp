@@ -8,8 +8,8 @@
 
 #include "base/parallel.hpp"
 #include "base/store_checks.hpp"
-#include "contour/contour_lines.hpp"
-#include "contour/contour_parts.hpp"
+#include "contour/lines.hpp"
+#include "contour/parts.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {

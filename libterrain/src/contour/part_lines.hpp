@@ -8,7 +8,7 @@
 
 #include <terrace/tri/delaunay2.hpp>
 
-#include "contour/contour_levels.hpp"
+#include "contour/levels.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {

@@ -9,7 +9,7 @@
 #include <GeographicLib/Geoid.hpp>
 #include <fmt/core.h>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/crs/operation_choice.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/ground.hpp"

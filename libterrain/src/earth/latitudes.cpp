@@ -11,7 +11,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 
 namespace terrace::terrain {
 namespace {

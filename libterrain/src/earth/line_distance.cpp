@@ -6,7 +6,7 @@
 
 #include <terrace/base/portable_math.hpp>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/terrain/latitudes.hpp"
 

@@ -2,7 +2,7 @@
 #include "terrace/terrain/point_file_crs.hpp"
 
 #include "base/store_checks.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/unit_words.hpp"
 #include "terrace/terrain/crs.hpp"

@@ -12,7 +12,7 @@
 #include <terrace/base/portable_math.hpp>
 
 #include "base/region_shape.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "terrace/stream/error.hpp"
 
 namespace terrace::terrain {

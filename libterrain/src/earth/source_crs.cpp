@@ -7,7 +7,7 @@
 
 #include <fmt/core.h>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"

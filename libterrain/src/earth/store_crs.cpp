@@ -13,7 +13,7 @@
 
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/region_crs.hpp"
 #include "earth/source_crs.hpp"
 #include "earth/whole_turns.hpp"

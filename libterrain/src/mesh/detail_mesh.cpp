@@ -26,7 +26,7 @@
 #include "base/units.hpp"
 #include "earth/ground.hpp"
 #include "mesh/matching_points.hpp"
-#include "mesh/mesh_heights.hpp"
+#include "mesh/vertex_heights.hpp"
 #include "mesh/wanted_entities.hpp"
 #include "surface/box_tree.hpp"
 #include "terrace/terrain/detail_lines.hpp"

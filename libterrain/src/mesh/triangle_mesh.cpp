@@ -16,7 +16,7 @@
 
 #include "base/file_marks.hpp"
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 

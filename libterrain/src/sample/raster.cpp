@@ -21,7 +21,7 @@
 #include "base/progress_report.hpp"
 #include "base/store_checks.hpp"
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "sample/raster_grid.hpp"
 #include "surface/ground_slope.hpp"

@@ -10,7 +10,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
 
-#include "view/view_frame.hpp"
+#include "view/frame.hpp"
 
 namespace terrace::terrain {
 

@@ -11,10 +11,10 @@
 #include <terrace/stream/store_query.hpp>
 
 #include "surface/circle_cover.hpp"
+#include "surface/corner.hpp"
 #include "surface/point_cells.hpp"
 #include "surface/point_cloud.hpp"
 #include "surface/point_star.hpp"
-#include "surface/surface_corner.hpp"
 #include "terrace/terrain/heights.hpp"
 
 namespace terrace::terrain {

@@ -17,9 +17,9 @@
 #include "surface/box_tree.hpp"
 #include "surface/circle_cover.hpp"
 #include "surface/cluster_frontier.hpp"
+#include "surface/corner.hpp"
 #include "surface/point_cloud.hpp"
 #include "surface/store_window.hpp"
-#include "surface/surface_corner.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {

@@ -13,7 +13,7 @@
 
 #include "terrace/terrain/store_source.hpp"
 #include "terrace/terrain/store_view.hpp"
-#include "view/view_frame.hpp"
+#include "view/frame.hpp"
 
 /// Readers of a view's clusters: in the drawing thread, or in a separate one.
 

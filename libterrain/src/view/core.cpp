@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "view/view_impl.hpp"
+#include "view/store_view_impl.hpp"
 
 /// The part of the view that needs neither threads nor PROJ nor CGAL, for WebAssembly.
 

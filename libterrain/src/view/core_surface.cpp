@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "view/view_impl.hpp"
+#include "view/store_view_impl.hpp"
 
 /// The same for surfaces of scans; separate from core.cpp because they need the triangulation in
 /// space.

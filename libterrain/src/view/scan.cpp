@@ -10,7 +10,7 @@
 #include "base/vector.hpp"
 #include "terrace/terrain/store_source.hpp"
 #include "terrace/terrain/store_view.hpp"
-#include "view/view_frame.hpp"
+#include "view/frame.hpp"
 
 namespace terrace::terrain {
 

@@ -3,7 +3,7 @@
 
 #include "earth/ground.hpp"
 #include "terrace/terrain/latitudes.hpp"
-#include "view/view_impl.hpp"
+#include "view/store_view_impl.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -17,7 +17,7 @@
 #include "cli/interrupt.hpp"
 #include "cli/output.hpp"
 #include "cli/selection_options.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/source_crs.hpp"
 #include "tables/point_table.hpp"
 #include "terrace/stream/error.hpp"

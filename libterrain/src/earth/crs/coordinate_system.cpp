@@ -13,9 +13,9 @@
 #include <terrace/base/portable_math.hpp>
 
 #include "base/units.hpp"
-#include "earth/crs/crs_definition.hpp"
-#include "earth/crs/crs_geo_keys.hpp"
 #include "earth/crs/datum_change.hpp"
+#include "earth/crs/definition.hpp"
+#include "earth/crs/geo_keys.hpp"
 #include "earth/crs/projection_engine.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/crs.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/crs/operation_choice.hpp"
 #include "earth/crs/proj_pipeline.hpp"
 

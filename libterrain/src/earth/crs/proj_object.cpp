@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/crs/proj_object.hpp"
 
 namespace terrace::terrain {

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 #include "earth/crs/proj_object.hpp"
 #include "earth/crs/projection.hpp"
 

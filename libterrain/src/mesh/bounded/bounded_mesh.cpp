@@ -10,16 +10,15 @@
 
 #include "base/store_checks.hpp"
 #include "earth/ground.hpp"
-#include "mesh/bounded/mesh_spool.hpp"
-#include "mesh/bounded/point_mesher.hpp"
-#include "mesh/bounded/raster_mesher.hpp"
+#include "mesh/bounded/mesher.hpp"
+#include "mesh/bounded/spool.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
 
 /// remedy: for a mesh that should have fewer points than its border.
-BoundedMeshResult mesh_by(BoundedMesher&& mesher, const stream::Store& store,
+BoundedMeshResult mesh_by(BoundedMesher& mesher, const stream::Store& store,
                           const BoundedMeshOptions& options, const stream::Message& remedy,
                           const std::stop_token& stop) {
   const double metres = mesher.metres_vertical();
@@ -73,13 +72,14 @@ BoundedMeshResult write_bounded_mesh(const stream::Store& store, const BoundedMe
         options.fill == Fill::none
             ? stream::message("allow more points, or {fill} cells without data")
             : "allow more points";
-    return mesh_by(RasterMesher(source, options, context), store, options, remedy, context.stop);
+    return mesh_by(*make_raster_mesher(source, options, context), store, options, remedy,
+                   context.stop);
   }
   if (options.fill != Fill::none) {
     throw UsageError(
         stream::message("{fill} is for rasters: irregular points have no cells without data"));
   }
-  return mesh_by(PointMesher(source, options, context), store, options, "allow more points",
+  return mesh_by(*make_point_mesher(source, options, context), store, options, "allow more points",
                  context.stop);
 }
 

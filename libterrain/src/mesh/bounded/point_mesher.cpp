@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/point_mesher.hpp"
-
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <numeric>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,9 +12,14 @@
 #include <fmt/core.h>
 #include <terrace/base/ordered_work.hpp>
 #include <terrace/stream/error.hpp>
+#include <terrace/stream/store.hpp>
 
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
+#include "mesh/bounded/mesher.hpp"
+#include "mesh/bounded/point_mesh_cells.hpp"
+#include "mesh/bounded/point_window_tin.hpp"
+#include "mesh/bounded/point_windows.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -92,7 +98,37 @@ double PointMeshEstimate::per_cell(double max_error) const {
   return vertices / 4.0;
 }
 
-}  // namespace
+/// Meshes the irregular samples of a store: in one piece if they are few, otherwise distributed to
+/// the cells of a division of the plane.
+class PointMesher final : public BoundedMesher {
+ public:
+  PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
+              const Context& context);
+
+  BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices) override;
+  [[nodiscard]] double estimate(double max_error) const override;
+  [[nodiscard]] bool can_estimate() const override { return samples_.has_value(); }
+
+ private:
+  [[nodiscard]] bool single() const { return scan_.whole.has_value(); }
+  [[nodiscard]] PointMeshOptions mesh_options(double max_error) const;
+  /// Describes the samples at one place: how many places there are, and how much the heights
+  /// differ.
+  [[nodiscard]] stream::Error shared_places_error() const;
+  BoundedMeshResult run_whole(const PointMeshOptions& options, MeshSpool& spool) const;
+  BoundedMeshResult run_plan(const PointMeshOptions& options, MeshSpool& spool,
+                             std::uint64_t most_vertices) const;
+  [[nodiscard]] PointMeshPlan plan_for(double max_error) const;
+  /// The number of threads for windows that need `each` bytes.
+  [[nodiscard]] unsigned threads_for(std::uint64_t each, std::uint64_t points) const;
+
+  PointMeshScan scan_;
+  PointMeshCuts cuts_;
+  // Locks internally.
+  mutable std::optional<PointMeshSamples> samples_;
+  unsigned cell_threads_ = 1;
+  double reading_seconds_ = 0.0;
+};
 
 PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
                          const Context& context)
@@ -240,6 +276,14 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
   result.reading_seconds += reading_seconds_;
   result.triangles = spool.triangles();
   return result;
+}
+
+}  // namespace
+
+std::unique_ptr<BoundedMesher> make_point_mesher(const stream::Store& store,
+                                                 const BoundedMeshOptions& options,
+                                                 const Context& context) {
+  return std::make_unique<PointMesher>(store, options, context);
 }
 
 }  // namespace terrace::terrain

@@ -8,7 +8,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "mesh/bounded/bounded_mesher.hpp"
+#include "mesh/bounded/mesher.hpp"
 #include "mesh/bounded/point_mesh_cells.hpp"
 #include "mesh/bounded/point_windows.hpp"
 

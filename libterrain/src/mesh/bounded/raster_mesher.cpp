@@ -1,19 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/raster_mesher.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include <terrace/base/ordered_work.hpp>
 #include <terrace/base/portable_math.hpp>
+#include <terrace/stream/store.hpp>
 
 #include "earth/ground.hpp"
 #include "mesh/bounded/lattice_plan.hpp"
+#include "mesh/bounded/mesher.hpp"
+#include "mesh/bounded/raster_window_tin.hpp"
+#include "surface/store_fill.hpp"
+#include "surface/store_window.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/terrain/error.hpp"
 
@@ -102,7 +110,40 @@ class SideSamples {
   std::map<std::uint64_t, unsigned> windows_;  ///< by place: those that do not cover it
 };
 
-}  // namespace
+/// Meshes a raster store. Windows share their sides, and the vertices on a side depend only on the
+/// samples there.
+class RasterMesher final : public BoundedMesher {
+ public:
+  /// Throws: stream::Error if memory does not suffice, UsageError.
+  RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
+               const Context& context);
+
+  BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices) override;
+  [[nodiscard]] double estimate(double max_error) const override;
+  /// Whether the sampled windows are a small part of all.
+  [[nodiscard]] bool can_estimate() const override;
+
+ private:
+  [[nodiscard]] WindowTinOptions window_options(double max_error) const;
+  [[nodiscard]] std::vector<std::unique_ptr<WindowMesher>> meshers(double max_error) const;
+  /// Measured on some windows; depends only on data and bound.
+  struct Sample {
+    double vertices_per_sample = 0.0;
+    double reading_seconds = 0.0, meshing_seconds = 0.0;
+  };
+  [[nodiscard]] Sample sample(double max_error, tri::TinQuality quality, std::size_t across,
+                              std::size_t down) const;
+
+  /// Returns the largest size of a window along each axis, in cells, at which a straight edge in
+  /// the file is within kMostBend of the samples along it. Requires a conversion.
+  [[nodiscard]] std::int64_t straight_cells() const;
+
+  LatticeWindow whole_;
+  std::int64_t most_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, along each
+                                                                        ///< axis
+  unsigned threads_ = 1;
+  std::shared_ptr<const StoreFill> fill_;
+};
 
 RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
                            const Context& context)
@@ -258,6 +299,14 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
   result.reading_seconds += sample.reading_seconds;
   result.meshing_seconds += sample.meshing_seconds;
   return result;
+}
+
+}  // namespace
+
+std::unique_ptr<BoundedMesher> make_raster_mesher(const stream::Store& store,
+                                                  const BoundedMeshOptions& options,
+                                                  const Context& context) {
+  return std::make_unique<RasterMesher>(store, options, context);
 }
 
 }  // namespace terrace::terrain

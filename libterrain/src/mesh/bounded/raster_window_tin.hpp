@@ -14,8 +14,8 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
 
-#include "mesh/bounded/bounded_mesher.hpp"
 #include "mesh/bounded/lattice_plan.hpp"
+#include "mesh/bounded/mesher.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/region.hpp"

@@ -8,8 +8,6 @@
 #include <type_traits>
 #include <utility>
 
-#include "tile/format/quantized_mesh_layout.hpp"
-
 namespace terrace::terrain {
 namespace {
 

@@ -16,6 +16,13 @@
 
 namespace terrace::terrain {
 
+enum class TileExtension : std::uint8_t { oct_normals = 1, water_mask = 2, metadata = 4 };
+
+/// With more vertices than this, indices have 32 bits.
+inline constexpr std::size_t kMostShortVertices = 65536;
+/// Number of cells in a water mask that is not uniform.
+inline constexpr std::size_t kWaterCells = std::size_t{256} * 256;
+
 /// The largest of the 15-bit numbers that position a vertex between two borders, or between the
 /// lowest and the highest height.
 inline constexpr std::uint16_t kTileUnits = 32767;

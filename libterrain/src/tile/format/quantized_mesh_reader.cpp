@@ -8,7 +8,6 @@
 
 #include "base/units.hpp"
 #include "tile/format/quantized_mesh.hpp"
-#include "tile/format/quantized_mesh_layout.hpp"
 
 namespace terrace::terrain {
 namespace {

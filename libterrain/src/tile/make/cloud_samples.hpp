@@ -9,7 +9,7 @@
 #include "earth/geoid_heights.hpp"
 #include "surface/point_cells.hpp"
 #include "tile/make/stored_places.hpp"
-#include "tile/make/tile_surface.hpp"
+#include "tile/make/surface.hpp"
 
 namespace terrace::terrain {
 
@@ -41,5 +41,11 @@ class CloudSamples {
   bool crowd_;
   LargeArray<Sample> samples_;  ///< of cells_.places()
 };
+
+/// Returns the typical spacing of a store's points in degrees of latitude: the spacing of a square
+/// lattice with the density around the median point. Estimated from the points in and around 32
+/// clusters; points at one x and y count once. If all are at one place, returns 180 / 64. Throws:
+/// stream::Error on a damaged store.
+double cloud_spacing(const stream::Store& store, const StoredPlaces& places);
 
 }  // namespace terrace::terrain

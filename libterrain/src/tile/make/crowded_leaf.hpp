@@ -6,10 +6,10 @@
 
 #include <terrace/tri/point_tin.hpp>
 
+#include "tile/format/address.hpp"
 #include "tile/format/quantized_mesh.hpp"
-#include "tile/format/tile_address.hpp"
-#include "tile/make/tile_sides.hpp"
-#include "tile/make/tile_surface.hpp"
+#include "tile/make/sides.hpp"
+#include "tile/make/surface.hpp"
 
 namespace terrace::terrain {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "terrace/terrain/context.hpp"
-#include "tile/format/tile_address.hpp"
-#include "tile/make/tile_surface.hpp"
+#include "tile/format/address.hpp"
+#include "tile/make/surface.hpp"
 
 /// Finds boxes and tiles with samples, and processes large boxes part by part.
 

@@ -11,7 +11,7 @@
 #include <terrace/base/portable_math.hpp>
 #include <terrace/stream/error.hpp>
 
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -13,7 +13,7 @@
 #include "earth/geography.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
-#include "tile/format/tile_address.hpp"
+#include "tile/format/address.hpp"
 
 namespace terrace::terrain {
 

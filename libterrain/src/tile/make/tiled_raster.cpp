@@ -12,7 +12,7 @@
 #include <terrace/stream/error.hpp>
 
 #include "base/digest.hpp"
-#include "earth/crs/crs_definition.hpp"
+#include "earth/crs/definition.hpp"
 
 namespace terrace::terrain {
 namespace {

@@ -9,7 +9,6 @@
 #include "surface/point_hull.hpp"
 #include "surface/store_window.hpp"
 #include "tile/make/height_blocks.hpp"
-#include "tile/make/height_cache.hpp"
 #include "tile/make/tiled_store.hpp"
 
 namespace terrace::terrain {

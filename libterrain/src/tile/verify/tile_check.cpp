@@ -18,15 +18,13 @@
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
+#include "tile/format/layer.hpp"
 #include "tile/format/quantized_mesh.hpp"
-#include "tile/format/tile_layer.hpp"
 #include "tile/make/sample_parts.hpp"
-#include "tile/make/tile_source.hpp"
-#include "tile/set/tile_file.hpp"
-#include "tile/set/tile_journal.hpp"
-#include "tile/verify/tile_height_check.hpp"
-#include "tile/verify/tile_inventory.hpp"
-#include "tile/verify/tile_mesh_check.hpp"
+#include "tile/make/source.hpp"
+#include "tile/set/file.hpp"
+#include "tile/set/journal.hpp"
+#include "tile/verify/checks.hpp"
 
 namespace terrace::terrain {
 namespace {
