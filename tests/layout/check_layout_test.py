@@ -190,28 +190,29 @@ class CheckLayout(unittest.TestCase):
                 write(root, f'libtri/src/b/{number}.cpp', head('libtri'))
         self.assertEqual(self.breaches(fill), ['libtri/src/b: has 41 sources, more than 40'])
 
-    def sizes(self, files, short=(), single=(), short_reasons=(), single_reasons=()):
-        """Returns the breaches of check_sizes() in a tree of these files, with these limits and reasons."""
+    def sizes(self, files, short=(), single=()):
+        """Returns the breaches of check_sizes() in a tree of these files, where these files have a reason."""
         with tempfile.TemporaryDirectory() as root:
             for path, text in files.items():
                 write(root, path, text)
-            with mock.patch.multiple(check_layout, MOST_SHORT_FILES=dict(short), MOST_SINGLE_USER_HEADERS=dict(single),
-                                     SHORT_FILES=dict(short_reasons), SINGLE_USER_HEADERS=dict(single_reasons)):
+            with mock.patch.multiple(check_layout, SHORT_FILES=dict.fromkeys(short, 'a reason'),
+                                     SINGLE_USER_HEADERS=dict.fromkeys(single, 'a reason')):
                 return list(check_layout.check_sizes(root))
 
-    def test_short_files_are_counted(self):
+    def test_short_files_need_a_reason(self):
         at_limit = {'libtri/src/a.cpp': '\n' * 25, 'libtri/src/tests/b.cpp': '', 'libtri/tests/c.cpp': '', 'tests/d.cpp': ''}
         self.assertEqual(self.sizes(at_limit), [])
         files = {'libtri/src/a.cpp': '\n' * 24, 'libtri/include/terrace/tri/b.hpp': '', 'libbase/src/a.cpp': '\n' * 30}
-        self.assertEqual(len(self.sizes(files, short={'libtri': 2})), 0)
-        found = self.sizes(files, short={'libtri': 1})
+        both = ['libtri/src/a.cpp', 'libtri/include/terrace/tri/b.hpp']
+        self.assertEqual(self.sizes(files, short=both), [])
+        found = self.sizes(files, short=both[:1])
         self.assertEqual(len(found), 1)
-        self.assertIn('libtri: has 2 files under 25 lines, more than 1', found[0])
-        self.assertEqual(self.sizes(files, short={'libtri': 1}, short_reasons={'libtri/src/a.cpp': 'a reason'}), [])
-        found = self.sizes(files, short={'libtri': 2}, short_reasons={'libbase/src/a.cpp': 'a reason'})
-        self.assertEqual(found, ['libbase/src/a.cpp: is in the list of files under 25 lines but is not one; delete the entry'])
+        self.assertIn('libtri/include/terrace/tri/b.hpp: has fewer than 25 lines', found[0])
+        found = self.sizes(files, short=both + ['libbase/src/a.cpp'])
+        self.assertEqual(len(found), 1)
+        self.assertIn('libbase/src/a.cpp: has a reason in check_layout.py that does not apply', found[0])
 
-    def test_private_headers_with_one_user_are_counted(self):
+    def test_private_headers_with_one_user_need_a_reason(self):
         long = '\n' * 30
 
         def found(includes, **allowed):
@@ -222,15 +223,14 @@ class CheckLayout(unittest.TestCase):
         own = {'libtri/src/b/a.cpp': '#include "b/a.hpp"\n', 'libtri/src/c.cpp': '#include "b/a.hpp"\n#include "b/a.hpp"\n',
                'libtri/tests/d.cpp': '#include "b/a.hpp"\n'}
         self.assertEqual(len(found(own)), 1)
-        self.assertIn('libtri: has 1 private headers with one user, more than 0', found(own)[0])
-        self.assertEqual(found(own, single={'libtri': 1}), [])
-        self.assertEqual(found(own, single_reasons={'libtri/src/b/a.hpp': 'a reason'}), [])
+        self.assertIn('libtri/src/b/a.hpp: is a private header with one user', found(own)[0])
+        self.assertEqual(found(own, single=['libtri/src/b/a.hpp']), [])
         # Names relative to the file count as well as those relative to src/, also from research.
         for path, name in (('libtri/src/b/d.cpp', 'a.hpp'), ('libtri/src/d.cpp', 'b/a.hpp'), ('research/d.cpp', 'b/a.hpp')):
             with self.subTest(path=path):
                 self.assertEqual(found(own | {path: f'#include "{name}"\n'}), [])
         two = own | {'libtri/src/d.cpp': '#include "b/a.hpp"\n'}
-        self.assertEqual(len(found(two, single_reasons={'libtri/src/b/a.hpp': 'a reason'})), 1)
+        self.assertEqual(len(found(two, single=['libtri/src/b/a.hpp'])), 1)
         # A public header may have any number of users.
         self.assertEqual(self.sizes({'libtri/include/terrace/tri/a.hpp': long}), [])
 
