@@ -86,7 +86,7 @@ TEST(TileInputs, QueriesStayWithinReach) {
                  {zoom, range.x0, range.y0}, {zoom, range.x1, range.y1}, {zoom, x, y}}) {
           Spy spy(hilly);
           make_tile(tile, plan, spy, {.normals = true, .water = true});
-          const GeographicBox box = box_of(tile), reach = reach_of(tile, hilly);
+          const GeographicBox box = box_of(tile), reach = input_box(tile, hilly);
           EXPECT_LE(spy.seen.west, box.west);
           EXPECT_GE(spy.seen.west, reach.west);
           EXPECT_GE(spy.seen.south, reach.south);

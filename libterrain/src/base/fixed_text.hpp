@@ -41,18 +41,18 @@ class FixedText {
     if (!(scaled < 9e18)) return std::to_chars(at, at + kLongest, value).ptr;
     const auto number = static_cast<std::uint64_t>(scaled);
     if (value < 0 && number != 0) *at++ = '-';
-    const std::uint64_t whole = number / power_;
-    at = std::to_chars(at, at + kLongest - 1, whole).ptr;
+    const std::uint64_t integer = number / power_;
+    at = std::to_chars(at, at + kLongest - 1, integer).ptr;
     if (decimals_ == 0) return at;
     *at++ = '.';
-    std::uint64_t rest = number - whole * power_;
-    int left = decimals_;
-    for (; left >= 2; left -= 2, rest /= 100) {
-      const std::size_t pair = 2 * (rest % 100);
-      at[left - 2] = kPairs[pair];
-      at[left - 1] = kPairs[pair + 1];
+    std::uint64_t fraction = number - integer * power_;
+    int digits = decimals_;
+    for (; digits >= 2; digits -= 2, fraction /= 100) {
+      const std::size_t pair = 2 * (fraction % 100);
+      at[digits - 2] = kPairs[pair];
+      at[digits - 1] = kPairs[pair + 1];
     }
-    if (left == 1) at[0] = static_cast<char>('0' + rest);
+    if (digits == 1) at[0] = static_cast<char>('0' + fraction);
     return at + decimals_;
   }
 

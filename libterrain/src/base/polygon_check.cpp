@@ -83,9 +83,9 @@ class PolygonSweep {
     if (step % kBetweenChecks == 0 && stop_.stop_requested()) throw stream::Stopped();
   }
 
-  void add_ring(const std::vector<Point2>& given) {
+  void add_ring(const std::vector<Point2>& places) {
     Ring ring{static_cast<std::uint32_t>(corners_.size()), 0};
-    for (const Point2& p : given) {
+    for (const Point2& p : places) {
       // A corner may be repeated.
       if (corners_.size() > ring.begin && corners_.back() == p) continue;
       corners_.push_back(p);
@@ -95,7 +95,7 @@ class PolygonSweep {
     }
     ring.end = static_cast<std::uint32_t>(corners_.size());
     if (ring.end - ring.begin < 3) {
-      fail("Too few different corners", given.front());
+      fail("Too few different corners", places.front());
       return;
     }
     const auto begin = corners_.begin() + ring.begin;

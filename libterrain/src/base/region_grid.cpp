@@ -17,21 +17,21 @@ static_assert(kOutside == 0 && kRing == 1 && kInside == 2, "sums over cells rely
 
 }  // namespace
 
-Point2 reach_of(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high) {
-  Point2 reach{};
+Point2 edge_extent(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high) {
+  Point2 extent{};
   for (const Polygon& polygon : polygons) {
     for (const std::vector<Point2>& ring : polygon) {
       for (std::size_t i = 0; i < ring.size(); ++i) {
         const Point2& next = ring[i + 1 == ring.size() ? 0 : i + 1];
         for (std::size_t axis = 0; axis < 2; ++axis) {
           if (!(high[axis] > low[axis])) continue;
-          reach[axis] +=
+          extent[axis] +=
               std::abs(next[axis] / 2 - ring[i][axis] / 2) / (high[axis] / 2 - low[axis] / 2);
         }
       }
     }
   }
-  return reach;
+  return extent;
 }
 
 RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
@@ -51,9 +51,9 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
   }
   while (side_ < kMostGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
   // Many edges across the whole box would mark the same cells again and again: take larger cells.
-  const Point2 reach = reach_of(polygons, low_, high_);
+  const Point2 extent = edge_extent(polygons, low_, high_);
   while (side_ > kLeastGridSide &&
-         (reach[0] + reach[1]) * static_cast<double>(side_) > kMostMarks) {
+         (extent[0] + extent[1]) * static_cast<double>(side_) > kMostMarks) {
     side_ /= 2;
   }
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -136,10 +136,10 @@ Overlap RegionGrid::overlap(const Point2& low, const Point2& high) const {
   const std::uint32_t sum =
       sums_[bottom + right] - sums_[bottom + left] - sums_[top + right] + sums_[top + left];
   if (sum == kOutside) return Overlap::none;
-  const bool beside =
+  const bool outside =
       low[0] < low_[0] || low[1] < low_[1] || high[0] > high_[0] || high[1] > high_[1];
   const std::size_t cells = (right - left) * ((bottom - top) / (side_ + 1));
-  return sum == kInside * cells && !beside ? Overlap::whole : Overlap::part;
+  return sum == kInside * cells && !outside ? Overlap::whole : Overlap::part;
 }
 
 }  // namespace terrace::terrain

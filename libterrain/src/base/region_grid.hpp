@@ -12,7 +12,7 @@ namespace terrace::terrain {
 
 /// Returns the total length of the polygons' edges along each axis, in multiples of the side of the
 /// box from `low` to `high`.
-Point2 reach_of(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high);
+Point2 edge_extent(const std::vector<Polygon>& polygons, const Point2& low, const Point2& high);
 
 /// A grid over polygons with cells that are inside, outside, or crossed by a ring. Classifies most
 /// places and boxes in constant time. Several threads may use it at once.

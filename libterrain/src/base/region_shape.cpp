@@ -38,7 +38,7 @@ class Geos {
     if (context_ == nullptr) throw fault();
     GEOSContext_setErrorMessageHandler_r(
         context_, [](const char* message, void* to) { *static_cast<std::string*>(to) = message; },
-        &said_);
+        &message_);
   }
   Geos(const Geos&) = delete;
   Geos& operator=(const Geos&) = delete;
@@ -46,9 +46,9 @@ class Geos {
 
   [[nodiscard]] GEOSContextHandle_t context() const { return context_; }
   template <class T>
-  [[nodiscard]] Owned<T> own(T* made) const {
-    if (made == nullptr) throw fault();
-    return Owned<T>(made, Destroy{context_});
+  [[nodiscard]] Owned<T> adopt(T* object) const {
+    if (object == nullptr) throw fault();
+    return Owned<T>(object, Destroy{context_});
   }
   /// Converts the answer of a predicate.
   [[nodiscard]] bool is_true(char answer) const {
@@ -57,7 +57,7 @@ class Geos {
   }
 
   [[nodiscard]] Geometry point(const Point2& p) const {
-    return own(GEOSGeom_createPointFromXY_r(context_, p[0], p[1]));
+    return adopt(GEOSGeom_createPointFromXY_r(context_, p[0], p[1]));
   }
   /// Adds the closing corner, which `corners` does not have.
   [[nodiscard]] Geometry ring(std::span<const Point2> corners) const {
@@ -66,30 +66,31 @@ class Geos {
     GEOSCoordSequence* places = GEOSCoordSeq_copyFromBuffer_r(
         context_, closed.front().data(), static_cast<unsigned>(closed.size()), 0, 0);
     if (places == nullptr) throw fault();
-    return own(GEOSGeom_createLinearRing_r(context_, places));  // takes ownership even if it fails
+    return adopt(
+        GEOSGeom_createLinearRing_r(context_, places));  // takes ownership even if it fails
   }
   [[nodiscard]] Geometry polygon(std::span<const Point2> corners) const {
-    return own(GEOSGeom_createPolygon_r(context_, ring(corners).release(), nullptr, 0));
+    return adopt(GEOSGeom_createPolygon_r(context_, ring(corners).release(), nullptr, 0));
   }
   [[nodiscard]] Geometry polygon(const Polygon& rings) const {
     std::vector<Geometry> holes;
     for (std::size_t i = 1; i < rings.size(); ++i) holes.push_back(ring(rings[i]));
     Geometry outer = ring(rings.front());
-    std::vector<GEOSGeometry*> given;
-    for (Geometry& hole : holes) given.push_back(hole.release());
-    return own(GEOSGeom_createPolygon_r(context_, outer.release(), given.data(),
-                                        static_cast<unsigned>(given.size())));
+    std::vector<GEOSGeometry*> geometries;
+    for (Geometry& hole : holes) geometries.push_back(hole.release());
+    return adopt(GEOSGeom_createPolygon_r(context_, outer.release(), geometries.data(),
+                                          static_cast<unsigned>(geometries.size())));
   }
 
  private:
   [[nodiscard]] stream::Error fault() const {
-    return stream::Error("", "GEOS failed: " + (said_.empty() ? "out of memory" : said_))
+    return stream::Error("", "GEOS failed: " + (message_.empty() ? "out of memory" : message_))
         .at("region")
         .remedy("simplify the polygons, or give a box");
   }
 
   GEOSContextHandle_t context_;
-  std::string said_;
+  std::string message_;
 };
 
 void require_valid(const std::vector<Polygon>& polygons, const std::string& file,
@@ -123,8 +124,8 @@ void require_valid(const std::vector<Polygon>& polygons, const std::string& file
     if (!fault) continue;
     for (std::size_t ring = 0; ring < polygons[i].size(); ++ring) {
       at_ring(ring);
-      const auto own = fault_of({polygons[i][ring]}, stop);
-      if (own) throw refused("the ring is not valid: " + *own);
+      const auto cause = fault_of({polygons[i][ring]}, stop);
+      if (cause) throw refused("the ring is not valid: " + *cause);
     }
     where = polygon;
     throw refused("its rings do not form a valid polygon: " + *fault);
@@ -139,14 +140,14 @@ class RegionShape::Prepared {
  public:
   /// swapped: exchanges x and y.
   Prepared(const std::vector<Polygon>& polygons, bool swapped)
-      : swapped_(swapped), tree_(geos_.own(GEOSSTRtree_create_r(geos_.context(), 10))) {
+      : swapped_(swapped), tree_(geos_.adopt(GEOSSTRtree_create_r(geos_.context(), 10))) {
     for (const Polygon& polygon : polygons) {
       Polygon turned;
       if (swapped) {
         for (const std::vector<Point2>& ring : polygon) turned.push_back(turn(ring));
       }
       shapes_.push_back(geos_.polygon(swapped ? turned : polygon));
-      prepared_.push_back(geos_.own(GEOSPrepare_r(geos_.context(), shapes_.back().get())));
+      prepared_.push_back(geos_.adopt(GEOSPrepare_r(geos_.context(), shapes_.back().get())));
     }
     for (std::size_t i = 0; i < shapes_.size(); ++i) {
       GEOSSTRtree_insert_r(geos_.context(), tree_.get(), shapes_[i].get(), &prepared_[i]);
@@ -188,10 +189,10 @@ class RegionShape::Prepared {
     GEOSSTRtree_query_r(
         question.context, tree_.get(), question.other,
         [](void* item, void* data) {
-          auto& asked = *static_cast<Question*>(data);
-          if (asked.answer != 0) return;
-          asked.answer =
-              asked.predicate(asked.context, static_cast<Shapes*>(item)->get(), asked.other);
+          auto& query = *static_cast<Question*>(data);
+          if (query.answer != 0) return;
+          query.answer =
+              query.predicate(query.context, static_cast<Shapes*>(item)->get(), query.other);
         },
         &question);
     return geos_.is_true(question.answer);
@@ -214,8 +215,8 @@ bool crosses_rows(const std::vector<Polygon>& polygons) {
     if (polygon.empty()) continue;
     for (const Point2& p : polygon.front()) box.include(stream::Point3{p[0], p[1], 0});
   }
-  const Point2 reach = reach_of(polygons, {box.min[0], box.min[1]}, {box.max[0], box.max[1]});
-  return reach[1] > reach[0];
+  const Point2 extent = edge_extent(polygons, {box.min[0], box.min[1]}, {box.max[0], box.max[1]});
+  return extent[1] > extent[0];
 }
 
 const std::vector<Polygon>& found_valid(const std::vector<Polygon>& polygons,
@@ -243,9 +244,9 @@ bool RegionShape::ask(const Ask& question) const {
   std::unique_ptr<Prepared> shape;
   {
     std::unique_lock lock(mutex_);
-    back_.wait(lock, [this] { return !idle_.empty() || made_ < kMostPrepared; });
+    idle_changed_.wait(lock, [this] { return !idle_.empty() || count_ < kMostPrepared; });
     if (idle_.empty()) {
-      ++made_;
+      ++count_;
     } else {
       shape = std::move(idle_.back());
       idle_.pop_back();
@@ -255,12 +256,12 @@ bool RegionShape::ask(const Ask& question) const {
     {
       const std::lock_guard lock(mutex_);
       if (shape == nullptr) {
-        --made_;
+        --count_;
       } else {
         idle_.push_back(std::move(shape));
       }
     }
-    back_.notify_one();
+    idle_changed_.notify_one();
   };
   bool answer = false;
   try {
@@ -333,9 +334,9 @@ void add_parts(const Geos& geos, const GEOSGeometry* shape, std::vector<Polygon>
 std::vector<Polygon> valid_polygons(const Polygon& polygon) {
   if (!fault_of(polygon)) return {polygon};
   const Geos geos;
-  const Geos::Geometry given = geos.polygon(polygon);
+  const Geos::Geometry input = geos.polygon(polygon);
   std::vector<Polygon> result;
-  add_parts(geos, geos.own(GEOSMakeValid_r(geos.context(), given.get())).get(), result);
+  add_parts(geos, geos.adopt(GEOSMakeValid_r(geos.context(), input.get())).get(), result);
   return result;
 }
 

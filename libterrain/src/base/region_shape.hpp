@@ -45,9 +45,9 @@ class RegionShape {
   std::vector<Polygon> polygons_;
   bool swapped_;  ///< whether GEOS gets y, x
   mutable std::mutex mutex_;
-  mutable std::condition_variable back_;
+  mutable std::condition_variable idle_changed_;
   mutable std::vector<std::unique_ptr<Prepared>> idle_;
-  mutable unsigned made_ = 0;
+  mutable unsigned count_ = 0;
   RegionGrid grid_;  // its constructor queries the members above
 };
 

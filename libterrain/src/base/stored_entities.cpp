@@ -37,7 +37,7 @@ CornerReader::CornerReader(const stream::Schema& schema, stream::Entities entiti
                                                                        : stream::kPolylineVertices;
   for (std::size_t corner = 2; corner <= corners; ++corner) {
     for (const char* const axis : {"x", "y", "z"}) {
-      others_.push_back(column(schema, fmt::format("{}{}", axis, corner)));
+      other_corners_.push_back(column(schema, fmt::format("{}{}", axis, corner)));
     }
   }
   if (entities == stream::Entities::polylines) vertices_ = column(schema, "vertices");
@@ -58,11 +58,11 @@ CornerReader::Column CornerReader::column(const stream::Schema& schema,
 
 std::size_t CornerReader::operator()(std::span<const std::byte> record,
                                      std::span<stream::Point3> corners) const {
-  assert(corners.size() == most());
+  assert(corners.size() == max_corners());
   const auto value = [&](const Column& column) {
     return stream::to_double(column.type, record.data() + column.offset);
   };
-  std::size_t count = most();
+  std::size_t count = max_corners();
   if (vertices_) {
     const double vertices = value(*vertices_);
     if (!(vertices >= 2 && vertices <= static_cast<double>(count))) {
@@ -72,7 +72,8 @@ std::size_t CornerReader::operator()(std::span<const std::byte> record,
     }
     count = static_cast<std::size_t>(vertices);
   }
-  for (std::size_t i = 0; i < 3 * (count - 1); ++i) corners[1 + i / 3][i % 3] = value(others_[i]);
+  for (std::size_t i = 0; i < 3 * (count - 1); ++i)
+    corners[1 + i / 3][i % 3] = value(other_corners_[i]);
   return count;
 }
 

@@ -33,7 +33,7 @@ class CornerReader {
   CornerReader(const stream::Schema& schema, stream::Entities entities, std::string file);
 
   /// The most corners that an entity can have, at most stream::kPolylineVertices.
-  [[nodiscard]] std::size_t most() const { return others_.size() / 3 + 1; }
+  [[nodiscard]] std::size_t max_corners() const { return other_corners_.size() / 3 + 1; }
   /// Reads all corners but the first into corners[1] and on, and returns the number of corners, the
   /// first included. corners: has size most(). Throws: stream::Error on an impossible number of
   /// vertices.
@@ -48,7 +48,7 @@ class CornerReader {
   [[nodiscard]] Column column(const stream::Schema& schema, const std::string& name) const;
 
   std::string file_;
-  std::vector<Column> others_;  ///< x, y, z of the second corner, then of the third, ...
+  std::vector<Column> other_corners_;  ///< x, y, z of the second corner, then of the third, ...
   std::optional<Column> vertices_;
 };
 

@@ -119,8 +119,8 @@ constexpr unsigned kMostPartsAhead = 4;
 
 /// Estimates peak memory with this many threads, excluding the source's. The estimate is generous;
 /// a benchmark prints the true peak.
-std::uint64_t memory_beside_source(const BuildRequest& request, std::size_t payload_size,
-                                   std::uint64_t threads) {
+std::uint64_t memory_without_source(const BuildRequest& request, std::size_t payload_size,
+                                    std::uint64_t threads) {
   const std::uint64_t point = sizeof(stream::Point3) + payload_size;
   // Counts the blocks read ahead, being clustered or waiting, and one forming per level, with
   // temporary data per point; and those that the store writer holds back to train its compression
@@ -177,8 +177,8 @@ void check_cells(const stream::SourceInfo& info) {
 /// Limits a source to its first points.
 class FirstPoints final : public stream::PointSource {
  public:
-  FirstPoints(std::unique_ptr<stream::PointSource> source, std::uint64_t most)
-      : source_(std::move(source)), most_(most) {}
+  FirstPoints(std::unique_ptr<stream::PointSource> source, std::uint64_t limit)
+      : source_(std::move(source)), limit_(limit) {}
 
   [[nodiscard]] const stream::SourceInfo& info() const override { return source_->info(); }
   [[nodiscard]] stream::Progress progress() const override { return source_->progress(); }
@@ -188,12 +188,12 @@ class FirstPoints final : public stream::PointSource {
   }
   bool next(stream::PointBlock& block) override {
     block.clear();
-    return source_->progress().points < most_ && source_->next(block);
+    return source_->progress().points < limit_ && source_->next(block);
   }
 
  private:
   std::unique_ptr<stream::PointSource> source_;
-  std::uint64_t most_;
+  std::uint64_t limit_;
 };
 
 /// Returns the lengths on the ground of the units of stored coordinates, with heights weighted.
@@ -252,7 +252,7 @@ std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request
   if (!joint || request.most_points > 0) return std::nullopt;
   if (request.entities != stream::Entities::points) {
     // Their corners are attributes, which cannot be shifted.
-    context.say("the points " + joint->what +
+    context.say("the points " + joint->reason +
                 ", and what connects them goes around the earth: continue longitudes beyond 180");
     return std::nullopt;
   }
@@ -260,7 +260,7 @@ std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request
       std::any_of(request.inputs.begin(), request.inputs.end(),
                   [](const std::string& name) { return stream::reads_once(name); })) {
     throw stream::Error(request.inputs.front(),
-                        "its points " + joint->what +
+                        "its points " + joint->reason +
                             ", which is known only at the end, and the input can be read only once")
         .remedy("name a file, or count longitudes from 0 to 360 or continue them beyond 180");
   }
@@ -368,7 +368,7 @@ std::unique_ptr<stream::PointSource> Build::in_order(std::unique_ptr<stream::Poi
 unsigned Build::threads_for(std::size_t payload_bytes) const {
   const std::uint64_t source_bytes = std::max(kSourceMemory, points_->reading_bytes());
   const auto needed = [&](unsigned threads) {
-    return source_bytes + memory_beside_source(request_, payload_bytes, threads);
+    return source_bytes + memory_without_source(request_, payload_bytes, threads);
   };
   for (unsigned threads = std::max(1U, context_.threads); threads > 0; --threads) {
     if (needed(threads) <= memory_bytes_) return threads;
@@ -481,8 +481,9 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   const unsigned threads = threads_for(schema.payload_size());
   if (info_.grid) {
     // Tiles should be square on the ground, and the size of a cell there is known only now.
-    points_->refine(cell_aspect(ground, info_),
-                    memory_bytes_ - memory_beside_source(request_, schema.payload_size(), threads));
+    points_->refine(
+        cell_aspect(ground, info_),
+        memory_bytes_ - memory_without_source(request_, schema.payload_size(), threads));
   }
 
   stream::StoreWriter writer(request_.store, schema, request_.replace, threads);
@@ -514,8 +515,8 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
 BuildOutcome build_store(const BuildRequest& request, const Context& context) {
   auto built = Build(request, context, std::nullopt).run();
   if (const auto* const joint = std::get_if<JoinedLongitudes::Joint>(&built)) {
-    const bool beyond = joint->what.ends_with("antimeridian");
-    context.say("the points " + joint->what + ": they are read again and joined" +
+    const bool beyond = joint->reason.ends_with("antimeridian");
+    context.say("the points " + joint->reason + ": they are read again and joined" +
                 (beyond ? ", with longitudes that continue beyond 180 degrees" : ""));
     built = Build(request, context, joint->middle).run();
   }

@@ -128,7 +128,7 @@ void set_corners(const BuildRequest& request, const stream::Schema& schema,
         entities, cluster::name_of(request.strategy)));
   }
   const CornerReader read(schema, request.entities, input_name(request));
-  options.corners.count = read.most();
+  options.corners.count = read.max_corners();
   options.corners.ordered = request.entities == stream::Entities::polylines;
   if (!options.corners.ordered) {
     options.corners.read = read;

@@ -26,8 +26,8 @@ void JoinedLongitudes::operator()(std::span<stream::Point3> stored) {
       const double turns = std::round((turned({longitude, 0})[0] - longitude) / 360);
       if (turns == 0) continue;
       // Keeps stored integers as integers if their scale divides a turn, as decimal scales do.
-      const double step = 360 / scale_, whole = std::round(step);
-      p[0] += turns * (std::abs(step - whole) < 1e-6 ? whole : step);
+      const double step = 360 / scale_, rounded = std::round(step);
+      p[0] += turns * (std::abs(step - rounded) < 1e-6 ? rounded : step);
     }
     return;
   }
@@ -37,7 +37,7 @@ void JoinedLongitudes::operator()(std::span<stream::Point3> stored) {
     most_ = std::max(most_, longitude);
     const double degree = std::floor(longitude - 360 * std::floor(longitude / 360));
     // NaN counts as the first degree.
-    seen_[degree > 0 ? std::min(static_cast<std::size_t>(degree), kBins - 1) : 0] = true;
+    occupied_[degree > 0 ? std::min(static_cast<std::size_t>(degree), kBins - 1) : 0] = true;
   }
 }
 
@@ -46,7 +46,7 @@ std::optional<JoinedLongitudes::Joint> JoinedLongitudes::joint() const {
   // Finds the widest gap around the circle; a gap that continues past the last degree counts once.
   std::size_t gap = 0, gap_end = 0, run = 0;
   for (std::size_t i = 0; i < 2 * kBins; ++i) {
-    run = seen_[i % kBins] ? 0 : run + 1;
+    run = occupied_[i % kBins] ? 0 : run + 1;
     if (run > gap) {
       gap = run;
       gap_end = i + 1;
@@ -58,11 +58,11 @@ std::optional<JoinedLongitudes::Joint> JoinedLongitudes::joint() const {
   const bool crosses = std::abs(middle) + 0.5 * width > 180;
   const bool from_zero = least_ >= 0 && most_ <= 360;
   if (middle < -90) middle += 360;
-  Joint joint{.middle = middle, .what = "are on both sides of the antimeridian"};
-  if (!crosses && from_zero) joint.what = "are on both sides of the meridian of 0";
+  Joint joint{.middle = middle, .reason = "are on both sides of the antimeridian"};
+  if (!crosses && from_zero) joint.reason = "are on both sides of the meridian of 0";
   if (!crosses && !from_zero) {
-    joint.what = "have longitudes that are whole turns apart (" + readable_number(least_, 10) +
-                 " to " + readable_number(most_, 10) + ")";
+    joint.reason = "have longitudes that are whole turns apart (" + readable_number(least_, 10) +
+                   " to " + readable_number(most_, 10) + ")";
   }
   return joint;
 }

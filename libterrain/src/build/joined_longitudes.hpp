@@ -25,7 +25,7 @@ class JoinedLongitudes {
   /// How to join longitudes: shift each to within half a turn of the middle.
   struct Joint {
     double middle = 0;
-    std::string what;  ///< the reason: "are on both sides of the antimeridian" or similar
+    std::string reason;  ///< the reason: "are on both sides of the antimeridian" or similar
   };
   /// Returns the joint of the longitudes seen, if they span less than half the globe but more than
   /// that in the numbers as written.
@@ -37,7 +37,7 @@ class JoinedLongitudes {
   bool degrees_;  ///< whether x is a longitude
   double scale_, offset_;
   std::optional<double> middle_;
-  std::array<bool, kBins> seen_{};  ///< by degree, starting at 0
+  std::array<bool, kBins> occupied_{};  ///< by degree, starting at 0
   double least_ = std::numeric_limits<double>::infinity(), most_ = -least_;
 };
 

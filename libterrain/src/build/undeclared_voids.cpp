@@ -20,16 +20,16 @@ constexpr double kApart = 1000;
 }  // namespace
 
 void UndeclaredVoids::add(const stream::PointBlock& block) {
-  Seen seen;
+  Tally tally;
   for (const stream::Point3& point : block.positions) {
     const double z = height(point[2]);
     if (z > kUsualVoids.front() && z <= kMost) {
-      seen.least = std::min(seen.least, z);
+      tally.least = std::min(tally.least, z);
       continue;
     }
     if (!(std::abs(z) <= kMost)) {
-      ++seen.beyond;
-      seen.value = point[2];
+      ++tally.beyond;
+      tally.value = point[2];
       continue;
     }
     // A raster declares the nodata value of its samples, before scale and offset.
@@ -37,16 +37,16 @@ void UndeclaredVoids::add(const stream::PointBlock& block) {
         std::find_if(kUsualVoids.begin(), kUsualVoids.end(),
                      [&](double value) { return z == value || (info_.grid && point[2] == value); });
     if (usual == kUsualVoids.end()) {
-      seen.least = std::min(seen.least, z);
+      tally.least = std::min(tally.least, z);
     } else {
-      ++seen.usual[static_cast<std::size_t>(usual - kUsualVoids.begin())];
+      ++tally.usual[static_cast<std::size_t>(usual - kUsualVoids.begin())];
     }
   }
   const std::lock_guard lock(mutex_);
-  if (seen.beyond > 0) seen_.value = seen.value;
-  seen_.beyond += seen.beyond;
-  seen_.least = std::min(seen_.least, seen.least);
-  for (std::size_t i = 0; i < kUsual; ++i) seen_.usual[i] += seen.usual[i];
+  if (tally.beyond > 0) tally_.value = tally.value;
+  tally_.beyond += tally.beyond;
+  tally_.least = std::min(tally_.least, tally.least);
+  for (std::size_t i = 0; i < kUsual; ++i) tally_.usual[i] += tally.usual[i];
 }
 
 stream::Message UndeclaredVoids::note_of(std::uint64_t count, double stored,
@@ -69,17 +69,17 @@ stream::Message UndeclaredVoids::note_of(std::uint64_t count, double stored,
 }
 
 stream::Message UndeclaredVoids::note() const {
-  if (seen_.beyond > 0) {
-    return note_of(seen_.beyond, seen_.value,
-                   "heights beyond 1e30, such as " + number_text(seen_.value));
+  if (tally_.beyond > 0) {
+    return note_of(tally_.beyond, tally_.value,
+                   "heights beyond 1e30, such as " + number_text(tally_.value));
   }
   std::size_t most = 0;
   for (std::size_t i = 0; i < kUsual; ++i) {
-    if (seen_.usual[i] > seen_.usual[most]) most = i;
+    if (tally_.usual[i] > tally_.usual[most]) most = i;
   }
   const double value = kUsualVoids[most];
-  if (seen_.usual[most] == 0 || !(seen_.least > value + kApart)) return {};
-  return note_of(seen_.usual[most], value,
+  if (tally_.usual[most] == 0 || !(tally_.least > value + kApart)) return {};
+  return note_of(tally_.usual[most], value,
                  "the height " + number_text(value) + ", far below all others");
 }
 

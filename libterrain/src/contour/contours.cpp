@@ -118,11 +118,11 @@ bool reaches_into(const StoredBox& box, const Region& region, const GroundSlope&
   return region.overlap(world) != Overlap::none;
 }
 
-ContourOutcome write_contours(const stream::Store& given, const ContourRequest& request,
+ContourOutcome write_contours(const stream::Store& input, const ContourRequest& request,
                               const std::function<void(std::string_view)>& write,
                               const Context& context) {
-  need_terrain(given, "a contour");
-  const stream::Store store = given.with_stop(context.stop);
+  need_terrain(input, "a contour");
+  const stream::Store store = input.with_stop(context.stop);
   const std::uint64_t memory = working_memory(context);
   need_level(store, request.level);
   if (store.points() > 0) check_levels(store, request);

@@ -26,16 +26,16 @@ LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
                 {static_cast<double>(store.schema().columns) - 1,
                  static_cast<double>(store.schema().rows) - 1}};
   if (region) {
-    const StoredBox wanted = box_around(*region, ground);
+    const StoredBox area = box_around(*region, ground);
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      box.min[axis] = std::max(box.min[axis], std::floor(wanted.min[axis]));
-      box.max[axis] = std::min(box.max[axis], std::ceil(wanted.max[axis]));
+      box.min[axis] = std::max(box.min[axis], std::floor(area.min[axis]));
+      box.max[axis] = std::min(box.max[axis], std::ceil(area.max[axis]));
     }
   }
   if (!(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) throw_none_inside(store);
-  const auto whole = [](double value) { return static_cast<std::int64_t>(value); };
-  return {whole(box.min[0]), whole(box.min[1]), whole(box.max[0] - box.min[0]) + 1,
-          whole(box.max[1] - box.min[1]) + 1};
+  const auto integer = [](double value) { return static_cast<std::int64_t>(value); };
+  return {integer(box.min[0]), integer(box.min[1]), integer(box.max[0] - box.min[0]) + 1,
+          integer(box.max[1] - box.min[1]) + 1};
 }
 
 }  // namespace
@@ -65,9 +65,9 @@ void draw_lattice_contours(const ContourParts& parts) {
         parts.emit(std::move(line));
       },
       parts.limit, parts.threads);
-  std::function<bool(std::int64_t, std::int64_t)> wanted;
+  std::function<bool(std::int64_t, std::int64_t)> is_wanted;
   if (request.region) {
-    wanted = [&](std::int64_t column, std::int64_t row) {
+    is_wanted = [&](std::int64_t column, std::int64_t row) {
       return request.region->covers(ground.world(
           stored({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5})));
     };
@@ -103,7 +103,7 @@ void draw_lattice_contours(const ContourParts& parts) {
           }
         },
         parts.limit.stop);
-    lines.add(heights, rows, wanted);
+    lines.add(heights, rows, is_wanted);
     parts.progress(static_cast<double>(row) / static_cast<double>(lattice.rows));
   }
   lines.finish();

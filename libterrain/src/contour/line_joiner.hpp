@@ -135,17 +135,17 @@ class LineJoiner {
   }
 
   /// Emits the lines with no end that continues. O(n log n) with n incomplete lines.
-  template <class GoesOn>
-  void emit_whole(const GoesOn& goes_on) {
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> whole;
+  template <class Continues>
+  void emit_complete(const Continues& continues) {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> complete;
     for (std::uint32_t i = 0; i < lines_.size(); ++i) {
       const Line& line = lines_[i];
-      if (line.count > 0 && !goes_on(line.begin) && !goes_on(line.end)) {
-        whole.emplace_back(line.number, i);
+      if (line.count > 0 && !continues(line.begin) && !continues(line.end)) {
+        complete.emplace_back(line.number, i);
       }
     }
-    std::sort(whole.begin(), whole.end());
-    for (const auto& [number, i] : whole) {
+    std::sort(complete.begin(), complete.end());
+    for (const auto& [number, i] : complete) {
       take(lines_[i].begin, hash_of(lines_[i].begin), kBegin);
       take(lines_[i].end, hash_of(lines_[i].end), kEnd);
       emit(i, false);

@@ -57,8 +57,8 @@ void ContourLines::triangle(const Corner& a, const Corner& b, const Corner& c) {
       });
 }
 
-void ContourLines::emit_whole(std::int64_t last_row, bool all) {
-  joiner_.emit_whole([&](const Crossing& c) {
+void ContourLines::emit_complete(std::int64_t last_row, bool all) {
+  joiner_.emit_complete([&](const Crossing& c) {
     return !all && c.edge % 4 == kHorizontal &&
            c.edge / 4 / static_cast<std::uint64_t>(columns_) ==
                static_cast<std::uint64_t>(last_row);
@@ -113,12 +113,12 @@ void ContourLines::add(std::span<const double> heights, std::int64_t rows,
   }
   row_ += rows - 1;
   // Not after every band, because the order of lines must not depend on available memory.
-  if (row_ % kMostBandRows == 0) emit_whole(row_, false);
+  if (row_ % kMostBandRows == 0) emit_complete(row_, false);
 }
 
 void ContourLines::finish() {
-  emit_whole(row_, false);
-  emit_whole(row_, true);
+  emit_complete(row_, false);
+  emit_complete(row_, true);
 }
 
 }  // namespace terrace::terrain

@@ -62,7 +62,7 @@ class ContourLines {
   void triangle(const Corner& a, const Corner& b, const Corner& c);
   /// Fills levels_ and crossed_ with all threads.
   void find_crossed(std::span<const double> heights, std::int64_t rows);
-  void emit_whole(std::int64_t last_row, bool all);
+  void emit_complete(std::int64_t last_row, bool all);
 
   std::int64_t columns_;
   ContourLevels contour_levels_;

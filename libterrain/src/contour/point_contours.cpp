@@ -45,7 +45,7 @@ constexpr std::uint32_t kNoPart = kNoContourPart;
 /// The lines of each of some parts, or the triangles with levels in them; and crossed triangles
 /// that have no vertex in any active part.
 struct Crossed {
-  std::vector<std::variant<PartLines, std::vector<Triangle>>> own;
+  std::vector<std::variant<PartLines, std::vector<Triangle>>> by_part;
   std::vector<Triangle> strange;
 };
 
@@ -130,7 +130,7 @@ class PointContours {
           return result;
         },
         [&](std::size_t i, const Crossed& triangles) {
-          for (const auto& part : triangles.own) {
+          for (const auto& part : triangles.by_part) {
             std::visit([&](const auto& of_part) { lines.add(of_part); }, part);
           }
           // Several parts meet such a triangle.
@@ -148,7 +148,7 @@ class PointContours {
   }
 
  private:
-  [[nodiscard]] bool wanted(const Triangle& t) const {
+  [[nodiscard]] bool is_wanted(const Triangle& t) const {
     for (std::size_t i = 0; request_.max_edge && i < 3; ++i) {
       if (ground_.metres(t[i].place, t[(i + 1) % 3].place) > *request_.max_edge) return false;
     }
@@ -178,18 +178,18 @@ class PointContours {
       add_crossed(window, tree_.part(part.above), result);
       return;
     }
-    const tri::Delaunay2<double>& whole = window.triangulation();
-    std::vector<std::int64_t> level_of(whole.vertex_slots());
-    std::vector<std::uint32_t> part_of(whole.vertex_slots());
-    for (const tri::VertexId vertex : whole.all_vertices()) {
+    const tri::Delaunay2<double>& delaunay = window.triangulation();
+    std::vector<std::int64_t> level_of(delaunay.vertex_slots());
+    std::vector<std::uint32_t> part_of(delaunay.vertex_slots());
+    for (const tri::VertexId vertex : delaunay.all_vertices()) {
       level_of[tri::slot(vertex)] = levels_.at_or_above(window.height(vertex));
-      part_of[tri::slot(vertex)] = rank_[tree_.window_of(whole.point(vertex))];
+      part_of[tri::slot(vertex)] = rank_[tree_.window_of(delaunay.point(vertex))];
     }
     const auto triangle_of = [&](tri::TriangleId id) {
       Triangle triangle;
       for (std::size_t i = 0; i < 3; ++i) {
-        const tri::VertexId v = whole.vertices(id)[i];
-        triangle[i] = {whole.point(v), window.height(v), level_of[tri::slot(v)],
+        const tri::VertexId v = delaunay.vertices(id)[i];
+        triangle[i] = {delaunay.point(v), window.height(v), level_of[tri::slot(v)],
                        part_of[tri::slot(v)]};
       }
       return triangle;
@@ -198,19 +198,19 @@ class PointContours {
     const std::uint32_t first_rank = rank_[first_at_work(part)];
     std::uint32_t count = 0;
     for (std::size_t i = part.first; i < part.end; ++i) count += rank_[i] != kNoPart ? 1U : 0U;
-    std::vector<std::vector<tri::TriangleId>> own(count);
+    std::vector<std::vector<tri::TriangleId>> by_part(count);
     std::uint64_t segments = 0;
-    for (const tri::TriangleId id : whole.all_triangles()) {
-      const std::array<tri::VertexId, 3> vertices = whole.vertices(id);
+    for (const tri::TriangleId id : delaunay.all_triangles()) {
+      const std::array<tri::VertexId, 3> vertices = delaunay.vertices(id);
       const auto level = [&](std::size_t i) { return level_of[tri::slot(vertices[i])]; };
       if (level(0) == level(1) && level(0) == level(2)) continue;
       const auto at = [&](std::size_t i) { return part_of[tri::slot(vertices[i])]; };
       const std::uint32_t first = std::min({at(0), at(1), at(2)});
       const bool is_own = first != kNoPart && first - first_rank < count;
       if ((!is_own && first != kNoPart) || !window.is_certain(id)) continue;
-      if (is_selective_ && !wanted(triangle_of(id))) continue;
+      if (is_selective_ && !is_wanted(triangle_of(id))) continue;
       if (is_own) {
-        own[first - first_rank].push_back(id);
+        by_part[first - first_rank].push_back(id);
         const auto [low, high] = std::minmax({level(0), level(1), level(2)});
         segments += static_cast<std::uint64_t>(high - low);
       } else {
@@ -218,14 +218,14 @@ class PointContours {
       }
     }
     if (segments <= most_segments_) {
-      PartTracer tracer(levels_, whole, window.heights(), level_of, part_of);
-      for (const auto& ids : own) result.own.emplace_back(tracer.trace(ids));
+      PartTracer tracer(levels_, delaunay, window.heights(), level_of, part_of);
+      for (const auto& ids : by_part) result.by_part.emplace_back(tracer.trace(ids));
     } else {
-      for (const auto& ids : own) {
+      for (const auto& ids : by_part) {
         std::vector<Triangle> triangles;
         for (const tri::TriangleId id : ids) triangles.push_back(triangle_of(id));
         ContourTriangles::sort(triangles);
-        result.own.emplace_back(std::move(triangles));
+        result.by_part.emplace_back(std::move(triangles));
       }
     }
   }

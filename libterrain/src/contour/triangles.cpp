@@ -61,13 +61,13 @@ void ContourTriangles::add(const PartLines& part) {
 }
 
 void ContourTriangles::end_part() {
-  joiner_.emit_whole([&](const ContourCrossing& c) { return c.last > part_; });
+  joiner_.emit_complete([&](const ContourCrossing& c) { return c.last > part_; });
   ++part_;
 }
 
 void ContourTriangles::finish(std::span<const Triangle> triangles) {
   join(triangles);
-  joiner_.emit_whole([](const ContourCrossing&) { return false; });
+  joiner_.emit_complete([](const ContourCrossing&) { return false; });
 }
 
 void ContourTriangles::sort(std::span<Triangle> triangles) {

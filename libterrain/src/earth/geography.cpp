@@ -30,18 +30,18 @@ std::optional<GeographyPatch> fit(const Point2& low, const Point2& size, const E
   exact(places);
   // Unwraps longitudes from the first one, also beyond 180, and finds their range.
   const double first = places[0][0];
-  double least = first, most = first;
+  double least = first, greatest = first;
   for (Point2& p : places) {
     if (!std::isfinite(p[0]) || !std::isfinite(p[1])) return std::nullopt;
     p[0] += 360.0 * std::round((first - p[0]) / 360.0);
     least = std::min(least, p[0]);
-    most = std::max(most, p[0]);
+    greatest = std::max(greatest, p[0]);
   }
   const std::optional<PlacePatch> patch = PlacePatch::through(places, kGeographyTolerance);
   if (!patch) return std::nullopt;
   // The extremes may be between the sampled places, so leave a margin.
-  const double margin = most - least;
-  return GeographyPatch{*patch, least - margin >= -180.0 && most + margin <= 180.0};
+  const double margin = greatest - least;
+  return GeographyPatch{*patch, least - margin >= -180.0 && greatest + margin <= 180.0};
 }
 
 }  // namespace
@@ -66,7 +66,7 @@ BoxGeography::BoxGeography(const CoordinateSystem& system, const stream::Box3& b
 
 void BoxGeography::operator()(std::span<Point2> places) const {
   patches_.convert(
-      places, [this](std::span<Point2> some) { system_.to_geographic(some); },
+      places, [this](std::span<Point2> batch) { system_.to_geographic(batch); },
       [](const Point2& place) -> Point2 {
         return {in_turn(place[0]), place[1]};
       });

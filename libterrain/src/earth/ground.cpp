@@ -135,30 +135,30 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
   }
 
   // The heights' own unit if it is named, then that of a CRS in feet, then metres.
-  const std::string& own = placement_.coordinates[2].unit;
+  const std::string& named_unit = placement_.coordinates[2].unit;
   // A file may name the unit only in its WKT.
   const double of_heights = crs.vertical_unit.empty() && known ? known->metres_per_height : 0;
   const std::string of_crs = of_heights != 0 ? recorded_unit(of_heights) : crs.vertical_unit;
-  const std::string& word = own.empty() ? of_crs : own;
+  const std::string& word = named_unit.empty() ? of_crs : named_unit;
   const bool unknown = !word.empty() && !metres_in_unit(word);
-  std::string taken = "metres";
-  if (const auto channel = metres_in_unit(own)) {
+  std::string assumed = "metres";
+  if (const auto channel = metres_in_unit(named_unit)) {
     metres_vertical_ = *channel;
-    height_unit_ = own;
+    height_unit_ = named_unit;
   } else if (const auto vertical = metres_in_unit(of_crs)) {
     metres_vertical_ = *vertical;
     height_unit_ = of_crs;
-    taken = "the vertical unit of the CRS";
+    assumed = "the vertical unit of the CRS";
   } else if (kind_ != Kind::geographic && metres_horizontal_ < 1.0) {
     metres_vertical_ = metres_horizontal_;
     height_unit_ =
         crs.horizontal_unit.empty() ? unit_name(metres_horizontal_) : crs.horizontal_unit;
-    taken = "that of x and y";
-    if (!unknown) assume("the unit of heights is unknown and taken as " + taken);
+    assumed = "that of x and y";
+    if (!unknown) assume("the unit of heights is unknown and taken as " + assumed);
   }
   if (unknown) {
     unknown_height_unit_ =
-        "the unit of heights, \"" + word + "\", is not known and taken as " + taken;
+        "the unit of heights, \"" + word + "\", is not known and taken as " + assumed;
     assume(unknown_height_unit_);
   }
   metres_vertical_ *= z_weight;

@@ -15,8 +15,8 @@ namespace {
 
 GeographicLib::Geodesic earth_of(const std::optional<CoordinateSystem>& system) {
   if (!system || system->reaches_wgs84()) return GeographicLib::Geodesic::WGS84();
-  const Ellipsoid& own = system->definition().ellipsoid;
-  return {own.semi_major, own.flattening()};
+  const Ellipsoid& ellipsoid = system->definition().ellipsoid;
+  return {ellipsoid.semi_major, ellipsoid.flattening()};
 }
 
 }  // namespace

@@ -12,19 +12,19 @@ namespace {
 
 /// Returns the unit that Ground uses. If nothing is converted and no unit is known, returns an
 /// empty string, because readers then make the same assumption again.
-std::string unit_of_heights(const stream::Placement& own, bool converted) {
-  if (!own.coordinates[2].unit.empty()) return own.coordinates[2].unit;
-  if (!own.crs.vertical_unit.empty()) return own.crs.vertical_unit;
-  if (converted) return Ground(own).height_unit();
-  const std::optional<CrsDefinition> known = definition_of(own.crs);
+std::string unit_of_heights(const stream::Placement& placement, bool converted) {
+  if (!placement.coordinates[2].unit.empty()) return placement.coordinates[2].unit;
+  if (!placement.crs.vertical_unit.empty()) return placement.crs.vertical_unit;
+  if (converted) return Ground(placement).height_unit();
+  const std::optional<CrsDefinition> known = definition_of(placement.crs);
   return known && known->metres_per_height != 0 ? recorded_unit(known->metres_per_height)
                                                 : std::string();
 }
 
 /// Returns the definition to record; nullopt for a local system. Throws: CrsError.
-std::optional<CrsDefinition> definition_in_file(const stream::Placement& own,
+std::optional<CrsDefinition> definition_in_file(const stream::Placement& placement,
                                                 const std::optional<stream::Crs>& other) {
-  stream::Crs crs = own.crs;
+  stream::Crs crs = placement.crs;
   crs.vertical_unit.clear();  // the WKT or code decides
   std::optional<CrsDefinition> definition = definition_of(crs);
   if (!other) return definition;
@@ -44,14 +44,15 @@ std::optional<CrsDefinition> definition_in_file(const stream::Placement& own,
 
 }  // namespace
 
-stream::Crs crs_of_point_file(const stream::Placement& own, const std::optional<stream::Crs>& other,
+stream::Crs crs_of_point_file(const stream::Placement& placement,
+                              const std::optional<stream::Crs>& other,
                               const std::string& vertical) {
-  stream::Crs crs = other.value_or(own.crs);
+  stream::Crs crs = other.value_or(placement.crs);
   try {
-    const std::string unit = unit_of_heights(own, other.has_value());
+    const std::string unit = unit_of_heights(placement, other.has_value());
     crs.vertical_unit = stream::canonical_unit(unit);
     const std::optional<double> metres = metres_in_unit(unit);
-    std::optional<CrsDefinition> definition = definition_in_file(own, other);
+    std::optional<CrsDefinition> definition = definition_in_file(placement, other);
     if (definition) {
       if (vertical == name_of(Heights::ellipsoidal) &&
           definition->heights != Heights::ellipsoidal) {
@@ -60,11 +61,11 @@ stream::Crs crs_of_point_file(const stream::Placement& own, const std::optional<
       }
       // Without a unit, readers assume metres for heights, unless x and y are in feet.
       const bool assumed = definition->geographic || definition->metres_per_unit >= 1;
-      const bool said = definition->metres_per_height != 0;
+      const bool states_unit = definition->metres_per_height != 0;
       // The vertical system that has the unit also says that heights are ellipsoidal.
       const bool unsaid =
           definition->heights == Heights::ellipsoidal && definition->height_wkt.empty();
-      if (metres && (said || unsaid || !assumed || *metres != 1)) {
+      if (metres && (states_unit || unsaid || !assumed || *metres != 1)) {
         write_height_unit(*definition, *metres);
       } else if (unsaid) {
         write_height_unit(*definition, assumed ? 1 : definition->metres_per_unit);
@@ -75,8 +76,8 @@ stream::Crs crs_of_point_file(const stream::Placement& own, const std::optional<
     }
     const std::optional<LocalCrs> local = local_crs_of(crs);
     // The WKT of a system with a third axis already has the unit.
-    const bool said = local && metres_in_unit(local->crs.vertical_unit) == metres;
-    if (local && !local->is_geocentric && metres && !said) {
+    const bool states_unit = local && metres_in_unit(local->crs.vertical_unit) == metres;
+    if (local && !local->is_geocentric && metres && !states_unit) {
       crs.wkt = with_height_unit(local->crs, *metres);
     }
   } catch (const CrsError&) {
@@ -85,25 +86,25 @@ stream::Crs crs_of_point_file(const stream::Placement& own, const std::optional<
   return crs;
 }
 
-std::string height_unit_of_point_file(const stream::Placement& own,
+std::string height_unit_of_point_file(const stream::Placement& placement,
                                       const std::optional<stream::Crs>& other) {
-  if (is_geocentric(own.crs)) return {};
+  if (is_geocentric(placement.crs)) return {};
   try {
-    return unit_of_heights(own, other.has_value());
+    return unit_of_heights(placement, other.has_value());
   } catch (const CrsError&) {
     return {};
   }
 }
 
 std::string lost_height_unit(const std::string& path, const stream::PointWriter& writer,
-                             const stream::Placement& own,
+                             const stream::Placement& placement,
                              const std::optional<stream::Crs>& other) {
-  if (is_geocentric(own.crs) || writer.names_height_unit()) return {};
+  if (is_geocentric(placement.crs) || writer.names_height_unit()) return {};
   try {
-    const std::string unit = unit_of_heights(own, other.has_value());
+    const std::string unit = unit_of_heights(placement, other.has_value());
     // Without a CRS the unit is a code of a GeoKey, which these two units do not have.
     const bool codeless = unit == "inch" || unit == "decimetre";
-    if (writer.records_units() && !(codeless && !definition_in_file(own, other))) return {};
+    if (writer.records_units() && !(codeless && !definition_in_file(placement, other))) return {};
     if (unit.empty() || metres_in_unit(unit).value_or(0) == 1) return {};
     return path + ": heights are in " + plural_unit(unit) + ", and the format has no place for " +
            (writer.records_units() ? "that" : "a") + " unit, so programs read them as metres; " +

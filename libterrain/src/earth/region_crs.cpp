@@ -155,23 +155,24 @@ Point2 middle_in(const Transformation& change, const stream::Box3& box) {
 
 Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
                   const Point2& tolerance) {
-  const stream::Box3& given = region.box();
+  const stream::Box3& bounding_box = region.box();
   const bool box = region.polygons().empty();
   // A box wider than two turns, such as an infinite one, is used as written.
-  if (box && !(given.max[0] - given.min[0] <= 2 * turn)) turn = 0;
+  if (box && !(bounding_box.max[0] - bounding_box.min[0] <= 2 * turn)) turn = 0;
   // Shifting by whole turns rounds as well.
   Point2 rounding{0x1p-50 * turn, 0};
-  const auto [first, last] = turns_to(widened(widened(given, tolerance), rounding), turn, bounds);
+  const auto [first, last] =
+      turns_to(widened(widened(bounding_box, tolerance), rounding), turn, bounds);
   if (first == 0 && last == 0) rounding[0] = 0;
-  stream::Box3 extent = widened(given, rounding);
+  stream::Box3 extent = widened(bounding_box, rounding);
   extent.min[0] += first * turn;
   extent.max[0] += last * turn;
-  if (box && (first == last || given.max[0] - given.min[0] >= turn)) {
+  if (box && (first == last || bounding_box.max[0] - bounding_box.min[0] >= turn)) {
     return Region::of_box(widened(extent, tolerance)).with_extent(extent);
   }
   if (first == 0 && last == 0) return region;
-  const std::vector<Polygon> one =
-      outlines(box ? within_reach(widened(widened(given, rounding), tolerance), bounds) : region);
+  const std::vector<Polygon> one = outlines(
+      box ? within_reach(widened(widened(bounding_box, rounding), tolerance), bounds) : region);
   std::vector<Polygon> polygons;
   for (double i = first; i <= last; ++i) {
     for (Polygon polygon : one) {
@@ -189,8 +190,9 @@ Region with_turns(const Region& region, double turn, const stream::Box3& bounds,
     }
   }
   if (polygons.empty()) return region;
-  const Region made = Region::of_polygons(std::move(polygons), given.min[2], given.max[2]);
-  return box ? made.with_extent(extent) : made;
+  const Region converted =
+      Region::of_polygons(std::move(polygons), bounding_box.min[2], bounding_box.max[2]);
+  return box ? converted.with_extent(extent) : converted;
 }
 
 }  // namespace terrace::terrain

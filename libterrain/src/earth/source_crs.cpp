@@ -68,11 +68,11 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
   const std::string file = info.files.empty() ? std::string() : info.files.front();
   std::optional<LocalCrs> local;
   try {
-    std::optional<AnyCrs> own = crs_of_record(info.crs);
-    if (own && std::holds_alternative<LocalCrs>(*own)) {
-      local = std::get<LocalCrs>(*std::move(own));
-    } else if (own) {
-      found.system.emplace(std::get<CrsDefinition>(*own));
+    std::optional<AnyCrs> file_crs = crs_of_record(info.crs);
+    if (file_crs && std::holds_alternative<LocalCrs>(*file_crs)) {
+      local = std::get<LocalCrs>(*std::move(file_crs));
+    } else if (file_crs) {
+      found.system.emplace(std::get<CrsDefinition>(*file_crs));
     }
   } catch (const ContradictoryCrs& error) {
     throw stream::Error(file, error.what()).remedy(error.remedy());

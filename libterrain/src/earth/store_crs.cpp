@@ -43,14 +43,14 @@ CoordinateSystem system_of(const stream::Store& store, const stream::Message& ot
 
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift) {
-  CoordinateSystem own = system_of(store);
+  CoordinateSystem store_system = system_of(store);
   const CoordinateSystem other = CoordinateSystem::parse(named, shift);
-  if (shift && !other.definition().shift && !own.counts_as_wgs84()) {
-    CrsDefinition shifted = own.definition();
+  if (shift && !other.definition().shift && !store_system.counts_as_wgs84()) {
+    CrsDefinition shifted = store_system.definition();
     shifted.shift = shift;
-    own = CoordinateSystem(shifted);
+    store_system = CoordinateSystem(shifted);
   }
-  return {own, other};
+  return {store_system, other};
 }
 
 namespace {
@@ -65,8 +65,8 @@ CoordinateSystem shifted(const CoordinateSystem& system, const std::optional<Dat
 
 /// Returns the CRS that GeoJSON names. The name never leads to a file: the author of a GeoJSON file
 /// must not choose which other files are read.
-CoordinateSystem system_named_in(const PlacesCrs& given) {
-  std::string name = given.name;
+CoordinateSystem system_named_in(const PlacesCrs& places_crs) {
+  std::string name = places_crs.name;
   // http://www.opengis.net/def/crs/EPSG/0/4326
   constexpr std::string_view kUrl = "opengis.net/def/crs/";
   if (const std::size_t at = name.find(kUrl); at != name.npos) {
@@ -81,8 +81,8 @@ CoordinateSystem system_named_in(const PlacesCrs& given) {
   } catch (const UsageError&) {
     // Reported below, with the file.
   }
-  throw stream::Error(given.file,
-                      fmt::format("its crs \"{}\" is not known", given.name.substr(0, 80)))
+  throw stream::Error(places_crs.file,
+                      fmt::format("its crs \"{}\" is not known", places_crs.name.substr(0, 80)))
       .remedy(stream::message("write a known one, like EPSG:n, or give {region_crs}"));
 }
 
@@ -103,7 +103,7 @@ RegionConversion::RegionConversion(const stream::Store& store,
 
 RegionConversion::RegionConversion(const stream::Store& store, Transformation to_regions)
     : RegionConversion(store) {
-  given_ = true;
+  overrides_ = true;
   if (!to_regions.identity()) to_regions_ = std::move(to_regions);
 }
 
@@ -144,7 +144,7 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   if (system && stored) system = system->over(area);
   system_ = [system] { return system; };
   if (named.empty()) return;
-  given_ = true;
+  overrides_ = true;
   Transformation change(*system, CoordinateSystem::parse(named));
   if (!change.identity()) to_regions_ = std::move(change);
 }
@@ -157,30 +157,31 @@ bool RegionConversion::may_turn(const Region& region) {
          box.max[1] >= -kPole;
 }
 
-std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given,
+std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& places_crs,
                                                           const stream::Box3& box) const {
-  const std::optional<CoordinateSystem> own = system_ ? system_() : std::nullopt;
-  if (!own && given.name.empty()) return std::nullopt;
-  if (!own) {
-    throw stream::Error(given.file,
+  const std::optional<CoordinateSystem> store_system = system_ ? system_() : std::nullopt;
+  if (!store_system && places_crs.name.empty()) return std::nullopt;
+  if (!store_system) {
+    throw stream::Error(places_crs.file,
                         fmt::format("its crs is {}, and the CRS of the data is not known",
-                                    system_named_in(given).title()))
+                                    system_named_in(places_crs).title()))
         .remedy(stream::message("name the CRS of the data with {crs} EPSG:n when they are read or "
                                 "built, or leave the crs out if it is the same"));
   }
-  if (given.name.empty()) {
+  if (places_crs.name.empty()) {
     // Longitudes may be counted to 360, and continue beyond the antimeridian.
     const bool fits =
         box.min[0] >= -360 && box.max[0] <= 540 && box.min[1] >= -90 && box.max[1] <= 90;
-    if (!fits || !own->reaches_wgs84()) {
+    if (!fits || !store_system->reaches_wgs84()) {
       // In a system of longitudes and latitudes the note would contradict itself.
-      if (!fits && own->is_geographic()) return std::nullopt;
-      say(given.file + ": has no crs, and its places are read in the CRS of the data, " +
-          own->title() + (fits ? "" : ", because they are not longitudes and latitudes"));
+      if (!fits && store_system->is_geographic()) return std::nullopt;
+      say(places_crs.file + ": has no crs, and its places are read in the CRS of the data, " +
+          store_system->title() + (fits ? "" : ", because they are not longitudes and latitudes"));
       return std::nullopt;
     }
   }
-  Transformation change(*own, given.name.empty() ? CoordinateSystem() : system_named_in(given));
+  Transformation change(*store_system,
+                        places_crs.name.empty() ? CoordinateSystem() : system_named_in(places_crs));
   if (change.identity()) return std::nullopt;
   say(change.note());
   return change;
@@ -189,34 +190,35 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& given
 namespace {
 
 /// Throws: stream::Error for a region beyond a pole. file: the GeoJSON file, if any.
-void check_region(const Region& region, double most, const std::string& file) {
+void check_region(const Region& region, double max_latitude, const std::string& file) {
   // Half of the outermost cells of a global raster may be beyond a pole.
   constexpr double kHalfCell = 1;
   const stream::Box3& box = region.box();
   const std::array<Point2, 2> corners{{{box.min[0], box.min[1]}, {box.max[0], box.max[1]}}};
-  check_latitudes(corners, most, file, "the region", kHalfCell);
+  check_latitudes(corners, max_latitude, file, "the region", kHalfCell);
 }
 
 }  // namespace
 
 Region RegionConversion::operator()(Region region) const {
-  const std::optional<PlacesCrs> given = region.crs();
+  const std::optional<PlacesCrs> places_crs = region.crs();
   region = region.in_crs({});
   if (to_regions_) {
-    check_region(region, to_regions_->to().most_latitude(), given ? given->file : std::string());
+    check_region(region, to_regions_->to().most_latitude(),
+                 places_crs ? places_crs->file : std::string());
     return region_in(region, *to_regions_, bounds_);
   }
   // Only longitudes, in degrees or gradians, have a turn this short.
   constexpr double kLongestTurn = 400;
   const bool turns = turn_ > 0 && turn_ <= kLongestTurn;
-  const double most = turns ? turn_ / 4 : std::numeric_limits<double>::infinity();
-  if (given && !given_) {
-    if (const auto change = to_places(*given, region.box())) {
-      check_region(region, change->to().most_latitude(), given->file);
+  const double max_latitude = turns ? turn_ / 4 : std::numeric_limits<double>::infinity();
+  if (places_crs && !overrides_) {
+    if (const auto change = to_places(*places_crs, region.box())) {
+      check_region(region, change->to().most_latitude(), places_crs->file);
       return region_in(region, *change, bounds_);
     }
   }
-  check_region(region, most, given ? given->file : std::string());
+  check_region(region, max_latitude, places_crs ? places_crs->file : std::string());
   return with_turns(region, turn_, bounds_, tolerance_);
 }
 

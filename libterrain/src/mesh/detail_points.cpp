@@ -14,7 +14,7 @@ namespace {
 class WrittenPart final : public WantedPart {
  public:
   /// The data that all parts share.
-  struct Job {
+  struct Output {
     const stream::Store& store;
     WantedPoints wanted;
     const PlaceConversion& places;
@@ -25,18 +25,20 @@ class WrittenPart final : public WantedPart {
     std::vector<stream::PointBlock> blocks;  ///< reused by each thread
   };
 
-  WrittenPart(Job& job, unsigned worker) : job_(job), block_(job.blocks[worker]) { block_.clear(); }
+  WrittenPart(Output& output, unsigned worker) : output_(output), block_(output.blocks[worker]) {
+    block_.clear();
+  }
 
   void add(stream::ClusterId id, const stream::ClusterRecord& record,
            const stream::ClusterPoints& points) override {
-    const std::size_t payload = job_.store.schema().payload_size();
+    const std::size_t payload = output_.store.schema().payload_size();
     std::span<const stream::OverlayValue> heights;
-    if (job_.overlay != nullptr) heights = job_.overlay->find(id);
-    job_.wanted(record, points, [&](std::size_t i, stream::Point3 place) {
+    if (output_.overlay != nullptr) heights = output_.overlay->find(id);
+    output_.wanted(record, points, [&](std::size_t i, stream::Point3 place) {
       while (!heights.empty() && heights.front().index < i) heights = heights.subspan(1);
       if (!heights.empty() && heights.front().index == i) {
         place[2] = heights.front().value;
-        ++job_.replaced;
+        ++output_.replaced;
       }
       block_.positions.push_back(place);
       const std::byte* values = points.payload.data() + i * payload;
@@ -46,17 +48,17 @@ class WrittenPart final : public WantedPart {
 
   void end() override {
     if (block_.empty()) return;
-    job_.places(block_.positions);
-    encoded_ = job_.writer.encode(block_);
+    output_.places(block_.positions);
+    encoded_ = output_.writer.encode(block_);
   }
 
   void take() override {
-    job_.context.check_stop();
-    if (encoded_ != nullptr) job_.writer.append(std::move(encoded_));
+    output_.context.check_stop();
+    if (encoded_ != nullptr) output_.writer.append(std::move(encoded_));
   }
 
  private:
-  Job& job_;
+  Output& output_;
   stream::PointBlock& block_;  ///< used until end()
   stream::PointWriter::EncodedPtr encoded_;
 };
@@ -67,16 +69,17 @@ std::uint64_t write_points(const stream::Store& store, const Detail& detail,
                            stream::PointWriter& writer, const PlaceConversion& places,
                            stream::Overlay* overlay, const Context& context) {
   const unsigned threads = overlay != nullptr ? 1 : context.threads;
-  WrittenPart::Job job{.store = store,
-                       .wanted = WantedPoints(store, detail),
-                       .places = places,
-                       .writer = writer,
-                       .context = context,
-                       .overlay = overlay,
-                       .blocks = std::vector<stream::PointBlock>(threads)};
-  for_each_wanted(store, detail, threads,
-                  [&job](unsigned worker) { return std::make_unique<WrittenPart>(job, worker); });
-  return job.replaced;
+  WrittenPart::Output output{.store = store,
+                             .wanted = WantedPoints(store, detail),
+                             .places = places,
+                             .writer = writer,
+                             .context = context,
+                             .overlay = overlay,
+                             .blocks = std::vector<stream::PointBlock>(threads)};
+  for_each_wanted(store, detail, threads, [&output](unsigned worker) {
+    return std::make_unique<WrittenPart>(output, worker);
+  });
+  return output.replaced;
 }
 
 }  // namespace terrace::terrain

@@ -64,18 +64,18 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   base::StopTicks ticks(check_stop);
   std::vector<double> areas;
   areas.reserve(mesh.triangles.size());
-  double whole = 0;
+  double total = 0;
   for (const auto& t : mesh.triangles) {
     const stream::Point3 n = area_vector(mesh, t);
     ticks(8);
     const double area = flat ? std::abs(n[2]) : base::hypot(base::hypot(n[0], n[1]), n[2]);
     areas.push_back(std::isfinite(area) ? area : 0.0);
-    whole += areas.back();
+    total += areas.back();
   }
   std::vector<double> shown;
-  const double each = whole / static_cast<double>(kShownHeights);
+  const double each = total / static_cast<double>(kShownHeights);
   // With subnormal areas, steps may round to 0.
-  if (!(each >= std::numeric_limits<double>::min()) || !std::isfinite(whole)) return shown;
+  if (!(each >= std::numeric_limits<double>::min()) || !std::isfinite(total)) return shown;
   double before = 0;
   for (std::size_t i = 0; i < areas.size(); ++i) {
     ticks(4);
@@ -127,11 +127,13 @@ std::vector<double> heights_by_cells(const TriangleMesh& cloud, const std::vecto
     }
     members[static_cast<std::size_t>(cell)].push_back(heights[i]);
   }
-  std::erase_if(members, [](const std::vector<double>& some) { return some.empty(); });
+  std::erase_if(members,
+                [](const std::vector<double>& coordinates) { return coordinates.empty(); });
   const std::size_t of_each = std::max<std::size_t>(1, kShownHeights / members.size());
   std::vector<double> shown;
-  for (const std::vector<double>& some : members) {
-    for (std::size_t k = 0; k < of_each; ++k) shown.push_back(some[k * some.size() / of_each]);
+  for (const std::vector<double>& coordinates : members) {
+    for (std::size_t k = 0; k < of_each; ++k)
+      shown.push_back(coordinates[k * coordinates.size() / of_each]);
   }
   return shown;
 }

@@ -176,9 +176,9 @@ MeshUnits::MeshUnits(const stream::Store& store, const PlaceConversion& places)
   if (!other) return;
   // Heights do not change; they keep the unit that they have with the store's own x and y.
   height_unit = Ground(store.schema()).height_unit();
-  const stream::Crs own = std::exchange(crs, *other);
-  crs.vertical_epsg = own.vertical_epsg;
-  crs.vertical_unit = own.vertical_unit;
+  const stream::Crs target = std::exchange(crs, *other);
+  crs.vertical_epsg = target.vertical_epsg;
+  crs.vertical_unit = target.vertical_unit;
 }
 
 MeshCoordinates mesh_coordinates(const std::string& path, const stream::WriterOptions& options,

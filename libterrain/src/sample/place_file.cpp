@@ -167,9 +167,9 @@ PlaceFile::PlaceFile(const std::string& path, std::stop_token stop)
 }
 
 bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
-  const std::size_t wanted = std::max(most_bytes, kLongestPlaceLine);
-  const std::string_view window = input_.fill(wanted);
-  const bool ended = window.size() < wanted;
+  const std::size_t limit = std::max(most_bytes, kLongestPlaceLine);
+  const std::string_view window = input_.fill(limit);
+  const bool ended = window.size() < limit;
   batch.begins.clear();
   batch.first_line = line_;
   std::size_t end = 0;

@@ -66,9 +66,9 @@ double points_met_by_a_place(const stream::Store& store, unsigned level) {
   const auto area = [](const stream::Box3& box) {
     return (box.max[0] - box.min[0]) * (box.max[1] - box.min[1]);
   };
-  const double whole = area(store.whole().bounds());
+  const double total_area = area(store.whole().bounds());
   const stream::LevelInfo& info = store.levels()[level];
-  if (level == store.top() || !(whole > 0)) return 0;
+  if (level == store.top() || !(total_area > 0)) return 0;
   constexpr std::uint64_t kLookedAt = 500;
   const std::uint64_t count = std::min(info.clusters, kLookedAt);
   double sum = 0;
@@ -76,7 +76,7 @@ double points_met_by_a_place(const stream::Store& store, unsigned level) {
     const std::uint64_t ordinal = i * info.clusters / count;
     sum += area(store.record(stream::cluster_id(level, ordinal)).summary.box);
   }
-  return static_cast<double>(info.points) * sum / static_cast<double>(count) / whole;
+  return static_cast<double>(info.points) * sum / static_cast<double>(count) / total_area;
 }
 
 /// The working data of one thread.
@@ -116,13 +116,13 @@ class PointSampler final : public HeightSampler {
     workers_.resize(threads);
     const std::uint64_t bytes = std::max(memory_ / threads, 2 * kReadBytes) - kReadBytes;
     room_ = static_cast<std::size_t>(bytes / PointCells::kBytesPerPoint);
-    const double whole = tree_.part(0).points;
+    const double total = tree_.part(0).points;
     most_points_ =
         std::min({static_cast<double>(bytes) / kBytesPerExpected, kMostPointsAtOnce,
-                  std::max(65536.0, whole / (kPartsPerThread * static_cast<double>(threads)))});
+                  std::max(65536.0, total / (kPartsPerThread * static_cast<double>(threads)))});
     const double met = points_met_by_a_place(store, options.level);
     points_per_place_ = kPointsPerPlace + kReadShare * met;
-    takes_whole_ = store.levels()[options.level].points * PointCells::kBytesPerPoint <= memory_;
+    may_load_all_ = store.levels()[options.level].points * PointCells::kBytesPerPoint <= memory_;
     if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
   }
 
@@ -130,11 +130,11 @@ class PointSampler final : public HeightSampler {
     std::fill(out.begin(), out.end(), SurfacePoint{});
     if (cloud_.hull.corners().empty()) return;
     sort_by_window(places);
-    if (takes_whole_ && !whole_ && is_dense(tree_.part(0), order_.size())) take_whole();
+    if (may_load_all_ && !all_cells_ && is_dense(tree_.part(0), order_.size())) load_all();
     std::vector<const WindowTree::Part*> parts;
     const auto takes = [&](const WindowTree::Part& part) {
       const std::size_t count = numbers_in(part).size();
-      return count == 0 || (part.points <= most_points_ && (whole_ || is_dense(part, count)));
+      return count == 0 || (part.points <= most_points_ && (all_cells_ || is_dense(part, count)));
     };
     tree_.for_each_part(takes, [&](const WindowTree::Part& part) {
       if (!numbers_in(part).empty()) parts.push_back(&part);
@@ -146,8 +146,8 @@ class PointSampler final : public HeightSampler {
           if (worker == nullptr) {
             worker = std::make_unique<CloudWorker>(cloud_, too_long_, memory_ / workers_.size());
           }
-          if (whole_) {
-            worker->surface.share(*whole_);
+          if (all_cells_) {
+            worker->surface.share(*all_cells_);
             return answer_along(*worker, parts[i]->box, numbers_in(*parts[i]), places, out);
           }
           work_on(*worker, *parts[i], places, out);
@@ -203,11 +203,11 @@ class PointSampler final : public HeightSampler {
 
   /// Loads all points once. Otherwise overlapping clusters would be read for many windows each, and
   /// circles in voids extend beyond windows.
-  void take_whole() {
+  void load_all() {
     auto cells = std::make_unique<PointCells>();
-    takes_whole_ =
+    may_load_all_ =
         cells->load_all(cloud_.store, cloud_.level, static_cast<unsigned>(workers_.size()));
-    if (takes_whole_) whole_ = std::move(cells);
+    if (may_load_all_) all_cells_ = std::move(cells);
   }
 
   /// If a part does not fit after all, its halves may.
@@ -313,8 +313,8 @@ class PointSampler final : public HeightSampler {
   std::size_t room_ = 0;         ///< the most points that a worker can hold
   double most_points_ = 0;       ///< limit for a part that is loaded in one piece
   double points_per_place_ = 0;  ///< points per place up to which that pays off
-  bool takes_whole_ = false;     ///< whether to load all points if there are many places
-  std::unique_ptr<const PointCells> whole_;
+  bool may_load_all_ = false;    ///< whether to load all points if there are many places
+  std::unique_ptr<const PointCells> all_cells_;
   std::vector<std::uint32_t> keys_, order_;
   std::vector<std::size_t> begin_;  ///< in order_, by window; then its size
 };

@@ -332,14 +332,14 @@ double largest_height(const stream::Store& store) {
 
 }  // namespace
 
-ProfileOutcome profile(const stream::Store& store, const ProfileRequest& given,
+ProfileOutcome profile(const stream::Store& store, const ProfileRequest& original,
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context) {
   need_terrain(store, "a profile");
-  ProfileRequest request = given;
-  const double most =
+  ProfileRequest request = original;
+  const double max_latitude =
       request.to_line ? request.to_line->to().most_latitude() : most_latitude(store.schema().crs);
-  check_latitudes(request.line, most, store.path().string());
+  check_latitudes(request.line, max_latitude, store.path().string());
   if (request.to_line) request.to_line->reverse(request.line);
   if (request.line.size() < 2) throw UsageError("a profile needs a line of two places or more");
   for (const Point2& place : request.line) {

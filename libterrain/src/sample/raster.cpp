@@ -173,7 +173,7 @@ class RasterRun {
     options.threads = context_.threads;
     options.replace = request_.replace;
     options.stop = context_.stop;
-    const std::uint64_t memory = room_beside_table(options);
+    const std::uint64_t memory = memory_without_table(options);
     stream::GeoTiffWriter writer(request_.output, options);
     const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
     const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
@@ -205,7 +205,7 @@ class RasterRun {
  private:
   /// Returns the memory left after the table of the file's tiles. Throws: stream::Error if that is
   /// less than the table.
-  [[nodiscard]] std::uint64_t room_beside_table(const stream::GeoTiffOptions& options) const {
+  [[nodiscard]] std::uint64_t memory_without_table(const stream::GeoTiffOptions& options) const {
     const std::uint64_t table = stream::geotiff_table_bytes(options);
     const std::uint64_t memory = working_memory(context_);
     if (table <= memory / 2) return memory - table;
@@ -350,9 +350,9 @@ RasterOutcome write_raster(const stream::Store& store, const RasterRequest& requ
   need_terrain(store, "a raster");
   const stream::Store source = store.with_stop(context.stop);
   const ProgressReport report(context, "cells");
-  RasterRequest wanted = request;
+  RasterRequest aligned = request;
   const RasterGrid grid =
-      request.align.empty() ? raster_grid(source, request) : aligned_grid(source, wanted, context);
+      request.align.empty() ? raster_grid(source, request) : aligned_grid(source, aligned, context);
   std::string height_unit = store.schema().coordinates[2].unit;
   if (request.to && height_unit.empty()) {
     // A unit that follows from the store's own x and y does not follow from those of the raster.
@@ -362,7 +362,7 @@ RasterOutcome write_raster(const stream::Store& store, const RasterRequest& requ
     const bool assumed = other.geographic || metres_in_unit(other.horizontal_unit) == 1.0;
     if (unit != "metre" || !assumed) height_unit = unit;
   }
-  return RasterRun(source, wanted, grid, context).run(height_unit, report);
+  return RasterRun(source, aligned, grid, context).run(height_unit, report);
 }
 
 }  // namespace terrace::terrain

@@ -138,9 +138,9 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
         .remedy("align with a raster that is north up");
   }
   const std::optional<CoordinateSystem> theirs = crs_of_source(info).system;
-  const std::optional<CoordinateSystem> own =
+  const std::optional<CoordinateSystem> ours =
       CoordinateSystem::of(store.schema().crs, store.path().string());
-  if (theirs && own && !theirs->same_places(*own)) {
+  if (theirs && ours && !theirs->same_places(*ours)) {
     if (request.to && !request.to->to().same_places(*theirs)) {
       throw UsageError(stream::message("{align} uses the CRS of {}, {}: leave {to_crs} out",
                                        request.align, theirs->title()));
@@ -152,7 +152,7 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
   } else if (request.to) {
     throw UsageError(
         stream::message("{align} uses the CRS of {}: leave {to_crs} out", request.align));
-  } else if (theirs.has_value() != own.has_value()) {
+  } else if (theirs.has_value() != ours.has_value()) {
     context.say(fmt::format("{}: its grid is read in the CRS of the store, because {} is not known",
                             request.align, theirs ? "that of the store" : "its own"));
   }
@@ -169,10 +169,10 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   need_level(store, level);
   const auto within_region = [&](stream::Box3 box) {
     if (request.region) {
-      const stream::Box3& wanted = request.region->extent();
+      const stream::Box3& limits = request.region->extent();
       for (std::size_t axis = 0; axis < 2; ++axis) {
-        box.min[axis] = std::max(box.min[axis], wanted.min[axis]);
-        box.max[axis] = std::min(box.max[axis], wanted.max[axis]);
+        box.min[axis] = std::max(box.min[axis], limits.min[axis]);
+        box.max[axis] = std::min(box.max[axis], limits.max[axis]);
       }
     }
     return box;

@@ -101,10 +101,10 @@ class StoreProbe::SomeSamples {
     std::sort_heap(samples_.begin(), samples_.end());
   }
   [[nodiscard]] double at(std::int64_t column, std::int64_t row) const {
-    const Sample wanted{static_cast<double>(row), static_cast<double>(column),
+    const Sample target{static_cast<double>(row), static_cast<double>(column),
                         -std::numeric_limits<double>::infinity()};
-    const auto found = std::lower_bound(samples_.begin(), samples_.end(), wanted);
-    if (found == samples_.end() || (*found)[0] != wanted[0] || (*found)[1] != wanted[1]) {
+    const auto found = std::lower_bound(samples_.begin(), samples_.end(), target);
+    if (found == samples_.end() || (*found)[0] != target[0] || (*found)[1] != target[1]) {
       return std::numeric_limits<double>::quiet_NaN();
     }
     return (*found)[2] * heights_.scale + heights_.offset;
@@ -127,7 +127,7 @@ class StoreProbe::SomeSamples {
   std::vector<Sample> samples_;
 };
 
-unsigned StoreProbe::descend(std::uint64_t most,
+unsigned StoreProbe::descend(std::uint64_t max_points,
                              const std::function<bool(const stream::Box3&)>& wants,
                              const std::function<void(const stream::ClusterPoints&)>& visit) {
   std::vector<stream::ByteRange> missing;
@@ -149,14 +149,14 @@ unsigned StoreProbe::descend(std::uint64_t most,
     std::vector<std::uint64_t> ordinals;
     std::uint64_t points = 0;
   };
-  std::vector<Level> wanted(top + 1);
-  wanted[top].ordinals = {0};
+  std::vector<Level> levels(top + 1);
+  levels[top].ordinals = {0};
   std::uint64_t read = 0;
   unsigned level = top + 1;
   while (level > 0) {
-    Level& here = wanted[level - 1];
+    Level& here = levels[level - 1];
     read += here.points;
-    if (read > most) break;
+    if (read > max_points) break;
     --level;
     std::sort(here.ordinals.begin(), here.ordinals.end());
     std::uint64_t last = UINT64_MAX;
@@ -176,8 +176,8 @@ unsigned StoreProbe::descend(std::uint64_t most,
             const stream::ClusterRecord record = store_.record(id);
             in = wants(record.summary.box);
             if (!in) return;
-            wanted[below].ordinals.push_back(child);
-            wanted[below].points += record.points;
+            levels[below].ordinals.push_back(child);
+            levels[below].points += record.points;
           });
           if (known && !in) break;
         }

@@ -47,9 +47,9 @@ void note_idle_focuses(const stream::Store& store, const Detail& detail, const C
   const stream::Box3 all = world_box(store.schema(), store.whole().bounds());
   for (std::size_t i = 0; i < detail.focuses.size(); ++i) {
     if (detail.reaches_into(detail.focuses[i].region, all)) continue;
-    const std::string which = detail.focuses.size() > 1 ? fmt::format(" {}", i + 1) : "";
+    const std::string ordinal = detail.focuses.size() > 1 ? fmt::format(" {}", i + 1) : "";
     context.say(stream::message("{focus}{} is outside the store and adds no points: they have {}",
-                                which, extent_text(store.whole())));
+                                ordinal, extent_text(store.whole())));
   }
 }
 
@@ -92,8 +92,8 @@ class Descent {
   void run(unsigned lowest) {
     take(read_first());
     for (unsigned level = stream::level_of(first_); level-- > lowest;) {
-      if (whole(level)) {
-        run_whole(level);
+      if (is_complete(level)) {
+        run_all(level);
       } else {
         run_heads(level);
       }
@@ -101,7 +101,7 @@ class Descent {
   }
 
   /// Whether a level is wanted everywhere, so that no list of its clusters is needed.
-  [[nodiscard]] bool whole(unsigned level) const {
+  [[nodiscard]] bool is_complete(unsigned level) const {
     return level >= detail_.level && !detail_.region && !detail_.cluster;
   }
 
@@ -133,7 +133,7 @@ class Descent {
     const stream::Box3 box = world_box(placement_, record.summary.box);
     for (unsigned below = finest_; below < level; ++below) {
       // Everything below this cluster is inside its box.
-      if (whole(below) || !detail_.wants(below, box)) continue;
+      if (is_complete(below) || !detail_.wants(below, box)) continue;
       for (std::size_t i = 0; i < points.size(); ++i) {
         to.heads[below].push_back(points.children[i * level + below]);
       }
@@ -168,7 +168,7 @@ class Descent {
     return read;
   }
 
-  void run_whole(unsigned level) {
+  void run_all(unsigned level) {
     const std::uint64_t clusters = store_.levels()[level].clusters;
     const std::uint64_t members = store_.levels()[level].members;
     const std::uint64_t each = clusters_per_part(level);
@@ -304,12 +304,12 @@ void WantedPoints::operator()(
            std::any_of(detail_.focuses.begin(), detail_.focuses.end(),
                        [&](const FinerRegion& focus) { return focus.region.contains(place); });
   };
-  const bool whole = !detail_.region || detail_.region->overlap(world_box(
-                                            placement_, record.summary.box)) == Overlap::whole;
+  const bool is_inside = !detail_.region || detail_.region->overlap(world_box(
+                                                placement_, record.summary.box)) == Overlap::whole;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!points.match(i)) continue;
     const stream::Point3 place = world_point(placement_, points.positions[i]);
-    if (whole || inside(place)) visit(i, place);
+    if (is_inside || inside(place)) visit(i, place);
   }
 }
 
@@ -345,7 +345,7 @@ void for_each_wanted_record(
   if (finest == stream::level_of(descent.first())) return descent.run(finest);
   // Counting does not require reading the clusters of the finest level.
   descent.run(finest + 1);
-  if (descent.whole(finest)) {
+  if (descent.is_complete(finest)) {
     for (std::uint64_t c = 0; c < store.levels()[finest].clusters; ++c) {
       const stream::ClusterId id = stream::cluster_id(finest, c);
       visit(id, store.record(id));

@@ -17,7 +17,7 @@ struct GroundSlope::Table {
   stream::Box3 bounds;
   std::mutex mutex;  ///< for creating maps
   std::vector<std::atomic<const GroundMap*>> maps;
-  std::deque<GroundMap> made;
+  std::deque<GroundMap> storage;
 
   explicit Table(const stream::Box3& box) : bounds(box), maps(kSide * kSide) {}
 
@@ -37,7 +37,7 @@ struct GroundSlope::Table {
     std::atomic<const GroundMap*>& slot = maps[part[1] * kSide + part[0]];
     if (const GroundMap* map = slot.load(std::memory_order_acquire)) return *map;
     const std::lock_guard lock(mutex);
-    if (slot.load() == nullptr) slot = &made.emplace_back(ground.map(box));
+    if (slot.load() == nullptr) slot = &storage.emplace_back(ground.map(box));
     return *slot.load();
   }
 };
@@ -62,8 +62,8 @@ Point2 GroundSlope::stored(const Point2& world) const {
   Point2 place = stored_place(placement_, turns_(world));
   if (grid_) {
     for (double& c : place) {
-      const double whole = std::nearbyint(c);
-      if (std::abs(c - whole) <= 1e-6) c = whole;
+      const double rounded = std::nearbyint(c);
+      if (std::abs(c - rounded) <= 1e-6) c = rounded;
     }
   }
   return place;

@@ -15,14 +15,14 @@ namespace terrace::terrain {
 PointHull::PointHull(const stream::Store& store, unsigned level) {
   stream::StoreQuery query(store);
   StreamingHull hull;
-  std::uint64_t added = 0, made_of = 0;
+  std::uint64_t added = 0, compacted_size = 0;
   query.descend(
       level,
       [&](unsigned, const stream::StoreQuery::Branch& branch) {
         // Rebuild the hull as more points arrive, less and less often.
-        if (added > made_of + made_of / 4) {
+        if (added > compacted_size + compacted_size / 4) {
           set_corners(hull.corners());
-          made_of = added;
+          compacted_size = added;
         }
         if (is_flat()) return true;
         for (unsigned corner = 0; corner < 4; ++corner) {

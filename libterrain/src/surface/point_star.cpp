@@ -94,16 +94,16 @@ void PointStar::offer(const Point2& point) {
 /// Replaces the spokes between these sectors by the point.
 void PointStar::replace(std::size_t first, std::size_t last, const Point2& point) {
   const std::size_t all = spokes_.size(), begin = (first + 1) % all;
-  const std::size_t gone = (last + all - first) % all;
+  const std::size_t removed = (last + all - first) % all;
   const auto at = [&](std::size_t i) { return spokes_.begin() + static_cast<std::ptrdiff_t>(i); };
   spokes_[first].mark = 0;
-  if (gone == 0) {
+  if (removed == 0) {
     spokes_.insert(at(begin), {point});
     return;
   }
   spokes_[begin] = {point};
-  spokes_.erase(at(begin + 1), at(std::min(begin + gone, all)));
-  if (begin + gone > all) spokes_.erase(at(0), at(begin + gone - all));
+  spokes_.erase(at(begin + 1), at(std::min(begin + removed, all)));
+  if (begin + removed > all) spokes_.erase(at(0), at(begin + removed - all));
 }
 
 }  // namespace terrace::terrain

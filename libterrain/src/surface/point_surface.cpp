@@ -71,12 +71,12 @@ PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t me
       memory_bytes_(memory_bytes),
       query_(cloud.store, kSurfaceCacheBytes),
       corners_(kCorners, {{}, NAN}) {
-  own_.clear();
+  loaded_.clear();
 }
 
 bool PointSurface::load(const StoredBox& box, std::size_t most_points, bool may_crowd) {
-  cells_ = &own_;
-  return own_.load(query_, cloud_.level, box, most_points, may_crowd);
+  cells_ = &loaded_;
+  return loaded_.load(query_, cloud_.level, box, most_points, may_crowd);
 }
 
 int PointSurface::side_of(const Point2& a, const Point2& b, const Target& target) {
@@ -226,7 +226,7 @@ void PointSurface::find_star(const Point2& centre) {
   const auto offer = [&](const Point2& p) {
     if (square_of(p[0] - centre[0], p[1] - centre[1]) <= limit) star_.offer(p);
   };
-  PointCells::Range seen, wanted;
+  PointCells::Range visited, range_needed;
   std::size_t cells = 0;
   // Finds the circles that may still contain points in memory.
   const auto find_open = [&] {
@@ -236,7 +236,7 @@ void PointSurface::find_star(const Point2& centre) {
       if (star_.mark(i) != kNone) continue;
       const CircleCover cover = star_.circle(i);
       const PointCells::Range range = cells_->cells_of(cover.bounds());
-      if (seen.contains(range)) {
+      if (visited.contains(range)) {
         star_.set_mark(i, kMemory);
       } else {
         covers_.push_back(cover);
@@ -244,17 +244,17 @@ void PointSurface::find_star(const Point2& centre) {
       }
     }
     if (covers_.empty()) return;
-    wanted = cells_->cells_of(bounds_of(covers_));
+    range_needed = cells_->cells_of(bounds_of(covers_));
     limit = greatest_square(bounds_of(covers_), centre);
   };
   for (std::uint32_t reach = 1;; reach *= 2) {
-    wanted = cells_->near(centre, reach);
-    cells_->visit_cells(wanted, seen, offer);
-    seen = wanted;
+    range_needed = cells_->near(centre, reach);
+    cells_->visit_cells(range_needed, visited, offer);
+    visited = range_needed;
     if (reach >= kFarthest) break;
     if (!star_.is_closed()) continue;
     find_open();
-    if (covers_.empty() || wanted.count() <= 2 * seen.count()) break;
+    if (covers_.empty() || range_needed.count() <= 2 * visited.count()) break;
   }
   if (!star_.is_closed()) {
     for (const Point2& corner : cloud_.hull.corners()) offer(corner);
@@ -269,9 +269,9 @@ void PointSurface::find_star(const Point2& centre) {
         if (star_.mark(i) == kNone) star_.set_mark(i, kMemory);
       }
       // The circles of new triangles are inside those of the old ones.
-      if (wanted.count() <= cells) {
-        cells_->visit_cells(wanted, seen, offer);
-        seen = wanted;
+      if (range_needed.count() <= cells) {
+        cells_->visit_cells(range_needed, visited, offer);
+        visited = range_needed;
       } else {
         for (const CircleCover& cover : covers_) cells_->in(cover, centre, offer);
       }

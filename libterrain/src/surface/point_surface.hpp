@@ -110,8 +110,8 @@ class PointSurface {
   /// Which points were offered to star_ in the circle of one of its triangles.
   enum Mark : std::uint8_t { kNone, kMemory, kAll };
 
-  PointCells own_;
-  const PointCells* cells_ = &own_;
+  PointCells loaded_;
+  const PointCells* cells_ = &loaded_;
   std::optional<Corners> triangle_;  ///< a triangle of the triangulation of all points
   PointStar star_;
   std::vector<SurfaceCorner> corners_;  ///< recent ones, by hash of the place; NaN: none

@@ -55,7 +55,7 @@ std::array<Point2, 3> PointWindow::corners(tri::TriangleId triangle) const {
   return {triangulation_.point(v[0]), triangulation_.point(v[1]), triangulation_.point(v[2])};
 }
 
-bool PointWindow::stands_before(const Origin& a, const Origin& b) const {
+bool PointWindow::precedes(const Origin& a, const Origin& b) const {
   if (b.cluster == kNowhere) return true;
   const stream::ClusterId ca = read_[a.cluster], cb = read_[b.cluster];
   if (ca == cb) return a.index < b.index;
@@ -90,22 +90,22 @@ void PointWindow::take(const stream::StoreQuery::Node& node) {
     const double height = p[2] * scale_ + offset_;
     if (inner_.contains(flat(p))) {
       places_.push_back({p[0], p[1]});
-      taken_.push_back({height, origin});
+      new_points_.push_back({height, origin});
       continue;
     }
     pending_.push_back({{p[0], p[1]}, height, origin});
     outer.box.include(pending_.back().place);
   }
   outer.count = pending_.size() - outer.begin;
-  left_ += outer.count;
+  pending_count_ += outer.count;
   if (outer.count > 0) outer_.push_back(outer);
 }
 
 void PointWindow::take(Pending& point) {
   places_.push_back(point.place);
-  taken_.push_back({point.height, point.origin});
+  new_points_.push_back({point.height, point.origin});
   point.origin.cluster = kNowhere;
-  --left_;
+  --pending_count_;
 }
 
 void PointWindow::grow_inner(const StoredBox& box) {
@@ -120,12 +120,12 @@ void PointWindow::grow_inner(const StoredBox& box) {
   frontier_.read_meeting(inner_, [this](const stream::StoreQuery::Node& node) { take(node); });
 }
 
-bool PointWindow::keeps_taken() const {
-  return taken_.capacity() * (sizeof(Triangulation::Point) + sizeof(Taken)) <=
+bool PointWindow::keeps_buffer() const {
+  return new_points_.capacity() * (sizeof(Triangulation::Point) + sizeof(NewPoint)) <=
          memory_bytes_ / kShareKept;
 }
 
-void PointWindow::insert_taken() {
+void PointWindow::insert_new_points() {
   check_memory(0);
   inserted_.clear();
   std::vector<tri::VertexId> built;
@@ -133,7 +133,7 @@ void PointWindow::insert_taken() {
   if (is_first) {
     triangulation_.set_check_stop([this] { cloud_.store.check_stop(); });
     built = triangulation_.build(places_);
-    if (keeps_taken()) {
+    if (keeps_buffer()) {
       places_.clear();
     } else {
       std::vector<Triangulation::Point>().swap(places_);
@@ -145,30 +145,30 @@ void PointWindow::insert_taken() {
   }
   heights_.resize(triangulation_.vertex_slots(), kUnknownHeight);
   origins_.resize(triangulation_.vertex_slots());
-  for (std::size_t i = 0; i < taken_.size(); ++i) {
+  for (std::size_t i = 0; i < new_points_.size(); ++i) {
     const std::uint32_t at = tri::slot(is_first ? built[i] : inserted_[i].vertex);
-    if (!stands_before(taken_[i].origin, origins_[at])) continue;
-    origins_[at] = taken_[i].origin;
-    heights_[at] = taken_[i].height;
+    if (!precedes(new_points_[i].origin, origins_[at])) continue;
+    origins_[at] = new_points_[i].origin;
+    heights_[at] = new_points_[i].height;
   }
-  if (!is_first || keeps_taken()) {
-    taken_.clear();
+  if (!is_first || keeps_buffer()) {
+    new_points_.clear();
   } else {
-    std::vector<Taken>().swap(taken_);
+    std::vector<NewPoint>().swap(new_points_);
   }
 }
 
 void PointWindow::clear() {
   triangulation_.restart();
-  is_whole_ = takes_too_long_ = false;
+  is_complete_ = takes_too_long_ = false;
   heights_.clear();
   origins_.clear();
   states_.clear();
   read_.clear();
   places_.clear();
-  taken_.clear();
+  new_points_.clear();
   pending_.clear();
-  left_ = 0;
+  pending_count_ = 0;
   outer_.clear();
   groups_.clear();
   read_in_trees_ = 0;
@@ -201,9 +201,9 @@ void PointWindow::load(const StoredBox& box) {
     if (cloud_.voids.known()) return load_with_border();
     // Triangles across the border need a few more points, which are cheaper in bulk.
     grow_inner(box.widened(margin()));
-    insert_taken();
-    is_whole_ = left_ == 0 && frontier_.open().empty();
-    if (!is_whole_ && !cloud_.hull.is_flat()) settle();
+    insert_new_points();
+    is_complete_ = pending_count_ == 0 && frontier_.open().empty();
+    if (!is_complete_ && !cloud_.hull.is_flat()) settle();
   };
   load();
   if (takes_too_long_) {
@@ -215,14 +215,14 @@ void PointWindow::load(const StoredBox& box) {
 void PointWindow::take_distant(const SurfaceCorner& corner) {
   if (inner_.contains(corner.place)) return;
   places_.push_back(corner.place);
-  taken_.push_back({corner.height, {}});
+  new_points_.push_back({corner.height, {}});
 }
 
 void PointWindow::load_with_border() {
   grow_inner(box_.widened(cloud_.voids.reach(box_)));
-  insert_taken();
+  insert_new_points();
   cloud_.voids.for_each(box_, [this](const SurfaceCorner& corner) { take_distant(corner); });
-  insert_taken();
+  insert_new_points();
   states_.assign(triangulation_.triangle_slots(), State::unknown);
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
     if (inner_.covers(circle(t).bounds()) || triangle_meets(corners(t), box_)) {
@@ -236,7 +236,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
   const double margin = this->margin();
   grow_inner(box.widened(margin));
   if (places_.empty()) return 0;
-  insert_taken();
+  insert_new_points();
   const auto is_inside = [&](tri::VertexId v) {
     const Point2 p = triangulation_.point(v);
     return box.contains(p);
@@ -257,7 +257,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
   // Slightly more, for rounding.
   const double reach = 2 * radius * (1 + 1e-6);
   grow_inner(box.widened(std::max(margin, reach)));
-  insert_taken();
+  insert_new_points();
   std::vector<bool> is_border(triangulation_.vertex_slots(), triangulation_.triangle_count() == 0);
   for (const tri::TriangleId t : triangulation_.all_triangles()) {
     const CircleCover cover = circle(t);

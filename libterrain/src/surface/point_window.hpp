@@ -81,7 +81,7 @@ class PointWindow {
   [[nodiscard]] const tri::Delaunay2<double>& triangulation() const { return triangulation_; }
   /// Whether a triangle belongs to the whole triangulation. Requires a living triangle.
   [[nodiscard]] bool is_certain(tri::TriangleId triangle) const {
-    return is_whole_ || states_[tri::slot(triangle)] == State::certain;
+    return is_complete_ || states_[tri::slot(triangle)] == State::certain;
   }
   /// In the store's vertical unit (scale and offset of the channel applied).
   [[nodiscard]] double height(tri::VertexId vertex) const { return heights_[tri::slot(vertex)]; }
@@ -102,7 +102,7 @@ class PointWindow {
   /// The height of points whose clusters were not read.
   static constexpr double kUnknownHeight = std::numeric_limits<double>::quiet_NaN();
   /// Data of a point to be inserted.
-  struct Taken {
+  struct NewPoint {
     double height = 0;
     Origin origin;
   };
@@ -136,9 +136,9 @@ class PointWindow {
   /// Takes a point from elsewhere, unless inner_ contains it.
   void take_distant(const SurfaceCorner& corner);
   void grow_inner(const StoredBox& box);
-  void insert_taken();
-  [[nodiscard]] bool keeps_taken() const;
-  [[nodiscard]] bool stands_before(const Origin& a, const Origin& b) const;
+  void insert_new_points();
+  [[nodiscard]] bool keeps_buffer() const;
+  [[nodiscard]] bool precedes(const Origin& a, const Origin& b) const;
   void check_memory(std::size_t more) const;
   [[nodiscard]] double margin() const;
 
@@ -169,16 +169,16 @@ class PointWindow {
   bool takes_too_long_ = false;
   ClusterFrontier frontier_;
   StoredBox box_{}, inner_{};  ///< loaded; box with all points inserted
-  bool is_whole_ = false;      ///< whether all points of the store are inserted
+  bool is_complete_ = false;   ///< whether all points of the store are inserted
   Triangulation triangulation_;
   std::vector<double> heights_;               ///< by vertex slot
   std::vector<Origin> origins_;               ///< by vertex slot
   std::vector<State> states_;                 ///< by triangle slot
   std::vector<stream::ClusterId> read_;       ///< in reading order
   std::vector<Triangulation::Point> places_;  ///< to be inserted
-  std::vector<Taken> taken_;                  ///< for places_
+  std::vector<NewPoint> new_points_;          ///< for places_
   std::vector<Pending> pending_;
-  std::size_t left_ = 0;  ///< of pending_, not taken
+  std::size_t pending_count_ = 0;  ///< of pending_, not taken
   std::vector<Outer> outer_;
   BoxForest groups_;  ///< of pending_
   std::vector<Triangulation::Insertion> inserted_;

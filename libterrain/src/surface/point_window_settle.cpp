@@ -66,13 +66,13 @@ void PointWindow::settle() {
   // With its corners, the hull is that of the whole, so only circles can lack points. The corners
   // get their heights when their clusters are read.
   for (const Point2& corner : cloud_.hull.corners()) take_distant({corner, kUnknownHeight});
-  insert_taken();
+  insert_new_points();
   examine_changes();
   for (unsigned round = 1; add_missing(); ++round) {
     // Where clusters have no missing points, more of them are read together.
     clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMostDoublings);
     cloud_.store.check_stop();
-    insert_taken();
+    insert_new_points();
     examine_changes();
   }
   triangulation_.stop_journal();
@@ -157,12 +157,13 @@ bool PointWindow::widen() {
   const auto at = reaches_.begin() +
                   static_cast<std::ptrdiff_t>(kWidened * static_cast<double>(reaches_.size() - 1));
   std::nth_element(reaches_.begin(), at, reaches_.end());
-  const double most = kMostWidened * std::max(box_.max[0] - box_.min[0], box_.max[1] - box_.min[1]);
+  const double limit =
+      kMostWidened * std::max(box_.max[0] - box_.min[0], box_.max[1] - box_.min[1]);
   // Slightly more, for rounding.
-  const double more = std::min(*at * (1 + 1e-6), most);
+  const double more = std::min(*at * (1 + 1e-6), limit);
   if (!(more > 0)) return false;
   grow_inner(inner_.widened(more));
-  insert_taken();
+  insert_new_points();
   examine_changes();
   for (const Suspect& suspect : suspects_) {
     if (!inner_.covers(suspect.cover.bounds())) continue;
@@ -191,11 +192,12 @@ bool PointWindow::add_missing() {
 void PointWindow::part(Outer& outer) {
   if (outer.groups.is_built) return;
   const auto at = [&](std::size_t i) { return pending_.begin() + static_cast<std::ptrdiff_t>(i); };
-  const auto taken = std::partition(at(outer.begin), at(outer.begin + outer.count),
-                                    [](const Pending& p) { return p.origin.cluster != kNowhere; });
+  const auto boundary =
+      std::partition(at(outer.begin), at(outer.begin + outer.count),
+                     [](const Pending& p) { return p.origin.cluster != kNowhere; });
   outer.groups = groups_.add(
-      static_cast<std::uint32_t>(outer.begin), static_cast<std::uint32_t>(taken - pending_.begin()),
-      kPointsPerGroup,
+      static_cast<std::uint32_t>(outer.begin),
+      static_cast<std::uint32_t>(boundary - pending_.begin()), kPointsPerGroup,
       [&](std::uint32_t i) {
         return StoredBox{pending_[i].place, pending_[i].place};
       },

@@ -26,21 +26,21 @@ void descend(stream::StoreQuery& query, const StoredBox& box, unsigned level, co
 
 std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const StoredBox& box) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
-  ClusterHeights found{.low = kFar, .high = -kFar, .some = {}};
+  ClusterHeights found{.low = kFar, .high = -kFar, .examples = {}};
   query.cut(
       tall(box),
       [&](const stream::Point3* head, const stream::StoreQuery::Branch& cluster) {
         found.low = std::min(found.low, cluster.box.min[2]);
         found.high = std::max(found.high, cluster.box.max[2]);
-        if (head != nullptr && found.some.size() < kMostSome && box.contains(flat(*head))) {
-          found.some.push_back(*head);
+        if (head != nullptr && found.examples.size() < kMostSome && box.contains(flat(*head))) {
+          found.examples.push_back(*head);
         }
         return true;
       },
       [&](const stream::StoreQuery::Branch& cluster) {
         // The clusters below cannot widen the range.
         const bool known = found.low <= cluster.box.min[2] && found.high >= cluster.box.max[2];
-        return !(known && found.some.size() == kMostSome);
+        return !(known && found.examples.size() == kMostSome);
       });
   if (found.low > found.high) return std::nullopt;
   return found;

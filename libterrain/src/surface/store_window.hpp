@@ -43,8 +43,8 @@ inline stream::Box3 tall(const StoredBox& box) {
 
 /// Bounds on the heights of the points in a box, from the index alone.
 struct ClusterHeights {
-  double low = 0.0, high = 0.0;      ///< stored; over all clusters that meet the box
-  std::vector<stream::Point3> some;  ///< a few points in the box, if any were met
+  double low = 0.0, high = 0.0;          ///< stored; over all clusters that meet the box
+  std::vector<stream::Point3> examples;  ///< a few points in the box, if any were met
 };
 /// Returns nullopt if no cluster meets the box. Throws: stream::Error on a damaged store.
 std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const StoredBox& box);

@@ -17,15 +17,15 @@ constexpr std::size_t kMostMissing = 512;
 
 class FrameReader final : public ClusterReader {
  public:
-  FrameReader(FramedSource& source, std::function<bool(const stream::ByteRange&)> given)
-      : source_(source), given_(std::move(given)) {}
+  FrameReader(FramedSource& source, std::function<bool(const stream::ByteRange&)> has_arrived)
+      : source_(source), has_arrived_(std::move(has_arrived)) {}
 
   void bring(double seconds, const Give& give, const GiveRecord& give_record) override {
     const tri::StepBudget budget{.seconds = kReadingShare * seconds, .clock = steady_seconds};
     meter_.start(budget);
     missing_.clear();
-    if (!given_ || lacking_.size() > 8 * kMostMissing) lacking_.clear();
-    if (!given_ || lacking_pages_.size() > 8 * kMostMissing) lacking_pages_.clear();
+    if (!has_arrived_ || lacking_.size() > 8 * kMostMissing) lacking_.clear();
+    if (!has_arrived_ || lacking_pages_.size() > 8 * kMostMissing) lacking_pages_.clear();
     ++number_;
     const double end = steady_seconds() + kMissingShare * seconds;
     for (const tri::ViewRequest& request : wanted_) {
@@ -65,9 +65,9 @@ class FrameReader final : public ClusterReader {
     std::uint64_t listed = 0;  ///< the last frame that added it to missing_
   };
 
-  /// Whether missing bytes have arrived. Without `given`, every frame tries to read them.
+  /// Whether missing bytes have arrived. Without `has_arrived`, every frame tries to read them.
   [[nodiscard]] bool has_come(const stream::ByteRange& range) const {
-    return given_ && given_(range);
+    return has_arrived_ && has_arrived_(range);
   }
 
   /// Returns false when the time is over.
@@ -94,7 +94,7 @@ class FrameReader final : public ClusterReader {
   }
 
   FramedSource& source_;
-  std::function<bool(const stream::ByteRange&)> given_;
+  std::function<bool(const stream::ByteRange&)> has_arrived_;
   std::vector<tri::ViewRequest> wanted_;  ///< by the previous step
   std::vector<stream::ByteRange> missing_;
   /// The ranges that each cluster lacked in the last attempt to read it.
@@ -147,7 +147,7 @@ tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
   return members;
 }
 
-tri::LoadedCluster FramedSource::whole(const std::function<tri::LoadedCluster()>& load) {
+tri::LoadedCluster FramedSource::retry(const std::function<tri::LoadedCluster()>& load) {
   tri::LoadedCluster cluster = load();
   if (!missing_.empty()) throw stream::MissingBytes(missing_);
   return cluster;
@@ -157,13 +157,13 @@ tri::LoadedCluster FramedSource::load(const tri::ViewRequest& request) {
   missing_pages_.clear();
   missing_.clear();
   if (bounds_) return tri::load(*this, request);
-  return whole([&] { return tri::load(*this, request); });
+  return retry([&] { return tri::load(*this, request); });
 }
 
 tri::LoadedCluster FramedSource::load_root() {
   missing_pages_.clear();
   missing_.clear();
-  return whole([&] { return tri::load_root(*this); });
+  return retry([&] { return tri::load_root(*this); });
 }
 
 std::vector<std::uint64_t> FramedSource::counts() const {
@@ -173,8 +173,8 @@ std::vector<std::uint64_t> FramedSource::counts() const {
 }
 
 std::unique_ptr<ClusterReader> make_frame_reader(
-    FramedSource& source, std::function<bool(const stream::ByteRange&)> given) {
-  return std::make_unique<FrameReader>(source, std::move(given));
+    FramedSource& source, std::function<bool(const stream::ByteRange&)> has_arrived) {
+  return std::make_unique<FrameReader>(source, std::move(has_arrived));
 }
 
 }  // namespace terrace::terrain

@@ -55,7 +55,7 @@ class FramedSource final : public tri::ClusterSource {
   [[nodiscard]] std::vector<std::uint64_t> counts() const;
 
  private:
-  tri::LoadedCluster whole(const std::function<tri::LoadedCluster()>& load);
+  tri::LoadedCluster retry(const std::function<tri::LoadedCluster()>& load);
 
   const stream::Store& store_;
   StoreSource inner_;
@@ -92,9 +92,9 @@ class ClusterReader {
 };
 
 /// Makes a reader in the calling thread, within the frame's time. Missing bytes are not an error:
-/// it tries again once they are `given` or, if that is empty, in every frame.
+/// it tries again once `has_arrived` says so or, if that is empty, in every frame.
 std::unique_ptr<ClusterReader> make_frame_reader(
-    FramedSource& source, std::function<bool(const stream::ByteRange&)> given = {});
+    FramedSource& source, std::function<bool(const stream::ByteRange&)> has_arrived = {});
 /// Makes a reader with its own thread.
 std::unique_ptr<ClusterReader> make_reading_thread(FramedSource& source);
 

@@ -31,33 +31,34 @@ class ReadingThread final : public ClusterReader {
   // Neither bring() nor ask() waits for the thread: if it holds the lock, the next frame tries
   // again.
   void bring(double seconds, const Give& give, const GiveRecord&) override {
-    if (next_ == taken_.size()) {
-      taken_.clear();
+    if (next_ == delivered_.size()) {
+      delivered_.clear();
       next_ = 0;
       const std::unique_lock lock(mutex_, std::try_to_lock);
       if (!lock) return;
       if (failure_) std::rethrow_exception(failure_);
-      taken_.swap(ready_);
+      delivered_.swap(ready_);
     }
     const double end = steady_seconds() + kReadingShare * seconds;
-    while (next_ < taken_.size() && steady_seconds() < end) give(std::move(taken_[next_++]));
+    while (next_ < delivered_.size() && steady_seconds() < end)
+      give(std::move(delivered_[next_++]));
   }
   void ask(const std::vector<tri::ViewRequest>&, const std::vector<tri::ViewRequest>& requests,
            const std::vector<tri::ClusterId>& withdrawn) override {
-    std::erase_if(asked_, [&](const tri::ViewRequest& request) {
+    std::erase_if(requested_, [&](const tri::ViewRequest& request) {
       return std::binary_search(withdrawn.begin(), withdrawn.end(), request.cluster);
     });
-    asked_.insert(asked_.end(), requests.begin(), requests.end());
+    requested_.insert(requested_.end(), requests.begin(), requests.end());
     withdrawn_.insert(withdrawn.begin(), withdrawn.end());
     for (const tri::ViewRequest& request : requests) withdrawn_.erase(request.cluster);
-    if (asked_.empty() && withdrawn_.empty()) return;
+    if (requested_.empty() && withdrawn_.empty()) return;
     const std::unique_lock lock(mutex_, std::try_to_lock);
     if (!lock) return;
     if (!withdrawn_.empty()) {
       std::erase_if(queue_, [&](const auto& request) { return withdrawn_.count(request.cluster); });
     }
-    queue_.insert(queue_.end(), asked_.begin(), asked_.end());
-    asked_.clear();
+    queue_.insert(queue_.end(), requested_.begin(), requested_.end());
+    requested_.clear();
     withdrawn_.clear();
     wake_.notify_one();
   }
@@ -83,9 +84,9 @@ class ReadingThread final : public ClusterReader {
   }
 
   FramedSource& source_;
-  std::vector<tri::LoadedCluster> taken_;
-  std::size_t next_ = 0;                          ///< the next of taken_ to pass on
-  std::vector<tri::ViewRequest> asked_;           ///< not yet in queue_
+  std::vector<tri::LoadedCluster> delivered_;
+  std::size_t next_ = 0;                          ///< the next of delivered_ to pass on
+  std::vector<tri::ViewRequest> requested_;       ///< not yet in queue_
   std::unordered_set<tri::ClusterId> withdrawn_;  ///< may still be in queue_
   std::mutex mutex_;                              ///< for the members below
   std::condition_variable wake_;

@@ -29,9 +29,9 @@ template <class Shown>
 struct StoreView<Shown>::Impl {
   using MakeReader = std::function<std::unique_ptr<ClusterReader>(FramedSource&)>;
 
-  Impl(const stream::Store& given, const stream::LinearMap& ground, const tri::ViewOptions& options,
+  Impl(const stream::Store& input, const stream::LinearMap& ground, const tri::ViewOptions& options,
        const MakeReader& make_reader)
-      : store(given),
+      : store(input),
         frame(store, ground),
         lattice(store, frame),
         source(store, frame, shows_surface<Shown> ? &lattice : nullptr, options.silhouette == 1.0),
@@ -58,9 +58,9 @@ struct StoreView<Shown>::Impl {
 template <class Shown>
 StoreView<Shown>::StoreView(const stream::Store& store, const stream::LinearMap& ground,
                             const tri::ViewOptions& options,
-                            std::function<bool(const stream::ByteRange&)> given)
+                            std::function<bool(const stream::ByteRange&)> input)
     : impl_(std::make_unique<Impl>(store, ground, options, [&](FramedSource& source) {
-        return make_frame_reader(source, std::move(given));
+        return make_frame_reader(source, std::move(input));
       })) {}
 
 template <class Shown>
@@ -76,9 +76,9 @@ const typename StoreView<Shown>::Step& StoreView<Shown>::frame(const tri::View& 
       [&](tri::ClusterId id, const tri::ClusterRecord& record) {
         impl_->control.give_record(id, record);
       });
-  const double left = seconds - (steady_seconds() - begin);
+  const double remaining = seconds - (steady_seconds() - begin);
   const Step& step =
-      impl_->control.step(view, {.seconds = left, .clock = steady_seconds, .after = after});
+      impl_->control.step(view, {.seconds = remaining, .clock = steady_seconds, .after = after});
   impl_->reader->ask(step.wanted, step.requests, step.withdrawn);
   impl_->settled = step.settled && step.wanted.empty();
   return step;
@@ -100,8 +100,8 @@ std::span<const stream::ByteRange> StoreView<Shown>::missing() const {
 }
 
 template <class Shown>
-void StoreView<Shown>::pin(tri::ClusterId cluster, tri::ViewPin how) {
-  impl_->control.pin(cluster, how);
+void StoreView<Shown>::pin(tri::ClusterId cluster, tri::ViewPin kind) {
+  impl_->control.pin(cluster, kind);
 }
 
 template <class Shown>
@@ -186,9 +186,9 @@ std::span<const std::byte> StoreView<Shown>::attributes(tri::VertexId vertex) co
   if (tri::level_of(id.cluster) == model().top()) {
     return std::span(impl_->root_values).subspan(id.index * bytes, bytes);
   }
-  const tri::LoadedCluster* const given = control().cached_cluster(id.cluster);
-  if (given == nullptr) return {};
-  return std::span(given->values).subspan(id.index * bytes, bytes);
+  const tri::LoadedCluster* const cached = control().cached_cluster(id.cluster);
+  if (cached == nullptr) return {};
+  return std::span(cached->values).subspan(id.index * bytes, bytes);
 }
 
 template <class Shown>

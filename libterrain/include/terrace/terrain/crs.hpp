@@ -208,7 +208,7 @@ class RegionConversion {
   [[nodiscard]] Region operator()(Region region) const;
   /// Returns the conversion from the CRS of the data to the CRS of a GeoJSON file with places in
   /// `box`; nullopt if the file uses the CRS of the data. Throws: as above.
-  [[nodiscard]] std::optional<Transformation> to_places(const PlacesCrs& given,
+  [[nodiscard]] std::optional<Transformation> to_places(const PlacesCrs& places_crs,
                                                         const stream::Box3& box) const;
   /// Sets the function that receives notes: assumptions about the CRS of a GeoJSON file, and the
   /// operation that converts from it.
@@ -221,7 +221,7 @@ class RegionConversion {
     if (note_ && !line.empty()) note_(line);
   }
 
-  bool given_ = false;  ///< one CRS for all regions, which overrides their own
+  bool overrides_ = false;  ///< one CRS for all regions, which overrides their own
   std::optional<Transformation> to_regions_;
   std::function<std::optional<CoordinateSystem>()> system_;  ///< of the data, computed when needed
   std::function<void(const std::string&)> note_;

@@ -79,12 +79,12 @@ class StoreView {
                      Reader reader = Reader::thread);
   /// For stores with missing bytes (stream::GivenBytes), read by the calling thread within the
   /// frame's time. ground: the linear map from stored coordinates to metres, as the other
-  /// constructor computes it and ground() returns it. given: as GivenBytes::has(); with it a frame
-  /// finds out faster that bytes are still missing. Needs neither threads nor PROJ. Throws: as
-  /// above, and stream::MissingBytes.
+  /// constructor computes it and ground() returns it. has_bytes: as GivenBytes::has(); with it a
+  /// frame finds out faster that bytes are still missing. Needs neither threads nor PROJ. Throws:
+  /// as above, and stream::MissingBytes.
   StoreView(const stream::Store& store, const stream::LinearMap& ground,
             const tri::ViewOptions& options,
-            std::function<bool(const stream::ByteRange&)> given = {});
+            std::function<bool(const stream::ByteRange&)> has_bytes = {});
   ~StoreView();
   StoreView(const StoreView&) = delete;
   StoreView& operator=(const StoreView&) = delete;
@@ -104,7 +104,7 @@ class StoreView {
   [[nodiscard]] std::span<const stream::ByteRange> missing() const;
 
   /// As in tri::ViewControl.
-  void pin(tri::ClusterId cluster, tri::ViewPin how);
+  void pin(tri::ClusterId cluster, tri::ViewPin kind);
   void unpin(tri::ClusterId cluster);
 
   [[nodiscard]] const Control& control() const;

@@ -27,7 +27,7 @@ class UndeclaredVoids {
 
  private:
   static constexpr std::size_t kUsual = 8;
-  struct Seen {
+  struct Tally {
     std::uint64_t beyond = 0;  ///< impossible heights
     double value = 0;          ///< one of them, stored
     std::array<std::uint64_t, kUsual> usual{};
@@ -42,7 +42,7 @@ class UndeclaredVoids {
 
   const stream::SourceInfo& info_;
   std::mutex mutex_;
-  Seen seen_;
+  Tally tally_;
 };
 
 }  // namespace terrace::terrain

@@ -211,8 +211,8 @@ bool agrees(const GeoKeyValues& keys, const PJ* base) {
   proj_ellipsoid_get_parameters(context, ellipsoid.get(), &major, &minor, nullptr, &inverse);
   proj_prime_meridian_get_parameters(context, meridian.get(), &longitude, nullptr, nullptr);
   const auto is = [&keys](int key, double value, double tolerance) {
-    const auto given = keys.number(key);
-    return !given || std::abs(*given - value) <= tolerance;
+    const auto recorded = keys.number(key);
+    return !recorded || std::abs(*recorded - value) <= tolerance;
   };
   return is(2057, major, 1e-3) && is(2058, minor, 1e-3) && is(2059, inverse, 1e-6) &&
          is(2061, longitude, 1e-9);
@@ -364,7 +364,7 @@ CrsDefinition definition_of_geo_keys(const stream::Crs& crs) {
   const GeoKeyValues keys(crs);
   PJ_CONTEXT* const context = proj_context();
   const ProjObject base = base_of(keys);
-  ProjObject whole;
+  ProjObject complete;
   if (keys.code(1024) != 2) {
     const double metres = keys.metres_per_unit();
     if (metres == 0) throw fault("its linear unit is missing (GeoKey 3076)");
@@ -373,12 +373,12 @@ CrsDefinition definition_of_geo_keys(const stream::Crs& crs) {
                                                       metres == 1 ? "metre" : "unknown", metres));
     std::string name = part_of(crs.name, "PCS Name");
     if (name.empty()) name = crs.name;
-    whole = required(
+    complete = required(
         ProjObject(proj_create_projected_crs(context, name.empty() ? "unnamed" : name.c_str(),
                                              base.get(), conversion.get(), axes.get())),
         "its projection is impossible");
   }
-  CrsDefinition definition = read_definition(whole != nullptr ? whole.get() : base.get());
+  CrsDefinition definition = read_definition(complete != nullptr ? complete.get() : base.get());
   read_shift(keys, definition);
   settle_code(definition);
   return definition;
@@ -411,8 +411,8 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
     return keys.number(row.key).has_value();
   });
   if (!parameters) return;
-  const ProjObject own = proj_crs_of_text(definition.wkt);
-  const ProjObject conversion(proj_crs_get_coordoperation(proj_context(), own.get()));
+  const ProjObject crs_object = proj_crs_of_text(definition.wkt);
+  const ProjObject conversion(proj_crs_get_coordoperation(proj_context(), crs_object.get()));
   const std::vector<ConversionParameter> meant = parameters_of(conversion.get());
   const double angle = keys.degrees_per_unit();
   const auto is_parallel = [](Role role) {
@@ -422,9 +422,9 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
     const auto value = keys.number(row.key);
     if (!value) continue;
     const ParameterKind kind = kind_of(row.role);
-    const double given = *value * (kind == ParameterKind::angle                 ? angle
-                                   : kind == ParameterKind::length && unit != 0 ? unit
-                                                                                : 1.0);
+    const double recorded = *value * (kind == ParameterKind::angle                 ? angle
+                                      : kind == ParameterKind::length && unit != 0 ? unit
+                                                                                   : 1.0);
     // Keys that the method does not use are ignored; two parallels may be in either order.
     bool known = false, good = false;
     for (const ConversionParameter& parameter : meant) {
@@ -433,8 +433,8 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
         continue;
       }
       known = true;
-      good = good || std::abs(given - parameter.value) <=
-                         1e-8 * std::max({1.0, std::abs(given), std::abs(parameter.value)});
+      good = good || std::abs(recorded - parameter.value) <=
+                         1e-8 * std::max({1.0, std::abs(recorded), std::abs(parameter.value)});
     }
     if (known && !good) {
       throw contradiction(fmt::format("GeoKey {} of {:f}", row.key, *value));
@@ -472,11 +472,12 @@ std::vector<stream::GeoKey> geo_keys_of(const CrsDefinition& definition) {
     }
     return keys;
   }
-  const ProjObject own = proj_crs_of_text(definition.wkt);
+  const ProjObject crs_object = proj_crs_of_text(definition.wkt);
   const std::array<const char*, 2> options{"MULTILINE=NO", nullptr};
   const auto written = [&](PJ_WKT_TYPE type) {
-    return own != nullptr ? text_of(proj_as_wkt(proj_context(), own.get(), type, options.data()))
-                          : std::string();
+    return crs_object != nullptr
+               ? text_of(proj_as_wkt(proj_context(), crs_object.get(), type, options.data()))
+               : std::string();
   };
   std::string wkt = written(PJ_WKT1_ESRI);
   // ESRI's form has no axes and does not support the parameters of every method.

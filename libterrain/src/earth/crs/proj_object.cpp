@@ -46,19 +46,19 @@ PJ_CONTEXT* make_proj_context() {
 }
 
 PJ_CONTEXT* proj_context() {
-  thread_local const ThreadContext own;
+  thread_local const ThreadContext thread_context;
   check_proj_database();
-  if (proj_context_get_database_path(own.context) == nullptr) {
+  if (proj_context_get_database_path(thread_context.context) == nullptr) {
     if (database_failure.empty()) database_failure = "Cannot find proj.db";
     check_proj_database();
   }
-  return own.context;
+  return thread_context.context;
 }
 
 void check_proj_database() {
-  const std::string why = std::exchange(database_failure, {});
-  if (why.empty()) return;
-  if (why.find("Cannot find") != why.npos) {
+  const std::string reason = std::exchange(database_failure, {});
+  if (reason.empty()) return;
+  if (reason.find("Cannot find") != reason.npos) {
     throw CrsDatabaseError(
         {.file = "proj.db",
          .cause = "PROJ's database of reference systems is not found",
@@ -66,7 +66,7 @@ void check_proj_database() {
   }
   throw CrsDatabaseError(
       {.file = "proj.db",
-       .cause = "PROJ's database of reference systems cannot be read (" + why + ")",
+       .cause = "PROJ's database of reference systems cannot be read (" + reason + ")",
        .remedy = "check the disk it is on, and how many files a process may open"});
 }
 

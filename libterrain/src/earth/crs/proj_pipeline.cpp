@@ -36,7 +36,7 @@ class Worker {
 class ProjPipeline::Pool {
  public:
   explicit Pool(std::string definition) : definition_(std::move(definition)) {
-    idle_.push_back(made());
+    idle_.push_back(create_worker());
   }
 
   /// Borrows a worker for its lifetime.
@@ -56,14 +56,15 @@ class ProjPipeline::Pool {
   [[nodiscard]] const std::string& definition() const { return definition_; }
 
  private:
-  [[nodiscard]] std::unique_ptr<Worker> made() const {
+  [[nodiscard]] std::unique_ptr<Worker> create_worker() const {
     proj_complaint();
     auto worker = std::make_unique<Worker>(definition_);
     check_proj_database();
     if (worker->operation() == nullptr) {
-      const std::string why = proj_complaint();
-      throw CrsError("PROJ cannot compute '" + definition_ + "'" + (why.empty() ? "" : ": " + why),
-                     stream::message("give another CRS with {crs} EPSG:n"));
+      const std::string reason = proj_complaint();
+      throw CrsError(
+          "PROJ cannot compute '" + definition_ + "'" + (reason.empty() ? "" : ": " + reason),
+          stream::message("give another CRS with {crs} EPSG:n"));
     }
     return worker;
   }
@@ -76,7 +77,7 @@ class ProjPipeline::Pool {
         return worker;
       }
     }
-    std::unique_ptr<Worker> worker = made();
+    std::unique_ptr<Worker> worker = create_worker();
     // Reserves room now, because giving a worker back must not throw.
     const std::scoped_lock lock(mutex_);
     idle_.reserve(++workers_);

@@ -73,10 +73,10 @@ ProjObject identified(const PJ* geographic) {
 void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
   PJ_CONTEXT* const context = proj_context();
   const ProjObject ellipsoid(proj_get_ellipsoid(context, crs));
-  Ellipsoid& own = definition.ellipsoid;
+  Ellipsoid& parsed = definition.ellipsoid;
   if (ellipsoid == nullptr ||
-      proj_ellipsoid_get_parameters(context, ellipsoid.get(), &own.semi_major, nullptr, nullptr,
-                                    &own.inverse_flattening) == 0) {
+      proj_ellipsoid_get_parameters(context, ellipsoid.get(), &parsed.semi_major, nullptr, nullptr,
+                                    &parsed.inverse_flattening) == 0) {
     throw CrsError("the CRS \"" + definition.name + "\" has no ellipsoid", remedy_by_code());
   }
   const ProjObject meridian(proj_get_prime_meridian(context, crs));
@@ -87,8 +87,8 @@ void read_ellipsoid(const PJ* crs, CrsDefinition& definition) {
   definition.prime_meridian = longitude == 0 ? 0 : longitude * degrees_of(unit);
   const ProjObject datum(proj_crs_get_datum_forced(context, crs));
   if (datum != nullptr) definition.datum = text_of(proj_get_name(datum.get()));
-  if (!(own.semi_major > 0 && std::isfinite(own.semi_major) && own.flattening() >= 0 &&
-        own.flattening() < 0.5)) {
+  if (!(parsed.semi_major > 0 && std::isfinite(parsed.semi_major) && parsed.flattening() >= 0 &&
+        parsed.flattening() < 0.5)) {
     throw CrsError("the CRS \"" + definition.name + "\" has an impossible ellipsoid",
                    remedy_by_code());
   }
@@ -113,12 +113,12 @@ void read_base(const PJ* crs, CrsDefinition& definition) {
   definition.base_epsg = epsg_of(base.get());
   if (definition.base_epsg == 0) {
     if (ProjObject known = identified(base.get())) {
-      CrsDefinition own, other;
-      read_ellipsoid(base.get(), own);
-      read_ellipsoid(known.get(), other);
-      if (std::abs(own.ellipsoid.semi_major / other.ellipsoid.semi_major - 1) < 1e-9 &&
-          std::abs(own.ellipsoid.flattening() - other.ellipsoid.flattening()) < 1e-9 &&
-          own.prime_meridian == other.prime_meridian &&
+      CrsDefinition first, second;
+      read_ellipsoid(base.get(), first);
+      read_ellipsoid(known.get(), second);
+      if (std::abs(first.ellipsoid.semi_major / second.ellipsoid.semi_major - 1) < 1e-9 &&
+          std::abs(first.ellipsoid.flattening() - second.ellipsoid.flattening()) < 1e-9 &&
+          first.prime_meridian == second.prime_meridian &&
           axes_of(base.get()).front().unit == axes_of(known.get()).front().unit) {
         base = std::move(known);
         definition.base_epsg = epsg_of(base.get());

@@ -150,9 +150,9 @@ std::string proj_pipeline_of(const CrsDefinition& definition) {
     }
   }
   check_proj_database();
-  const std::string why = proj_complaint();
+  const std::string reason = proj_complaint();
   throw CrsError("PROJ cannot compute the projection of the CRS " + definition.title() +
-                     (why.empty() ? "" : ": " + why),
+                     (reason.empty() ? "" : ": " + reason),
                  stream::message("give another with {crs} EPSG:n"));
 }
 

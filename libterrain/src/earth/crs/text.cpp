@@ -335,8 +335,8 @@ std::optional<AnyCrs> find_crs(const std::string& text) {
 
 AnyCrs crs_of_contents(const std::string& text) {
   if (auto system = find_crs(text)) return *std::move(system);
-  const std::string why = proj_complaint();
-  throw CrsError("the definition cannot be read" + (why.empty() ? "" : ": " + why),
+  const std::string reason = proj_complaint();
+  throw CrsError("the definition cannot be read" + (reason.empty() ? "" : ": " + reason),
                  remedy_for_text());
 }
 

@@ -24,10 +24,10 @@ BoundedMeshResult mesh_by(BoundedMesher& mesher, const stream::Store& store,
   const double metres = mesher.metres_vertical();
   BoundedMeshResult result;
   std::optional<MeshSpool> spool;
-  const auto run = [&](double bound, std::uint64_t most) {
+  const auto run = [&](double bound, std::uint64_t max_vertices) {
     spool.reset();  // its files have the same names as the next one's
     spool.emplace(options.path);
-    result = mesher.run(bound, *spool, most);
+    result = mesher.run(bound, *spool, max_vertices);
     return static_cast<double>(result.vertices);
   };
   if (options.max_points == 0) {

@@ -17,11 +17,11 @@ std::vector<std::int64_t> cut(std::int64_t first, std::int64_t samples, std::int
 
 }  // namespace
 
-LatticePlan::LatticePlan(const LatticeWindow& whole, std::int64_t cells)
-    : whole_(whole),
-      columns_(cut(whole.column, whole.columns, cells)),
-      rows_(cut(whole.row, whole.rows, cells)) {
-  assert(whole.columns > 0 && whole.rows > 0 && cells > 0);
+LatticePlan::LatticePlan(const LatticeWindow& lattice, std::int64_t cells)
+    : lattice_(lattice),
+      columns_(cut(lattice.column, lattice.columns, cells)),
+      rows_(cut(lattice.row, lattice.rows, cells)) {
+  assert(lattice.columns > 0 && lattice.rows > 0 && cells > 0);
 }
 
 LatticeWindow LatticePlan::window(std::size_t i) const {
@@ -38,8 +38,8 @@ LatticePlan::Sample LatticePlan::sample(std::size_t i, std::int64_t column,
   const bool east = column + 1 == window.columns && x + 1 < across();
   const bool south = row + 1 == window.rows && y + 1 < down();
   Sample sample;
-  sample.place = static_cast<std::uint64_t>((window.row + row - whole_.row) * whole_.columns +
-                                            window.column + column - whole_.column);
+  sample.place = static_cast<std::uint64_t>((window.row + row - lattice_.row) * lattice_.columns +
+                                            window.column + column - lattice_.column);
   sample.windows = (west || east ? 2U : 1U) * (north || south ? 2U : 1U);
   sample.last = (south ? y + 1 : y) * across() + (east ? x + 1 : x);
   return sample;

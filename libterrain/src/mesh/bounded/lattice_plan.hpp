@@ -15,7 +15,7 @@ class LatticePlan {
  public:
   /// whole: at least 1 sample along each axis. cells: the target size of a window along each axis;
   /// windows are equal to within one cell and at most 1.5 times as large.
-  LatticePlan(const LatticeWindow& whole, std::int64_t cells);
+  LatticePlan(const LatticeWindow& lattice, std::int64_t cells);
 
   [[nodiscard]] std::size_t across() const { return columns_.size() - 1; }
   [[nodiscard]] std::size_t down() const { return rows_.size() - 1; }
@@ -33,7 +33,7 @@ class LatticePlan {
   [[nodiscard]] Sample sample(std::size_t i, std::int64_t column, std::int64_t row) const;
 
  private:
-  LatticeWindow whole_;
+  LatticeWindow lattice_;
   std::vector<std::int64_t> columns_, rows_;  ///< of the sides
 };
 

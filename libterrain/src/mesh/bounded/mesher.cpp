@@ -24,16 +24,16 @@ stream::Box3 meshed_box(const stream::Store& store, const std::optional<Region>&
   const stream::Box3& inside = region->box();
   stream::Box3 box = inside;
   if (store.schema().grid) {
-    constexpr double kBeside = 2;  // in cells
-    stream::Box3 wanted;
+    constexpr double kMargin = 2;  // in cells
+    stream::Box3 wanted_box;
     for (unsigned corner = 0; corner < 4; ++corner) {
       const Point2 place = stored_place(placement, {((corner & 1) ? inside.max : inside.min)[0],
                                                     ((corner & 2) ? inside.max : inside.min)[1]});
-      wanted.include(stream::Point3{place[0], place[1], 0});
+      wanted_box.include(stream::Point3{place[0], place[1], 0});
     }
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      stored.min[axis] = std::max(stored.min[axis], wanted.min[axis] - kBeside);
-      stored.max[axis] = std::min(stored.max[axis], wanted.max[axis] + kBeside);
+      stored.min[axis] = std::max(stored.min[axis], wanted_box.min[axis] - kMargin);
+      stored.max[axis] = std::min(stored.max[axis], wanted_box.max[axis] + kMargin);
       if (!(stored.min[axis] <= stored.max[axis])) return all;
     }
     box = world_box(placement, stored);

@@ -25,21 +25,21 @@ constexpr double kSlack = 0.05;
 
 class Cutter {
  public:
-  Cutter(std::vector<Point2> some, std::uint64_t period, std::size_t most)
-      : some_(std::move(some)),
+  Cutter(std::vector<Point2> sample, std::uint64_t period, std::size_t max_per_cell)
+      : sample_(std::move(sample)),
         period_(static_cast<double>(period)),
-        most_(static_cast<double>(most)) {}
+        max_per_cell_(static_cast<double>(max_per_cell)) {}
 
   PointMeshCuts make() {
-    Part whole;
-    whole.end = some_.size();
-    cuts_.root = divide(whole);
+    Part all_points;
+    all_points.end = sample_.size();
+    cuts_.root = divide(all_points);
     return std::move(cuts_);
   }
 
  private:
   struct Part {
-    std::size_t begin = 0, end = 0;  ///< range in some_
+    std::size_t begin = 0, end = 0;  ///< range in sample_
     double cells = 0.0;              ///< number of cells to divide it into; 0: unknown
     PlaneBox box;
   };
@@ -56,26 +56,27 @@ class Cutter {
   [[nodiscard]] std::array<Point2, 2> bounds(const Part& part) const;
   std::uint32_t add_cell(const Part& part);
 
-  std::vector<Point2> some_;
-  double period_, most_;
+  std::vector<Point2> sample_;
+  double period_, max_per_cell_;
   PointMeshCuts cuts_;
 };
 
 std::uint32_t Cutter::divide(const Part& part) {
   const double count = static_cast<double>(part.end - part.begin) * period_;
-  if (count <= most_) return add_cell(part);
-  const double cells =
-      part.cells >= 2.0 ? part.cells : std::max(2.0, std::ceil(count / (kFullness * most_)));
+  if (count <= max_per_cell_) return add_cell(part);
+  const double cells = part.cells >= 2.0
+                           ? part.cells
+                           : std::max(2.0, std::ceil(count / (kFullness * max_per_cell_)));
   const double lower_cells = std::floor(cells / 2.0);
   const auto line = line_for(part, lower_cells / cells, kSlack / cells);
   if (!line) return add_cell(part);
 
   const unsigned axis = line->axis;
-  const auto middle = std::partition(some_.begin() + static_cast<std::ptrdiff_t>(part.begin),
-                                     some_.begin() + static_cast<std::ptrdiff_t>(part.end),
+  const auto middle = std::partition(sample_.begin() + static_cast<std::ptrdiff_t>(part.begin),
+                                     sample_.begin() + static_cast<std::ptrdiff_t>(part.end),
                                      [&](const Point2& p) { return p[axis] < line->at; });
   Part lower = part, upper = part;
-  lower.end = upper.begin = static_cast<std::size_t>(middle - some_.begin());
+  lower.end = upper.begin = static_cast<std::size_t>(middle - sample_.begin());
   lower.box.max[axis] = upper.box.min[axis] = line->at;
   lower.cells = line->balanced ? lower_cells : 0.0;
   upper.cells = line->balanced ? cells - lower_cells : 0.0;
@@ -89,11 +90,11 @@ std::uint32_t Cutter::divide(const Part& part) {
 }
 
 std::array<Point2, 2> Cutter::bounds(const Part& part) const {
-  Point2 low = some_[part.begin], high = low;
+  Point2 low = sample_[part.begin], high = low;
   for (std::size_t i = part.begin; i < part.end; ++i) {
     for (std::size_t k = 0; k < 2; ++k) {
-      low[k] = std::min(low[k], some_[i][k]);
-      high[k] = std::max(high[k], some_[i][k]);
+      low[k] = std::min(low[k], sample_[i][k]);
+      high[k] = std::max(high[k], sample_[i][k]);
     }
   }
   return {low, high};
@@ -114,7 +115,7 @@ std::optional<Cutter::Line> Cutter::line_along(const Part& part, unsigned axis, 
                                                double slack) const {
   std::vector<double> at;
   at.reserve(part.end - part.begin);
-  for (std::size_t i = part.begin; i < part.end; ++i) at.push_back(some_[i][axis]);
+  for (std::size_t i = part.begin; i < part.end; ++i) at.push_back(sample_[i][axis]);
   const auto last = static_cast<double>(at.size() - 1);
   const auto first_rank = static_cast<std::size_t>(std::max(0.0, (share - slack) * last));
   const auto last_rank = static_cast<std::size_t>(std::min(last, (share + slack) * last + 1.0));
@@ -129,13 +130,13 @@ std::optional<Cutter::Line> Cutter::line_along(const Part& part, unsigned axis, 
   // Prefer the widest gap; in a lattice, where all are equal, the nearest. If all ranks are
   // allowed, take the nearest, however narrow.
   const bool any = slack >= 1.0;
-  const double wanted = share * last;
+  const double target_rank = share * last;
   double best = 0.0, lower = 0.0, upper = 0.0;
   for (std::size_t rank = first_rank; rank < last_rank; ++rank) {
     const double gap = at[rank + 1] - at[rank];
     if (!(gap > 0.0)) continue;
-    const double away = std::abs(static_cast<double>(rank) + 0.5 - wanted) / (last + 1.0);
-    const double worth = any ? 1.0 / (1.0 + away * last) : gap * (1.0 - away);
+    const double distance = std::abs(static_cast<double>(rank) + 0.5 - target_rank) / (last + 1.0);
+    const double worth = any ? 1.0 / (1.0 + distance * last) : gap * (1.0 - distance);
     if (worth > best) {
       best = worth;
       lower = at[rank];
@@ -147,8 +148,8 @@ std::optional<Cutter::Line> Cutter::line_along(const Part& part, unsigned axis, 
   if (line == lower) {
     // There is no number between, so the line passes through samples; some must be above it.
     line = upper;
-    const bool more = std::any_of(some_.begin() + static_cast<std::ptrdiff_t>(part.begin),
-                                  some_.begin() + static_cast<std::ptrdiff_t>(part.end),
+    const bool more = std::any_of(sample_.begin() + static_cast<std::ptrdiff_t>(part.begin),
+                                  sample_.begin() + static_cast<std::ptrdiff_t>(part.end),
                                   [&](const Point2& p) { return p[axis] > line; });
     if (!more) return std::nullopt;
   }
@@ -187,8 +188,8 @@ void for_each_sample(const stream::Store& store, const Detail& detail, unsigned 
                      const std::function<void(std::span<const stream::Point3>)>& show) {
   if (!places.has_effect()) return for_each_wanted_place(store, detail, threads, show);
   std::vector<stream::Point3> moved;
-  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> own) {
-    moved.assign(own.begin(), own.end());
+  for_each_wanted_place(store, detail, threads, [&](std::span<const stream::Point3> placed) {
+    moved.assign(placed.begin(), placed.end());
     places(std::span<stream::Point3>(moved));
     show(moved);
   });
@@ -216,8 +217,9 @@ double number_between(double a, double b) {
   }
 }
 
-PointMeshCuts cut_for_point_mesh(std::vector<Point2> some, std::uint64_t period, std::size_t most) {
-  return Cutter(std::move(some), period, most).make();
+PointMeshCuts cut_for_point_mesh(std::vector<Point2> sample, std::uint64_t period,
+                                 std::size_t max_per_cell) {
+  return Cutter(std::move(sample), period, max_per_cell).make();
 }
 
 double merged_height(std::span<const double> heights, tri::PointDuplicates duplicates) {
@@ -310,12 +312,12 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
   std::vector<stream::Point3> chunk(chunk_points_);
   const auto bytes = std::as_writable_bytes(std::span(chunk));
   for (const std::uint32_t number : chunks_[cell]) {
-    std::size_t got = 0;
+    std::size_t read_bytes = 0;
     {
       const std::lock_guard lock(mutex_);
-      got = file_.read_at(std::uint64_t{number} * bytes.size(), bytes);
+      read_bytes = file_.read_at(std::uint64_t{number} * bytes.size(), bytes);
     }
-    if (got != bytes.size()) {
+    if (read_bytes != bytes.size()) {
       throw stream::Error(file_.target().string(), "a temporary file was truncated while in use")
           .at_byte(number * bytes.size())
           .remedy("check the disk and run again");
@@ -328,7 +330,7 @@ void PointMeshSamples::read_cell(std::size_t cell, const PlaneBox& box, MeshSamp
 PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, std::size_t few,
                               unsigned threads, const PlaceConversion& places) {
   PointMeshScan scan;
-  scan.whole.emplace();
+  scan.all.emplace();
   StreamingHull hull;
   const auto add = [&](const stream::Point3& p) {
     if (!(std::abs(p[0]) < kLargest && std::abs(p[1]) < kLargest && std::abs(p[2]) < kLargest)) {
@@ -337,26 +339,26 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
           .remedy(stream::message("leave it out of the store, or of the {region}"));
     }
     if (scan.samples % scan.period == 0) {
-      if (scan.some.size() == kMostPlaces) {
-        thin_out(scan.some);
+      if (scan.sample.size() == kMostPlaces) {
+        thin_out(scan.sample);
         scan.period *= 2;
       }
-      if (scan.samples % scan.period == 0) scan.some.push_back({p[0], p[1]});
+      if (scan.samples % scan.period == 0) scan.sample.push_back({p[0], p[1]});
     }
     ++scan.samples;
     hull.add({p[0], p[1]});
-    if (!scan.whole) return;
+    if (!scan.all) return;
     if (scan.samples > few) {
-      scan.whole.reset();
+      scan.all.reset();
     } else {
-      scan.whole->add(p);
+      scan.all->add(p);
     }
   };
   for_each_sample(store, detail, threads, places, [&](std::span<const stream::Point3> samples) {
     for (const stream::Point3& p : samples) add(p);
   });
-  if (scan.whole) {
-    scan.some = {};
+  if (scan.all) {
+    scan.sample = {};
   } else {
     scan.hull = hull.corners();
   }

@@ -77,7 +77,8 @@ struct PointMeshCuts {
 /// Where possible, lines are between samples of `some`, in the widest gap near the ideal position.
 /// Other samples may be on a line; they belong to the cell above. Depends only on the arguments.
 /// O(n log n) for n samples in `some`.
-PointMeshCuts cut_for_point_mesh(std::vector<Point2> some, std::uint64_t period, std::size_t most);
+PointMeshCuts cut_for_point_mesh(std::vector<Point2> sample, std::uint64_t period,
+                                 std::size_t max_per_cell);
 
 /// Returns a number with few binary digits strictly between a and b, not close to either; a if
 /// there is none between. Requires a < b.
@@ -150,9 +151,9 @@ class PointMeshSamples {
 /// The result of one pass over the samples of a region.
 struct PointMeshScan {
   std::uint64_t samples = 0;
-  std::optional<MeshSamples> whole;  ///< all samples, if they are few
+  std::optional<MeshSamples> all;  ///< all samples, if they are few
   // Otherwise:
-  std::vector<Point2> some;  ///< every `period`-th place
+  std::vector<Point2> sample;  ///< every `period`-th place
   std::uint64_t period = 1;
   std::vector<Point2> hull;  ///< convex_hull() of all samples
 };

@@ -35,7 +35,7 @@ constexpr double kPointsPerMeshWindow = 10000.0;
 constexpr double kMostMeshCells = 4.0;
 /// Memory for reading per thread, and for everything else.
 constexpr std::uint64_t kBytesPerReader = std::uint64_t{12} << 20;
-constexpr std::uint64_t kBytesBeside = std::uint64_t{48} << 20;
+constexpr std::uint64_t kFixedBytes = std::uint64_t{48} << 20;
 
 /// The middle's share of a cell's width and height: about an eighth of its area.
 constexpr double kMiddle = 0.35;
@@ -74,9 +74,9 @@ double PointMeshEstimate::in_cell(std::uint32_t number, double max_error) const 
   PlaneBox box;
   for (std::size_t k = 0; k < 2; ++k) {
     const double middle = cell.low[k] / 2.0 + cell.high[k] / 2.0;
-    const double reach = kMiddle * (cell.high[k] - cell.low[k]) / 2.0;
-    box.min[k] = middle - reach;
-    box.max[k] = middle + reach;
+    const double half_size = kMiddle * (cell.high[k] - cell.low[k]) / 2.0;
+    box.min[k] = middle - half_size;
+    box.max[k] = middle + half_size;
   }
   MeshSamples samples;
   samples_.read(number, 1, box, samples);
@@ -110,12 +110,12 @@ class PointMesher final : public BoundedMesher {
   [[nodiscard]] bool can_estimate() const override { return samples_.has_value(); }
 
  private:
-  [[nodiscard]] bool single() const { return scan_.whole.has_value(); }
+  [[nodiscard]] bool single() const { return scan_.all.has_value(); }
   [[nodiscard]] PointMeshOptions mesh_options(double max_error) const;
   /// Describes the samples at one place: how many places there are, and how much the heights
   /// differ.
   [[nodiscard]] stream::Error shared_places_error() const;
-  BoundedMeshResult run_whole(const PointMeshOptions& options, MeshSpool& spool) const;
+  BoundedMeshResult run_single(const PointMeshOptions& options, MeshSpool& spool) const;
   BoundedMeshResult run_plan(const PointMeshOptions& options, MeshSpool& spool,
                              std::uint64_t most_vertices) const;
   [[nodiscard]] PointMeshPlan plan_for(double max_error) const;
@@ -137,22 +137,21 @@ PointMesher::PointMesher(const stream::Store& store, const BoundedMeshOptions& o
   Detail detail;
   detail.region = options.region;
   scan_ = scan_point_mesh(store, detail, options.window_points, context.threads, options.places);
-  if (!scan_.whole && scan_.hull.size() >= 3) {
-    cuts_ = cut_for_point_mesh(std::move(scan_.some), scan_.period, options.window_points);
-    scan_.some = {};
+  if (!scan_.all && scan_.hull.size() >= 3) {
+    cuts_ = cut_for_point_mesh(std::move(scan_.sample), scan_.period, options.window_points);
+    scan_.sample = {};
     samples_.emplace(store, detail, cuts_, options.path, context.threads, options.places);
-    std::uint64_t most = 0;
+    std::uint64_t max_points = 0;
     for (std::uint32_t i = 0; i < cuts_.cells.size(); ++i) {
-      most = std::max<std::uint64_t>(most, samples_->count(i, 1));
+      max_points = std::max<std::uint64_t>(max_points, samples_->count(i, 1));
     }
-    cell_threads_ = threads_for(most * kBytesPerPoint, most);
+    cell_threads_ = threads_for(max_points * kBytesPerPoint, max_points);
   }
   reading_seconds_ = reading.seconds();
 }
 
 unsigned PointMesher::threads_for(std::uint64_t each, std::uint64_t points) const {
-  return threads_within_memory(single() ? each : each + kBytesPerReader,
-                               single() ? 0 : kBytesBeside,
+  return threads_within_memory(single() ? each : each + kBytesPerReader, single() ? 0 : kFixedBytes,
                                " for " + with_commas(points) + " irregular points at a time");
 }
 
@@ -168,11 +167,11 @@ PointMeshOptions PointMesher::mesh_options(double max_error) const {
   return out;
 }
 
-BoundedMeshResult PointMesher::run_whole(const PointMeshOptions& options, MeshSpool& spool) const {
+BoundedMeshResult PointMesher::run_single(const PointMeshOptions& options, MeshSpool& spool) const {
   const Stopwatch meshing;
-  const std::uint64_t points = scan_.whole->size();
+  const std::uint64_t points = scan_.all->size();
   static_cast<void>(threads_for(points * kBytesPerPoint, points));
-  const BoundedWindow mesh = mesh_samples(*scan_.whole, {}, {}, options, rounding_, store_);
+  const BoundedWindow mesh = mesh_samples(*scan_.all, {}, {}, options, rounding_, store_);
   BoundedMeshResult result;
   result.max_error = mesh.measures.max_error;
   result.rms_error = mesh.measures.rms_error;
@@ -214,16 +213,16 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
     return result;
   }
   const PointMeshPlan plan = plan_for(options.tin.max_error);
-  std::uint64_t most = 0, each = 0;
+  std::uint64_t max_points = 0, each = 0;
   for (const PointMeshPlan::Window& window : plan.windows) {
     const std::uint64_t points = samples_->count(window.first_cell, window.cells);
-    most = std::max(most, points);
+    max_points = std::max(max_points, points);
     each = std::max(each, points * (window.cells == 1 ? kBytesPerPoint : kBytesPerSample));
   }
   PointMeshSides sides(plan, *samples_, options.tin.duplicates, options.tin.max_error);
   const PointWindowMesher mesher(plan, *samples_, sides, options, rounding_, store_);
   return run_windows(
-      plan.windows.size(), threads_for(each, most), scan_.samples, spool, most_vertices,
+      plan.windows.size(), threads_for(each, max_points), scan_.samples, spool, most_vertices,
       [&](unsigned, std::size_t i) { return mesher.mesh(i); },
       [&](std::size_t i, const BoundedWindow&) {
         for (const std::uint32_t side : plan.windows[i].sides) {
@@ -234,15 +233,15 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
 
 double PointMesher::estimate(double max_error) const {
   // Removal leaves less than two thirds of the vertices that insertion makes.
-  const double left = options_.quality == tri::TinQuality::greedy ? 1.0 : 0.6;
-  return left * PointMeshEstimate(cuts_, *samples_, options_.duplicates).per_cell(max_error) *
+  const double kept_share = options_.quality == tri::TinQuality::greedy ? 1.0 : 0.6;
+  return kept_share * PointMeshEstimate(cuts_, *samples_, options_.duplicates).per_cell(max_error) *
          static_cast<double>(cuts_.cells.size());
 }
 
 stream::Error PointMesher::shared_places_error() const {
   SharedPlaces shared;
-  if (scan_.whole) {
-    shared.add(*scan_.whole);
+  if (scan_.all) {
+    shared.add(*scan_.all);
   } else {
     for (std::uint32_t cell = 0; cell < cuts_.cells.size(); ++cell) {
       context_.check_stop();
@@ -269,7 +268,7 @@ BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
   BoundedMeshResult result;
   try {
     const PointMeshOptions options = mesh_options(max_error);
-    result = single() ? run_whole(options, spool) : run_plan(options, spool, most_vertices);
+    result = single() ? run_single(options, spool) : run_plan(options, spool, most_vertices);
   } catch (const SamplesShareAPlace&) {
     throw shared_places_error();
   }

@@ -184,22 +184,22 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
   std::size_t places = 0;
   std::vector<double> heights;
   for (const tri::Point3& v : frame) {
-    const std::vector<std::size_t>& own = at[{v[0], v[1]}];
-    if (own.empty()) continue;
+    const std::vector<std::size_t>& indices = at[{v[0], v[1]}];
+    if (indices.empty()) continue;
     heights.clear();
-    for (const std::size_t i : own) heights.push_back(samples.z[i]);
+    for (const std::size_t i : indices) heights.push_back(samples.z[i]);
     const bool differ = duplicates == tri::PointDuplicates::all &&
                         std::count(heights.begin(), heights.end(), v[2]) !=
                             static_cast<std::ptrdiff_t>(heights.size());
     if (differ || merged_height(heights, duplicates) != v[2]) continue;
     ++places;
-    for (const std::size_t i : own) out[i] = 1;
+    for (const std::size_t i : indices) out[i] = 1;
   }
-  MeshSamples left;
+  MeshSamples remaining;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (out[i] == 0) left.add({samples.x[i], samples.y[i], samples.z[i]});
+    if (out[i] == 0) remaining.add({samples.x[i], samples.y[i], samples.z[i]});
   }
-  samples = std::move(left);
+  samples = std::move(remaining);
   return places;
 }
 
@@ -211,18 +211,18 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
                           bool may_miss) {
   store.check_stop();
   const bool refuse = options.tin.duplicates == tri::PointDuplicates::error;
-  MeshSamples left;
-  const MeshSamples* taken = &samples;
+  MeshSamples remaining;
+  const MeshSamples* used = &samples;
   std::size_t vertex_places = 0;
   if (!frame.empty() && options.tin.max_error == 0.0) {
-    left = samples;
-    vertex_places = take_out_vertices(frame, options.tin.duplicates, left);
-    if (refuse && samples.size() - left.size() > vertex_places) throw SamplesShareAPlace{};
-    taken = &left;
+    remaining = samples;
+    vertex_places = take_out_vertices(frame, options.tin.duplicates, remaining);
+    if (refuse && samples.size() - remaining.size() > vertex_places) throw SamplesShareAPlace{};
+    used = &remaining;
   }
   tri::PointTin tin;
   try {
-    tin = tri::point_tin(taken->x, taken->y, taken->z, frame, options.tin);
+    tin = tri::point_tin(used->x, used->y, used->z, frame, options.tin);
   } catch (const std::invalid_argument& error) {
     SharedPlaces shared;
     if (refuse) shared.add(samples);
@@ -236,7 +236,7 @@ BoundedWindow mesh_to_aim(const MeshSamples& samples, const std::vector<tri::Poi
       std::sqrt(static_cast<double>(tin.errors.covered) /
                 std::max(1.0, static_cast<double>(tin.errors.covered + vertex_places)));
   tin.errors.covered += vertex_places;
-  tin.duplicates += samples.size() - taken->size() - vertex_places;
+  tin.duplicates += samples.size() - used->size() - vertex_places;
   BoundedWindow out;
   out.vertices = std::move(tin.vertices);
   out.triangles = std::move(tin.triangles);

@@ -39,7 +39,7 @@ constexpr std::int64_t kSampleCells = 256;
 /// Worst case per thread: a window of kWindowCells with every sample a vertex, or one of
 /// kWidestCells with few, and the waiting results.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{112} << 20;
-constexpr std::uint64_t kRasterBytesBeside = std::uint64_t{48} << 20;
+constexpr std::uint64_t kRasterFixedBytes = std::uint64_t{48} << 20;
 constexpr std::uint64_t kFillBytes = std::uint64_t{32} << 20;
 /// Limit, in cells, for the distance of an edge that is straight in the file from the samples along
 /// it: less than half, so that no sample next to a window's side moves to the other side of it.
@@ -138,7 +138,7 @@ class RasterMesher final : public BoundedMesher {
   /// the file is within kMostBend of the samples along it. Requires a conversion.
   [[nodiscard]] std::int64_t straight_cells() const;
 
-  LatticeWindow whole_;
+  LatticeWindow lattice_;
   std::int64_t most_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, along each
                                                                         ///< axis
   unsigned threads_ = 1;
@@ -147,8 +147,8 @@ class RasterMesher final : public BoundedMesher {
 
 RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
                            const Context& context)
-    : BoundedMesher(store, options, context), whole_(lattice_of(store, options.region)) {
-  if (whole_.columns < 2 || whole_.rows < 2) {
+    : BoundedMesher(store, options, context), lattice_(lattice_of(store, options.region)) {
+  if (lattice_.columns < 2 || lattice_.rows < 2) {
     if (options.region) {
       throw UsageError(stream::message("{region}: it does not meet the raster of the store"));
     }
@@ -158,9 +158,9 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
   }
   const bool interpolates = options.fill == Fill::interpolate;
   threads_ =
-      threads_within_memory(kBytesPerThread, kRasterBytesBeside +
+      threads_within_memory(kBytesPerThread, kRasterFixedBytes +
                                                  WindowJoiner::kBytesPerShared *
-                                                     static_cast<std::uint64_t>(whole_.columns) +
+                                                     static_cast<std::uint64_t>(lattice_.columns) +
                                                  (interpolates ? kFillBytes : 0));
   if (interpolates) fill_ = std::make_shared<StoreFill>(store);
   if (options.places.has_effect()) most_cells_ = straight_cells();
@@ -170,14 +170,15 @@ std::int64_t RasterMesher::straight_cells() const {
   constexpr int kPlaces = 8;  // along each axis
   constexpr std::array<Point2, 4> kWays{{{1, 0}, {0, 1}, {1, 1}, {1, -1}}};
   const double half = 0.5 * static_cast<double>(std::min<std::int64_t>(
-                                kWindowCells, std::max(whole_.columns, whole_.rows) - 1));
+                                kWindowCells, std::max(lattice_.columns, lattice_.rows) - 1));
   double bend = 0.0;  // of an edge of twice `half` cells along a row or column
   for (int i = 0; i <= kPlaces; ++i) {
     for (int j = 0; j <= kPlaces; ++j) {
       const auto at = [](std::int64_t first, std::int64_t count, int step) {
         return static_cast<double>(first) + static_cast<double>((count - 1) * step) / kPlaces;
       };
-      const Point2 middle{at(whole_.column, whole_.columns, i), at(whole_.row, whole_.rows, j)};
+      const Point2 middle{at(lattice_.column, lattice_.columns, i),
+                          at(lattice_.row, lattice_.rows, j)};
       for (const Point2& way : kWays) {
         std::array<Point2, 3> places{};
         for (std::size_t k = 0; k < 3; ++k) {
@@ -206,11 +207,11 @@ std::int64_t RasterMesher::straight_cells() const {
 
 double RasterMesher::estimate(double max_error) const {
   return sample(max_error, options_.quality, 4, 2).vertices_per_sample *
-         static_cast<double>(whole_.size());
+         static_cast<double>(lattice_.size());
 }
 
 bool RasterMesher::can_estimate() const {
-  return whole_.size() >= std::size_t{24} * kSampleCells * kSampleCells;
+  return lattice_.size() >= std::size_t{24} * kSampleCells * kSampleCells;
 }
 
 std::vector<std::unique_ptr<WindowMesher>> RasterMesher::meshers(double max_error) const {
@@ -228,7 +229,7 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
   out.bound = aim.bound;
   out.first_aim = aim.first;
   out.aim = aim.sure;
-  out.whole = whole_;
+  out.lattice = lattice_;
   out.region = options_.region;
   out.places = options_.places;
   out.tin.quality = options_.quality;
@@ -250,7 +251,7 @@ WindowTinOptions RasterMesher::window_options(double max_error) const {
 
 RasterMesher::Sample RasterMesher::sample(double max_error, tri::TinQuality quality,
                                           std::size_t across, std::size_t down) const {
-  const LatticePlan plan(whole_, kSampleCells);
+  const LatticePlan plan(lattice_, kSampleCells);
   std::vector<std::size_t> windows;
   for (std::size_t y = 0; y < down; ++y) {
     for (std::size_t x = 0; x < across; ++x) {
@@ -283,15 +284,15 @@ BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
                                     std::uint64_t most_vertices) {
   std::int64_t cells = kWindowCells;
   Sample sample;
-  if (LatticePlan(whole_, cells).size() > 1) {
+  if (LatticePlan(lattice_, cells).size() > 1) {
     sample = this->sample(max_error, tri::TinQuality::greedy, 2, 2);
     cells = window_cells(sample.vertices_per_sample);
   }
-  const LatticePlan plan(whole_, std::min(cells, most_cells_));
+  const LatticePlan plan(lattice_, std::min(cells, most_cells_));
   const auto meshers = this->meshers(max_error);
   SideSamples side_samples;
   BoundedMeshResult result = run_windows(
-      plan.size(), threads_, whole_.size(), spool, most_vertices,
+      plan.size(), threads_, lattice_.size(), spool, most_vertices,
       [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan, i); },
       [&](std::size_t, RasterWindow& window) {
         window.measures.uncovered += side_samples.add(window.uncovered);

@@ -186,8 +186,8 @@ WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
   Samples<T> samples;
   samples.columns = window.columns;
   samples.rows = window.rows;
-  const std::int64_t own_column = window.column == options_.whole.column ? 0 : 1;
-  const std::int64_t own_row = window.row == options_.whole.row ? 0 : 1;
+  const std::int64_t own_column = window.column == options_.lattice.column ? 0 : 1;
+  const std::int64_t own_row = window.row == options_.lattice.row ? 0 : 1;
   const auto counts = [&](std::int64_t c, std::int64_t r) {
     return c >= own_column && r >= own_row && c < window.columns && r < window.rows;
   };

@@ -29,7 +29,7 @@ struct WindowTinOptions {
   /// where the first misses the bound.
   double first_aim = 0.0, aim = 0.0;
   tri::GridTinOptions tin;
-  LatticeWindow whole;  ///< the window that contains all others
+  LatticeWindow lattice;  ///< the window that contains all others
   /// With a region, meshes only have the triangles that reach into it.
   std::optional<Region> region;
   /// Converts to the CRS of the file.

@@ -62,9 +62,9 @@ TileLayer layer_from(const Json& json) {
   if (const auto zoom = json.find("minzoom"); zoom != json.end()) {
     layer.first_zoom = std::min<unsigned>(count_from(*zoom), layer.last_zoom);
   }
-  if (const auto own = json.find("terrace"); own != json.end()) {
-    layer.max_errors = own->value("maxErrors", std::vector<double>{});
-    layer.fingerprint = own->value("fingerprint", "");
+  if (const auto extension = json.find("terrace"); extension != json.end()) {
+    layer.max_errors = extension->value("maxErrors", std::vector<double>{});
+    layer.fingerprint = extension->value("fingerprint", "");
   }
   return layer;
 }

@@ -88,17 +88,17 @@ tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
                                 const tri::PointTinOptions& options, TileSurface& surface) {
   const LeafPlaces units(tile, leaf);
   const GeographicBox box = box_of(tile, leaf);
-  Places taken;
+  Places chosen;
   {
     Extremes extremes(units);
     for_each_part(box, surface,
                   [&](const SurfaceSamples& samples) { extremes.add(on_units(samples, units)); });
-    taken = extremes.places();
+    chosen = extremes.places();
   }
   tri::PointTin best;
   double before = std::numeric_limits<double>::infinity();
   for (unsigned round = 0; round < kRounds; ++round) {
-    tri::PointTin tin = tri::point_tin(taken.u, taken.v, taken.height, frame, options);
+    tri::PointTin tin = tri::point_tin(chosen.u, chosen.v, chosen.height, frame, options);
     tri::TinErrors all;
     double squares = 0.0;
     for_each_part(box, surface, [&](const SurfaceSamples& samples) {
@@ -111,7 +111,7 @@ tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
       squares += errors.rms * errors.rms * static_cast<double>(errors.covered);
       if (errors.largest > options.max_error) {
         const std::size_t worst = errors.largest_at;
-        taken.add(places.u[worst], places.v[worst], places.height[worst]);
+        chosen.add(places.u[worst], places.v[worst], places.height[worst]);
       }
     });
     if (all.covered > 0) all.rms = std::sqrt(squares / static_cast<double>(all.covered));

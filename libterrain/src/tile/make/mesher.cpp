@@ -59,14 +59,14 @@ struct LeafUnits {
 tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface& surface,
                      bool measured, std::span<const tri::Point3> frame,
                      const tri::PointTinOptions& options) {
-  const GeographicBox whole = box_of(tile);
-  const double units = kTileUnits / (whole.east - whole.west);
+  const GeographicBox tile_box = box_of(tile);
+  const double units = kTileUnits / (tile_box.east - tile_box.west);
   const auto units_along = [&](double from, std::uint32_t part) {
     return LeafUnits{from, units, static_cast<double>(leaf_unit(part, leaf.depth)),
                      static_cast<double>(leaf_unit(part + 1, leaf.depth))};
   };
-  const LeafUnits across = units_along(whole.west, leaf.x);
-  const LeafUnits down = units_along(whole.south, leaf.y);
+  const LeafUnits across = units_along(tile_box.west, leaf.x);
+  const LeafUnits down = units_along(tile_box.south, leaf.y);
   if (!measured) return tri::point_tin(tri::SampleRows{}, frame, options);
   if (is_to_be_cut(box_of(tile, leaf), surface)) {
     return mesh_crowded_leaf(tile, leaf, frame, options, surface);
@@ -142,7 +142,7 @@ LeafMesh mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan
 /// Meshes a tile leaf by leaf. Parameters: as make_tile().
 LeafMesh mesh_leaves(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
                      tri::TinQuality quality, SharedSides* shared) {
-  LeafMesh whole;
+  LeafMesh joined;
   TileSides sides(tile, plan, surface, shared);
   const std::vector<TileLeaf> leaves = leaves_of(tile, plan, surface);
   // On one thread, because others make other tiles. Then each leaf follows the previous one's take.
@@ -154,15 +154,16 @@ LeafMesh mesh_leaves(const TileAddress& tile, const ZoomPlan& plan, TileSurface&
         // If heights differ by less than the bound, usually only the sides are read.
         if (range && range->high - range->low > plan.max_error) surface.expect(box);
         return mesh_leaf(tile, leaves[i], plan, surface, quality, sides.around(leaves[i]),
-                         whole.has_data);
+                         joined.has_data);
       },
       [&](std::size_t, const LeafMesh& leaf) {
-        whole.vertices.insert(whole.vertices.end(), leaf.vertices.begin(), leaf.vertices.end());
-        whole.triangles.insert(whole.triangles.end(), leaf.triangles.begin(), leaf.triangles.end());
-        whole.max_error = std::max(whole.max_error, leaf.max_error);
-        whole.has_data = whole.has_data || leaf.has_data;
+        joined.vertices.insert(joined.vertices.end(), leaf.vertices.begin(), leaf.vertices.end());
+        joined.triangles.insert(joined.triangles.end(), leaf.triangles.begin(),
+                                leaf.triangles.end());
+        joined.max_error = std::max(joined.max_error, leaf.max_error);
+        joined.has_data = joined.has_data || leaf.has_data;
       });
-  return whole;
+  return joined;
 }
 
 /// Sets heights as 15-bit numbers from the lowest to the highest, which clients use for culling.
@@ -219,14 +220,14 @@ TileHeader header_of(const TileAddress& tile, const TileMesh& mesh) {
 /// sample.
 void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
   const GeographicBox box = box_of(tile);
-  const double reach = std::max(surface.spacing(), (box.east - box.west) / 256.0);
+  const double distance = std::max(surface.spacing(), (box.east - box.west) / 256.0);
   std::vector<double> longitude, latitude;
   for (std::size_t i = 0; i < mesh.size(); ++i) {
     const double lon = longitude_at(tile, mesh.u[i]), lat = latitude_at(tile, mesh.v[i]);
-    longitude.insert(longitude.end(), {lon - reach, lon + reach, lon, lon});
+    longitude.insert(longitude.end(), {lon - distance, lon + distance, lon, lon});
     // There is no geoid beyond a pole.
     latitude.insert(latitude.end(),
-                    {lat, lat, std::max(lat - reach, -90.0), std::min(lat + reach, 90.0)});
+                    {lat, lat, std::max(lat - distance, -90.0), std::min(lat + distance, 90.0)});
   }
   std::vector<double> heights(longitude.size());
   surface.heights(longitude, latitude, heights);
@@ -236,9 +237,9 @@ void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) 
     // All meridians meet at the poles.
     const double east = metres.longitude < 1.0 ? 0.0
                                                : (heights[4 * i + 1] - heights[4 * i]) /
-                                                     (2.0 * reach * metres.longitude);
-    const bool at_pole = std::abs(lat) + reach > 90.0;
-    const double span = at_pole ? latitude[4 * i + 3] - latitude[4 * i + 2] : 2.0 * reach;
+                                                     (2.0 * distance * metres.longitude);
+    const bool at_pole = std::abs(lat) + distance > 90.0;
+    const double span = at_pole ? latitude[4 * i + 3] - latitude[4 * i + 2] : 2.0 * distance;
     const double north = (heights[4 * i + 3] - heights[4 * i + 2]) / (span * metres.latitude);
     const LocalFrame frame = local_frame(lon, lat);
     stream::Point3 normal;
@@ -272,18 +273,18 @@ void set_water(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
 
 }  // namespace
 
-MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
-                   const TileMeshOptions& options, SharedSides* shared) {
+BuiltTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                    const TileMeshOptions& options, SharedSides* shared) {
   LeafMesh leaves = mesh_leaves(tile, plan, surface, options.quality, shared);
-  MadeTile made;
-  made.has_data = leaves.has_data;
-  made.max_error = leaves.max_error + set_heights(leaves.vertices, plan.height_step, made.mesh);
-  made.mesh.triangles = std::move(leaves.triangles);
-  order_vertices(made.mesh);
-  made.header = header_of(tile, made.mesh);
-  if (options.normals) set_normals(tile, surface, made.mesh);
-  if (options.water) set_water(tile, surface, made.mesh);
-  return made;
+  BuiltTile built;
+  built.has_data = leaves.has_data;
+  built.max_error = leaves.max_error + set_heights(leaves.vertices, plan.height_step, built.mesh);
+  built.mesh.triangles = std::move(leaves.triangles);
+  order_vertices(built.mesh);
+  built.header = header_of(tile, built.mesh);
+  if (options.normals) set_normals(tile, surface, built.mesh);
+  if (options.water) set_water(tile, surface, built.mesh);
+  return built;
 }
 
 }  // namespace terrace::terrain

@@ -20,7 +20,7 @@ struct TileMeshOptions {
 };
 
 /// A tile's mesh and header, and its largest distance from the samples.
-struct MadeTile {
+struct BuiltTile {
   TileMesh mesh;
   TileHeader header;
   double max_error = 0.0;  ///< in metres, as decoded by a client; never too small
@@ -38,7 +38,7 @@ class HeightsTooFar : public std::runtime_error {
 /// actual error. Depends only on the arguments; the borders of the tile depend only on the plan and
 /// the surface along them. shared: of the zoom, or null. Memory: for the samples of one leaf,
 /// whatever the tile contains. Throws: HeightsTooFar; stream::Error on a damaged store.
-MadeTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
-                   const TileMeshOptions& options, SharedSides* shared = nullptr);
+BuiltTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
+                    const TileMeshOptions& options, SharedSides* shared = nullptr);
 
 }  // namespace terrace::terrain

@@ -28,7 +28,7 @@ constexpr std::size_t kMostRemembered = 1U << 14;
 }  // namespace
 
 TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
-                       EllipsoidalHeights heights, std::uint64_t bytes, std::uint64_t whole_bytes,
+                       EllipsoidalHeights heights, std::uint64_t bytes, std::uint64_t all_bytes,
                        unsigned threads)
     : TiledStore(tiled, std::move(system), std::move(heights)),
       window_bytes(bytes),
@@ -36,7 +36,7 @@ TiledCloud::TiledCloud(const stream::Store& tiled, CoordinateSystem system,
   spacing = cloud_spacing(tiled, places);
   rim = rim_of_outline();
   constexpr std::uint64_t kMost = std::uint64_t{1} << 31;
-  if (tiled.points() >= std::min(whole_bytes / CloudSamples::kBytesPerPoint, kMost)) return;
+  if (tiled.points() >= std::min(all_bytes / CloudSamples::kBytesPerPoint, kMost)) return;
   samples = std::make_unique<CloudSamples>(store, places, vertical, threads);
 }
 
@@ -49,9 +49,9 @@ PointTileSurface::PointTileSurface(const TiledCloud& cloud)
 }
 
 const std::vector<StoredBox>& PointTileSurface::windows(const GeographicBox& box) {
-  if (!asked_ || *asked_ != box) {
+  if (!requested_ || *requested_ != box) {
     windows_ = cloud_.places.windows(box);
-    asked_ = box;
+    requested_ = box;
   }
   return windows_;
 }
@@ -156,7 +156,7 @@ std::optional<HeightRange> PointTileSurface::range(const GeographicBox& box) {
     range->low = std::min(range->low, low);
     range->high = std::max(range->high, high);
     std::vector<Point2> places;
-    for (const stream::Point3& p : found->some) {
+    for (const stream::Point3& p : found->examples) {
       if (std::isfinite(p[2])) places.push_back({p[0], p[1]});
     }
     cloud_.places.to_geographic(places);
@@ -172,7 +172,7 @@ std::optional<HeightRange> PointTileSurface::range(const GeographicBox& box) {
   return range;
 }
 
-bool PointTileSurface::holds(const StoredBox& box) const { return held_ && held_->covers(box); }
+bool PointTileSurface::holds(const StoredBox& box) const { return loaded_ && loaded_->covers(box); }
 
 void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<std::uint32_t> part,
                                     std::span<double> out) {
@@ -181,13 +181,13 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
   for (const std::uint32_t i : part) box.include(stored[i]);
   if (!holds(box)) {
     const auto within = [&](const StoredBox& all) { return all.covers(box); };
-    std::optional<StoredBox> wanted;
+    std::optional<StoredBox> needed;
     if (expected_ && within(*expected_) && estimate(*expected_, kMostTogether) <= kMostTogether) {
-      wanted = expected_;
+      needed = expected_;
     } else if (box.min == box.max || estimate(box, kMostTogether) <= kMostTogether) {
-      wanted = box;
+      needed = box;
     }
-    if (!wanted) {
+    if (!needed) {
       const std::size_t axis = box.max[0] - box.min[0] < box.max[1] - box.min[1] ? 1 : 0;
       const double middle = box.min[axis] + 0.5 * (box.max[axis] - box.min[axis]);
       const auto split = std::stable_partition(
@@ -202,21 +202,21 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
       part_heights(stored, part.subspan(first), out);
       return;
     }
-    load(*wanted);
+    load(*needed);
   }
   for (const std::uint32_t i : part) out[i] = surface_.linear(stored[i]).height;
 }
 
 /// Loads the points of a box and as far around it as most circles extend.
 void PointTileSurface::load(const StoredBox& box) {
-  held_.reset();  // so that nothing is held if reading fails
+  loaded_.reset();  // so that nothing is held if reading fails
   const StoredBox all = cloud_.places.stored_bounds();
   const double area = (all.max[0] - all.min[0]) * (all.max[1] - all.min[1]);
   const double margin = kMargin * std::sqrt(area / static_cast<double>(cloud_.store.points()));
-  const std::size_t most = cloud_.window_bytes / PointCells::kBytesPerPoint;
+  const std::size_t max_points = cloud_.window_bytes / PointCells::kBytesPerPoint;
   // Without points in memory, each place reads its own.
-  if (!surface_.load(box.widened(margin), most, true)) surface_.load(box, most, true);
-  held_ = box;
+  if (!surface_.load(box.widened(margin), max_points, true)) surface_.load(box, max_points, true);
+  loaded_ = box;
 }
 
 void PointTileSurface::surface_heights(std::span<const Point2> stored, std::span<double> out) {

@@ -34,7 +34,7 @@ struct TiledCloud : TiledStore {
   /// Reads a level of the store and a few clusters, or the whole store if it fits in whole_bytes.
   /// Throws: stream::Error if no place of it has a longitude and latitude.
   TiledCloud(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
-             std::uint64_t window_bytes, std::uint64_t whole_bytes, unsigned threads);
+             std::uint64_t window_bytes, std::uint64_t all_bytes, unsigned threads);
 };
 
 /// The surface of a store of irregular points: linear on the triangles of their Delaunay
@@ -82,9 +82,9 @@ class PointTileSurface final : public TileSurface {
   const TiledCloud& cloud_;
   StoreWindow reader_;
   PointSurface surface_;
-  bool has_all_ = false;                      ///< whether all points are in memory
-  std::optional<StoredBox> held_, expected_;  ///< the loaded box, and the one to load
-  std::optional<GeographicBox> asked_;
+  bool has_all_ = false;                        ///< whether all points are in memory
+  std::optional<StoredBox> loaded_, expected_;  ///< the loaded box, and the one to load
+  std::optional<GeographicBox> requested_;
   std::vector<StoredBox> windows_;
   WindowPoints points_;
   std::vector<std::uint32_t> slots_;

@@ -29,26 +29,28 @@ std::optional<Part> part_between(std::span<const double> places, double low, dou
   while (part.first < places.size() && !(places[part.first] >= low && places[part.first] <= high)) {
     ++part.first;
   }
-  const std::span<const double> rest = places.subspan(part.first);
-  while (part.count < rest.size() && rest[part.count] >= low && rest[part.count] <= high) {
+  const std::span<const double> following = places.subspan(part.first);
+  while (part.count < following.size() && following[part.count] >= low &&
+         following[part.count] <= high) {
     ++part.count;
   }
-  if (std::any_of(rest.begin() + static_cast<std::ptrdiff_t>(part.count), rest.end(),
+  if (std::any_of(following.begin() + static_cast<std::ptrdiff_t>(part.count), following.end(),
                   [&](double place) { return place >= low && place <= high; })) {
     return std::nullopt;
   }
   if (part.count < 2) return part;
-  part.descending = rest[1] < rest[0];
+  part.descending = following[1] < following[0];
   for (std::size_t i = 1; i < part.count; ++i) {
-    if (!(part.descending ? rest[i] < rest[i - 1] : rest[i] > rest[i - 1])) return std::nullopt;
+    if (!(part.descending ? following[i] < following[i - 1] : following[i] > following[i - 1]))
+      return std::nullopt;
   }
   return part;
 }
 
 /// Copies the part's places in ascending order.
 void take(std::span<const double> places, const Part& part, std::vector<double>& out) {
-  const std::span<const double> own = places.subspan(part.first, part.count);
-  out.assign(own.begin(), own.end());
+  const std::span<const double> selected = places.subspan(part.first, part.count);
+  out.assign(selected.begin(), selected.end());
   if (part.descending) std::reverse(out.begin(), out.end());
 }
 
@@ -58,15 +60,15 @@ RasterTileSurface::RasterTileSurface(const TiledRaster& raster)
     : raster_(raster), reader_(raster.store, kDecodedBytes) {}
 
 RasterTileSurface::View RasterTileSurface::view(const LatticeWindow& window) {
-  const std::int64_t column = window.column - held_.column, row = window.row - held_.row;
-  const bool holds = column >= 0 && row >= 0 && column + window.columns <= held_.columns &&
-                     row + window.rows <= held_.rows;
-  if (holds) return {heights_.data() + row * held_.columns + column, held_.columns};
-  held_ = {};  // so that nothing is held if reading fails
+  const std::int64_t column = window.column - loaded_.column, row = window.row - loaded_.row;
+  const bool holds = column >= 0 && row >= 0 && column + window.columns <= loaded_.columns &&
+                     row + window.rows <= loaded_.rows;
+  if (holds) return {heights_.data() + row * loaded_.columns + column, loaded_.columns};
+  loaded_ = {};  // so that nothing is held if reading fails
   heights_.resize(window.size());
   raster_.height_cache.heights(reader_, window, heights_);
-  held_ = window;
-  return {heights_.data(), held_.columns};
+  loaded_ = window;
+  return {heights_.data(), loaded_.columns};
 }
 
 const LatticeWindow& RasterTileSurface::window_around(const GeographicBox& box) {
@@ -154,8 +156,9 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
   // the rim of the outline to two samples.
   for (Point2& p : places) {
     const double outside = std::max({-p[0], -p[1], p[0] - last_column, p[1] - last_row});
-    const double most = outside > raster_.rim ? 2.0 : 1.0;
-    p = {std::clamp(p[0], -most, last_column + most), std::clamp(p[1], -most, last_row + most)};
+    const double margin = outside > raster_.rim ? 2.0 : 1.0;
+    p = {std::clamp(p[0], -margin, last_column + margin),
+         std::clamp(p[1], -margin, last_row + margin)};
   }
   std::vector<std::uint32_t> order(places.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -181,9 +184,9 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
       const std::int64_t nr0 = first ? row : std::min(r0, row);
       const std::int64_t nc1 = first ? column + 1 : std::max(c1, column + 1);
       const std::int64_t nr1 = first ? row + 1 : std::max(r1, row + 1);
-      const std::int64_t most =
+      const std::int64_t max_samples =
           std::min(kMostInWindow, kMostForEach * static_cast<std::int64_t>(to + 1 - from));
-      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > most) break;
+      if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > max_samples) break;
       c0 = nc0;
       r0 = nr0;
       c1 = nc1;

@@ -57,7 +57,7 @@ class RasterTileSurface : public TileSurface {
   const TiledRaster& raster_;
   StoreWindow reader_;
   std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the most recent
-  LatticeWindow held_{};
+  LatticeWindow loaded_{};
   std::vector<double> heights_;  ///< of the held window
   std::vector<Point2> places_;   ///< places to evaluate the geoid at
   std::vector<double> geoid_shares_;

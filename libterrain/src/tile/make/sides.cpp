@@ -102,7 +102,7 @@ TileSides::TileSides(const TileAddress& tile, const ZoomPlan& plan, TileSurface&
     : tile_(tile),
       plan_(plan),
       surface_(surface),
-      border_(shared != nullptr ? *shared : own_),
+      border_(shared != nullptr ? *shared : inner_),
       data_(surface.bounds()) {}
 
 bool TileSides::is_cut(const Side& side) const {
@@ -198,10 +198,10 @@ SideVertices TileSides::settle(const Side& side) {
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const bool looked_at =
       is_near_data(side, 2.0 * (unit + surface_.spacing())) && !is_flat(band_around(side));
-  const double wanted =
+  const double count =
       looked_at ? std::min(2.0 * length / surface_.spacing(), kMostSidePlaces) : 1.0;
   const auto parts =
-      static_cast<std::size_t>(std::clamp(std::ceil(wanted), 1.0, static_cast<double>(to - from)));
+      static_cast<std::size_t>(std::clamp(std::ceil(count), 1.0, static_cast<double>(to - from)));
   std::vector<double> t, longitude, latitude, height;
   for (std::size_t i = 0; i <= parts; ++i) {
     const double at =
@@ -240,7 +240,7 @@ std::shared_ptr<const SideVertices> TileSides::vertices(const Side& side) {
   const TileSideKey key{side.along_parallel, side.depth, across * parts + side.line,
                         along * parts + side.k};
   const bool on_border = side.line == 0 || side.line == parts;
-  return (on_border ? border_ : own_).vertices(key, [&] { return settle(side); });
+  return (on_border ? border_ : inner_).vertices(key, [&] { return settle(side); });
 }
 
 std::vector<TileVertex> TileSides::around(const TileLeaf& leaf) {
@@ -296,11 +296,11 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
                                  : (near->longitude[i] - longitude[0]) / unit;
       const double north = (near->latitude[i] - latitude[0]) / unit;
       // Vertices can only be at integers.
-      const double whole = from + std::round(side.along_parallel ? east : north);
-      if (!(whole > from && whole < to)) continue;
-      t.push_back(whole);
+      const double shifted = from + std::round(side.along_parallel ? east : north);
+      if (!(shifted > from && shifted < to)) continue;
+      t.push_back(shifted);
       if (surface_.sides_take_samples()) {
-        found[whole].add(near->height[i], std::abs(side.along_parallel ? north : east));
+        found[shifted].add(near->height[i], std::abs(side.along_parallel ? north : east));
       }
     }
   }
@@ -318,26 +318,28 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
 }
 
 std::optional<SurfaceSamples> TileSides::samples_near(const GeographicBox& box) {
-  SurfaceSamples all, some;
+  SurfaceSamples all, part_samples;
   const auto add = [&](const GeographicBox& part) {
     if (surface_.crowded(part)) return false;
-    surface_.samples(part, some);
-    all.longitude.insert(all.longitude.end(), some.longitude.begin(), some.longitude.end());
-    all.latitude.insert(all.latitude.end(), some.latitude.begin(), some.latitude.end());
-    all.height.insert(all.height.end(), some.height.begin(), some.height.end());
+    surface_.samples(part, part_samples);
+    all.longitude.insert(all.longitude.end(), part_samples.longitude.begin(),
+                         part_samples.longitude.end());
+    all.latitude.insert(all.latitude.end(), part_samples.latitude.begin(),
+                        part_samples.latitude.end());
+    all.height.insert(all.height.end(), part_samples.height.begin(), part_samples.height.end());
     return true;
   };
   // Beyond 180 degrees the globe continues at the other end, for tiles on both sides.
   const bool beyond_east = box.east > 180.0, beyond_west = box.west < -180.0;
   const double reach = beyond_east ? box.east - 180.0 : -180.0 - box.west;
-  bool taken = false;
+  bool added = false;
   if (beyond_east || beyond_west) {
-    taken = add({180.0 - reach, box.south, 180.0, box.north}) &&
+    added = add({180.0 - reach, box.south, 180.0, box.north}) &&
             add({-180.0, box.south, -180.0 + reach, box.north});
   } else {
-    taken = add(box);
+    added = add(box);
   }
-  if (!taken) return std::nullopt;
+  if (!added) return std::nullopt;
   return all;
 }
 

@@ -125,7 +125,7 @@ class TileSides {
   TileAddress tile_;
   const ZoomPlan& plan_;
   TileSurface& surface_;
-  WindowSides<TileSideKey> own_;  ///< within the tile
+  WindowSides<TileSideKey> inner_;  ///< within the tile
   WindowSides<TileSideKey>& border_;
   GeographicBox data_;
   std::map<std::pair<double, double>, std::optional<Samples>> corners_;

@@ -23,7 +23,7 @@ namespace {
 /// Memory of a thread: the samples of a leaf or of a part of a tile, their mesh and its caches.
 constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
 /// Memory of the store's fill and blocks, and of the lists of tiles.
-constexpr std::uint64_t kBytesBeside = std::uint64_t{80} << 20;
+constexpr std::uint64_t kTilingFixedBytes = std::uint64_t{80} << 20;
 /// The least memory for the triangles of a part.
 constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
 
@@ -81,25 +81,26 @@ void check_heights(const stream::Store& store, double metres) {
 
 TileResources tile_resources(const Context& context, const std::string& path) {
   const std::uint64_t memory = context.memory_or(0);
-  if (memory < kBytesBeside + kBytesPerThread) {
-    throw stream::Error(path, stream::message("tiles need {}M of memory, {memory_bytes} allows {}M",
-                                              (kBytesBeside + kBytesPerThread) >> 20, memory >> 20))
+  if (memory < kTilingFixedBytes + kBytesPerThread) {
+    throw stream::Error(path,
+                        stream::message("tiles need {}M of memory, {memory_bytes} allows {}M",
+                                        (kTilingFixedBytes + kBytesPerThread) >> 20, memory >> 20))
         .remedy("allow more");
   }
-  const std::uint64_t threads = (memory - kBytesBeside) / kBytesPerThread;
+  const std::uint64_t threads = (memory - kTilingFixedBytes) / kBytesPerThread;
   return {memory, static_cast<unsigned>(std::min<std::uint64_t>(context.threads, threads))};
 }
 
-std::unique_ptr<TileSource> open_tile_source(const stream::Store& given,
+std::unique_ptr<TileSource> open_tile_source(const stream::Store& input,
                                              const TilesRequest& request,
                                              const TileResources& resources,
                                              const Context& context) {
-  if (request.water && !request.water_height && !given.schema().grid) {
+  if (request.water && !request.water_height && !input.schema().grid) {
     throw UsageError(stream::message(
         "{water} nodata is for rasters: irregular points have no cells without data; give the "
         "height of the water"));
   }
-  const stream::Store store = given.with_stop(context.stop);
+  const stream::Store store = input.with_stop(context.stop);
   const CoordinateSystem system = system_of(store);
   EllipsoidalHeights heights(store.schema(), request.vertical, request.geoid,
                              resources.memory_bytes / 4, system.area());

@@ -62,13 +62,14 @@ struct PlaceGrid {
   }
   /// Returns the largest second difference of a coordinate of the converted places; infinite if one
   /// has no image. Between places, a quadratic function deviates from a line by an eighth of it.
-  [[nodiscard]] double second_difference(std::span<const Point2> made, std::size_t axis) const {
+  [[nodiscard]] double second_difference(std::span<const Point2> converted,
+                                         std::size_t axis) const {
     double largest = 0.0;
     const auto look = [&](std::size_t at, std::size_t step) {
-      const double own =
-          std::abs(made[at - step][axis] - 2.0 * made[at][axis] + made[at + step][axis]);
-      largest = own <= largest ? largest : own;
-      if (std::isnan(own)) largest = kFarPlace;
+      const double difference = std::abs(converted[at - step][axis] - 2.0 * converted[at][axis] +
+                                         converted[at + step][axis]);
+      largest = difference <= largest ? largest : difference;
+      if (std::isnan(difference)) largest = kFarPlace;
     };
     for (std::size_t j = 0; j <= steps[1]; ++j) {
       for (std::size_t i = 0; i <= steps[0]; ++i) {
@@ -147,7 +148,7 @@ void StoredPlaces::fit_polynomials(const stream::Store& store) {
 
 void StoredPlaces::from_geographic(std::span<Point2> places) const {
   plane_.convert(
-      places, [this](std::span<Point2> some) { crs_.from_geographic(some); },
+      places, [this](std::span<Point2> batch) { crs_.from_geographic(batch); },
       [this](Point2 place) {
         for (std::size_t k = 0; k < 2; ++k) {
           const double low = world_bounds_.min[k];

@@ -162,10 +162,10 @@ std::vector<Point2> places_of(const TiledRaster& raster, const GeographicBox& bo
 void add_in_all_turns(const TiledRaster& raster, const stream::Box3& box, double margin,
                       Digest& digest) {
   const auto [first, last] = raster.places.longitudes();
-  const double beside = std::max(0.0, 360.0 - (last - first)) / 2.0 + 1e-6;
+  const double gap = std::max(0.0, 360.0 - (last - first)) / 2.0 + 1e-6;
   for (int turn = -2; turn <= 2; ++turn) {
-    const double west = std::max(box.min[0] + 360.0 * turn, first - beside);
-    const double east = std::min(box.max[0] + 360.0 * turn, last + beside);
+    const double west = std::max(box.min[0] + 360.0 * turn, first - gap);
+    const double east = std::min(box.max[0] + 360.0 * turn, last + gap);
     if (west > east) continue;
     stream::Box3 around;
     for (const double x : {west, east}) {

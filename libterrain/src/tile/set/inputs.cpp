@@ -19,11 +19,11 @@ constexpr std::uint64_t kGeneration = 4;
 
 }  // namespace
 
-GeographicBox reach_of(const TileAddress& tile, const TileSurface& surface) {
+GeographicBox input_box(const TileAddress& tile, const TileSurface& surface) {
   // Sides use a unit beyond the tile, normals a sample or a 256th of the tile.
   const GeographicBox box = box_of(tile);
-  const double reach = 1.01 * std::max(surface.spacing(), (box.east - box.west) / 256.0);
-  return {box.west - reach, box.south - reach, box.east + reach, box.north + reach};
+  const double distance = 1.01 * std::max(surface.spacing(), (box.east - box.west) / 256.0);
+  return {box.west - distance, box.south - distance, box.east + distance, box.north + distance};
 }
 
 std::uint64_t digest_of(const TileAddress& tile, const ZoomPlan& plan, const TileInputs& inputs,
@@ -44,7 +44,7 @@ std::uint64_t digest_of(const TileAddress& tile, const ZoomPlan& plan, const Til
   }
   digest.add(std::string_view(inputs.source_options));
   digest.add(std::string_view(inputs.metadata));
-  digest.add(surface.digest(reach_of(tile, surface)));
+  digest.add(surface.digest(input_box(tile, surface)));
   return digest.value();
 }
 

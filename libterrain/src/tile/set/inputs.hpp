@@ -21,7 +21,7 @@ struct TileInputs {
 
 /// Returns a box with all places at which make_tile() may query a surface: the tile and a margin.
 /// May extend beyond 180 degrees and the poles.
-GeographicBox reach_of(const TileAddress& tile, const TileSurface& surface);
+GeographicBox input_box(const TileAddress& tile, const TileSurface& surface);
 
 /// Returns a hash of everything that a tile's bytes, or its absence for lack of data, depend on.
 /// The tile is up to date while the hash stays the same.

@@ -129,7 +129,7 @@ class TileFolder {
 
  private:
   std::string path_;
-  bool made_ = false;
+  bool created_ = false;
   stream::FileLock lock_;
 };
 
@@ -145,7 +145,7 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
         .remedy("name another folder, or empty it yourself");
   }
   std::error_code error;
-  made_ = fs::create_directories(path_, error);
+  created_ = fs::create_directories(path_, error);
   if (error) throw stream::system_error(folder, "cannot be created", error.value());
   lock_ = stream::FileLock(fs::path(path_) / kLockName);
   if (!lock_.held()) {
@@ -180,7 +180,7 @@ void TileFolder::check_same() const {
 TileFolder::~TileFolder() {
   lock_.release();
   std::error_code ignored;
-  if (made_) fs::remove(path_, ignored);  // fails if it is not empty, as intended
+  if (created_) fs::remove(path_, ignored);  // fails if it is not empty, as intended
 }
 
 /// Returns the zoom at which a 64th of a tile is at most as wide as the spacing of samples.

@@ -137,15 +137,15 @@ TileSetWriter::Written TileSetWriter::write_tile(const TileAddress& tile, Zoom& 
       return {false, true, *earlier};
     }
   }
-  MadeTile made = make_tile(tile, zoom.plan, surface, options_.mesh(), &zoom.sides);
-  if (!made.has_data && tile.zoom > 0) return {true, true, {.inputs = digest}};
-  made.mesh.metadata = std::move(inputs.metadata);
-  std::vector<std::byte> bytes = encode_tile(made.mesh, made.header);
+  BuiltTile built = make_tile(tile, zoom.plan, surface, options_.mesh(), &zoom.sides);
+  if (!built.has_data && tile.zoom > 0) return {true, true, {.inputs = digest}};
+  built.mesh.metadata = std::move(inputs.metadata);
+  std::vector<std::byte> bytes = encode_tile(built.mesh, built.header);
   if (options_.request.gzip) bytes = stream::gzip(bytes);
   if (before.empty()) before = read_tile_file(path);
   if (!before.empty() && !repeats_ && is_stranger(tile)) throw stream::not_replaced(path, false);
   const Written written{
-      true, bytes == before, {bytes.size(), checksum_of(bytes), digest, made.max_error}};
+      true, bytes == before, {bytes.size(), checksum_of(bytes), digest, built.max_error}};
   if (!written.kept) {
     begin_change();
     write_tile_file(path, bytes);
@@ -304,7 +304,7 @@ void TileSetWriter::conclude(const Zoom& zoom) {
 }
 
 void TileSetWriter::remove_others() {
-  std::vector<fs::path> gone, torn;
+  std::vector<fs::path> obsolete, torn;
   std::error_code error;
   fs::recursive_directory_iterator at(options_.folder, error);
   for (; !error && at != fs::recursive_directory_iterator(); at.increment(error)) {
@@ -317,11 +317,11 @@ void TileSetWriter::remove_others() {
     if (!tile) continue;
     if (tile->zoom >= present.size() || !number_of(*tile, present[tile->zoom])) {
       if (is_stranger(*tile)) throw stream::not_replaced(path.string(), false);
-      gone.push_back(path);
+      obsolete.push_back(path);
     }
   }
   if (error) throw stream::system_error(options_.folder, "cannot be listed", error.value());
-  if (!gone.empty()) begin_change();
+  if (!obsolete.empty()) begin_change();
   const auto remove = [](const fs::path& path) {
     fs::remove(path);
     // Fails on folders that are not empty, as intended.
@@ -330,9 +330,9 @@ void TileSetWriter::remove_others() {
       fs::remove(path.parent_path().parent_path(), ignored);
     }
   };
-  std::ranges::for_each(gone, remove);
+  std::ranges::for_each(obsolete, remove);
   std::ranges::for_each(torn, remove);
-  result.removed = gone.size();
+  result.removed = obsolete.size();
 }
 
 void TileSetWriter::finish() {

@@ -71,10 +71,10 @@ std::vector<TileFault> check_tile_header(const TileAddress& address, const Decod
     fault(0, "the centre is outside the sphere around the tile");
   }
   // The point may be in any direction; only its distance matters.
-  const Point3& given = tile.header.horizon_occlusion;
-  const double length = std::sqrt(dot(given, given));
-  const Point3 towards{given[0] * kEquatorialRadius, given[1] * kEquatorialRadius,
-                       given[2] * kPolarRadius};
+  const Point3& occlusion = tile.header.horizon_occlusion;
+  const double length = std::sqrt(dot(occlusion, occlusion));
+  const Point3 towards{occlusion[0] * kEquatorialRadius, occlusion[1] * kEquatorialRadius,
+                       occlusion[2] * kPolarRadius};
   if (!(length > 0.0)) {
     fault(kHorizonAt, "the horizon occlusion point is the centre of the Earth");
     return faults;
@@ -115,7 +115,7 @@ class MeshCheck {
   void vertices();
   void edges();
   void normals();
-  void extensions(const std::vector<std::string>& wanted);
+  void extensions(const std::vector<std::string>& promised_names);
 
   std::vector<TileFault> faults;
 
@@ -296,9 +296,10 @@ void MeshCheck::normals() {
   }
 }
 
-void MeshCheck::extensions(const std::vector<std::string>& wanted) {
+void MeshCheck::extensions(const std::vector<std::string>& promised_names) {
   const auto compare = [&](const char* name, bool there) {
-    const bool promised = std::find(wanted.begin(), wanted.end(), name) != wanted.end();
+    const bool promised =
+        std::find(promised_names.begin(), promised_names.end(), name) != promised_names.end();
     if (promised == there) return;
     fault(extensions_at_,
           std::string("the extension ") + name +

@@ -72,12 +72,12 @@ std::string misfit(const BorderSide& one, const BorderSide& other) {
                                                                 return p.first == q.first;
                                                               });
   if (!same_places) return "vertices at other places";
-  double most = 0.0;
+  double largest = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    most = std::max(most, std::abs(a[i].second - b[i].second));
+    largest = std::max(largest, std::abs(a[i].second - b[i].second));
   }
-  return most > kBorderSlack + one.rounding + other.rounding
-             ? "heights that differ by up to " + readable_number(most) + " m"
+  return largest > kBorderSlack + one.rounding + other.rounding
+             ? "heights that differ by up to " + readable_number(largest) + " m"
              : "";
 }
 
@@ -145,7 +145,7 @@ class SetCheck {
   /// Measures the heights of each tile. Skips unreadable tiles, which check() reports.
   [[nodiscard]] std::vector<TileHeights> measure(const std::vector<TileAddress>& tiles) const;
   [[nodiscard]] std::vector<Region> regions_of(const std::vector<TileAddress>& tiles) const;
-  void compare(const TileAddress& tile, const char* side, const BorderSide& own,
+  void compare(const TileAddress& tile, const char* side, const BorderSide& side_vertices,
                const TileAddress& neighbour, const BorderSide& other);
   void add(unsigned zoom, const TileHeights& heights);
 
@@ -276,9 +276,9 @@ std::vector<TileHeights> SetCheck::measure(const std::vector<TileAddress>& tiles
   return heights;
 }
 
-void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSide& own,
+void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSide& side_vertices,
                        const TileAddress& neighbour, const BorderSide& other) {
-  const std::string what = misfit(own, other);
+  const std::string what = misfit(side_vertices, other);
   if (what.empty()) return;
   result.problems.push_back(
       {path_of(tile), 0,
