@@ -641,7 +641,7 @@ class Sources(StoreCase):
             points = self.points.copy()
             points[17, 1] = -np.inf
             self.built(points)
-        with self.assertRaisesRegex(terrace.Error, 'not one point with data'):
+        with self.assertRaisesRegex(terrace.Error, 'has no point with data'):
             self.built(np.full((5, 5), np.nan))
         with self.assertRaises(ValueError):
             self.built(hills(), transform=(1, 2, 3))

@@ -154,7 +154,7 @@ class StoreCrashTest(CrashCase):
                 result = terrace('build', self.input('void.tif'), '-o', 's', '--force',
                                  cwd=self.folder)
                 self.assertEqual(result.returncode, 1)
-                self.assertIn('not one point', result.stderr)
+                self.assertIn('has no point', result.stderr)
             found = {name: data for name, data in files_below(self.folder).items()
                      if name.startswith('s/')}
             self.assertIn(found, (old, new))

@@ -101,7 +101,7 @@ class SelectionTest(unittest.TestCase):
             result = self.terrace('match', file, '-o', self.path('pairs.csv'), '--force')
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn('2 points without a coordinate are left out', result.stderr)
-        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'not one point in it (1 points, all without a coordinate)'),
+        for file, words in ((write('none.xyz', 'nan 1 2\n'), 'has no point (1 point, all without a coordinate)'),
                             (write('inf.ply', ply.format(1) + '1 2 inf\n'), 'a coordinate is infinite')):
             result = self.terrace('build', file, '-o', self.path('none.st'))
             self.assertEqual(result.returncode, 1)

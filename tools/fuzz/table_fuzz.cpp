@@ -29,7 +29,7 @@ bool read_places(const std::string& path) {
     due += batch.size();
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const std::string_view line = batch.line(i);
-      if (is_no_place(line)) continue;
+      if (is_skipped_line(line)) continue;
       if (!layout) {
         layout = PlaceLayout::of(line, file.name());
         if (layout->header) continue;

@@ -117,7 +117,7 @@ bool is_our_tiff(std::ifstream& file, bool big_endian, bool big_tiff) {
   file.clear();
   file.seekg(0, std::ios::end);
   const auto size = static_cast<std::uint64_t>(file.tellg());
-  // Where the values begin that are too long for their entries.
+  // Offset of the first value that is too long for its entry.
   std::uint64_t next = *directory + count_bytes + *entries * entry_bytes + word;
   bool marked = false, tiled = false, current = false;
   for (std::size_t at = 0; at + entry_bytes <= bytes.size(); at += entry_bytes) {

@@ -21,10 +21,10 @@ inline constexpr std::string_view kLinesHead =
     R"({"type":"FeatureCollection","generator":"terrace",)";
 inline constexpr std::string_view kProfileHead = "distance,x,y,height";
 
-/// Whether the regular file at `path` is empty or has terrace's mark where its format has room for
-/// one: a header comment (PLY, OBJ, VTK), the generator (GLB, GeoJSON, LAS), the tag Software
-/// (TIFF, PNG) or the first bytes (overlays). nullopt for formats without room for a mark, such as
-/// CSV; false if the file cannot be read.
+/// Whether the regular file at `path` is empty or has terrace's mark. The mark is a header comment
+/// (PLY, OBJ, VTK), the generator (GLB, GeoJSON, LAS), the tag Software (TIFF, PNG) or the first
+/// bytes (overlays). Returns nullopt for formats without room for a mark, such as CSV, and false if
+/// the file cannot be read.
 [[nodiscard]] std::optional<bool> marked_by_terrace(const std::string& path);
 
 }  // namespace terrace::terrain

@@ -23,7 +23,7 @@ constexpr const char* kCrossing = "Self-intersection";
 
 /// Visits the corners from left to right and, at equal x, from below. Keeps the edges that cross
 /// the sweep line in order from below. No two of them cross before the sweep line, because a
-/// crossing is found when its edges become neighbours; so their order never changes.
+/// crossing is found when its edges become neighbours. So their order never changes.
 ///
 /// Rings may touch each other at single places. The polygon is then valid if no ring crosses
 /// another there and the touching rings do not form a cycle, which would cut the interior in two.

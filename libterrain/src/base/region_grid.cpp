@@ -8,7 +8,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kLeastGridSide = 16, kMostGridSide = 1024, kCellsPerCorner = 10;
-/// The most cells to mark; a cell counts once for each edge that marks it.
+/// Limit on the cells to mark. A cell counts once for each edge that marks it.
 constexpr double kMostMarks = 0x1p25;
 constexpr auto kOutside = static_cast<std::uint8_t>(Overlap::none);
 constexpr auto kRing = static_cast<std::uint8_t>(Overlap::part);
@@ -50,7 +50,7 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
     }
   }
   while (side_ < kMostGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
-  // Many edges across the whole box would mark the same cells again and again: take larger cells.
+  // Many edges across the whole box would mark the same cells again and again, so use larger cells.
   const Point2 extent = edge_extent(polygons, low_, high_);
   while (side_ > kLeastGridSide &&
          (extent[0] + extent[1]) * static_cast<double>(side_) > kMostMarks) {

@@ -16,7 +16,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Each takes 20 MB for 100,000 corners. The grid answers all but one query in a hundred, so a few
+/// A copy takes 20 MB for 100,000 corners. The grid answers 99 of 100 queries, so a few copies
 /// serve many threads.
 constexpr unsigned kMostPrepared = 4;
 

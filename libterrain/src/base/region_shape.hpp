@@ -15,14 +15,14 @@
 
 namespace terrace::terrain {
 
-/// Polygons prepared for queries; GEOS answers where the grid cannot decide. GEOS's predicates use
+/// Polygons prepared for queries. GEOS answers where the grid cannot decide. GEOS's predicates use
 /// twice the precision of a double where rounding could matter. Several threads may call all
 /// functions at once.
 class RegionShape {
  public:
-  /// Throws: stream::Error that names `file`, the polygon, the ring and the place if there is no
-  /// polygon or if one is invalid by OGC Simple Features; stream::Stopped. Polygons may overlap
-  /// each other.
+  /// Polygons may overlap each other. Throws: stream::Error if there is no polygon or if one is
+  /// invalid by OGC Simple Features, naming `file`, the polygon, the ring and the place;
+  /// stream::Stopped.
   RegionShape(std::vector<Polygon> polygons, const std::string& file,
               const std::stop_token& stop = {});
   RegionShape(const RegionShape&) = delete;
@@ -51,14 +51,14 @@ class RegionShape {
   RegionGrid grid_;  // its constructor queries the members above
 };
 
-/// Returns the part of the plane inside the polygon by the even-odd rule, as valid polygons; the
-/// polygon itself if it is valid. Empty if it has no area.
+/// Returns the part of the plane inside the polygon by the even-odd rule, as valid polygons.
+/// Returns the polygon itself if it is valid, and an empty list if it has no area.
 std::vector<Polygon> valid_polygons(const Polygon& polygon);
 
 /// Returns why and where a polygon is invalid by OGC Simple Features; nullopt if it is valid.
-/// Sweeps over the edges; exact, O(n log n) for n corners in any arrangement. Source: M. Shamos, D.
-/// Hoey, Geometric intersection problems, 1976. Requires finite coordinates and at least one ring.
-/// Throws: stream::Stopped.
+/// Sweeps over the edges with exact predicates, in O(n log n) for n corners in any arrangement.
+/// Source: M. Shamos, D. Hoey, Geometric intersection problems, 1976. Requires finite coordinates
+/// and at least one ring. Throws: stream::Stopped.
 [[nodiscard]] std::optional<std::string> fault_of(const Polygon& polygon,
                                                   const std::stop_token& stop = {});
 

@@ -10,19 +10,20 @@
 
 namespace terrace::terrain {
 
-/// Throws: stream::Error if the store holds anything but points, which `what` needs.
+/// Throws: stream::Error unless the store holds points. what: the request that needs them.
 void need_points(const stream::Store& store, const std::string& what);
 /// Whether a recorded CRS is geocentric: x, y and z are measured from the centre of the earth.
 bool is_geocentric(const stream::Crs& recorded);
-/// need_points(), and z must be a height. Throws: stream::Error for a store in a geocentric CRS.
+/// As need_points(). Also throws stream::Error for a store in a geocentric CRS, whose z is not a
+/// height.
 void need_terrain(const stream::Store& store, const std::string& what);
 /// Throws: UsageError if the store does not have this level.
 void need_level(const stream::Store& store, unsigned level);
 /// Throws: stream::Error if the clusters of a level and of those above do not have as many points
-/// as the manifest says; for callers that read them without Store::for_each().
+/// as the manifest says. Call it before reading them without Store::for_each().
 void need_all_points(const stream::Store& store, unsigned level, std::uint64_t points);
-/// Returns "x from 0 to 10, y from 0 to 5, z from -1 to 1": the extent of the points, in a view of
-/// those that meet its condition. Throws: stream::Error if none does.
+/// Returns the extent of the points as text: "x from 0 to 10, y from 0 to 5, z from -1 to 1". In a
+/// view, only points that meet the condition count. Throws: stream::Error if no point does.
 std::string extent_text(const stream::Store& store);
 /// Throws a stream::Error that states the extent of the points, because no `what` is in a region,
 /// or no point meets the condition of a view.

@@ -34,9 +34,9 @@ class CornerReader {
 
   /// The most corners that an entity can have, at most stream::kPolylineVertices.
   [[nodiscard]] std::size_t max_corners() const { return other_corners_.size() / 3 + 1; }
-  /// Reads all corners but the first into corners[1] and on, and returns the number of corners, the
-  /// first included. corners: has size most(). Throws: stream::Error on an impossible number of
-  /// vertices.
+  /// Reads all corners except the first into corners[1], corners[2], and so on. Returns the number
+  /// of corners, including the first. corners: has max_corners() elements. Throws: stream::Error on
+  /// an impossible number of vertices.
   std::size_t operator()(std::span<const std::byte> record,
                          std::span<stream::Point3> corners) const;
 

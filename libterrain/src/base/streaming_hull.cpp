@@ -22,7 +22,8 @@ double outward_place(const Point2& from, const Point2& to, unsigned axis, double
   const auto left = [&](double t) {
     return tri::orientation(from, to, axis == 0 ? Point2{c, t} : Point2{t, c}) > 0;
   };
-  // Right of a side is down if the side goes to larger x, and up in x if it goes to larger y.
+  // The right of a side is towards smaller y if the side goes to larger x, and towards larger x if
+  // it goes to larger y.
   const bool grows = (to[axis] > from[axis]) == (axis == 1);
   const double size = std::max(std::abs(from[along]), std::abs(to[along]));
   for (double step = std::max(size * 0x1p-53, 0x1p-1060); left(at); step *= 2.0)
@@ -46,7 +47,7 @@ std::vector<Point2> convex_hull(std::vector<Point2> points, bool keep_straight) 
     hull.push_back(p);
   };
   for (const Point2& p : points) add(p, 0);
-  // All on one line: skip the upper chain.
+  // If all points are on one line, there is no upper chain.
   if (hull.size() == points.size() && tri::orientation(points[0], points[1], points.back()) == 0 &&
       std::all_of(points.begin(), points.end(), [&](const Point2& p) {
         return tri::orientation(points.front(), points.back(), p) == 0;

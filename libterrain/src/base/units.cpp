@@ -184,7 +184,7 @@ std::string readable_number(double value, int digits) {
     std::snprintf(text.data(), text.size(), "%.*g", digits, value);
   }
   const std::string plain = text.data();
-  // Not for coordinates.
+  // Coordinates get no commas.
   const bool commas = digits < 10 && size >= 999.5 && plain.find_first_of(".e") == plain.npos;
   if (!commas) return plain;
   return (value < 0 ? "-" : "") + with_commas(static_cast<std::uint64_t>(std::llround(size)));

@@ -12,7 +12,7 @@
 
 namespace terrace::terrain {
 
-/// Parses all of `text` as a number with std::from_chars(); nullopt if it is not one.
+/// Parses all of `text` as a number with std::from_chars(). Returns nullopt if that fails.
 template <class Number>
 std::optional<Number> number_from(std::string_view text) {
   Number value{};
@@ -47,7 +47,7 @@ std::string with_commas(std::uint64_t value);
 /// Formats a number with a noun, in the plural unless it is 1: "1 level", "12,345 tiles",
 /// "2 vertices".
 std::string counted(std::uint64_t number, std::string_view noun);
-/// The same with a verb that agrees with the number: "1 sample is", "2 samples are".
+/// As above, with a verb that agrees with the number: "1 sample is", "2 samples are".
 std::string counted(std::uint64_t number, std::string_view noun, std::string_view verb_of_one,
                     std::string_view verb_of_more);
 /// Formats an amount of memory: "3.2 GiB", "640 MiB", "12 bytes".
@@ -58,13 +58,13 @@ std::string readable_rate(double per_second);
 std::string readable_seconds(double seconds);
 /// Returns the shortest text that reads back as the same double: "0.1", "1e+20", "nan".
 std::string number_text(double value);
-/// The same for messages: without an exponent from 1e-9 up to 1e15, as in "500000".
+/// As number_text(), for messages: without an exponent from 1e-9 up to 1e15, as in "500000".
 std::string plain_number(double value);
 /// Formats a number with `digits` significant digits, but keeps all digits before the point:
 /// "2.99", "1,834", "0.00012", "4345.68" (of 6), "nan". With 10 digits or more, as for coordinates,
 /// it omits the commas.
 std::string readable_number(double value, int digits = 3);
-/// The same with 3 digits, rounded up, so that the printed bound holds.
+/// As readable_number() with 3 digits, but rounded up, so that the printed bound holds.
 std::string readable_bound(double value);
 
 }  // namespace terrace::terrain

@@ -108,23 +108,23 @@ struct Located {
   }
 };
 
-/// Memory for a source, unless it says that it needs more. The source also gets what is left of
-/// --memory, which lets it keep more files of a mosaic open.
+/// Memory for a source, unless it reports that it needs more. The source also gets the unused part
+/// of --memory, so that it can keep more files of a mosaic open.
 constexpr std::uint64_t kSourceMemory = std::uint64_t{64} << 20;
 constexpr std::size_t kBlocksAhead = 4;
 /// Memory limit of a build, unless its context sets another.
 constexpr std::uint64_t kMemory = std::uint64_t{256} << 20;
-/// How many parts of points are sorted ahead; each uses about 20 MiB.
+/// Number of parts of points that are sorted ahead. Each uses about 20 MiB.
 constexpr unsigned kMostPartsAhead = 4;
 
-/// Estimates peak memory with this many threads, excluding the source's. The estimate is generous;
+/// Estimates peak memory with this many threads, excluding the source's. The estimate is generous:
 /// a benchmark prints the true peak.
 std::uint64_t memory_without_source(const BuildRequest& request, std::size_t payload_size,
                                     std::uint64_t threads) {
   const std::uint64_t point = sizeof(stream::Point3) + payload_size;
-  // Counts the blocks read ahead, being clustered or waiting, and one forming per level, with
-  // temporary data per point; and those that the store writer holds back to train its compression
-  // tables.
+  // Counts the blocks that are read ahead, clustered or waiting, and one per level that is being
+  // filled, with temporary data per point. Also counts the blocks that the store writer holds back
+  // to train its compression tables.
   const std::uint64_t blocks =
       (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
       64 * request.block_points * (point + 16);
@@ -204,8 +204,8 @@ std::array<double, 3> unit_lengths(const GroundMap& map) {
   return {length(0), length(1), length(2)};
 }
 
-/// Notes in what order the points arrived, if they were sorted.
-void tell_order(const stream::OrderedSource::Report& order, const std::filesystem::path& folder,
+/// Notes the order in which the points arrived, if they were sorted.
+void note_order(const stream::OrderedSource::Report& order, const std::filesystem::path& folder,
                 const Context& context) {
   if (!order.reordered) return;
   std::string line = "the points were put in spatial order";
@@ -232,10 +232,10 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
                               : "none of its points is selected";
     remedy = stream::message("give another {where} or {region}");
   } else {
-    cause = fmt::format("there is not one point{} in it", info.grid ? " with data" : "");
+    cause = info.grid ? "has no point with data" : "has no point";
     if (read.nodata > 0) {
-      cause += fmt::format(" ({} {})", read.nodata,
-                           info.grid ? "cells, all nodata" : "points, all without a coordinate");
+      cause += fmt::format(" ({}, {})", counted(read.nodata, info.grid ? "cell" : "point"),
+                           info.grid ? "all nodata" : "all without a coordinate");
     }
     remedy = info.grid ? "check the file and its nodata value" : "check the file";
   }
@@ -243,11 +243,11 @@ void tell_order(const stream::OrderedSource::Report& order, const std::filesyste
       .remedy(remedy);
 }
 
-/// Returns how to join the points across the antimeridian if they must be joined and the input can
-/// be read again; nullopt if they need not be. Throws: stream::Error if it cannot be read again.
-std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request,
-                                                     const JoinedLongitudes& longitudes,
-                                                     const Context& context) {
+/// Returns how to join the points across the antimeridian; nullopt if they need not be joined.
+/// Throws: stream::Error if they must be joined and the input cannot be read again.
+std::optional<JoinedLongitudes::Joint> needed_joint(const BuildRequest& request,
+                                                    const JoinedLongitudes& longitudes,
+                                                    const Context& context) {
   std::optional<JoinedLongitudes::Joint> joint = longitudes.joint();
   if (!joint || request.most_points > 0) return std::nullopt;
   if (request.entities != stream::Entities::points) {
@@ -267,24 +267,24 @@ std::optional<JoinedLongitudes::Joint> joint_to_make(const BuildRequest& request
   return joint;
 }
 
-/// One reading of the input into a store. A thread of its own reads ahead; the context's threads
-/// cluster.
+/// Reads the input once and builds the store. A separate thread reads ahead, and the context's
+/// threads cluster.
 class Build {
  public:
   /// middle: for joining points across the antimeridian; see JoinedLongitudes.
   Build(const BuildRequest& request, const Context& context, std::optional<double> middle)
       : request_(request), context_(context), middle_(middle) {}
 
-  /// Returns the outcome, or, if there is no middle but one is needed, the joint to build again
-  /// with. To be called once.
+  /// Returns the outcome. If a middle is needed and was not given, returns the joint to build again
+  /// with. Call it only once.
   std::variant<BuildOutcome, JoinedLongitudes::Joint> run();
 
  private:
   [[nodiscard]] std::unique_ptr<stream::PointSource> open_input();
   [[nodiscard]] std::unique_ptr<stream::PointSource> in_order(
       std::unique_ptr<stream::PointSource> points);
-  /// Returns the number of threads: as many as requested and as fit into --memory. Results do not
-  /// depend on it. Throws: stream::Error if not even one thread fits.
+  /// Returns the number of threads: the requested number, or fewer if they do not fit into
+  /// --memory. Results do not depend on it. Throws: stream::Error if not even one thread fits.
   [[nodiscard]] unsigned threads_for(std::size_t payload_bytes) const;
   /// Pushes all points to the builder.
   void read_all(cluster::HierarchyBuilder& builder, const stream::StoreSchema& schema,
@@ -293,8 +293,8 @@ class Build {
   [[nodiscard]] BuildOutcome outcome_of(const stream::Progress& read,
                                         const cluster::HierarchyResult& result,
                                         std::uint64_t store_bytes) const;
-  /// Notes what a user should know of the input.
-  void tell(const BuildOutcome& outcome, const UndeclaredVoids& voids) const;
+  /// Notes what a user should know about the input.
+  void note(const BuildOutcome& outcome, const UndeclaredVoids& voids) const;
 
   [[nodiscard]] std::filesystem::path folder() const {
     return std::filesystem::absolute(request_.store).parent_path();
@@ -317,7 +317,7 @@ class Build {
   /// are read meanwhile.
   std::shared_future<Located> located_;
   stream::OrderedSource* ordered_ = nullptr;  ///< in points_, unless they are cells
-  /// Last, because its thread uses the members above.
+  /// The last member, because its thread uses the members above.
   std::unique_ptr<stream::PointSource> points_;
 };
 
@@ -334,7 +334,7 @@ std::unique_ptr<stream::PointSource> Build::open_input() {
   options.crs = request_.crs;
   options.same_crs = &same_crs;
   options.threads = std::max(1U, context_.threads);
-  if (request_.skip_damaged) options.on_damage = damage_.taker();
+  if (request_.skip_damaged) options.on_damage = damage_.handler();
   options.stop = reading_.get_token();
   auto source =
       request_.open ? request_.open(options) : stream::open_source(request_.inputs, options);
@@ -389,7 +389,7 @@ unsigned Build::threads_for(std::size_t payload_bytes) const {
 }
 
 bool Build::next(cluster::HierarchyBuilder& builder, stream::PointBlock& block) {
-  // Reading stops for two reasons: the context requested it, or a failure that push() rethrows.
+  // Reading stops if the context requests it, or after a failure that push() rethrows.
   try {
     return points_->next(block);
   } catch (const stream::Stopped&) {
@@ -441,7 +441,7 @@ BuildOutcome Build::outcome_of(const stream::Progress& read, const cluster::Hier
   return outcome;
 }
 
-void Build::tell(const BuildOutcome& outcome, const UndeclaredVoids& voids) const {
+void Build::note(const BuildOutcome& outcome, const UndeclaredVoids& voids) const {
   const auto say = [this](const stream::Message& note) {
     if (!note.empty()) context_.say(note);
   };
@@ -454,11 +454,11 @@ void Build::tell(const BuildOutcome& outcome, const UndeclaredVoids& voids) cons
                 "is marked as withheld in its file; it is kept, with the mark",
                 "are marked as withheld in their file; they are kept, with the mark"));
   }
-  tell_spooled(info_, context_);
+  note_spooled(info_, context_);
   say(info_.note);
   say(voids.note());
-  damage_.tell(context_);
-  tell_order(outcome.order, folder(), context_);
+  damage_.note(context_);
+  note_order(outcome.order, folder(), context_);
   const auto& [crs, ground] = located_.get();
   say(crs.note);
   say(ground.assumption());
@@ -501,12 +501,12 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   const stream::Progress read = points_->progress();
   if (read.points == 0) throw_no_points(request_, info_, read);
   if (!middle_) {
-    if (auto joint = joint_to_make(request_, longitudes, context_)) return *std::move(joint);
+    if (auto joint = needed_joint(request_, longitudes, context_)) return *std::move(joint);
   }
   writer.set_nodata(read.nodata);
   const cluster::HierarchyResult result = builder.finish();
   BuildOutcome outcome = outcome_of(read, result, sink.store_bytes());
-  tell(outcome, voids);
+  note(outcome, voids);
   return outcome;
 }
 

@@ -26,8 +26,8 @@ void set_metric(const BuildRequest& request, const stream::Placement& info, cons
     options.metric = choice.on_ground({0, 0, 0}, cluster::kIdentityMap);
     return;
   }
-  // Composes the maps from the CRS to stored coordinates (a raster's columns and rows) to the
-  // ground.
+  // Composes two maps: from the CRS to stored coordinates (a raster's columns and rows), and from
+  // these to the ground.
   const std::array<double, 6>& xy = info.world.xy;
   const stream::Channel& height = info.coordinates[2];
   options.metric_of = [&choice, &ground, xy, height](const base::Box3& bounds) {

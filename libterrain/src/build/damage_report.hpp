@@ -18,7 +18,7 @@
 namespace terrace::terrain {
 
 /// Notes that the input was spooled to disk, if it was.
-inline void tell_spooled(const stream::SourceInfo& info, const Context& context) {
+inline void note_spooled(const stream::SourceInfo& info, const Context& context) {
   if (info.spooled_bytes == 0) return;
   context.say("the input cannot be read from a pipe or out of gzip: " +
               readable_bytes(info.spooled_bytes) + " were copied to a temporary file");
@@ -28,20 +28,20 @@ inline void tell_spooled(const stream::SourceInfo& info, const Context& context)
 class DamageReport {
  public:
   /// For SourceOptions::on_damage; the report must outlive the source.
-  [[nodiscard]] auto taker() {
+  [[nodiscard]] auto handler() {
     return [this](const stream::Error& damage, std::uint64_t points) {
       const stream::Error::Parts& parts = damage.parts();
       std::string line = parts.file + ": " + (parts.where.empty() ? "" : parts.where + ": ") +
                          parts.cause.text() + " (" + counted(points, "point") + " left out)";
       const std::lock_guard lock(mutex_);
-      // With several files, each is opened twice: to check that they agree, and to read it.
+      // Each of several files is opened twice, first to check that they agree and then to read it.
       if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
       ++parts_;
       if (lines_.size() < kMostLines) lines_.push_back(std::move(line));
     };
   }
 
-  void tell(const Context& context) const {
+  void note(const Context& context) const {
     const std::lock_guard lock(mutex_);
     for (const std::string& line : lines_) context.say(line);
     if (parts_ > lines_.size()) {

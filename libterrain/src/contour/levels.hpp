@@ -22,10 +22,10 @@ class ContourLevels {
 
   [[nodiscard]] double height(std::int64_t level) const { return heights_(level); }
 
-  /// Returns the lowest level not below a height; exactly the levels below it are below the height.
+  /// Returns the lowest level that is not below a height. All levels below it are below the height.
   [[nodiscard]] std::int64_t at_or_above(double height) const {
     auto level = static_cast<std::int64_t>(std::ceil(height / heights_.step()));
-    // The quotient is rounded, so compare with the level as it is written.
+    // The quotient is rounded, so compare the height with the heights of the levels.
     while (this->height(level) < height) ++level;
     while (this->height(level - 1) >= height) --level;
     return level;
@@ -39,7 +39,7 @@ class ContourLevels {
     const std::array<const Corner*, 3> corner{&a, &b, &c};
     const auto [low, high] = std::minmax({a.level, b.level, c.level});
     for (std::int64_t level = low; level < high; ++level) {
-      // The corner that is alone on its side of the level.
+      // Find the corner that is alone on its side of the level.
       const std::array<bool, 3> above{a.level > level, b.level > level, c.level > level};
       const std::size_t alone = above[1] == above[2] ? 0 : above[0] == above[2] ? 1 : 2;
       const Corner& next = *corner[(alone + 1) % 3];

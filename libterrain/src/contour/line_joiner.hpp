@@ -48,7 +48,7 @@ struct LineStretch {
 /// member `level`) on an edge. At most one segment begins there, and at most one ends. The order of
 /// the lines depends only on the order of the segments.
 ///
-/// Two hash look-ups per segment or stretch. Memory: the incomplete lines.
+/// Costs two hash look-ups per segment or stretch. Memory: the incomplete lines.
 template <class Crossing, class Hash>
 class LineJoiner {
  public:
@@ -65,9 +65,9 @@ class LineJoiner {
     end_of_stretches(1);
   }
 
-  /// Equivalent to adding the segments of some stretches one by one, in their order. Stretches must
-  /// come in the order of their last segments, and be numbered from 0 in the order of their first;
-  /// end_of_stretches(count) must follow.
+  /// Has the effect of adding the segments of some stretches one by one, in their order. Stretches
+  /// must come in the order of their last segments, and be numbered from 0 in the order of their
+  /// first ones. Call end_of_stretches(count) after the last stretch.
   void add(const LineStretch<Crossing>& stretch) {
     const std::span<const Point2> points = stretch.points;
     segments_ += points.size() - 1;
@@ -184,7 +184,8 @@ class LineJoiner {
     return (end & 1U) == kBegin ? line.begin : line.end;
   }
 
-  /// Removes the line that begins (or ends) at a crossing from the table; kNone if there is none.
+  /// Removes the line that begins (or ends) at a crossing from the table and returns it; kNone if
+  /// there is none.
   std::uint32_t take(const Crossing& crossing, std::uint32_t hash, std::uint32_t side) {
     for (std::size_t at = hash & mask_; slots_[at].end != kNone; at = (at + 1) & mask_) {
       const std::uint32_t end = slots_[at].end;

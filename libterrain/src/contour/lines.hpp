@@ -30,7 +30,7 @@ class ContourLines {
 
   /// Adds the next band: `rows` rows of heights (NaN: no data), the first of which is the last of
   /// the previous band. wanted: whether to draw in the square right of and below (column, row) of
-  /// the lattice; empty: in all squares.
+  /// the lattice. If it is empty, draws in all squares.
   void add(std::span<const double> heights, std::int64_t rows,
            const std::function<bool(std::int64_t column, std::int64_t row)>& wanted = {});
   /// Emits the lines that are still open. No bands may follow.

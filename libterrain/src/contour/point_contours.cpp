@@ -25,7 +25,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Memory of one triangulated part; with less per thread, fewer threads are used.
+/// Memory of one triangulated part. If there is less per thread, fewer threads are used.
 constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
 /// Several parts are triangulated together, which costs less per point. A point's memory is its
 /// share of the triangulation and of the triangles that wait to be drawn.
@@ -34,7 +34,7 @@ constexpr double kMostPointsAtOnce = 1U << 16;
 constexpr std::uint64_t kBytesPerPointAlone = 1200;
 constexpr double kPartsPerThread = 4;
 constexpr double kBytesPerExpected = 3.0 * PointWindow::kBytesPerPoint + 3 * 240;
-/// Share of a thread's memory for lines that wait to be drawn; where levels are denser, triangles
+/// Share of a thread's memory for lines that wait to be drawn. Where levels are denser, triangles
 /// wait instead.
 constexpr std::uint64_t kShareOfLines = 8;
 constexpr std::uint64_t kBytesPerSegment = 64;
@@ -42,8 +42,8 @@ constexpr std::uint64_t kBytesPerSegment = 64;
 using Triangle = ContourTriangles::Triangle;
 constexpr std::uint32_t kNoPart = kNoContourPart;
 
-/// The lines of each of some parts, or the triangles with levels in them; and crossed triangles
-/// that have no vertex in any active part.
+/// For each of several parts, its lines or the triangles that levels cross. Also the crossed
+/// triangles without a vertex in an active part.
 struct Crossed {
   std::vector<std::variant<PartLines, std::vector<Triangle>>> by_part;
   std::vector<Triangle> strange;
@@ -167,7 +167,7 @@ class PointContours {
     return first;
   }
 
-  /// If it does not fit after all, its halves may.
+  /// A part that does not fit is divided, because its halves may fit.
   void add_crossed(PointWindow& window, const WindowTree::Part& part, Crossed& result) const {
     if (first_at_work(part) == part.end) return;
     try {

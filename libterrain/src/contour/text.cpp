@@ -106,7 +106,7 @@ void ContourText::append(std::string& text, const ContourLine& line,
   if (reverse_) std::reverse(places.begin(), places.end());
   if (geography_) {
     (*geography_)(places);
-    // Longitudes continue across the antimeridian; all lines begin on the same side.
+    // Longitudes continue across the antimeridian, and all lines begin on the same side of it.
     double near = middle_;
     for (Point2& p : places) {
       p = WholeTurns(near, 360)(p);

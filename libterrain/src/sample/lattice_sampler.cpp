@@ -197,7 +197,7 @@ class LatticeSampler final : public HeightSampler {
       top = std::min(top, row);
       bottom = std::max(bottom, row);
     }
-    // Nearest may use the sample after the square, and its gradient one more.
+    // The nearest sample may be after the square, and its gradient uses one more.
     left = std::max<std::int64_t>(left - 1, 0);
     top = std::max<std::int64_t>(top - 1, 0);
     right = std::min(right + 2, raster_.columns - 1);

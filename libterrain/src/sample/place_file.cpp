@@ -192,7 +192,7 @@ bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most
   return true;
 }
 
-bool is_no_place(std::string_view line) { return line.empty() || line.front() == '#'; }
+bool is_skipped_line(std::string_view line) { return line.empty() || line.front() == '#'; }
 
 Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::string& file,
                 std::uint64_t line_number) {

@@ -59,8 +59,8 @@ class PlaceFile {
   std::uint64_t line_ = 1;
 };
 
-/// Whether a line is copied without an answer, because it is empty or a comment (#).
-bool is_no_place(std::string_view line);
+/// Whether a line has no place, because it is empty or a comment (#). Such lines are copied.
+bool is_skipped_line(std::string_view line);
 
 /// Parses the place in a line; NaN where a coordinate is empty or "nan". Throws: stream::Error
 /// naming file and line if a coordinate is not a number.

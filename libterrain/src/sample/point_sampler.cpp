@@ -20,7 +20,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// With more than this, threads would wait for the last one.
+/// With more points, threads would wait for the last one.
 constexpr double kMostPointsAtOnce = 1U << 21;
 constexpr double kPartsPerThread = 4;
 /// A single place costs as much as loading this many points. In addition it reads all clusters
@@ -39,7 +39,7 @@ constexpr double kMostSampleMargin = 0.125;
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
 /// Memory for reading, in addition to the points.
 constexpr std::uint64_t kReadBytes = std::uint64_t{12} << 20;
-/// Allows for half as many points again as expected, and for those loaded around.
+/// Allows for half as many points again as expected, and for the points loaded around them.
 constexpr double kBytesPerExpected = 2.0 * PointCells::kBytesPerPoint;
 
 /// Returns the position along a curve through the box, so that the next place is usually near.
@@ -88,8 +88,8 @@ struct CloudWorker {
   CloudWorker(PointCloud& cloud, const TooLong& too_long, std::uint64_t memory_bytes)
       : surface(cloud, too_long, memory_bytes) {}
 
-  /// Loads the points in a box and `margin` around it, unless loaded. Returns false if they do not
-  /// fit.
+  /// Loads the points in a box and `margin` around it, unless they are loaded. Returns false if
+  /// they do not fit.
   bool load(const StoredBox& inner, double margin, std::size_t most_points, bool may_crowd) {
     const StoredBox box = inner.widened(margin);
     if (loaded && loaded->min == box.min && loaded->max == box.max) return true;
@@ -210,7 +210,7 @@ class PointSampler final : public HeightSampler {
     if (may_load_all_) all_cells_ = std::move(cells);
   }
 
-  /// If a part does not fit after all, its halves may.
+  /// A part that does not fit is divided, because its halves may fit.
   void work_on(CloudWorker& worker, const WindowTree::Part& part, std::span<const Point2> places,
                std::span<SurfacePoint> out) {
     const Numbers numbers = numbers_in(part);
@@ -312,7 +312,7 @@ class PointSampler final : public HeightSampler {
   std::vector<std::unique_ptr<CloudWorker>> workers_;
   std::size_t room_ = 0;         ///< the most points that a worker can hold
   double most_points_ = 0;       ///< limit for a part that is loaded in one piece
-  double points_per_place_ = 0;  ///< points per place up to which that pays off
+  double points_per_place_ = 0;  ///< loads a part at once up to this many points per place
   bool may_load_all_ = false;    ///< whether to load all points if there are many places
   std::unique_ptr<const PointCells> all_cells_;
   std::vector<std::uint32_t> keys_, order_;

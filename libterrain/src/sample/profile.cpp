@@ -112,7 +112,7 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
       const double size = box.max[k] - box.min[k], way = std::abs(to[k] - from[k]);
       if (size > 0 && way > 0) end = std::min(end, begin + kCrossingPiece * size / way);
     }
-    // Large enough to make progress.
+    // Advance at least this far, so that the loop ends.
     end = std::max(end, begin + 1e-9);
     collect(from, to, begin, std::min(end, last), end >= last);
     for (const Crossing& one : found_) {
@@ -270,7 +270,7 @@ class ProfileRun {
   }
 
   void add(const Point2& place, double metres) { add(place, metres, ground_.stored(place)); }
-  /// known: the height of the linear surface there, if already computed.
+  /// known: the height of the linear surface there if it was computed, otherwise NaN.
   void add(const Point2& place, double metres, const Point2& stored, double known = NAN) {
     places_.push_back(place);
     metres_.push_back(metres);

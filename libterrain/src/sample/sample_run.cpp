@@ -148,7 +148,7 @@ class Answers {
   void append_line(std::string& text, const PlaceBatch& batch, std::size_t i,
                    const PlaceConversions& conversions) const {
     const std::string_view line = batch.line(i);
-    if (!conversions.to_written || !layout_ || is_no_place(line)) {
+    if (!conversions.to_written || !layout_ || is_skipped_line(line)) {
       text += line;
     } else if (is_header(batch, i)) {
       const bool degrees = conversions.writes_degrees;
@@ -167,7 +167,7 @@ class Answers {
   void find_layout(const PlaceBatch& batch) {
     std::string_view comment;
     for (std::size_t i = 0; !layout_ && i < batch.size(); ++i) {
-      if (is_no_place(batch.line(i))) {
+      if (is_skipped_line(batch.line(i))) {
         comment = batch.line(i);
         continue;
       }
@@ -179,7 +179,7 @@ class Answers {
     return batch.first_line + i == header_line_;
   }
   [[nodiscard]] bool is_place(const PlaceBatch& batch, std::size_t i) const {
-    return !is_header(batch, i) && !is_no_place(batch.line(i));
+    return !is_header(batch, i) && !is_skipped_line(batch.line(i));
   }
 
   const stream::Store& store_;

@@ -63,7 +63,7 @@ class StoreProbe {
   class SomeSamples;
 
   /// Visits all clusters that may have points with a box for which wants(box) is true, from the
-  /// root down, as long as these have at most `most` points. Returns the level reached.
+  /// root down, as long as these have at most `max_points` points. Returns the level reached.
   unsigned descend(std::uint64_t max_points, const std::function<bool(const stream::Box3&)>& wants,
                    const std::function<void(const stream::ClusterPoints&)>& visit);
   Profile of_raster(const stream::Point3& from, const stream::Point3& to);

@@ -20,8 +20,8 @@ struct HalfPlane {
   std::array<double, 2> a{}, b{};
 
   [[nodiscard]] bool meets(const StoredBox& box) const { return !(leftness(box) > 0); }
-  /// How far left of the line the rightmost corner of the box is; positive only if it is certainly
-  /// left. Proportional to the distance, for comparisons.
+  /// Returns how far left of the line the rightmost corner of the box is, in a unit that allows
+  /// only comparisons. Positive only if the corner is certainly left of the line.
   [[nodiscard]] double leftness(const StoredBox& box) const {
     const double ux = b[0] - a[0], uy = b[1] - a[1];
     // The cross product of u and (p - a) is smallest at this corner.

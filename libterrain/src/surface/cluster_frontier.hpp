@@ -14,8 +14,8 @@
 
 namespace terrace::terrain {
 
-/// An incremental descent into a store's clusters: which have been read, and the boxes of all that
-/// have not. Outside the boxes of open(), all points are known.
+/// An incremental descent into a store's clusters. Knows the boxes of all clusters that have not
+/// been read. Outside the boxes of open(), all points are known.
 class ClusterFrontier {
  public:
   /// A cluster that has not been read; its box also contains all points below it.
@@ -52,8 +52,8 @@ class ClusterFrontier {
 
   void read_one(std::size_t at, const Take& take);
   void add_below(const stream::StoreQuery::Node& node);
-  /// Skips boxes of a single point: all points below have the x and y of the head, which is the one
-  /// that counts, except in views. Returns false if no box is left.
+  /// Skips boxes of a single point, except in views: all points below have the x and y of the head,
+  /// and the head determines the height. Returns false if no box is left.
   bool settle(Open& open) const;
 
   stream::StoreQuery reader_;

@@ -14,7 +14,7 @@ namespace {
 
 bool before(const SurfaceCorner& a, const SurfaceCorner& b) { return a.place < b.place; }
 
-/// The same with bounded error, see weights_at().
+/// As on_plane(), with a bounded error for thin triangles, see weights_at().
 SurfacePoint on_needle(const SurfaceTriangle& corner, const Point2& place) {
   tri::Delaunay2<double> alone;
   std::vector<double> heights;

@@ -22,12 +22,12 @@ using SurfaceTriangle = std::array<SurfaceCorner, 3>;  ///< counter-clockwise
 /// Whether an edge between two places is too long for its triangles to be part of the surface.
 using TooLong = std::function<bool(const Point2&, const Point2&)>;
 
-/// The surface inside a triangle, its border included.
+/// Returns the surface inside a triangle or on its border.
 SurfacePoint on_plane(SurfaceTriangle triangle, const Point2& place);
 /// Returns the height on an edge.
 double on_edge(SurfaceCorner a, SurfaceCorner b, const Point2& place);
-/// The surface at a place where triangles meet: the height is given, and the gradient is the mean
-/// over the triangles without too long an edge. Reorders the triangles.
+/// Returns the surface at a place where triangles meet, with the given height. The gradient is the
+/// mean over the triangles whose edges are not too long. Reorders the triangles.
 SurfacePoint where_triangles_meet(const Point2& place, double height,
                                   std::span<SurfaceTriangle> triangles, const TooLong& too_long);
 

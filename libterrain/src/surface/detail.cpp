@@ -55,7 +55,7 @@ void note_idle_focuses(const stream::Store& store, const Detail& detail, const C
 
 namespace {
 
-/// The number of points to read, encode and so on at once.
+/// Number of points that are processed at once.
 constexpr std::uint64_t kPointsAtOnce = 16384;
 
 /// Descends the levels and collects the clusters headed by the points it meets. Unlike
@@ -87,8 +87,8 @@ class Descent {
   /// The start of the descent: the root, or the one wanted cluster.
   [[nodiscard]] stream::ClusterId first() const { return first_; }
 
-  /// Visits the first cluster and the wanted clusters down to `lowest`; at level 0 only those with
-  /// points that may meet the condition of a view.
+  /// Visits the first cluster and the wanted clusters down to level `lowest`. At level 0, visits
+  /// only clusters with points that may meet the condition of a view.
   void run(unsigned lowest) {
     take(read_first());
     for (unsigned level = stream::level_of(first_); level-- > lowest;) {

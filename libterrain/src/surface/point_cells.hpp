@@ -33,8 +33,8 @@ class PointCells {
   /// stream::Stopped.
   bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
             std::size_t most_points, bool may_crowd);
-  /// Loads all points of a store with several threads; each decodes consecutive clusters, then
-  /// sorts a band of rows. Returns false if the points are crowded, but keeps them. Throws: as
+  /// Loads all points of a store with several threads. Each thread decodes consecutive clusters,
+  /// then sorts a band of rows. Returns false if the points are crowded, but keeps them. Throws: as
   /// above.
   bool load_all(const stream::Store& store, unsigned level, unsigned threads);
   void clear();
@@ -91,7 +91,7 @@ class PointCells {
   void visit_cells(const Range& range, const Visit& visit) const {
     visit_indices(range, [&](std::uint32_t i) { visit(places_[i]); });
   }
-  /// The same, except for cells in `without`.
+  /// As above, except for cells in `without`.
   template <class Visit>
   void visit_cells(const Range& range, const Range& without, const Visit& visit) const {
     for (std::uint32_t row = range.row; row < range.end_row; ++row) {

@@ -13,8 +13,8 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kPointsPerPart = std::size_t{1} << 16;
-/// Looking at a box costs about a fiftieth of triangulating a point, so the border is found before
-/// looking has cost as much.
+/// Testing a box costs about a fiftieth of triangulating a point. So the border is found before the
+/// tests have cost as much as finding it.
 constexpr std::uint64_t kLooksPerPoint = 16;
 /// Peak memory in bytes of a border point: itself, then a vertex with two triangles and their
 /// boxes.

@@ -25,14 +25,14 @@ class PointWindow;
 
 /// The border of the voids of a cloud: the points with a triangle whose circumcircle extends beyond
 /// a reach, which is a few times the local point spacing. All points with a long or open triangle
-/// are among them, so they make a window complete at once: a triangle that meets a box either has a
-/// corner that is not a border point, and is within reach of the box, or it is a triangle of the
-/// triangulation of the border points alone. The same holds for circles that contain a place.
-/// The border is found in one pass over the store, which costs as much as triangulating it once.
-/// That happens when windows have spent enough time looking for missing points: at most once, and
-/// usually never. The contents of windows do not depend on it.
+/// are among them, so they make a window complete at once. A triangle that meets a box either has a
+/// corner that is not a border point, and then it is within reach of the box. Or all its corners
+/// are border points, and then it is a triangle of their triangulation. The same holds for circles
+/// that contain a place. The border is found in one pass over the store, which costs as much as
+/// triangulating it once. That happens at most once, when windows have spent enough time looking
+/// for missing points, and usually never. The contents of windows do not depend on it.
 ///
-/// Windows and surfaces (PointSurface) of several threads share one object; the threads that need
+/// Windows and surfaces (PointSurface) of several threads share one object. The threads that need
 /// the border find it together.
 class PointVoids {
  public:
@@ -90,8 +90,8 @@ class PointVoids {
   BoxTree triangles_;            ///< by triangle slot
 };
 
-/// A store's points of a level and above, with what is known about their triangulation as a whole.
-/// The windows and surfaces of all threads share one object.
+/// A store's points of a level and above, with their hull and the border of their voids. The
+/// windows and surfaces of all threads share one object.
 struct PointCloud {
   /// Finds the hull. The store must outlive this object. Throws: stream::Error on a damaged store,
   /// stream::Stopped.

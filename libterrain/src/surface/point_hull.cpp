@@ -19,7 +19,7 @@ PointHull::PointHull(const stream::Store& store, unsigned level) {
   query.descend(
       level,
       [&](unsigned, const stream::StoreQuery::Branch& branch) {
-        // Rebuild the hull as more points arrive, less and less often.
+        // Rebuild the hull whenever a quarter more points have arrived.
         if (added > compacted_size + compacted_size / 4) {
           set_corners(hull.corners());
           compacted_size = added;

@@ -85,11 +85,11 @@ class PointSurface {
   std::optional<Target> target_of(const Point2& place, PointHull::Side& side) const;
   /// Sets triangle_ to the triangle containing the target, which must be inside the hull.
   void find_triangle(const Target& target);
-  /// Sets star_ to that of a place among all points, which may be one of them. Requires a place
+  /// Sets star_ to that of a place among all points, which may contain the place. Requires a place
   /// that is not outside the hull.
   void find_star(const Point2& centre);
   void narrow_first(const Point2& centre);
-  /// Whether the border of the voids is known; finds it if that pays off.
+  /// Whether the border of the voids is known. Finds it when that is worth its cost.
   bool knows_border();
   /// Sets points_ to the point at a place among collinear points, or else to its two neighbours.
   /// Clears points_ outside the segment.

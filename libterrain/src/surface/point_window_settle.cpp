@@ -13,7 +13,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Small, so that few points are tested that are not near a circle's border; but boxes cost time
+/// Small groups avoid tests of points far from a circle's border, but each group's box costs time
 /// too.
 constexpr std::size_t kPointsPerGroup = 16;
 /// Share of the circles crossing the border that a wider border should contain.
@@ -26,7 +26,7 @@ constexpr unsigned kMostTimesWidened = 3;
 constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
 /// With fewer suspects, a wider border does not pay off.
 constexpr std::size_t kFewSuspects = 12;
-/// Looks are added to the count of all windows in batches of this size.
+/// Tested boxes are added to the count of all windows in batches of this size.
 constexpr std::uint64_t kLooksAtOnce = 1024;
 
 }  // namespace
@@ -63,8 +63,8 @@ void PointWindow::settle() {
   triangulation_.start_journal();
   examine_all();
   for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) cloud_.store.check_stop();
-  // With its corners, the hull is that of the whole, so only circles can lack points. The corners
-  // get their heights when their clusters are read.
+  // With these corners, the hull is that of all points, so only circles can lack points. The
+  // corners get their heights when their clusters are read.
   for (const Point2& corner : cloud_.hull.corners()) take_distant({corner, kUnknownHeight});
   insert_new_points();
   examine_changes();

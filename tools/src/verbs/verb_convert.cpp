@@ -64,7 +64,7 @@ class ConvertCommand : public Command {
                                   .threads = common.threads};
     reading.selection = selection_.selection(inputs_, reading, std::nullopt, common);
     DamageReport damage;
-    if (skip_damaged_) reading.on_damage = damage.taker();
+    if (skip_damaged_) reading.on_damage = damage.handler();
     const std::unique_ptr<stream::PointSource> source = stream::open_source(inputs_, reading);
     const std::uint64_t memory = common.memory_or(0);
     const std::uint64_t reading_bytes = reading_within_memory(*source, memory);
@@ -93,10 +93,10 @@ class ConvertCommand : public Command {
     if (writer->points() == 0) common.say(inputs_.front() + ": contains no points");
     const std::string unit_note = lost_height_unit(output_, *writer, with_source_crs(info));
     if (!unit_note.empty()) common.say(unit_note);
-    tell_spooled(info, common.context());
+    note_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
     if (const stream::Message note = voids.note(); !note.empty()) common.say(note);
-    damage.tell(common.context());
+    damage.note(common.context());
 
     Summary summary = summary_of(source->progress(), writer->points(), info.grid, watch);
     report_rounding(*writer, summary);
