@@ -76,7 +76,7 @@ EllipsoidalHeights::EllipsoidalHeights(const stream::StoreSchema& schema, Height
         recorded.empty() ? "the store does not say what its heights refer to"
                          : "the store's heights are " + recorded));
   }
-  // The same unit as all other verbs, with the same assumption.
+  // Use the same unit as all other functions, with the same assumption.
   const Ground ground(schema);
   metres_per_unit_ = ground.metres_vertical();
   if (!metres_in_unit(schema.coordinates[2].unit) && !metres_in_unit(schema.crs.vertical_unit)) {

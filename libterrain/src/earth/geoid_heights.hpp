@@ -58,8 +58,9 @@ class EllipsoidalHeights {
   /// Converts heights in the store's vertical unit, at places in WGS 84 degrees, to metres above
   /// the ellipsoid, in place. Sizes must be equal.
   void convert(std::span<const Point2> places, std::span<double> heights) const;
-  /// The second half of convert(): adds the height of the geoid above the ellipsoid to heights in
-  /// metres. Does nothing unless has_geoid(). Pass many places at once: see add_smooth_offsets().
+  /// Adds the height of the geoid above the ellipsoid to heights in metres. This is the second step
+  /// of convert(). Does nothing unless has_geoid(). Pass many places at once: see
+  /// add_smooth_offsets().
   void add_geoid(std::span<const Point2> places, std::span<double> heights) const;
 
   /// Metres per unit of the store's heights.
@@ -69,7 +70,8 @@ class EllipsoidalHeights {
   /// Adds everything that the conversion depends on, except for the bytes of a geoid file: unit and
   /// PROJ's operation.
   void add_to(Digest& digest) const;
-  /// Returns a note for the user on an unknown unit or unconverted heights; may be empty.
+  /// Returns a note for the user on an unknown unit or unconverted heights. Empty if there is
+  /// nothing to report.
   [[nodiscard]] const std::string& note() const { return note_; }
 
  private:

@@ -134,7 +134,7 @@ Ground::Ground(stream::Placement placement, double z_weight) : placement_(std::m
     assume("the horizontal unit is unknown and taken as metres");
   }
 
-  // The heights' own unit if it is named, then that of a CRS in feet, then metres.
+  // Prefer the unit that the heights name, then the unit of a CRS in feet, then metres.
   const std::string& named_unit = placement_.coordinates[2].unit;
   // A file may name the unit only in its WKT.
   const double of_heights = crs.vertical_unit.empty() && known ? known->metres_per_height : 0;

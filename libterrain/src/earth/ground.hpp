@@ -10,8 +10,8 @@
 #include "terrace/terrain/context.hpp"
 #include "terrace/terrain/crs.hpp"
 
-/// Ground distances. Points are stored as given, in degrees, feet, or columns and rows, but
-/// distances are measured in metres on the ground.
+/// Ground distances. Stores keep points in degrees, feet, or columns and rows, as their files have
+/// them. Distances are measured in metres on the ground.
 
 namespace terrace::terrain {
 
@@ -47,7 +47,8 @@ class Ground {
   /// area.
   [[nodiscard]] bool projected() const { return kind_ == Kind::projected; }
 
-  /// Returns a note on assumptions that fill gaps in the source; may be empty.
+  /// Returns a note on assumptions about units that the source does not name. Empty if there are
+  /// none.
   [[nodiscard]] const std::string& assumption() const { return assumption_; }
   /// The part of assumption() about a unit of heights that is named in the source and unknown.
   /// Empty if the unit is known or not named. Every conversion of heights to metres reports it.

@@ -18,19 +18,20 @@ namespace terrace::terrain {
 /// in the map.
 class LineDistance {
  public:
-  /// metres_per_unit: of x and y, used without a system and for places that are not on the earth.
+  /// metres_per_unit: metres per unit of x and y, used without a system and for places that are not
+  /// on the earth.
   LineDistance(std::optional<CoordinateSystem> system, double metres_per_unit);
   /// For the CRS of a store.
   static LineDistance of(const stream::Store& store);
 
-  /// Length of the shortest path on the ground.
+  /// Returns the length of the shortest path on the ground, in metres.
   [[nodiscard]] double between(const Point2& a, const Point2& b) const;
-  /// Length of a line that is straight in the CRS, as the sum of shortest paths between points of
-  /// it at most about a kilometre apart. Along the parallel of 80 degrees the result is too short
-  /// by a relative 1e-7.
+  /// Returns the length in metres of a line that is straight in the CRS, as the sum of shortest
+  /// paths between points of it at most about a kilometre apart. Along the parallel of 80 degrees
+  /// the result is too short by a relative 1e-7.
   [[nodiscard]] double along(const Point2& a, const Point2& b) const;
-  /// Number of pieces of at most this length, by a coarse measure: degrees at the equator, metres
-  /// of the map.
+  /// Returns the number of pieces of at most this length in metres. The estimate is coarse: it
+  /// measures degrees at the equator and metres of the map.
   [[nodiscard]] double pieces(const Point2& a, const Point2& b, double metres) const;
 
  private:

@@ -10,8 +10,8 @@
 namespace terrace::terrain {
 namespace {
 
-/// Returns the unit that Ground uses. If nothing is converted and no unit is known, returns an
-/// empty string, because readers then make the same assumption again.
+/// Returns the unit of heights that Ground uses. Returns an empty string if nothing is converted
+/// and no unit is known, because readers of the file then make the same assumption.
 std::string unit_of_heights(const stream::Placement& placement, bool converted) {
   if (!placement.coordinates[2].unit.empty()) return placement.coordinates[2].unit;
   if (!placement.crs.vertical_unit.empty()) return placement.crs.vertical_unit;

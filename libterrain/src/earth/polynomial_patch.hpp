@@ -18,9 +18,9 @@
 /// Every use follows one scheme: fit polynomials to the function over a box, compare them with the
 /// function where their error is largest, and use them if the error is within a tolerance.
 /// Otherwise divide the box, or evaluate the function itself. The tolerance is in the unit of the
-/// function's values; its user names it: degrees for longitudes and latitudes (BoxGeography,
-/// GridGeography), metres for a geoid (add_smooth_offsets()) and for places in a map
-/// (StoredPlaces), samples for a mask of water (RasterTileSurface).
+/// function's values: degrees for longitudes and latitudes (BoxGeography, GridGeography), metres
+/// for a geoid (add_smooth_offsets()) and for places in a map (StoredPlaces), samples for a mask of
+/// water (RasterTileSurface).
 
 namespace terrace::terrain {
 
@@ -232,8 +232,8 @@ class PatchGrid {
     }
   }
 
-  /// Converts in place. finish(values): turns the values of polynomials into the result of a place.
-  /// exact(places): converts a span in place, where polynomials are not accurate enough.
+  /// Converts in place. finish(values) turns the values of polynomials into the result of a place.
+  /// exact(places) converts a span in place, where polynomials are not accurate enough.
   template <class Exact, class Finish>
   void convert(std::span<Point2> places, const Exact& exact, const Finish& finish) const {
     std::size_t done = 0;  // the places before this index
@@ -290,11 +290,11 @@ void divide(const LatticePart& part, const Handle& handle) {
 
 /// Adds to each height, to within `tolerance`, what exact(places, heights) would add. The offsets
 /// must be smooth except along some lines, as geoids are along the lines of their grids. Uses
-/// PolynomialPatch in boxes around places; a box where it is not accurate enough is quartered,
-/// along common grid lines. NaN heights stay NaN. Sizes must be equal. The same places give the
-/// same heights; a place among other places may get a height that differs by the tolerance. 66 to
-/// 240 million heights per second and core for EGM96 at neighbouring places, 4 million one by one
-/// (tests/bench/geography_bench).
+/// PolynomialPatch in boxes around places. A box where it is not accurate enough is quartered along
+/// common grid lines. NaN heights stay NaN. Both spans must have the same size. The same places
+/// give the same heights; a place among other places may get a height that differs by the
+/// tolerance. 66 to 240 million heights per second and core for EGM96 at neighbouring places, 4
+/// million one by one (tests/bench/geography_bench).
 void add_smooth_offsets(
     std::span<const Point2> places, std::span<double> heights, double tolerance,
     const std::function<void(std::span<const Point2>, std::span<double>)>& exact);

@@ -78,7 +78,7 @@ class Outline {
         base::hypot(place[0] - 0.5 * (start[0] + end[0]), place[1] - 0.5 * (start[1] + end[1]));
     if (off <= 1e-6 * length) return end;
     if (depth == kMost) {
-      // By now the pieces of a smooth curve are straight; only a jump is not.
+      // By now the pieces of a smooth curve are straight. Only a jump is not.
       if (off > 0.1 * length) throw fault(to_, "the region's outline is discontinuous in");
       return end;
     }
@@ -108,7 +108,7 @@ struct Turns {
 
 Turns turns_to(const stream::Box3& box, double turn, const stream::Box3& bounds) {
   if (!(turn > 0)) return {};
-  // No data are further away.
+  // There are no data beyond this distance.
   constexpr double kMost = 4;
   const Turns turns{std::max(-kMost, std::ceil((bounds.min[0] - box.max[0]) / turn)),
                     std::min(kMost, std::floor((bounds.max[0] - box.min[0]) / turn))};

@@ -77,7 +77,7 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
   } catch (const ContradictoryCrs& error) {
     throw stream::Error(file, error.what()).remedy(error.remedy());
   } catch (const CrsError& error) {
-    // Without a unit, even distances are unknown.
+    // A system without a unit does not even determine distances.
     if (!info.crs.geographic && !metres_in_unit(info.crs.horizontal_unit)) {
       throw stream::Error(file, error.what()).remedy(error.remedy());
     }
@@ -89,7 +89,7 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
   if (!found.system) {
     if (!local) found.system = system_of_sidecars(info, sidecar, local, found.note);
   } else if (!info.crs.geo_keys.empty()) {
-    // A file with its own CRS needs no .prj file; if there is one, it must agree.
+    // A file with its own CRS needs no .prj file. If there is one, it must agree.
     const std::optional<CoordinateSystem> other =
         system_of_sidecars(info, sidecar, local, found.note);
     if (other && !other->same_places(*found.system)) {

@@ -13,7 +13,7 @@ namespace {
 /// The wanted points of some clusters, encoded for a file.
 class WrittenPart final : public WantedPart {
  public:
-  /// The data that all parts share.
+  /// The data that all threads share.
   struct Output {
     const stream::Store& store;
     WantedPoints wanted;

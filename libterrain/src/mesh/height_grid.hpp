@@ -17,7 +17,7 @@ namespace terrace::terrain {
 /// memory, for pictures.
 class HeightGrid {
  public:
-  /// Uses the smallest reduction that leaves at most `most_cells` of columns x rows cells.
+  /// Chooses the smallest squares that leave at most `most_cells` cells of columns x rows.
   HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells,
              base::StopCheck check_stop = {});
 
@@ -43,7 +43,7 @@ class HeightGrid {
   std::vector<std::uint32_t> counts_;
 };
 
-/// Returns this mesh of all cells of a raster store. Throws: stream::Error, stream::Stopped, what
+/// Returns mesh() of all cells of a raster store. Throws: stream::Error, stream::Stopped, what
 /// context.progress throws.
 TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
                             const Context& context);

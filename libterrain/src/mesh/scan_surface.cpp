@@ -20,7 +20,7 @@ namespace {
 /// Peak memory in bytes per point: tetrahedra and their vertices, the shape, positions in the CRS
 /// and on the ground, and the surface.
 constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
-/// For the poles rule: the tetrahedra in another order, spheres and their labels, instead of the
+/// The poles rule needs the tetrahedra in another order, spheres and their labels, but not the
 /// surface.
 constexpr std::uint64_t kPolesBytesPerPoint = 660;
 /// Memory of the program and for reading the store.

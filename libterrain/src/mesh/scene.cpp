@@ -96,7 +96,7 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
   return shown;
 }
 
-/// Samples by cells of space with points; where points are fewest, a cell has about four.
+/// Samples each cell of space that has points. Where points are sparse, a cell has about four.
 std::vector<double> heights_by_cells(const TriangleMesh& cloud, const std::vector<double>& heights,
                                      const base::StopCheck& check_stop) {
   base::StopTicks ticks(check_stop);

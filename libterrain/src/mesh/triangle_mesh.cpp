@@ -66,7 +66,7 @@ struct Coordinates {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       middle[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
     }
-    // Without a place, this is the unit alone.
+    // Without a place on the earth, only the unit is known.
     const GroundMap unit = ground.map({}), there = ground.map(bounds);
     metres = {unit[0], unit[4], unit[8]};
     width = bounds.max[0] - bounds.min[0];
@@ -74,7 +74,7 @@ struct Coordinates {
     constexpr double kStretched = 0.1;
     const double east = there[0] / unit[0], north = there[4] / unit[4];
     const bool stretched = std::abs(east - 1) > kStretched || std::abs(north - 1) > kStretched;
-    // Far from its centre a map does not preserve right angles either.
+    // Far from its centre, a map does not preserve right angles either.
     const bool straight = std::abs(there[1]) <= kStretched * std::min(there[0], there[4]);
     degrees = !ground.same_everywhere() && !ground.projected() && north > 10000;  // metres
     // Numbers beyond the poles are not latitudes.
@@ -103,7 +103,8 @@ struct Coordinates {
     return degrees ? "degrees" : metres[0] == 1 ? "metres" : "feet";
   }
   [[nodiscard]] std::string projection() const {
-    // In degrees, not grads, and narrow enough that the projection does not stretch lengths itself.
+    // Requires degrees, not grads, and a mesh so narrow that the projection does not stretch
+    // lengths itself.
     const bool common = metres[1] > 1.05e5 && metres[1] < 1.2e5 && width < 12;
     return degrees && common ? " " + projection_at(middle[0], middle[1]) : " EPSG:n";
   }

@@ -90,7 +90,7 @@ std::vector<tri::HeightChange> smoothed(const Model& model, const stream::Placem
 
 std::uint64_t height_bytes_per_vertex(const HeightOptions& options) {
   std::uint64_t bytes = options.any() ? 8 : 0;
-  // Heights of two steps, the changes, the vertices, and 16 bytes per edge end.
+  // Counts the heights of two steps, the changes, the vertices, and 16 bytes per edge end.
   if (options.smoothing) bytes += 3 * 8 + 16 + 4 + 6 * 16;
   if (options.overlay != nullptr || options.save != nullptr) bytes += sizeof(Named);
   return bytes;

@@ -352,7 +352,7 @@ Transformation::Transformation(CoordinateSystem from, CoordinateSystem to)
           change_between(from_.definition(), same_ ? from_.definition() : to_.definition(),
                          from_.area() ? from_.area() : to_.area()))) {
   if (!change_->possible()) {
-    // The remedy is for the system whose datum differs from WGS 84.
+    // Direct the remedy at the system whose datum differs from WGS 84.
     const bool other = from_.counts_as_wgs84() && !to_.counts_as_wgs84();
     fail_without_way(other ? to_ : from_, (other ? from_ : to_).definition().datum, *change_);
   }

@@ -13,14 +13,14 @@
 namespace terrace::terrain {
 
 /// The change from one datum to another, for longitudes (from Greenwich) and latitudes in degrees.
-/// Uses a single operation for the whole area: of those in PROJ's database with installed grids,
-/// the most accurate one there. A shift given with a system takes precedence. Operations that
-/// ignore the difference between the datums ("ballpark") are never used.
+/// Uses a single operation for the whole area: the most accurate one in PROJ's database that is
+/// valid there and whose grids are installed. A shift given with a system takes precedence.
+/// Operations that ignore the difference between the datums ("ballpark") are never used.
 ///
 /// Several threads may call const members at once.
 class DatumChange {
  public:
-  /// area: where the change is needed; by default, where both systems are used.
+  /// area: where the change is needed. By default, the area where both systems are used.
   DatumChange(const CrsDefinition& from, const CrsDefinition& to,
               const std::optional<GeographicArea>& area);
 
@@ -34,7 +34,8 @@ class DatumChange {
   /// Name, accuracy and, if one exists, a better operation that lacks a grid: "\"OSGB36 to WGS 84
   /// (6)\" within 2 m; ...".
   [[nodiscard]] std::string description() const;
-  /// A better operation that lacks a grid, with its accuracy and the grid; may be empty.
+  /// Names a better operation that lacks a grid, with its accuracy and the grid. Empty if there is
+  /// none.
   [[nodiscard]] const std::string& better() const { return better_; }
 
   /// Convert in place. Require possible().

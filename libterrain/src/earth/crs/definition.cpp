@@ -28,7 +28,7 @@ std::string wkt_name(std::string_view text) {
   return result + '"';
 }
 
-/// Writes all digits, never an exponent, which some readers do not support.
+/// Writes all digits and no exponent, because some readers do not support exponents.
 std::string plain_number(double value) {
   std::array<char, 400> text{};
   const auto [end, error] =

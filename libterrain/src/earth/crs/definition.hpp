@@ -45,16 +45,16 @@ class ContradictoryCrs : public CrsError {
   using CrsError::CrsError;
 };
 
-/// The name of a vertical system of which only the unit is known, as GDAL writes it.
+/// Name that GDAL gives a vertical system if only its unit is known.
 inline constexpr char kUnknownHeights[] = "unknown";
 
 /// Returns the name of a unit that metres_in_unit() knows, such as "metre", "foot" or "US survey
 /// foot"; empty for other units.
 std::string unit_name(double metres);
-/// Returns the same, or a number like "0.3047995 m" for other units, so that no unit is missing in
-/// a record.
+/// As unit_name(), but returns a number such as "0.3047995 m" for other units, so that every record
+/// names a unit.
 std::string recorded_unit(double metres);
-/// Returns the plural: "feet", "US survey feet", "metres".
+/// Returns the plural of a unit's name: "feet", "US survey feet", "metres".
 std::string plural_unit(const std::string& unit);
 
 /// Returns "ellipsoidal", "orthometric" or an empty string, as stores record it.
@@ -96,9 +96,9 @@ struct CrsDefinition {
   [[nodiscard]] std::string title() const;
 };
 
-/// A local (engineering) system, which has units but no place on the earth, or a geocentric one:
-/// its x, y and z are measured from the centre of the earth, so z is not a height. The points of
-/// both are stored alike.
+/// A local (engineering) system, which has units but no place on the earth, or a geocentric system.
+/// Geocentric x, y and z are measured from the centre of the earth, so z is not a height. Stores
+/// treat the points of both in the same way.
 struct LocalCrs {
   stream::Crs crs;  ///< the record of this system in stores
   bool is_geocentric = false;
@@ -108,7 +108,7 @@ using AnyCrs = std::variant<CrsDefinition, LocalCrs>;
 /// Returns the definition of a system on the earth. Throws: CrsError for a local one.
 CrsDefinition on_earth(AnyCrs system);
 
-/// Reads what a user writes: anything that a file may contain (see crs_of_contents), or the name of
+/// Reads the text of a user: anything that a file may contain (see crs_of_contents), or the name of
 /// a file. Throws: CrsError.
 AnyCrs crs_of_text(const std::string& text);
 /// Reads the contents of a file, which never refer to another file: WKT (version 1 by OGC, GDAL or
@@ -116,30 +116,30 @@ AnyCrs crs_of_text(const std::string& text);
 /// a URN or URL of the OGC, or a name. Refuses text of more than 64 KiB, 512 parts or 32 levels.
 /// Throws: CrsError.
 AnyCrs crs_of_contents(const std::string& text);
-/// The same for a system that must be on the earth.
+/// As above, for a system that must be on the earth.
 inline CrsDefinition definition_of_contents(const std::string& text) {
   return on_earth(crs_of_contents(text));
 }
-/// Returns the contents of such a file, without a byte order mark and surrounding white space. Of a
-/// file that is too large, returns only enough to show that.
+/// Returns the contents of such a file, without a byte order mark and surrounding white space. If
+/// the file is too large, returns only enough of it for crs_of_contents() to refuse it.
 std::string contents_of_file(const std::string& name);
 /// Returns the system of an EPSG code: geographic, projected, compound or geocentric. Throws:
 /// CrsError.
 AnyCrs crs_of_epsg(int code);
 inline CrsDefinition definition_of_epsg(int code) { return on_earth(crs_of_epsg(code)); }
-/// Sets the vertical part to a vertical system's code. Throws: CrsError.
+/// Sets the vertical part to the system of a vertical EPSG code. Throws: CrsError.
 void set_vertical_epsg(CrsDefinition& definition, int code);
-/// Makes the reference of heights unknown.
+/// Marks the reference surface of heights as unknown.
 void forget_heights(CrsDefinition& definition);
 /// Writes a unit of heights, given in metres, into the definition's WKT. Adds a vertical system
 /// named "unknown" if none is known.
 void write_height_unit(CrsDefinition& definition, double metres);
-/// The same for the WKT of a local system.
+/// As above, for the WKT of a local system.
 std::string with_height_unit(const stream::Crs& local, double metres);
 /// Returns the system as WKT 2 (ISO 19162:2019), with a shift as a bound CRS.
 std::string wkt_of(const CrsDefinition& definition);
-/// Returns the system as WKT 1, as GDAL writes it; empty if WKT 1 cannot express it, which is
-/// checked by reading the result.
+/// Returns the system as WKT 1, as GDAL writes it. Reads the result back, and returns an empty
+/// string if WKT 1 cannot express the system.
 std::string wkt1_of(const CrsDefinition& definition);
 /// Whether both texts, when read, have the same code, places and kind of heights.
 bool mean_the_same(const std::string& wkt, const std::string& other);
@@ -147,12 +147,13 @@ bool mean_the_same(const std::string& wkt, const std::string& other);
 /// Reads the CRS that a source or a store records, in whatever form. Returns nullopt if there is no
 /// CRS. Throws: CrsError.
 std::optional<AnyCrs> crs_of_record(const stream::Crs& crs);
-/// The same; nullopt also for a local or geocentric system.
+/// As crs_of_record(), but also returns nullopt for a local or geocentric system.
 std::optional<CrsDefinition> definition_of(const stream::Crs& crs);
-/// The same; nullopt for a system on the earth.
+/// As crs_of_record(), but returns nullopt for a system on the earth.
 std::optional<LocalCrs> local_crs_of(const stream::Crs& crs);
 
-/// Whether both are the same apart from names: equal coordinates are equal places on the earth.
+/// Whether both systems are equal apart from their names, so that equal coordinates are equal
+/// places on the earth.
 bool same_places(const CrsDefinition& a, const CrsDefinition& b);
 /// Whether both have the same datum, ignoring prime meridians, so that no operation is needed.
 bool same_datum(const CrsDefinition& a, const CrsDefinition& b);

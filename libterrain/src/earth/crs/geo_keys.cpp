@@ -19,7 +19,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The code that means: defined by the other keys.
+/// Code for "user-defined": the other keys define the system.
 constexpr int kUserDefined = 32767;
 
 CrsError fault(const std::string& cause) { return {cause, remedy_by_code()}; }
@@ -228,7 +228,7 @@ ProjObject base_of(const GeoKeyValues& keys) {
   std::string name = part_of(citation, "GCS Name"), datum = part_of(citation, "Datum");
   if (name.empty()) name = citation;
   const double degrees = keys.degrees_per_unit();
-  // Old files give the code of a datum and mean the system on it, such as 6326 for 4326.
+  // Old files give the code of a datum instead of the system on it, such as 6326 for 4326.
   const int datum_code = keys.known_code(2050);
   if (datum_code >= 6001 && datum_code < 6999 && degrees == 1) {
     ProjObject base = geographic_of_code(datum_code - 2000);
@@ -425,7 +425,7 @@ void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition) {
     const double recorded = *value * (kind == ParameterKind::angle                 ? angle
                                       : kind == ParameterKind::length && unit != 0 ? unit
                                                                                    : 1.0);
-    // Keys that the method does not use are ignored; two parallels may be in either order.
+    // Ignores keys that the method does not use. Two parallels may be in either order.
     bool known = false, good = false;
     for (const ConversionParameter& parameter : meant) {
       if (!parameter.role || (*parameter.role != row.role &&

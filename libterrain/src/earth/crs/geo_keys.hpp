@@ -13,8 +13,9 @@ namespace terrace::terrain {
 /// CrsError.
 CrsDefinition definition_of_geo_keys(const stream::Crs& crs);
 
-/// Checks that the keys next to an EPSG code do not contradict `definition`, which is the code's:
-/// kind, unit, geographic system and parameters. Throws: CrsError, naming both.
+/// Checks that the keys next to an EPSG code do not contradict `definition`, the definition of the
+/// code. Compares kind, unit, geographic system and parameters. Throws: CrsError, naming the key
+/// and the code.
 void check_geo_keys(const stream::Crs& crs, const CrsDefinition& definition);
 
 /// Returns the keys for a system without an EPSG code: its ellipsoid and unit, or its WKT in ESRI's

@@ -33,8 +33,8 @@ ProjObject candidate(const List& list, int i) {
 
 int size_of(const List& list) { return list == nullptr ? 0 : proj_list_get_count(list.get()); }
 
-/// Returns the first grid that is not installed; empty if all are, or if PROJ does not distribute
-/// it.
+/// Returns the first grid that is not installed. Returns an empty string if all are installed, or
+/// if PROJ does not distribute the grid.
 std::string missing_grid(const PJ* operation) {
   PJ_CONTEXT* const context = proj_context();
   const int count = proj_coordoperation_get_grid_used_count(context, operation);
@@ -95,7 +95,8 @@ OperationChoice choose_operation(const PJ* from, const PJ* to,
   List list = candidates(from, to, area);
   choose(list, true, choice);
   if (!choice.found && area) {
-    // No operation is meant for the area. A grid has no values there, but a formula does.
+    // No operation is valid in the whole area. A grid has no values outside its area, but a formula
+    // does.
     list = candidates(from, to, std::nullopt);
     choose(list, false, choice);
     if (!choice.found) choose(list, true, choice);

@@ -20,10 +20,10 @@ struct OperationChoice {
   std::string better;
 };
 
-/// Returns the best operation with installed grids for a whole area: the one meant for most of the
-/// area, then the most accurate. Operations that ignore a difference between the systems
-/// ("ballpark") are never used. area: by default, where both systems are used. Data outside all
-/// areas of use get the operation for the whole system.
+/// Returns the best operation with installed grids for an area. Prefers the operation that is valid
+/// in the largest part of the area, then the most accurate one. Operations that ignore a difference
+/// between the systems ("ballpark") are never used. area: by default, the area where both systems
+/// are used. Data outside all areas of use get the operation for the whole system.
 OperationChoice choose_operation(const PJ* from, const PJ* to,
                                  const std::optional<GeographicArea>& area);
 

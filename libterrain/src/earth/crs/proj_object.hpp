@@ -8,7 +8,7 @@
 // Needed to build a CRS from its parts; stable since PROJ 6, and GDAL uses it.
 #include <proj_experimental.h>
 
-/// PROJ's objects, owned by one function while it reads their definitions into plain data.
+/// PROJ's objects, which a function owns while it reads their definitions into plain data.
 /// ProjPipeline converts coordinates.
 
 namespace terrace::terrain {
@@ -29,9 +29,9 @@ using ProjObject = ProjOwned<PJ>;
 /// check_proj_database().
 PJ_CONTEXT* proj_context();
 
-/// Checks for a failed read of the database; call it after every function that reads it, because
-/// PROJ returns the same for a failed read as for an unknown name. Throws: CrsDatabaseError if a
-/// read failed in this thread since the last call.
+/// Checks whether a read of the database failed. Call it after every function that reads the
+/// database, because PROJ returns the same for a failed read as for an unknown name. Throws:
+/// CrsDatabaseError if a read failed in this thread since the last call.
 void check_proj_database();
 
 /// Returns a context that never uses the network and keeps messages for proj_complaint().

@@ -78,7 +78,7 @@ class ProjPipeline::Pool {
       }
     }
     std::unique_ptr<Worker> worker = create_worker();
-    // Reserves room now, because giving a worker back must not throw.
+    // Reserve room now, because returning a worker must not throw.
     const std::scoped_lock lock(mutex_);
     idle_.reserve(++workers_);
     return worker;
@@ -100,7 +100,7 @@ PJ_COORD moved(PJ* operation, PJ_DIRECTION direction, const Point2& place) {
   constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
   constexpr PJ_COORD kNothing{{kNowhere, kNowhere, kNowhere, kNowhere}};
   if (!std::isfinite(place[0]) || !std::isfinite(place[1])) return kNothing;
-  // Without a time; coordinates that move with the plates are used at their own epoch.
+  // Pass no time: coordinates that move with the plates are used at their own epoch.
   const PJ_COORD result =
       proj_trans(operation, direction, proj_coord(place[0], place[1], 0, HUGE_VAL));
   return std::isfinite(result.xyzt.x) && std::isfinite(result.xyzt.y) ? result : kNothing;

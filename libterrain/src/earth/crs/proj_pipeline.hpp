@@ -23,8 +23,8 @@ class ProjPipeline {
   /// second.
   void forward(std::span<Point2> places) const;
   void reverse(std::span<Point2> places) const;
-  /// Adds the image of height 0 at each place to its height; NaN if it has none. Sizes must be
-  /// equal.
+  /// Adds the image of height 0 at each place to the height of the place. The height becomes NaN if
+  /// the place has no image. Both spans must have the same size.
   void add_heights(std::span<const Point2> places, std::span<double> heights) const;
 
  private:

@@ -52,8 +52,8 @@ int epsg_of(const PJ* object) {
   return definition.epsg();
 }
 
-/// Returns the coded geographic system with the same datum name, which files without codes spell in
-/// many ways. The caller checks that the ellipsoid matches.
+/// Returns the coded geographic system with the same datum name. Files without codes spell these
+/// names in many ways. The caller checks that the ellipsoid matches.
 ProjObject identified(const PJ* geographic) {
   PJ_CONTEXT* const context = proj_context();
   int* confidence = nullptr;

@@ -62,7 +62,7 @@ class Projection {
   virtual void reverse(std::span<Point2> places) const = 0;
 };
 
-/// Makes a projection computed by GeographicLib (to a few nanometres); Web Mercator follows IOGP
+/// Makes a projection that GeographicLib computes to a few nanometres. Web Mercator follows IOGP
 /// Publication 373-7-2, Geomatics Guidance Note 7 part 2 (2019). Forward and reverse agree within a
 /// micrometre in the area of use. Throws: std::invalid_argument for invalid parameters.
 std::unique_ptr<const Projection> make_projection(ProjectionMethod method,

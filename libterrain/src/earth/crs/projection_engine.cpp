@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Which definitions of a method GeographicLib computes.
+/// The definitions of a method that GeographicLib computes.
 enum class Condition : std::uint8_t {
   none,
   /// Around a pole, all axes of a coordinate system point in the same direction.

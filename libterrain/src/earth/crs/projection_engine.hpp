@@ -41,7 +41,7 @@ std::optional<GeographicLibProjection> geographiclib_projection(const PJ* conver
 /// Returns the projection of a projected system: from longitudes (from its prime meridian) and
 /// latitudes in degrees to metres. Throws: CrsError.
 std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition);
-/// The same, but always computed by PROJ.
+/// As projection_of(), but PROJ always computes it.
 std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition);
 /// Returns the projection as a PROJ pipeline, from longitudes and latitudes of the geographic
 /// system, in its own unit and from its own meridian, to x and y. Throws: CrsError.

@@ -25,7 +25,7 @@ namespace {
 /// The longest definition that is read, in bytes.
 constexpr std::size_t kMostCrsText = std::size_t{64} << 10;
 
-/// Widespread codes that are not in the EPSG dataset.
+/// Common codes that are not in the EPSG dataset.
 int alias_of(int code) {
   constexpr std::array<int, 3> kWebMercator{900913, 102100, 102113};
   return std::find(kWebMercator.begin(), kWebMercator.end(), code) != kWebMercator.end() ? 3857
@@ -134,7 +134,8 @@ ProjObject crs_of_name(const std::string& text) {
     }
     const bool flat = proj_get_type(found.get()) != PJ_TYPE_GEOGRAPHIC_3D_CRS;
     const bool epsg = text_of(proj_get_id_auth_name(found.get(), 0)) == "EPSG";
-    // A system of two axes takes precedence over one with heights, and EPSG's over others.
+    // A system with two axes takes precedence over a system with heights, and EPSG's systems over
+    // others.
     if (!flat || !epsg) {
       if (only == nullptr) only = std::move(found);
       continue;
@@ -157,8 +158,8 @@ std::string without_padding(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(kPadding) - first + 1));
 }
 
-/// Whether the text is WKT (with brackets or parentheses), PROJJSON or a PROJ string, which no name
-/// of a system or file looks like.
+/// Whether the text is WKT (with brackets or parentheses), PROJJSON or a PROJ string. No name of a
+/// system or file looks like these.
 bool is_formal(std::string_view text) {
   if (text.starts_with('+') || text.find_first_of("[{") != text.npos) return true;
   // "NAD83(HARN)" is a name.

@@ -13,8 +13,8 @@ namespace terrace::terrain {
 /// the first of the next.
 class LatticePlan {
  public:
-  /// whole: at least 1 sample along each axis. cells: the target size of a window along each axis;
-  /// windows are equal to within one cell and at most 1.5 times as large.
+  /// lattice: at least 1 sample along each axis. cells: the target size of a window along each
+  /// axis; windows are equal to within one cell and at most 1.5 times as large.
   LatticePlan(const LatticeWindow& lattice, std::int64_t cells);
 
   [[nodiscard]] std::size_t across() const { return columns_.size() - 1; }

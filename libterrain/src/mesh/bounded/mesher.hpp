@@ -17,10 +17,10 @@
 
 namespace terrace::terrain {
 
-/// Targets for the error of a mesh such that a reader of the file, after its rounding, sees at most
-/// the bound. Heights are rounded by a known amount. Rounded places add slightly more, depending on
-/// the slope, and so do lines that are curves in the file. Both targets equal the bound if the
-/// format is exact and the samples are not converted.
+/// Targets for the error of a mesh. They leave room for the rounding of the file, so that its
+/// readers see at most the bound. Heights are rounded by a known amount. Rounded places add
+/// slightly more, depending on the slope, and so do lines that are curves in the file. Both targets
+/// equal the bound if the format is exact and the samples are not converted.
 struct Aim {
   double first = 0.0;  ///< ignores rounded places: try it first, then check
   double sure = 0.0;   ///< use it where the first misses the bound or cannot be checked

@@ -71,12 +71,12 @@ struct PointMeshCuts {
   }
 };
 
-/// Divides the plane into cells of slightly fewer than `most` samples, unless too many share a
-/// place. `some`: every `period`-th sample.
+/// Divides the plane into cells of slightly fewer than `max_per_cell` samples, unless too many
+/// share a place. sample: every `period`-th sample of all.
 ///
-/// Where possible, lines are between samples of `some`, in the widest gap near the ideal position.
+/// Where possible, lines are between the given samples, in the widest gap near the ideal position.
 /// Other samples may be on a line; they belong to the cell above. Depends only on the arguments.
-/// O(n log n) for n samples in `some`.
+/// O(n log n) for n given samples.
 PointMeshCuts cut_for_point_mesh(std::vector<Point2> sample, std::uint64_t period,
                                  std::size_t max_per_cell);
 

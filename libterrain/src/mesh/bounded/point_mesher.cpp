@@ -64,7 +64,7 @@ PointMeshEstimate::PointMeshEstimate(const PointMeshCuts& cuts, PointMeshSamples
                                      tri::PointDuplicates duplicates)
     : cuts_(cuts), samples_(samples) {
   options_.quality = tri::TinQuality::greedy;
-  // Duplicates are refused elsewhere.
+  // Another check refuses duplicates.
   options_.duplicates =
       duplicates == tri::PointDuplicates::error ? tri::PointDuplicates::first : duplicates;
 }
@@ -112,8 +112,8 @@ class PointMesher final : public BoundedMesher {
  private:
   [[nodiscard]] bool single() const { return scan_.all.has_value(); }
   [[nodiscard]] PointMeshOptions mesh_options(double max_error) const;
-  /// Describes the samples at one place: how many places there are, and how much the heights
-  /// differ.
+  /// Returns the error for several samples at one place, with the number of such places and the
+  /// largest difference of their heights.
   [[nodiscard]] stream::Error shared_places_error() const;
   BoundedMeshResult run_single(const PointMeshOptions& options, MeshSpool& spool) const;
   BoundedMeshResult run_plan(const PointMeshOptions& options, MeshSpool& spool,
@@ -124,7 +124,7 @@ class PointMesher final : public BoundedMesher {
 
   PointMeshScan scan_;
   PointMeshCuts cuts_;
-  // Locks internally.
+  // Thread-safe.
   mutable std::optional<PointMeshSamples> samples_;
   unsigned cell_threads_ = 1;
   double reading_seconds_ = 0.0;

@@ -38,8 +38,8 @@ struct OuterSide {
   [[nodiscard]] double greatest() const { return std::max(from[0], to[0]); }
 };
 
-/// The outer sides of a frame, sorted by x to find the sides that samples are on; sides above the
-/// frame and sides below it are separate.
+/// The outer sides of a frame, sorted by x to find the sides that samples are on. Keeps the upper
+/// and the lower sides separately.
 class OuterSides {
  public:
   void add(const Point2& from, const Point2& to) {
@@ -54,7 +54,7 @@ class OuterSides {
   [[nodiscard]] bool empty() const {
     return chains_[0].empty() && chains_[1].empty() && chains_[2].empty() && chains_[3].empty();
   }
-  /// Returns the side that a place is on, ends included; null if there is none.
+  /// Returns the side that a place is on, including its ends; null if there is none.
   OuterSide* find(const Point2& p) {
     for (std::vector<OuterSide>& sides : chains_) {
       auto after = std::upper_bound(sides.begin(), sides.end(), p[0],
@@ -116,7 +116,7 @@ std::vector<tri::Point3> simplify(OuterSide& side, double from_height, double to
   height.push_back(to_height);
   std::vector<tri::Point3> chosen;
   if (options.max_error > 0.0) {
-    // Slightly less, because other code interpolates with different rounding.
+    // Leave a small margin, because other code interpolates with different rounding.
     const double bound = std::max(0.0, options.max_error - apart) * (1.0 - 0x1p-20);
     const std::vector<tri::LineVertex> line = tri::simplify_line(at, height, bound).vertices;
     for (std::size_t i = 1; i + 1 < line.size(); ++i) chosen.push_back(places[line[i].sample]);

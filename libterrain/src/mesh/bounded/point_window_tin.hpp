@@ -14,7 +14,7 @@
 
 namespace terrace::terrain {
 
-/// How to mesh irregular samples. Heights are in the store's vertical unit.
+/// Options for meshing irregular samples. Heights are in the store's vertical unit.
 struct PointMeshOptions {
   double bound = 0.0;  ///< limit for readers of the file
   /// tin.max_error and first_aim: the targets of Aim. first_aim is tried first, inside windows.
@@ -22,13 +22,13 @@ struct PointMeshOptions {
   double first_aim = 0.0;
 };
 
-/// Thrown if several samples share a place although that is refused, or differ by more than the
-/// bound.
+/// Thrown if several samples share a place, and the options refuse that or their heights differ by
+/// more than the bound.
 struct SamplesShareAPlace {};
 
 /// Meshes samples and measures what a reader of the file decodes. frame: as in tri::point_tin(),
-/// the first vertices of the mesh; box: the frame's straight sides are on its finite sides. store:
-/// named in errors. Throws: SamplesShareAPlace; stream::Error if the bound is missed;
+/// the first vertices of the mesh. box: its finite sides contain the straight sides of the frame.
+/// store: named in errors. Throws: SamplesShareAPlace; stream::Error if the bound is missed;
 /// stream::Stopped.
 BoundedWindow mesh_samples(const MeshSamples& samples, const std::vector<tri::Point3>& frame,
                            const PlaneBox& box, const PointMeshOptions& options,

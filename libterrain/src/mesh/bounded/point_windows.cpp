@@ -249,11 +249,11 @@ std::vector<ProfilePlace> LocalSurface::profile(unsigned axis, double c) const {
   return places;
 }
 
-/// Share of the bound for sides; the rest is left for the triangles at them.
+/// Share of the bound for sides. The triangles at the sides use the rest.
 constexpr double kPointSideShare = 0.9;
-/// How far around a side samples are used, in distances of neighbours.
+/// Distance from a side within which samples are used, in distances of neighbours.
 constexpr double kReach = 3.0;
-/// With more samples than this around a knot the search ends.
+/// The search around a knot ends at this many samples.
 constexpr std::size_t kManySamples = 20000;
 
 std::optional<double> nearest_height(const MeshSamples& samples, const Point2& place) {

@@ -53,8 +53,8 @@ struct PointMeshPlan {
   std::vector<Window> windows;  ///< in the order of their cells
 };
 
-/// hull: of all samples, with positive area. together(first, cells): whether these cells, all of
-/// one node, should be one window.
+/// hull: of all samples, with positive area. together(first, cells) returns whether these cells,
+/// all of one node, should be one window.
 PointMeshPlan plan_point_mesh(
     const PointMeshCuts& cuts, std::span<const Point2> hull,
     const std::function<bool(std::uint32_t first, std::uint32_t cells)>& together);

@@ -28,8 +28,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Smallest and largest size of a window along each axis, in cells; the largest is for small
-/// meshes.
+/// Smallest and largest size of a window along each axis, in cells. Small meshes use the largest.
 constexpr std::int64_t kWindowCells = 512, kWidestCells = 2048;
 /// Target for the vertices per window, so that few of them are on sides, where they cannot be
 /// removed.
@@ -93,8 +92,8 @@ LatticeWindow lattice_of(const stream::Store& store, const std::optional<Region>
 /// Counts samples on sides of windows that no window covers.
 class SideSamples {
  public:
-  /// Adds samples that a window does not cover. Returns the number of those that none of the
-  /// windows that share them covers, once each.
+  /// Adds samples that a window does not cover. Returns the number of samples that are now known to
+  /// be covered by none of the windows that share them. Each sample counts once.
   std::uint64_t add(const std::vector<RasterWindow::SideSample>& uncovered) {
     std::uint64_t by_none = 0;
     for (const RasterWindow::SideSample& sample : uncovered) {

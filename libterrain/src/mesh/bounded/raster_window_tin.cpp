@@ -76,8 +76,8 @@ struct WindowMesher::WindowTin {
   /// Number of samples with data, before filling and inside the region; those on the first row and
   /// column count in the previous window.
   std::uint64_t samples = 0;
-  /// Indices in the window of such samples, including the first row and column, that are on no
-  /// triangle of this window.
+  /// Indices in the window of samples with data that are on no triangle of it, including those on
+  /// the first row and column.
   std::vector<std::uint32_t> uncovered;
   double reading_seconds = 0.0, meshing_seconds = 0.0;
 
@@ -293,8 +293,8 @@ void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) cons
     for (const stream::Point3& p : moved) values->push_back(p[static_cast<std::size_t>(axis)]);
   }
   const tri::TinErrors errors = tri::measure_surface(x, y, z, read, tin.triangles);
-  // A sample that is now next to the mesh was on one of its sides. The next window measures it, or
-  // it is at the border, where it counts on the side, as on the lattice.
+  // A sample that is now next to the mesh was on one of its sides. The next window measures it. At
+  // the border of the raster, it counts as on the side, as it is on the lattice.
   if (errors.uncovered == 0) tin.check.max_error = 0.0;
   tin.check.max_error = std::max(tin.check.max_error, errors.largest);
   if (errors.covered > 0) tin.check.rms_error = errors.rms;

@@ -22,15 +22,15 @@
 
 namespace terrace::terrain {
 
-/// How to mesh the windows of a raster. Heights are in the store's vertical unit.
+/// Options for meshing the windows of a raster. Heights are in the store's vertical unit.
 struct WindowTinOptions {
   double bound = 0.0;  ///< limit for readers of the file
-  /// The targets of Aim. Sides are meshed to the second, smaller one, as is the inside of a window
-  /// where the first misses the bound.
+  /// The targets of Aim. The inside of a window is meshed to first_aim, and to the smaller `aim` if
+  /// that misses the bound. Sides are always meshed to `aim`.
   double first_aim = 0.0, aim = 0.0;
   tri::GridTinOptions tin;
   LatticeWindow lattice;  ///< the window that contains all others
-  /// With a region, meshes only have the triangles that reach into it.
+  /// If set, meshes have only the triangles that reach into it.
   std::optional<Region> region;
   /// Converts to the CRS of the file.
   PlaceConversion places;
@@ -40,12 +40,12 @@ struct WindowTinOptions {
 
 /// The mesh of one window. Vertices are in the order in which triangles first use them.
 struct RasterWindow : BoundedWindow {
-  /// A sample on a side to a neighbour.
+  /// A sample on a side that the window shares with a neighbour.
   struct SideSample {
     std::uint64_t place = 0;  ///< as in LatticePlan::Sample
     unsigned windows = 0;     ///< how many windows share it
   };
-  /// Samples on such sides, with data and inside the region, that are on no triangle of this
+  /// Samples on shared sides, with data and inside the region, that are on no triangle of this
   /// window. The measures do not count them.
   std::vector<SideSample> uncovered;
 };
@@ -79,7 +79,7 @@ class WindowMesher {
   /// Whether a sample of the window is in the region, if there is one.
   [[nodiscard]] bool in_region(const LatticeWindow& window, std::int64_t column, std::int64_t row,
                                double height) const;
-  /// In the CRS of the store.
+  /// Returns the positions of the vertices in the CRS of the store.
   [[nodiscard]] std::vector<stream::Point3> positions(const WindowTin& tin) const;
   void measure_as_read(WindowTin& tin,
                        const std::function<tri::GridTinCheck(std::span<const tri::Point3>,

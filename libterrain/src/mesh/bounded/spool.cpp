@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kSpoolPiece = 65536;  // vertices or triangles at a time
 
-/// The name that the names of the temporary files are derived from.
+/// The path from which the names of the temporary files are derived.
 std::filesystem::path spool_name(const std::string& path) {
   return path != "-" ? std::filesystem::path(path)
                      : std::filesystem::temp_directory_path() / "terrace-mesh";

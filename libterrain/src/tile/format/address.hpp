@@ -49,8 +49,8 @@ std::optional<TileAddress> parse_tile_path(const std::string& path);
 inline constexpr std::uint32_t tile_columns(unsigned zoom) { return std::uint32_t{2} << zoom; }
 inline constexpr std::uint32_t tile_rows(unsigned zoom) { return std::uint32_t{1} << zoom; }
 
-/// In degrees; closed. Borders of neighbouring tiles are the same numbers. A separate type, so that
-/// it is not taken for a box in stored coordinates.
+/// A closed box in degrees. Borders of neighbouring tiles are the same numbers. A separate type, so
+/// that it cannot be confused with a box in stored coordinates.
 struct GeographicBox {
   double west = 0.0, south = 0.0, east = 0.0, north = 0.0;
 
@@ -64,8 +64,8 @@ struct TileRange {
 
   friend bool operator==(const TileRange&, const TileRange&) = default;
 };
-/// Returns the tiles of a zoom with an interior that meets `box`; for a box without width or
-/// height, the tiles that it touches.
+/// Returns the tiles of a zoom whose interior meets `box`. For a box without width or height,
+/// returns the tiles that it touches.
 TileRange tiles_in(const GeographicBox& box, unsigned zoom);
 
 /// Returns the error in metres that a web globe expects of a tile, 77,067.34 / 2^zoom: a quarter of

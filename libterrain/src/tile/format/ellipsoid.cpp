@@ -16,10 +16,10 @@ stream::Point3 scaled(const stream::Point3& p) {
   return {p[0] / kEquatorialRadius, p[1] / kEquatorialRadius, p[2] / kPolarRadius};
 }
 
-// Used if no point on the line qualifies: this many radii out.
+// Distance in radii of the point that is returned if no point on the line qualifies.
 constexpr double kNeverHidden = 1e6;
 
-// Returns how far out along `direction` the occlusion point of one point is, in radii.
+// Returns the distance along `direction` of the occlusion point of one point, in radii.
 double magnitude(const stream::Point3& direction, const stream::Point3& point) {
   const stream::Point3 p = scaled(point);
   const double square = dot(p, p);

@@ -32,11 +32,12 @@ struct Sphere {
 /// wide as the smallest one. points: at least one.
 Sphere bounding_sphere(std::span<const stream::Point3> points);
 
-/// Returns a point on the line from the Earth's centre through `towards`, in units of the
-/// ellipsoid's radii along each axis. Whenever it is hidden behind the ellipsoid, all of `points`
-/// are. If there is no such point, because the points extend further than a quarter of the Earth
-/// from `towards`, returns a point that is practically never hidden.
-/// Source: K. Ring, Horizon culling (2013), https://cesium.com/blog/2013/04/25/horizon-culling/.
+/// Returns the horizon occlusion point: a point on the line from the Earth's centre through
+/// `towards`, in units of the ellipsoid's radii along each axis. Whenever the ellipsoid hides it,
+/// the ellipsoid hides all of `points`. If there is no such point, because the points extend
+/// further than a quarter of the Earth from `towards`, returns a point that is practically never
+/// hidden. Source: K. Ring, Horizon culling (2013),
+/// https://cesium.com/blog/2013/04/25/horizon-culling/.
 stream::Point3 horizon_occlusion_point(const stream::Point3& towards,
                                        std::span<const stream::Point3> points);
 

@@ -74,7 +74,7 @@ TileLayer layer_from(const Json& json) {
 std::vector<TileRange> ranges_of(const std::vector<TileAddress>& tiles) {
   std::vector<TileRange> open, done;
   for (std::size_t i = 0; i < tiles.size();) {
-    // Find the runs of one row; a run extends a rectangle that ends in the row below.
+    // Find the runs of one row. A run extends a rectangle that ends in the row below.
     const std::uint32_t y = tiles[i].y;
     std::vector<TileRange> row;
     for (; i < tiles.size() && tiles[i].y == y; ++i) {

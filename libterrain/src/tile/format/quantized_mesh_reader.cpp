@@ -23,7 +23,7 @@ class Reader {
         .at_byte(at_)
         .remedy("the tile is damaged: make it again");
   }
-  // Call before allocating memory for the values.
+  // Throws unless that many values are left. Call it before allocating memory for them.
   void need(std::uint64_t count, std::size_t size, const char* what) const {
     if (count > left() / size) {
       throw fault(fmt::format("{} {} of {}, but only {} {} left", count, what,

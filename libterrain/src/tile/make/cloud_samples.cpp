@@ -84,7 +84,7 @@ StoredBox widened(StoredBox box, const stream::Box3& store) {
 
 bool holds(const StoredBox& outer, const stream::Box3& inner) { return outer.covers(flat(inner)); }
 
-/// Returns the seed's box, or a smaller one around the seed with few enough points near it.
+/// Returns the seed's box, or a smaller one around the seed if it has too many points.
 StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
   constexpr unsigned kHalvings = 60;
   StoredBox box = seed.box;

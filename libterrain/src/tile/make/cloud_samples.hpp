@@ -13,9 +13,9 @@
 
 namespace terrace::terrain {
 
-/// The samples of a cloud that fits in memory, placed on the globe once, because tiles of every
-/// zoom need all of them. Of points at one x and y, uses the first in the order of
-/// StoreWindow::points(). Several threads may call const members at once.
+/// The samples of a cloud that fits in memory, with their places on the globe. These are computed
+/// once, because tiles of every zoom need all samples. Of points at one x and y, uses the first in
+/// the order of StoreWindow::points(). Several threads may call const members at once.
 class CloudSamples {
  public:
   static constexpr std::uint64_t kBytesPerPoint = PointCells::kBytesPerPoint;

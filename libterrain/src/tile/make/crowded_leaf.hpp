@@ -13,8 +13,8 @@
 
 namespace terrace::terrain {
 
-/// Converts degrees of samples in a leaf to units of a tile. Clamps, because rounding must not move
-/// a sample on a side out of both leaves.
+/// Converts degrees of samples in a leaf to units of a tile. Clamps them to the leaf, because
+/// rounding could move a sample on a side out of both leaves.
 class LeafPlaces {
  public:
   LeafPlaces(const TileAddress& tile, const TileLeaf& leaf)
@@ -41,11 +41,11 @@ class LeafPlaces {
   double units_, west_, south_, east_, north_;
 };
 
-/// Meshes a leaf that cannot be divided further and has too many samples to hold at once. Uses the
-/// lowest and the highest sample of each quarter of a unit, then adds samples that exceed the bound
-/// when all are measured, part by part, for a few rounds. The returned errors are those of all
-/// samples; PointTin::sample and the vertex counts are meaningless. Memory: for a part, and for
-/// 2^19 samples.
+/// Meshes a leaf that cannot be divided further and has too many samples to hold at once. Starts
+/// with the lowest and the highest sample of each quarter of a unit. Then it measures all samples
+/// part by part and adds those that exceed the bound, for a few rounds. The returned errors are
+/// those of all samples. PointTin::sample and the vertex counts are meaningless. Memory: for a
+/// part, and for 2^19 samples.
 tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
                                 std::span<const tri::Point3> frame,
                                 const tri::PointTinOptions& options, TileSurface& surface);

@@ -18,8 +18,8 @@
 
 namespace terrace::terrain {
 
-/// The lowest and highest samples of square blocks of a raster, so that irrelevant parts need not
-/// be read, and a hash of each block, so that tiles of unchanged blocks are kept.
+/// The lowest and highest samples of square blocks of a raster, and a hash of each block. The
+/// former save reading irrelevant parts. The latter show which tiles are unchanged.
 class HeightBlocks {
  public:
   /// Reads the store once, with all threads. Memory: 20 bytes per block, at most 20 MiB. Throws:
@@ -92,9 +92,9 @@ class HeightCache {
   HeightCache(const HeightCache&) = delete;
   HeightCache& operator=(const HeightCache&) = delete;
 
-  /// As StoreWindow::heights() at full resolution. `reader`, the calling thread's own for the same
-  /// store, reads what is not cached. The window may have any size; squares that do not fit are not
-  /// kept. Throws: stream::Error on a damaged store, stream::Stopped.
+  /// As StoreWindow::heights() at full resolution. reader: the calling thread's reader of the same
+  /// store, which reads missing squares. The window may have any size. Squares that do not fit into
+  /// the cache are not kept. Throws: stream::Error on a damaged store, stream::Stopped.
   void heights(StoreWindow& reader, const LatticeWindow& window, std::span<double> out);
 
  private:

@@ -19,7 +19,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// A mesh in units of the tile and steps of height: of a leaf, or of the whole tile.
+/// The mesh of a leaf or of the whole tile, in units of the tile and steps of height.
 struct LeafMesh : WindowMesh<TileVertex> {
   double max_error = 0.0;
   bool has_data = false;
@@ -88,8 +88,8 @@ tri::PointTin tin_of(const TileAddress& tile, const TileLeaf& leaf, TileSurface&
   auto& samples = std::get<SurfaceSamples>(part);
   across.convert(samples.longitude);
   down.convert(samples.latitude);
-  // Different places may be one on the globe, as at 180 degrees; the highest makes the result
-  // independent of their order.
+  // Different places may be one on the globe, as at 180 degrees. The highest is used, so that the
+  // result does not depend on their order.
   tri::PointTinOptions highest = options;
   highest.duplicates = tri::PointDuplicates::max;
   return tri::point_tin(samples.longitude, samples.latitude, samples.height, frame, highest);
@@ -105,7 +105,7 @@ LeafMesh mesh_leaf(const TileAddress& tile, const TileLeaf& leaf, const ZoomPlan
   if (range) {
     const double error = flat_error(frame, plan.height_step, *range);
     if (error <= plan.max_error && (range->certain || has_data)) {
-      // Any triangles are within the bound, so nothing needs to be read.
+      // All triangulations are within the bound, so nothing needs to be read.
       mesh.max_error = error;
       mesh.has_data = true;
     } else {
@@ -167,8 +167,8 @@ LeafMesh mesh_leaves(const TileAddress& tile, const ZoomPlan& plan, TileSurface&
 }
 
 /// Sets heights as 15-bit numbers from the lowest to the highest, which clients use for culling.
-/// Two neighbours decode a shared height to within half of such a number each. Returns the largest
-/// change of a vertex.
+/// Each of two neighbours decodes a shared height to within half of such a number. Returns the
+/// largest change of a vertex.
 double set_heights(const std::vector<TileVertex>& vertices, double step, TileMesh& mesh) {
   std::int64_t lowest = vertices.front().height, highest = lowest;
   for (const TileVertex& vertex : vertices) {
@@ -216,8 +216,7 @@ TileHeader header_of(const TileAddress& tile, const TileMesh& mesh) {
   return header;
 }
 
-/// Sets the source's own normals, from its slope over about a 256th of the tile, but at least a
-/// sample.
+/// Sets normals from the slope of the source over a 256th of the tile, but at least over a sample.
 void set_normals(const TileAddress& tile, TileSurface& surface, TileMesh& mesh) {
   const GeographicBox box = box_of(tile);
   const double distance = std::max(surface.spacing(), (box.east - box.west) / 256.0);

@@ -27,7 +27,8 @@ struct BuiltTile {
   bool has_data = false;   ///< whether a sample is in the tile
 };
 
-/// The heights of a tile do not fit in its zoom's steps; use larger ones.
+/// Thrown if the heights of a tile do not fit in the steps of its zoom. The caller then uses larger
+/// steps.
 class HeightsTooFar : public std::runtime_error {
  public:
   HeightsTooFar() : std::runtime_error("the heights of a tile need larger steps") {}

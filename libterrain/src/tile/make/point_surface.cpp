@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// The most samples to take at once.
+/// The most samples to return at once.
 constexpr double kMostSamples = 1U << 18;
 /// Margin to load around a part, in mean distances of points.
 constexpr double kMargin = 8;
@@ -193,7 +193,7 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
       const auto split = std::stable_partition(
           part.begin(), part.end(), [&](std::uint32_t i) { return stored[i][axis] < middle; });
       const auto first = static_cast<std::size_t>(split - part.begin());
-      // Two places may have no number between them.
+      // There may be no number between two places.
       if (first == 0 || first == part.size()) {
         for (std::uint32_t& i : part) part_heights(stored, std::span(&i, 1), out);
         return;
@@ -214,7 +214,7 @@ void PointTileSurface::load(const StoredBox& box) {
   const double area = (all.max[0] - all.min[0]) * (all.max[1] - all.min[1]);
   const double margin = kMargin * std::sqrt(area / static_cast<double>(cloud_.store.points()));
   const std::size_t max_points = cloud_.window_bytes / PointCells::kBytesPerPoint;
-  // Without points in memory, each place reads its own.
+  // Without points in memory, each place reads the points that it needs.
   if (!surface_.load(box.widened(margin), max_points, true)) surface_.load(box, max_points, true);
   loaded_ = box;
 }

@@ -24,14 +24,15 @@ namespace terrace::terrain {
 
 /// The data that all threads share when tiling a store of irregular points.
 struct TiledCloud : TiledStore {
-  /// Memory limit of a thread for the points of a part.
+  /// Memory limit of a thread for the points of a part, in bytes.
   std::uint64_t window_bytes = 0;
   double rim = 0;  ///< from rim_of_outline()
-  /// All samples if they fit in memory; otherwise each thread reads those of a part at a time.
+  /// All samples, if they fit in memory. Otherwise each thread reads the samples of one part at a
+  /// time.
   std::unique_ptr<const CloudSamples> samples{};
   std::unique_ptr<PointCloud> points;
 
-  /// Reads a level of the store and a few clusters, or the whole store if it fits in whole_bytes.
+  /// Reads a level of the store and a few clusters, or the whole store if it fits in all_bytes.
   /// Throws: stream::Error if no place of it has a longitude and latitude.
   TiledCloud(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
              std::uint64_t window_bytes, std::uint64_t all_bytes, unsigned threads);
@@ -58,8 +59,8 @@ class PointTileSurface final : public TileSurface {
                std::span<double> out) override;
   void water(std::span<const double> longitude, std::span<const double> latitude,
              std::span<std::uint8_t> out) override;
-  /// Depends on the whole store: a point changes the triangles around it, and possibly a distant
-  /// hull.
+  /// Hashes the whole store, because a point changes the triangles around it, and possibly a
+  /// distant part of the hull.
   std::uint64_t digest(const GeographicBox& box) override;
 
  private:

@@ -138,7 +138,7 @@ std::optional<HeightRange> RasterTileSurface::surface_range(const GeographicBox&
       if (const auto range = raster_.blocks.range(window)) return above_ellipsoid(*range, false);
     }
   }
-  // Fill is between the heights of samples, but those may be anywhere.
+  // Filled heights are between those of samples, but the samples may be anywhere.
   return above_ellipsoid(raster_.everywhere, true);
 }
 

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 
 /// The surface of a raster store: bilinear between four samples with data, filled elsewhere.
-/// Memory: 12 MiB, and 8 bytes per sample of the largest requested box, 24 for samples().
+/// Memory: 12 MiB, and 8 bytes per sample of the largest requested box, or 24 for samples().
 class RasterTileSurface : public TileSurface {
  public:
   explicit RasterTileSurface(const TiledRaster& raster);
@@ -47,7 +47,7 @@ class RasterTileSurface : public TileSurface {
   template <class Visit>
   void visit_places(std::span<const double> longitude, std::span<const double> latitude,
                     const Visit& visit);
-  /// The heights of a window: part of the held one, or read.
+  /// The heights of a window, which are part of the loaded window or are read.
   struct View {
     const double* first = nullptr;
     std::int64_t stride = 0;
@@ -58,7 +58,7 @@ class RasterTileSurface : public TileSurface {
   StoreWindow reader_;
   std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the most recent
   LatticeWindow loaded_{};
-  std::vector<double> heights_;  ///< of the held window
+  std::vector<double> heights_;  ///< of the loaded window
   std::vector<Point2> places_;   ///< places to evaluate the geoid at
   std::vector<double> geoid_shares_;
   std::vector<std::size_t> filled_;  ///< samples of a grid that get the flat fill

@@ -16,8 +16,8 @@ namespace {
 
 /// Largest error of an interpolated place, in samples, at the places where it is checked.
 constexpr double kTolerance = 0.005;
-/// Sizes of a part of a mask, in cells: smaller parts are converted cell by cell, larger ones are
-/// divided unless they are uniform.
+/// Limits on the size of a part of a mask, in cells. Smaller parts are converted cell by cell.
+/// Larger parts are divided unless they are uniform.
 constexpr std::size_t kSmallestHeight = 8, kLargestHeight = 64;
 /// The most samples to read at once, unless a single cell needs more.
 constexpr std::size_t kMostWaterSamples = 65536;
@@ -215,7 +215,7 @@ bool even(std::span<const double> places, std::size_t step) {
   return true;
 }
 
-/// Returns the number of places in the first row of a regular grid; 0 if it is not one.
+/// Returns the number of places in the first row of a regular grid; 0 if the grid is not regular.
 std::size_t columns_of(std::span<const double> longitude, std::span<const double> latitude) {
   std::size_t columns = 0;
   while (columns < latitude.size() && latitude[columns] == latitude[0]) ++columns;

@@ -12,7 +12,7 @@ bool meet(const GeographicBox& a, const GeographicBox& b) {
   return a.west <= b.east && b.west <= a.east && a.south <= b.north && b.south <= a.north;
 }
 
-/// Removes the samples that another part of `whole` has as well.
+/// Removes the samples that belong to another part of `whole` as well.
 void drop_elsewhere(const GeographicBox& part, const GeographicBox& whole,
                     SurfaceSamples& samples) {
   std::size_t kept = 0;
@@ -45,7 +45,7 @@ bool may_have_samples(const GeographicBox& box, TileSurface& surface) {
 }
 
 bool is_to_be_cut(const GeographicBox& box, TileSurface& surface) {
-  // Slightly more, because leaves of tiles are rounded to units.
+  // Widen the box slightly, because leaves of tiles are rounded to units.
   return box.east - box.west > 1.01 * surface.widest_part() || surface.crowded(box);
 }
 

@@ -27,8 +27,8 @@ void for_each_part(const GeographicBox& box, TileSurface& surface,
                    const std::function<void(const SurfaceSamples&)>& visit);
 
 /// Returns the tiles of a zoom that may have samples, sorted by row, then column. Searches from
-/// zoom 0 down, so the cost is proportional to the number of these tiles, however far apart the
-/// samples are. Throws: stream::Stopped.
+/// zoom 0 down, so the cost is proportional to the number of these tiles, even if the samples are
+/// far apart. Throws: stream::Stopped.
 std::vector<TileAddress> tiles_with_samples(TileSurface& surface, unsigned zoom,
                                             const Context& context);
 

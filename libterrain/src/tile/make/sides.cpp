@@ -40,7 +40,7 @@ ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurf
   // millimetre.
   plan.height_step = 0x1p-11;
   while (plan.height_step * (kTileUnits - 2) < range) plan.height_step *= 2.0;
-  // A tile's own range is divided into 32767 parts, and vertices are rounded to the nearest, so
+  // The range of a tile is divided into 32767 parts, and vertices are rounded to the nearest. So
   // they move by at most half a step.
   plan.max_error = std::max(max_error - 0.5 * plan.height_step, 0.5 * max_error);
   // A chord of angle a is at most R a^2 / 8 below its arc: half of the error that clients expect at
@@ -111,7 +111,7 @@ bool TileSides::is_cut(const Side& side) const {
   // true. So the side is divided wherever a leaf of its length is.
   const double width = width_at(tile_.zoom, side.depth);
   if (width > plan_.longest_edge) return true;
-  // Slightly more than the length, because units are rounded.
+  // Use slightly more than the length, because units are rounded.
   if (width > plan_.widest_leaf && is_near_data(side, 1.01 * width)) return true;
   return is_crowded(side);
 }
@@ -192,8 +192,8 @@ SideVertices TileSides::settle(const Side& side) {
   const std::uint32_t to = leaf_unit(side.k + 1, side.depth);
   const std::uint32_t across = leaf_unit(side.line, side.depth);
 
-  // Two places per sample, at equal distances. Away from all samples, and where heights are nearly
-  // equal, the ends suffice.
+  // Use two places per sample, at equal distances. Far from all samples, and where heights are
+  // nearly equal, the ends suffice.
   const double length = width_at(tile_.zoom, side.depth);
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const bool looked_at =
@@ -221,7 +221,7 @@ SideVertices TileSides::settle(const Side& side) {
   surface_.heights(longitude, latitude, height);
   for (const auto& [at, between] : samples) {
     const auto place = std::lower_bound(t.begin(), t.end(), at) - t.begin();
-    // The middle, to minimise the largest distance.
+    // Use the middle of the range, to minimise the largest distance.
     height[static_cast<std::size_t>(place)] = between.low + 0.5 * (between.high - between.low);
   }
   const tri::SimplifiedLine line = tri::simplify_line(t, height, kSideShare * plan_.max_error,

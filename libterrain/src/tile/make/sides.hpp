@@ -27,11 +27,12 @@ struct ZoomPlan {
                               ///< curve
   double widest_leaf = 0.0;   ///< in degrees; wider parts of a tile with samples are quartered
 };
-/// surface: for the spacing of its samples. range: of heights within any tile of the zoom.
+/// surface: provides the spacing of the samples. range: the largest range of heights within a tile
+/// of the zoom, in metres.
 ZoomPlan plan_zoom(unsigned zoom, double max_error, double range, const TileSurface& surface);
 
-/// A square part of a tile with a width of 1 / 2^depth of it. x and y count such parts from the
-/// tile's south-west corner.
+/// A square part of a tile whose width is 1 / 2^depth of the tile's. x and y count such parts from
+/// the tile's south-west corner.
 struct TileLeaf {
   unsigned depth = 0;
   std::uint32_t x = 0, y = 0;
@@ -57,8 +58,8 @@ struct TileVertex {
   std::int64_t height = 0;
 };
 
-/// A side of a leaf, the same for the tiles on both sides: from part k to k + 1 along a line. Lines
-/// and parts are 1 / 2^depth of a tile apart and are counted from -180, -90 degrees.
+/// A side of a leaf, which is the same for the tiles on both sides: from part k to k + 1 along a
+/// line. Lines and parts are 1 / 2^depth of a tile apart and are counted from -180, -90 degrees.
 struct TileSideKey {
   bool along_parallel = false;  ///< from west to east; otherwise from south to north
   unsigned depth = 0;
@@ -66,8 +67,8 @@ struct TileSideKey {
   friend auto operator<=>(const TileSideKey&, const TileSideKey&) = default;
 };
 
-/// Sides on the borders of a zoom's tiles, for the tile beyond. Positions are in units of a tile,
-/// heights in metres.
+/// Sides on the borders of a zoom's tiles, kept for the neighbouring tile. Positions are in units
+/// of a tile, heights in metres.
 using SharedSides = WindowSides<TileSideKey>;
 /// Limit for SharedSides, at 16 bytes each.
 inline constexpr std::size_t kMostSharedVertices = std::size_t{1} << 16;
@@ -94,8 +95,8 @@ class TileSides {
   };
   std::shared_ptr<const SideVertices> vertices(const Side& side);
   SideVertices settle(const Side& side);
-  /// The lowest and highest samples within a unit of a place on a side; if any are within half a
-  /// unit, only of those.
+  /// The lowest and highest samples within a unit of a place on a side. If any are within half a
+  /// unit, only these count.
   struct Samples {
     double low = 0.0, high = 0.0;
     bool any = false, on = false;
@@ -107,12 +108,12 @@ class TileSides {
   /// of these samples if the surface needs sides to pass through them.
   SamplesAt add_samples(const Side& side, std::vector<double>& t, std::vector<double>& longitude,
                         std::vector<double>& latitude);
-  /// Returns the samples in a box around places on a side or at its end, the same for all tiles
-  /// there; nullopt if there may be too many.
+  /// Returns the samples in a box around places on a side or at its end, which are the same for all
+  /// tiles there. Returns nullopt if there may be too many.
   std::optional<SurfaceSamples> samples_near(const GeographicBox& box);
   /// Returns the samples at the end of a side, the same for all sides and tiles that meet there.
   std::optional<Samples> samples_at_corner(double longitude, double latitude);
-  /// Returns what both tiles at a side can see of it: its ends, and a unit to either side.
+  /// Returns the box around a side that both tiles can query: its ends, and a unit to either side.
   [[nodiscard]] GeographicBox band_around(const Side& side) const;
   /// Whether heights in a band differ by so little that the ends of the side suffice.
   [[nodiscard]] bool is_flat(const GeographicBox& band) const;

@@ -27,7 +27,7 @@ constexpr std::uint64_t kTilingFixedBytes = std::uint64_t{80} << 20;
 /// The least memory for the triangles of a part.
 constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
 
-/// In metres above or below the ellipsoid.
+/// The largest height that is accepted, in metres above or below the ellipsoid.
 constexpr double kFarthest = 1e7;
 
 template <class Tiled, class Surface>
@@ -47,7 +47,8 @@ class SourceOf final : public TileSource {
   std::unique_ptr<Tiled> tiled_;
 };
 
-/// In metres above the ellipsoid; nullopt: heights are interpolated from surrounding heights.
+/// Returns the flat fill in metres above the ellipsoid; nullopt if heights are interpolated from
+/// surrounding heights.
 std::optional<double> flat_height(const stream::Store& store, const TilesRequest& request,
                                   double metres_per_unit) {
   if (request.fill == Fill::none) {
@@ -62,7 +63,7 @@ std::optional<double> flat_height(const stream::Store& store, const TilesRequest
   return request.flat_height.value_or(lowest);
 }
 
-/// metres: per unit of the store's heights.
+/// metres: metres per unit of the store's heights.
 void check_heights(const stream::Store& store, double metres) {
   const stream::Channel& z = store.schema().coordinates[2];
   for (const stream::Point3& end : {store.bounds().min, store.bounds().max}) {

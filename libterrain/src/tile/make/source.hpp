@@ -14,7 +14,7 @@
 
 namespace terrace::terrain {
 
-/// The resources of a job over tiles.
+/// The threads and memory of a job over tiles.
 struct TileResources {
   std::uint64_t memory_bytes = 0;
   unsigned threads = 1;

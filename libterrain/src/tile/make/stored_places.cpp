@@ -22,8 +22,9 @@ constexpr double kMarginMetres = 0.02;
 constexpr double kMarginDegrees = 2e-7;
 /// Number of steps across a box in which its image is sampled.
 constexpr unsigned kPlaceSteps = 24;
-/// Fewer steps suffice for boxes up to this size (degrees), where second differences bound the
-/// bulge; and for boxes up to the other size if that bound is below what many steps would allow.
+/// Fewer steps suffice for boxes up to the first size in degrees, where second differences bound
+/// the bulge. They also suffice for boxes up to the second size if that bound is below what many
+/// steps would allow.
 constexpr double kSmall = 1.0, kMayBeSmooth = 8.0;
 constexpr unsigned kSmallSteps = 6;
 constexpr unsigned kBoundsSteps = 64;
@@ -256,7 +257,8 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
     windows.push_back(around);
   };
   if (crs_.is_geographic()) {
-    // The turns that may reach the store. If it goes around several times, the first ones suffice.
+    // Only turns that may reach the store matter. If it goes around several times, the first turns
+    // suffice.
     constexpr int kMostTurns = 5;
     const double first = std::floor(first_longitude_ / turn_ - 0.5),
                  last = std::ceil(last_longitude_ / turn_ + 0.5);
@@ -328,7 +330,8 @@ void StoredPlaces::to_geographic(std::span<Point2> places) const {
 }
 
 void StoredPlaces::to_stored(std::span<Point2> places) const {
-  // For places without an image in the store's CRS: beyond every outline and its rim.
+  // The result for places without an image in the store's CRS: a corner beyond every outline and
+  // its rim.
   constexpr double kFarAway = 1e9;
   for (Point2& p : places) {
     // The meridian of 180 degrees has two numbers; use one, as tiles on both sides request it.

@@ -20,8 +20,8 @@ namespace terrace::terrain {
 /// Returns the same longitude in [-180, 180].
 double wrapped_longitude(double longitude);
 
-/// The location of a store on the globe: of its points, or of the whole lattice of a raster.
-/// Several threads may call const members at once.
+/// The location of a store's points, or of the lattice of a raster, on the globe. Several threads
+/// may call const members at once.
 class StoredPlaces {
  public:
   /// Throws: stream::Error if no place of the store has a longitude and latitude.
@@ -49,8 +49,8 @@ class StoredPlaces {
   /// it does not meet bounds(), two if a store in degrees goes around the globe.
   [[nodiscard]] std::vector<StoredBox> windows(const GeographicBox& box) const;
 
-  /// Converts stored x, y to longitude in [-180, 180] and latitude, in place; NaN where there is
-  /// none. Irregular points use BoxGeography, within its tolerance.
+  /// Converts stored x, y to longitude in [-180, 180] and latitude, in place. Places without them
+  /// become NaN. Irregular points use BoxGeography, within its tolerance.
   void to_geographic(std::span<Point2> places) const;
   /// Converts longitude and latitude to stored x, y, in place. -180 and 180 give the same result.
   /// Places without an image become a corner outside stored_bounds(). Projected stores use

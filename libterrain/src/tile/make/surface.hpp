@@ -41,7 +41,7 @@ struct SurfaceGrid {
 /// The samples of a box.
 using SurfacePart = std::variant<SurfaceSamples, SurfaceRows, SurfaceGrid>;
 
-/// Bounds on the heights of samples; not necessarily tight.
+/// Bounds on the heights of samples, which need not be tight.
 struct HeightRange {
   double low = 0.0, high = 0.0;  ///< in metres above the ellipsoid
   bool certain = false;          ///< whether there certainly is a sample
@@ -54,7 +54,7 @@ class TileSurface {
  public:
   virtual ~TileSurface() = default;
 
-  /// Throws: stream::Stopped if a stop was requested. For loops that may not read.
+  /// Throws: stream::Stopped if a stop was requested. Call it in loops that may not read the store.
   virtual void check_stop() const {}
   /// A box around all samples.
   [[nodiscard]] virtual GeographicBox bounds() const = 0;

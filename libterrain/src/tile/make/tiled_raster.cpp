@@ -17,7 +17,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Returns the same store, if it can be tiled.
+/// Returns the store. Throws: stream::Error if it is a single line of samples.
 const stream::Store& checked(const stream::Store& store) {
   if (store.schema().columns >= 2 && store.schema().rows >= 2) return store;
   throw stream::Error(store.path().string(),
@@ -28,7 +28,7 @@ const stream::Store& checked(const stream::Store& store) {
 /// this (degrees) may have places outside the raster where its projection is discontinuous.
 constexpr unsigned kDigestSteps = 8;
 constexpr double kSmooth = 1.0;
-/// Samples around a place: those that it is between, plus a margin for rounding.
+/// Distance in samples that includes the samples around a place, plus a margin for rounding.
 constexpr double kDigestMargin = 2.0;
 /// Memory in bytes of cached heights per thread.
 constexpr std::uint64_t kHeightsOfThread = std::uint64_t{24} << 20;

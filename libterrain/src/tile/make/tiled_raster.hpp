@@ -28,21 +28,21 @@ struct TiledRaster : TiledStore {
   TiledRaster(const stream::Store& tiled, CoordinateSystem system, EllipsoidalHeights heights,
               unsigned threads);
 
-  /// Whether a place of the lattice without a sample is within the outline of those with data: in
-  /// their hull, or so near that it belongs to the cells around them, such as half a cell beyond
-  /// the last row and the gap between the ends of a raster around the globe.
+  /// Whether a place of the lattice without a sample is within the outline of the samples with
+  /// data. The outline is their hull and the cells around them, such as half a cell beyond the last
+  /// row and the gap between the ends of a raster around the globe.
   [[nodiscard]] bool is_within_outline(double column, double row) const;
 
   /// Returns the window of the lattice with all samples in the box; empty if there is none.
   [[nodiscard]] LatticeWindow window_around(const GeographicBox& box) const;
 
-  /// Implements TileSurface::digest() for a raster. Hashes its lattice, its CRS and how it is
-  /// filled; the samples in the blocks of the lattice that the box may need; and, if some of these
-  /// are missing or the box extends beyond the raster, the fill there. Depends on the samples, not
-  /// on how the store clusters them, except for the fill, which is made from the store's level 1.
-  /// The rule for what a box may need is the same as for reading it, with a margin; if that cannot
-  /// be determined (wide boxes of projected rasters that extend beyond the raster), everything is
-  /// hashed. Cost: a few nanoseconds per block and per cell of the fill.
+  /// Implements TileSurface::digest() for a raster. Hashes the lattice, the CRS, the kind of fill,
+  /// and the samples in the blocks of the lattice that the box may need. If some of these are
+  /// missing or the box extends beyond the raster, it also hashes the fill there. Depends on the
+  /// samples, not on how the store clusters them, except for the fill, which is made from the
+  /// store's level 1. The rule for what a box may need is the same as for reading it, with a
+  /// margin. If that cannot be determined (wide boxes of projected rasters that extend beyond the
+  /// raster), it hashes everything. Cost: a few nanoseconds per block and per cell of the fill.
   [[nodiscard]] std::uint64_t digest(const GeographicBox& box) const;
 };
 

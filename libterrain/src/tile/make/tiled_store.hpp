@@ -22,18 +22,18 @@ struct TiledStore {
   EllipsoidalHeights vertical;
   StoreFill fill;
   double spacing = 0.0;  ///< from TileSurface::spacing()
-  /// The height in metres where there are no samples; nullopt: interpolated from surrounding
-  /// samples, within the outline of all samples.
+  /// The height in metres where there are no samples. If not set, heights within the outline of all
+  /// samples are interpolated from surrounding samples.
   std::optional<double> flat_fill{};
   /// The height in metres beyond the outline, where no land is invented.
   [[nodiscard]] double height_beyond() const { return flat_fill.value_or(0.0); }
-  /// How far heights continue beyond the outline, in stored units: an eighth to a half of the
-  /// height by which the surface falls there, rounded to a power of four, and at least one and a
-  /// half cells of a raster. Tiles round places, and a sample on the outline must not end up beyond
-  /// it.
+  /// Returns the distance by which heights continue beyond the outline, in stored units. It is an
+  /// eighth to a half of the height by which the surface falls there, rounded to a power of four,
+  /// and at least one and a half cells of a raster. Tiles round places, and a sample on the outline
+  /// must not end up beyond it.
   [[nodiscard]] double rim_of_outline() const;
-  /// Water is where the surface has this height (in the store's unit); nullopt: where a raster has
-  /// no data.
+  /// The height of water surfaces, in the store's unit. If not set, water is where a raster has no
+  /// data.
   std::optional<double> water_height{};
 
   /// Reads a level of the store. Throws: stream::Error if no place of it has a longitude and

@@ -14,16 +14,17 @@ namespace terrace::terrain {
 std::vector<std::byte> read_tile_file(const std::string& path);
 
 /// Creates the folder, writes the file as `.NAME.tmp-PID` in it and renames it. Does not sync:
-/// sync_files() syncs thousands of tiles together. Throws: stream::Error; no partial file is left.
+/// sync_files() syncs thousands of tiles together. Throws: stream::Error, and leaves no partial
+/// file.
 void write_tile_file(const std::string& path, std::span<const std::byte> bytes);
 
-/// Whether a path in a tile set's folder is a file that write_tile_file() was writing when it was
-/// killed.
+/// Whether a path in a tile set's folder is a temporary file that an interrupted write_tile_file()
+/// left.
 bool is_torn_tile(std::string_view path);
 
-/// Makes the file system of `folder` persist everything written to files. Throws: stream::Error.
+/// Syncs the contents of all files in the file system of `folder`. Throws: stream::Error.
 void sync_files(const std::string& folder);
-/// Makes it persist the names in `folder`. Throws: stream::Error.
+/// Syncs the names in `folder`. Throws: stream::Error.
 void sync_names(const std::string& folder);
 
 }  // namespace terrace::terrain

@@ -14,7 +14,7 @@
 namespace terrace::terrain {
 namespace {
 
-/// Version of the tile maker; increment it when equal inputs give other bytes.
+/// Version of the algorithm. Increment it when equal inputs give other bytes.
 constexpr std::uint64_t kGeneration = 4;
 
 }  // namespace

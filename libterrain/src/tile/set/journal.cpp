@@ -100,7 +100,7 @@ std::uint64_t checksum_of(std::span<const std::byte> bytes) {
 TileJournal::TileJournal(const std::string& folder) : folder_(folder), path_(folder + "/" + kName) {
   Lines read = read_lines(path_);
   if (read.good_bytes > 0) {
-    // Remove what a crash left after the last complete line.
+    // Remove the truncated line that a crash leaves after the last complete one.
     std::error_code error;
     if (fs::file_size(path_, error) != read.good_bytes) {
       fs::resize_file(path_, read.good_bytes, error);

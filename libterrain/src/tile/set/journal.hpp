@@ -26,18 +26,17 @@ struct FinishedTile {
 /// A 64-bit checksum, FNV-1a.
 std::uint64_t checksum_of(std::span<const std::byte> bytes);
 
-/// The file in a tile set's folder that records which tiles are finished and what they were made
-/// from. It exists while the set is being made, so that an interrupted run can resume, and stays,
-/// so that a later run makes only what changed. There is one line per tile; if there are several,
-/// the last counts. A truncated line, as a crash leaves it, ends the records; each record is
-/// checked against the tile's file in any case.
+/// The file in a tile set's folder that records the finished tiles and a hash of their inputs. An
+/// interrupted run resumes from it, and a later run rebuilds only tiles with other inputs. The file
+/// has one line per tile. If there are several, the last one counts. A line that a crash truncated
+/// ends the records. Each record is checked against the tile's file before it is used.
 class TileJournal {
  public:
   static constexpr const char* kName = ".terrace-tiles";
   using Record = std::pair<TileAddress, FinishedTile>;
 
-  /// Reads the journal in the folder and continues it, if this version wrote it; otherwise starts a
-  /// new one. Memory: 48 bytes per tile. Throws: stream::Error.
+  /// Reads the journal in the folder and continues it if this version wrote it. Otherwise starts a
+  /// new journal. Memory: 48 bytes per tile. Throws: stream::Error.
   explicit TileJournal(const std::string& folder);
 
   /// Returns the record of an earlier run; nullptr if it did not finish this tile.
@@ -56,8 +55,8 @@ class TileJournal {
   int failure_ = 0;  ///< the error number of the first add() that failed, for later calls
 };
 
-/// Returns the records of a finished set, sorted by address; empty without a journal that this
-/// version can read.
+/// Returns the records of a finished set, sorted by address. Returns an empty list without a
+/// journal that this version can read.
 std::vector<TileJournal::Record> read_tile_records(const std::string& folder);
 
 }  // namespace terrace::terrain

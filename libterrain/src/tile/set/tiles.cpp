@@ -112,9 +112,9 @@ void write_layer(const std::string& path, const std::string& text) {
 /// against other runs.
 class TileFolder {
  public:
-  /// `folder` may be written if it is missing or empty, if it is a tile set of ours and `force` is
-  /// set, or an unfinished one and `resume` is set; and if no other run writes to it. Throws:
-  /// stream::Error with the remedy.
+  /// Locks `folder` for writing. It must be missing or empty, or contain a tile set of terrace: any
+  /// set if `force` is set, or an unfinished one if `resume` is set. Throws: stream::Error with the
+  /// remedy otherwise, and if another run writes to it.
   TileFolder(const std::string& folder, bool force, bool resume);
   /// Removes a folder that was created here and stayed empty.
   ~TileFolder();
@@ -139,7 +139,7 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
   if (fs::exists(path_) && !fs::is_directory(path_)) {
     throw fault("is not a folder").remedy("name another one");
   }
-  // Nothing is created in a foreign folder, not even the lock.
+  // Create nothing in a folder of another program, not even the lock.
   if (holds_others(path_)) {
     throw fault("is not empty and contains no tile set")
         .remedy("name another folder, or empty it yourself");

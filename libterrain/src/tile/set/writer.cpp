@@ -98,7 +98,8 @@ void TileSetWriter::begin_change() {
     std::error_code error;
     fs::remove(layer_path_, error);
     if (error) throw stream::system_error(layer_path_, "cannot be removed", error.value());
-    // It must not reappear after a power failure that the tiles survived.
+    // Sync the folder, so that the file does not reappear after a power failure that the tiles
+    // survived.
     sync_names(options_.folder);
   });
 }
@@ -158,7 +159,7 @@ void TileSetWriter::begin_zooms() {
   for (unsigned zoom = options_.request.first_zoom; zoom <= options_.last_zoom; ++zoom) {
     auto begun = std::make_unique<Zoom>();
     begun->tiles = candidates(zoom, surface, context_);
-    // A quarter more, for the fill next to samples.
+    // Add a quarter, for the fill next to samples.
     begun->range = 1.25 * widest_range(begun->tiles, surface);
     begun->plan = plan_zoom(zoom, options_.max_error(zoom), begun->range, surface);
     zooms_.push_back(std::move(begun));

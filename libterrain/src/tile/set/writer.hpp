@@ -34,7 +34,7 @@ struct TileSetOptions {
 };
 
 /// Writes the tiles of one folder. Keeps files that are complete and up to date. Removes
-/// `layer.json` before any change, so that an unfinished set has none.
+/// `layer.json` before any change, so that an unfinished set does not have it.
 class TileSetWriter {
  public:
   TileSetWriter(const std::vector<std::unique_ptr<TileSurface>>& surfaces,
@@ -53,8 +53,8 @@ class TileSetWriter {
   /// in the folder.
   void check_strangers() const;
   void write_zooms();
-  /// Call after all zooms: removes tiles of an earlier set that are not in this one, and temporary
-  /// files of killed runs; completes the journal.
+  /// Removes tiles of an earlier set that are not in this one, and temporary files of killed runs.
+  /// Completes the journal. Call it after all zooms.
   void finish();
 
   TilesOutcome result;
@@ -81,8 +81,8 @@ class TileSetWriter {
   using Family = std::vector<std::pair<Zoom*, std::size_t>>;
 
   void begin_zooms();
-  /// Returns the families, in stages that wait for the previous one; those of a stage may be
-  /// written at once.
+  /// Returns the families in stages. The families of a stage may be written at once, after the
+  /// previous stage.
   std::vector<std::vector<Family>> stages();
   /// Adds the tiles below a tile by families of the zoom `last`, and the tiles above that zoom one
   /// by one, each after its children. So threads work close to each other at any time.

@@ -29,17 +29,17 @@ struct TileInventory {
 TileInventory take_inventory(const std::string& folder, const TileLayer& layer,
                              const Context& context);
 
-/// A fault in a tile: the byte (after decompression, if it is compressed), and what is wrong.
+/// A fault in a tile, and its byte. Bytes of a compressed tile are counted after decompression.
 struct TileFault {
   std::uint64_t offset = 0;
   std::string what;
 };
 
-/// Checks a tile by itself: triangles are counter-clockwise, have an area and cover the square
-/// once; all corners exist and no vertex is unused; lists of border vertices are exact and sorted;
-/// sphere, centre and horizon occlusion point of the header are sound; normals point upward; and it
-/// has exactly the extensions that `extensions` (of layer.json) promises. Reports the first fault
-/// of each kind and counts them all. O(n log n).
+/// Checks a tile without its neighbours. Triangles must be counter-clockwise, have an area and
+/// cover the square once. All corners must exist, and no vertex may be unused. Lists of border
+/// vertices must be exact and sorted. Sphere, centre and horizon occlusion point of the header must
+/// be sound. Normals must point upward. The tile must have exactly the extensions that `extensions`
+/// (of layer.json) promises. Reports the first fault of each kind and counts them all. O(n log n).
 std::vector<TileFault> check_tile_mesh(const TileAddress& address, const DecodedTile& tile,
                                        const std::vector<std::string>& extensions);
 

@@ -19,7 +19,7 @@ namespace {
 
 using stream::Point3;
 
-/// Tolerances of a header, in metres and as shares: only for rounding.
+/// Tolerances of a header for rounding, in metres and as shares.
 constexpr double kLengthSlack = 1e-3;
 constexpr double kShareSlack = 1e-3;
 constexpr std::uint64_t kLowestAt = 24, kHighestAt = 28, kSphereAt = 32, kHorizonAt = 64;

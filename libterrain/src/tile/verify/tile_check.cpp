@@ -29,13 +29,13 @@
 namespace terrace::terrain {
 namespace {
 
-/// In metres: how much rounding may exceed a bound. Samples are placed on the globe to a hundredth
-/// of a millimetre.
+/// Tolerance of a bound for rounding, in metres. Samples are placed on the globe to a hundredth of
+/// a millimetre.
 constexpr double kHeightSlack = 1e-4;
 
 /// Limit on the size of an uncompressed tile.
 constexpr std::uint64_t kMostBorderBytes = std::uint64_t{1} << 28;
-/// In metres: how much the heights of neighbours may differ, in addition to the rounding of each.
+/// Tolerance in metres for the heights of neighbours, in addition to the rounding of each.
 constexpr double kBorderSlack = 1e-3;
 
 /// A side of a tile.
@@ -286,8 +286,9 @@ void SetCheck::compare(const TileAddress& tile, const char* side, const BorderSi
 }
 
 void SetCheck::tiles(const std::vector<TileAddress>& tiles) {
-  // Northern sides of the row below and of this row, by column; the eastern side of the previous
-  // tile; and the western side of the row's first tile, which is next to the last.
+  // The northern sides of the row below and of this row, by column, the eastern side of the
+  // previous tile, and the western side of the row's first tile. The first tile is next to the last
+  // one.
   std::map<std::uint32_t, BorderSide> below, row;
   BorderSide before, first;
   std::optional<TileAddress> last;
