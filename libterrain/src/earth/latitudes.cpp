@@ -26,9 +26,9 @@ std::string place_text(double x, double y) { return plain_number(x) + ' ' + plai
 
 }  // namespace
 
-void check_latitudes(std::span<const Point2> places, double most, const std::string& file,
+void check_latitudes(std::span<const Point2> places, double max_latitude, const std::string& file,
                      const std::string& where, double beyond) {
-  const double degrees = 90 / most;
+  const double degrees = 90 / max_latitude;
   for (const auto& [x, y] : places) {
     const double latitude = y * degrees;
     if (!(std::abs(latitude) > 90 + beyond) || !std::isfinite(latitude)) continue;

@@ -188,7 +188,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   const bool straight = m[1] == 0 && m[3] == 0;
   RasterGrid grid;
   if (!request.cell && !request.to && store.schema().grid && straight && level == 0) {
-    // The lattice itself: the samples within the box.
+    // Use the lattice itself: the samples within the box.
     std::array<double, 2> first{}, last{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double step = m[4 * axis], origin = axis == 0 ? m[2] : m[5];
@@ -211,7 +211,7 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
   double cell = request.cell.value_or(spacing_of(store, selected, level));
   if (request.to) {
     const Point2 centre{0.5 * (box.min[0] + box.max[0]), 0.5 * (box.min[1] + box.max[1])};
-    // In both directions, because the new CRS may be discontinuous on one side.
+    // Measure in both directions, because the new CRS may be discontinuous on one side.
     std::vector<Point2> steps{centre,
                               {centre[0] + cell, centre[1]},
                               {centre[0], centre[1] + cell},

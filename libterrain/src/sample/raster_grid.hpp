@@ -15,7 +15,7 @@ struct RasterGrid {
   std::uint32_t columns = 0, rows = 0;
 };
 
-/// Returns the grid that write_raster() describes, and throws its errors.
+/// Returns the grid that write_raster() describes. Throws: as write_raster().
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request);
 
 /// Returns the grid of the raster to align with. Sets request.to if its CRS is not the store's.

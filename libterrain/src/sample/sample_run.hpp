@@ -21,7 +21,7 @@ struct SampleCounts {
   std::uint64_t answered = 0;  ///< lines with a height
 };
 
-/// Conversions of coordinates, in place; several threads may call them at once.
+/// Conversions of coordinates in place. Several threads may call them at once.
 struct PlaceConversions {
   std::function<void(std::span<Point2>)> to_store;    ///< empty: places are in the store's CRS
   std::function<void(std::span<Point2>)> to_written;  ///< empty: lines keep their places
@@ -32,9 +32,9 @@ struct PlaceConversions {
 
 /// Writes every line of `places` with its own columns, followed by height, gradient (rise per run),
 /// slope (degrees) and aspect (degrees clockwise from north, downhill), which are empty where there
-/// is no surface. Empty lines and comments are copied unchanged; a header line gets the four
-/// names too. Places written in another CRS replace the original ones in their columns, named x and
-/// y, or longitude and latitude; they are empty where they have no image.
+/// is no surface. Empty lines and comments are copied unchanged. A header line gets the four names
+/// too. Places in another CRS replace the original ones in their columns, which are named x and y,
+/// or longitude and latitude. They are empty where they have no image.
 ///
 /// write: receives the lines in order, many at a time. Reports "points". Throws: stream::Error on
 /// invalid lines, latitudes beyond a pole and a damaged store; stream::Stopped; what `write`

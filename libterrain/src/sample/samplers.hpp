@@ -20,7 +20,7 @@ std::unique_ptr<HeightSampler> make_lattice_sampler(const stream::Store& store,
                                                     const Context& context);
 /// A cloud that is sampled in windows. A sampler and SurfaceCrossings may share one.
 struct SampledCloud {
-  /// As many windows as pay off are loaded together.
+  /// Points of a window. Several windows are loaded together where that costs less.
   static constexpr std::size_t kWindowPoints = 16384;
 
   /// Throws: as PointCloud.

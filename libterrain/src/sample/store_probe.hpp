@@ -18,9 +18,9 @@ namespace terrace::terrain {
 /// coarser than the store.
 ///
 /// Bytes of the store may be missing (stream::GivenBytes). Then each function throws
-/// stream::MissingBytes, which lists all missing bytes that it can determine, not only the first;
-/// once they are available, it returns its answer. Answers depend only on the store and the
-/// arguments. All functions throw stream::Error on damage. One object per thread.
+/// stream::MissingBytes, which lists all missing bytes that it can determine, not only the first.
+/// Call it again once they are available. Answers depend only on the store and the arguments. All
+/// functions throw stream::Error on damage. One object per thread.
 class StoreProbe {
  public:
   /// ground: the linear map from stored coordinates to metres. The store must outlive this object.
@@ -36,9 +36,9 @@ class StoreProbe {
   /// Returns a place on the surface of a raster, as HeightSampler computes it at level 0, with the
   /// attributes of the sample whose cell contains it; nullopt where there is no surface.
   std::optional<Found> on_raster(double column, double row);
-  /// Returns the point within `reach` metres that is nearest to a stored place; on ties, the one
-  /// with smaller coordinates. Reads at most about kMostRead points; if there are more, those of a
-  /// coarser level.
+  /// Returns the point within `reach` metres that is nearest to a stored place, on ties the one
+  /// with smaller coordinates. Reads at most about kMostRead points. If there are more, it reads
+  /// those of a coarser level.
   std::optional<Found> nearest(const stream::Point3& place, double reach);
 
   struct Profile {
@@ -52,8 +52,9 @@ class StoreProbe {
         false;  ///< a raster sampled at equal distances, because the line crosses too many cells
   };
   /// Returns the profile between two stored places. For a raster it has the places where the line
-  /// crosses a column, a row or a diagonal, at most kMostCrossings; for points, those in a strip of
-  /// width kStrip times its length. axis: the upward coordinate, 1 or 2; 2 for rasters.
+  /// crosses a column, a row or a diagonal, at most kMostCrossings. For other stores it has the
+  /// points in a strip whose width is kStrip times its length. axis: the upward coordinate, 1 or 2;
+  /// 2 for rasters.
   Profile profile(const stream::Point3& from, const stream::Point3& to, std::size_t axis);
 
   static constexpr std::uint64_t kMostRead = 1u << 18;

@@ -23,7 +23,7 @@ namespace terrace::terrain {
 /// view frame.
 class FramedSource final : public tri::ClusterSource {
  public:
-  /// Without a lattice (null), members are in stored coordinates. `bounds`: records with missing
+  /// If the lattice is null, members are in stored coordinates. `bounds`: records with missing
   /// bytes may be replaced by bounds (tri::ClusterRecord::kUnread). Keeps references to its
   /// arguments.
   FramedSource(const stream::Store& store, const ViewFrame& frame, const ViewLattice* lattice,
@@ -80,10 +80,10 @@ class ClusterReader {
   using GiveRecord = std::function<void(tri::ClusterId, const tri::ClusterRecord&)>;
 
   virtual ~ClusterReader() = default;
-  /// Call before a step: passes on requested clusters that are available, for about `seconds`.
-  /// Rethrows what reading threw.
+  /// Passes on requested clusters that are available, for about `seconds`. Call it before a step.
+  /// Rethrows exceptions of the reading thread.
   virtual void bring(double seconds, const Give& give, const GiveRecord& give_record) = 0;
-  /// Call after a step, with what the step lacks, as in tri::ViewControl::Step.
+  /// Requests the clusters that a step lacks, see tri::ViewControl::Step. Call it after the step.
   virtual void ask(const std::vector<tri::ViewRequest>& wanted,
                    const std::vector<tri::ViewRequest>& requests,
                    const std::vector<tri::ClusterId>& withdrawn) = 0;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "view/store_view_impl.hpp"
 
-/// The same for surfaces of scans; separate from core.cpp because they need the triangulation in
-/// space.
+/// The part of core.cpp for surfaces of scans. It is separate, because only these need the
+/// triangulation in space.
 
 namespace terrace::terrain {
 

@@ -25,7 +25,7 @@ struct BoundedMeshOptions {
   double max_error = 0.0;        ///< metres
   std::uint64_t max_points = 0;  ///< 0: no limit; otherwise max_error is ignored
   tri::TinQuality quality = tri::TinQuality::removal;
-  /// With `all`: an error if samples at one place differ by more than max_error.
+  /// With `all`, samples at one place that differ by more than max_error are an error.
   tri::PointDuplicates duplicates = tri::PointDuplicates::all;
   Fill fill = Fill::none;          ///< for cells of a raster without data
   std::optional<Region> region{};  ///< in the store's CRS
@@ -34,7 +34,7 @@ struct BoundedMeshOptions {
   PlaceConversion places{};
   std::string path{};              ///< output file; "-" is standard output
   stream::WriterOptions writer{};  ///< output format; Context::stop is used, not this one's
-  /// The most irregular samples that are meshed at once; the mesh depends on it.
+  /// Limit on the irregular samples that are meshed at once. The mesh depends on it.
   std::size_t window_points = std::size_t{1} << 18;
 };
 

@@ -22,7 +22,7 @@
 
 namespace terrace::terrain {
 
-/// What to build, and how.
+/// The inputs and options of a build.
 struct BuildRequest {
   /// Rasters (several form a mosaic) or point files; "-" is standard input.
   std::vector<std::string> inputs{};
@@ -66,7 +66,8 @@ struct BuildRequest {
   /// How to order points that are not the cells of a raster: see stream::in_spatial_order(). The
   /// temporary file is next to the store.
   stream::Order order = stream::Order::automatic;
-  /// Stops after about this many points and leaves no store, as a trial run; 0: reads everything.
+  /// Ends a trial run after about this many points, without a store. 0 builds the store from all
+  /// points.
   std::uint64_t most_points = 0;
 };
 

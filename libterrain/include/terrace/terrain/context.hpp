@@ -19,8 +19,8 @@ struct Progress {
   bool ended = false;       ///< the last report of this task, completed or abandoned
 };
 
-/// How a job runs. Every long-running function of this library takes one. A job only reads it; a
-/// caller that starts two jobs at the same time passes a separate context to each.
+/// The resources and callbacks of a job. Every long-running function of this library takes a
+/// context and only reads it. Jobs that run at the same time need separate contexts.
 struct Context {
   unsigned threads = 1;                         ///< upper limit; results do not depend on it
   std::optional<std::uint64_t> memory_bytes{};  ///< upper limit, if set
@@ -31,7 +31,7 @@ struct Context {
   std::function<void(const stream::Message&)> note{};
 
   /// Returns memory_bytes if set. Otherwise returns `standard` bytes, limited to the available
-  /// memory; if `standard` is 0, half of the available memory.
+  /// memory, or half of the available memory if `standard` is 0.
   [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
   /// Calls note, if it is set.
   void say(const stream::Message& line) const;

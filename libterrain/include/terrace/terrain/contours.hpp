@@ -34,9 +34,8 @@ struct ContourOutcome {
 ///
 /// The surface of a raster at level 0 is its triangulated lattice of samples. Otherwise it is the
 /// Delaunay triangulation of the points of the level and above (see PointWindow), which spans the
-/// points' convex hull, holes included, unless max_edge limits it. With a region, the lines are
-/// those of the squares of samples, or the triangles, with their middles inside; the lines end
-/// there.
+/// points' convex hull, holes included, unless max_edge limits it. With a region, only squares of
+/// samples or triangles with their middles inside have lines, and the lines end there.
 ///
 /// write: receives the text in order, in large pieces. Reports "lines".
 /// The lines and their order depend neither on threads nor on memory. Memory: one band of rows, or

@@ -37,7 +37,7 @@ enum class Heights : std::uint8_t {
 /// WKT.
 using DatumShift = std::array<double, 7>;
 
-/// In degrees. west is greater than east if the area crosses the antimeridian.
+/// An area in degrees. west is greater than east if the area crosses the antimeridian.
 struct GeographicArea {
   double west = 0, south = 0, east = 0, north = 0;
 };
@@ -59,8 +59,8 @@ class CoordinateSystem {
 
   /// Reads a CRS as users write it: "EPSG:n", "EPSG:n+m" (horizontal and vertical), a code of
   /// another authority ("ESRI:54030"), a name, WKT, PROJJSON, or the name of a file with WKT or
-  /// PROJJSON (.prj, .wkt). shift: for a datum that does not count as WGS 84; it overrides PROJ's
-  /// operations. Throws: UsageError, naming the code or text and the remedy.
+  /// PROJJSON (.prj, .wkt). shift: the shift of a datum that does not count as WGS 84. It overrides
+  /// PROJ's operations. Throws: UsageError, naming the code or text and the remedy.
   static CoordinateSystem parse(const std::string& text,
                                 const std::optional<DatumShift>& shift = std::nullopt);
   /// Reads a CRS as a source or store records it. Returns nullopt if `crs` does not name one.
@@ -86,10 +86,10 @@ class CoordinateSystem {
 
   /// The record of this system in stores and files: code, name, WKT, units.
   [[nodiscard]] stream::Crs crs() const;
-  /// The same, plus the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
+  /// As above, plus the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
   [[nodiscard]] stream::Crs crs_with_keys() const;
-  /// The same with WKT 1 (OGC 01-009), which LAS requires, or with WKT 2 if WKT 1 cannot express
-  /// it.
+  /// As above, but with WKT 1 (OGC 01-009), which LAS requires, or with WKT 2 if WKT 1 cannot
+  /// express the system.
   [[nodiscard]] stream::Crs crs_with_wkt1() const;
 
   /// Returns a note for the user on the conversion: "EPSG:... to WGS 84 by \"...\" within 2 m";
@@ -109,13 +109,14 @@ class CoordinateSystem {
   [[nodiscard]] Point2 to_geographic(Point2 place) const;
   [[nodiscard]] Point2 from_geographic(Point2 place) const;
 
-  /// The same on the system's own datum and ellipsoid (from Greenwich), without a shift.
+  /// As to_geographic() and from_geographic(), but on the system's own datum and ellipsoid, from
+  /// Greenwich and without a shift.
   void to_own_geographic(std::span<Point2> places) const;
   void from_own_geographic(std::span<Point2> places) const;
 
-  /// Whether both systems are the same apart from their names, so coordinates need no conversion.
+  /// Whether both systems are equal apart from their names, so that coordinates need no conversion.
   [[nodiscard]] bool same_places(const CoordinateSystem& other) const;
-  /// The area of the data, if over() set it; on the system's own datum.
+  /// The area of the data on the system's own datum, if over() set it.
   [[nodiscard]] const std::optional<GeographicArea>& area() const { return area_; }
 
   /// The definition that this library computes with.
@@ -132,9 +133,9 @@ class CoordinateSystem {
   std::shared_ptr<LazyChange> wgs84_;
 };
 
-/// Whether both describe the same system of places and heights, be it by code or in full, in WKT of
+/// Whether both records describe the same system of places and heights. One may be a code, WKT of
 /// any version or GeoKeys, with or without explicit units. Unknown systems match only if their
-/// descriptions are equal. For stream::SourceOptions::same_crs.
+/// descriptions are equal. Can serve as stream::SourceOptions::same_crs.
 bool same_crs(const stream::Crs& a, const stream::Crs& b);
 
 /// Returns a CRS named as for CoordinateSystem::parse(), or a local (engineering) system, in the
@@ -172,14 +173,14 @@ CoordinateSystem system_of(const stream::Store& store, const stream::Message& ot
 
 /// Converts from a store's CRS to another, named as for CoordinateSystem::parse(), by the best
 /// operation for the store's area. shift: belongs to the system whose datum does not count as WGS
-/// 84; to the named one if neither does. Throws: UsageError for an unknown CRS; stream::Error if
+/// 84, or to the named one if neither does. Throws: UsageError for an unknown CRS; stream::Error if
 /// the store has no CRS, or if no operation leads from one datum to the other.
 Transformation transformation_to(const stream::Store& store, const std::string& named,
                                  const std::optional<DatumShift>& shift = std::nullopt);
 
-/// Converts regions, also of another CRS, to the CRS of the data; default-constructed, it leaves
-/// them unchanged. Longitudes may be off by whole turns. A box over a raster includes cells within
-/// a millionth of a cell.
+/// Converts regions, which may have another CRS, to the CRS of the data. A default-constructed
+/// object leaves them unchanged. Longitudes may be off by whole turns. A box over a raster includes
+/// cells within a millionth of a cell.
 ///
 /// Unless one CRS is given for all regions, the caller's boxes and polygons are in the CRS of the
 /// data, and GeoJSON is in the CRS that it names. GeoJSON that names none is in longitude and
@@ -188,15 +189,15 @@ Transformation transformation_to(const stream::Store& store, const std::string& 
 class RegionConversion {
  public:
   RegionConversion() = default;
-  /// Regions that name no CRS are in the store's. shift: see transformation_to().
+  /// Assumes the store's CRS for regions that do not name one. shift: see transformation_to().
   explicit RegionConversion(const stream::Store& store,
                             const std::optional<DatumShift>& shift = std::nullopt);
   /// to_regions: from the store's CRS to the CRS of all regions.
   RegionConversion(const stream::Store& store, Transformation to_regions);
   /// For Region::restrict() of a source that is opened again. named: the CRS of the regions, as for
-  /// CoordinateSystem::parse(); empty: the source's own, known or not. shift: the value of
-  /// --towgs84. Throws: UsageError for an unknown name; stream::Error if no operation leads from
-  /// one CRS to the other.
+  /// CoordinateSystem::parse(). If it is empty, regions are in the CRS of the source, even if that
+  /// is unknown. shift: the value of --towgs84. Throws: UsageError for an unknown name;
+  /// stream::Error if no operation leads from one CRS to the other.
   explicit RegionConversion(const stream::SourceInfo& source, const std::string& named = {},
                             const std::optional<DatumShift>& shift = {});
   /// Returns false for a region that cannot be on the globe in angles of any unit. Such a region is
@@ -230,8 +231,8 @@ class RegionConversion {
   double turn_ = 0;  ///< a full turn of longitude; 0: no turns
 };
 
-/// Converts places of the store's CRS to another; default-constructed, it leaves them unchanged.
-/// Heights do not change.
+/// Converts places of the store's CRS to another CRS. A default-constructed object leaves them
+/// unchanged. Heights do not change.
 class PlaceConversion {
  public:
   PlaceConversion() = default;

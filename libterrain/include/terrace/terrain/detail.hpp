@@ -33,8 +33,8 @@ struct Detail {
   /// representative as its last member. Its level is `level` or coarser. Excludes region and
   /// focuses.
   std::optional<stream::ClusterId> cluster{};
-  /// In units of the CRS: also wants places this far outside polygons, but within the box around
-  /// them.
+  /// Distance in units of the CRS: places this far outside polygons are wanted too, if they are
+  /// within the box around them.
   double margin = 0;
 
   /// Returns the finest level wanted anywhere.
@@ -51,11 +51,11 @@ void note_idle_focuses(const stream::Store& store, const Detail& detail, const C
 
 /// Visits every cluster that `detail` wants: first the root (or `cluster`), then level by level
 /// downward, in order of ordinals within a level. The parent of a wanted cluster is always wanted
-/// too. In a view (stream::Store::where()), clusters of level 0 without any point that can meet the
-/// condition are left out; for the others stream::ClusterPoints::match() says which points do.
-/// Memory: the ordinals of the wanted clusters of two levels where a level is wanted in part,
-/// constant where it is wanted in full. Throws: stream::Error on a damaged store; UsageError for a
-/// cluster that the store does not have or that is finer than the level.
+/// too. In a view (stream::Store::where()), leaves out clusters of level 0 without any point that
+/// can meet the condition. In the other clusters, stream::ClusterPoints::match() selects the points
+/// that do. Memory: the ordinals of the wanted clusters of two levels where a level is wanted in
+/// part, constant where it is wanted in full. Throws: stream::Error on a damaged store; UsageError
+/// for a cluster that the store does not have or that is finer than the level.
 void for_each_wanted(const stream::Store& store, const Detail& detail,
                      const stream::Store::VisitCluster& visit);
 
@@ -72,14 +72,14 @@ class WantedPart {
   virtual void take() = 0;
 };
 
-/// The same with several threads, which read clusters and add them to parts concurrently.
+/// As above with several threads, which read clusters and add them to parts concurrently.
 /// make(worker) returns a new part for the thread of that number, 0 to threads - 1. The effect does
 /// not depend on the number of threads if only take() has effects. At most two parts per thread
 /// wait.
 void for_each_wanted(const stream::Store& store, const Detail& detail, unsigned threads,
                      const std::function<std::unique_ptr<WantedPart>(unsigned worker)>& make);
 
-/// The same for the index entries alone; clusters of level 0 are not read.
+/// As above, but visits index entries only. Clusters of level 0 are not read.
 void for_each_wanted_record(
     const stream::Store& store, const Detail& detail,
     const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit);

@@ -40,10 +40,10 @@ struct DetailMeshOptions {
   MetricChoice metric{};
 };
 
-/// Returns the 2D Delaunay triangulation of what `detail` wants: exact in column and row for
-/// rasters, in x and y for other points. Leaves out triangles of a raster that span samples without
-/// data, see StoreView::spans_gap(). Positions are in the store's CRS, triangles are
-/// counter-clockwise seen from above, and a vertex's level is the highest of its point. With a
+/// Returns the 2D Delaunay triangulation of the points that `detail` wants. It is exact, in column
+/// and row for rasters and in x and y for other points. Leaves out triangles of a raster that span
+/// samples without data, see StoreView::spans_gap(). Positions are in the store's CRS, triangles
+/// are counter-clockwise seen from above, and a vertex's level is the highest of its point. With a
 /// region, returns every triangle that reaches into it, uncut. With a cluster, triangulates only
 /// the points that the cluster represents; its representative counts as a point of the cluster's
 /// level. The store never changes. Single-threaded.
@@ -61,14 +61,14 @@ struct DetailMeshOptions {
                                        const DetailMeshOptions& options = {},
                                        const Context& context = {});
 
-/// Returns the same points without triangles, with a region only those inside, with their colours,
-/// classes and normals. `left_out` says where they are coarse. All are held in memory, 26 to 50
-/// bytes each. Throws: stream::Error on a damaged store.
+/// Returns the points that `detail` wants without triangles, with their colours, classes and
+/// normals. With a region, returns only points inside it. TriangleMesh::left_out records where they
+/// are coarse. A point takes 26 to 50 bytes of memory. Throws: stream::Error on a damaged store.
 [[nodiscard]] TriangleMesh detail_points(const stream::Store& store, const Detail& detail);
 
 /// Returns the finest level with at most `most_points` points, or the top if every level has more.
-/// In a view, reads the points of that level and of the levels above and next below it to count
-/// them. Throws, in a view: stream::Error on a damaged store; stream::Stopped.
+/// In a view, reads the points of that level, of the levels above it and of the next level below
+/// it, to count them. Throws (only in a view): stream::Error on a damaged store; stream::Stopped.
 [[nodiscard]] unsigned level_within(const stream::Store& store, std::uint64_t most_points);
 
 /// Opens an overlay that replaces heights of a store's points. Throws: stream::Error, as

@@ -17,12 +17,11 @@ namespace terrace::terrain {
 
 /// Appends the points that `detail` wants, with all attributes of the store, in the order of
 /// for_each_wanted(). places: converts to the CRS of the file, unless that is the store's. overlay:
-/// its heights replace the store's, which still decide whether a point is inside a region; with an
-/// overlay one thread reads, otherwise context.threads read and encode. Returns how many heights
-/// were replaced.
-/// Memory: about 16,000 points and their encoding by `writer`, twice per thread.
-/// Throws: stream::Error on a damaged store, for a point without an image in that CRS, or if
-/// writing fails; as for_each_wanted(); stream::Stopped.
+/// its heights replace the store's, but the store's heights decide whether a point is inside a
+/// region. With an overlay one thread reads, otherwise context.threads read and encode. Returns the
+/// number of replaced heights. Memory: about 16,000 points and their encoding by `writer`, twice
+/// per thread. Throws: stream::Error on a damaged store, for a point without an image in that CRS,
+/// or if writing fails; as for_each_wanted(); stream::Stopped.
 std::uint64_t write_points(const stream::Store& store, const Detail& detail,
                            stream::PointWriter& writer, const PlaceConversion& places = {},
                            stream::Overlay* overlay = nullptr, const Context& context = {});

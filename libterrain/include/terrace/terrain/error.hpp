@@ -8,7 +8,7 @@
 
 namespace terrace::terrain {
 
-/// An option or value that is invalid for any data. (Faults in data are a stream::Error.)
+/// Reports an option or value that is invalid for any data. Faults in data are a stream::Error.
 class UsageError : public std::runtime_error {
  public:
   explicit UsageError(stream::Message message)

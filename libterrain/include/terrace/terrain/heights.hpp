@@ -27,10 +27,10 @@ struct SurfacePoint {
 struct SamplerOptions {
   tri::Interpolation method = tri::Interpolation::linear;
   unsigned level = 0;  ///< uses the points of this level and above
-  /// Ignores triangles with a side longer than this, in metres on the ground. Not for rasters at
-  /// level 0.
+  /// Ignores triangles with a side longer than this, in metres on the ground. Does not apply to
+  /// rasters at level 0.
   std::optional<double> max_edge{};
-  /// False: a gradient that costs more than the height may be left out (NaN).
+  /// If false, gradients may be NaN where they cost more than the height.
   bool gradients = true;
 };
 
@@ -71,9 +71,9 @@ class HeightSampler {
   virtual void sample(std::span<const Point2> places, std::span<SurfacePoint> out) = 0;
 };
 
-/// Uses half of the available memory unless the context sets another bound.
-/// Throws: UsageError for a level that the store does not have, and for a max_edge that does not
-/// apply; stream::Error; stream::Stopped.
+/// Makes a sampler of a store. It uses half of the available memory unless the context sets another
+/// bound. Throws: UsageError for a level that the store does not have, and for a max_edge that does
+/// not apply; stream::Error; stream::Stopped.
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                                             const SamplerOptions& options = {},
                                             const Context& context = {});
@@ -86,9 +86,9 @@ struct GroundPoint {
   double north = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// places: in the store's CRS; otherwise as HeightSampler. A place within a millionth of a cell of
-/// a raster's column or row is treated as on it. Uses 90 bytes of memory per place. Throws: as
-/// make_sampler() and HeightSampler::sample().
+/// Samples places in the store's CRS, as HeightSampler does for stored coordinates. A place within
+/// a millionth of a cell of a raster's column or row is treated as on it. Uses 90 bytes of memory
+/// per place. Throws: as make_sampler() and HeightSampler::sample().
 std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<const Point2> places,
                                        const SamplerOptions& options = {},
                                        const Context& context = {});

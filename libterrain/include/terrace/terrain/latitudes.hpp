@@ -15,15 +15,15 @@
 namespace terrace::terrain {
 
 /// Throws: stream::Error if one of the places, given as longitude and latitude, is beyond a pole.
-/// most: the y of the north pole, see CoordinateSystem::most_latitude(). file, where: named in the
-/// error; without `where` it names the place. beyond: tolerance in degrees.
-void check_latitudes(std::span<const Point2> places, double most, const std::string& file,
+/// max_latitude: the y of the north pole, see CoordinateSystem::most_latitude(). file, where: named
+/// in the error. Without `where`, the error names the place. beyond: tolerance in degrees.
+void check_latitudes(std::span<const Point2> places, double max_latitude, const std::string& file,
                      const std::string& where = {}, double beyond = 0);
 /// Returns the y of the north pole if y is a latitude, otherwise infinity.
 double most_latitude(const stream::Crs& crs);
 
-/// Returns the latitude in degrees; the pole if it exceeds it only by rounding, NaN if it exceeds
-/// it by more.
+/// Returns the latitude in degrees. A latitude that exceeds a pole only by rounding becomes the
+/// pole, and one that exceeds it by more becomes NaN.
 double latitude_on_earth(double degrees);
 
 /// Degrees per unit of y if y is a latitude, otherwise 0.
@@ -42,7 +42,8 @@ class LatitudeCheck {
   double degrees_;  ///< from degrees_of_latitude()
 };
 
-/// The same check on the bounds of a store, for stores that were built without it.
+/// Checks the bounds of a store, because it may have been built without this check. Throws: as
+/// above.
 void check_latitudes(const stream::Store& store);
 
 }  // namespace terrace::terrain

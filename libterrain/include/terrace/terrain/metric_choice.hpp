@@ -35,9 +35,9 @@ struct MetricChoice {
   /// region and member.
   static MetricChoice parse(const std::string& text);
 
-  /// The regions as one line of JSON, without file names. For records.
+  /// Returns the regions as one line of JSON without file names, for the record in a store.
   [[nodiscard]] std::string canonical() const;
-  /// Whether boxes make the metric depend on the place.
+  /// Whether the metric depends on the place, because regions have boxes.
   [[nodiscard]] bool has_boxes() const;
 
   /// Returns the metric between points ground = map * (position - origin), with positions in the

@@ -19,8 +19,8 @@ struct OutputFormat {
 struct OutputKind {
   std::string_view what;  ///< for messages, as in "a raster"
   std::span<const OutputFormat> formats;
-  /// Listed: the ending must be one of `formats`; it may be missing only if there is one format.
-  /// Free: any ending, or none, that does not belong to another format.
+  /// listed: the ending must be one of `formats`. It may be missing only if there is one format.
+  /// free: any ending or none is allowed, unless it belongs to another format.
   enum class Names : std::uint8_t { listed, free } names = Names::listed;
   bool streams = true;  ///< may go to standard output
 };
@@ -48,7 +48,7 @@ namespace outputs {
 using enum OutputKind::Names;
 inline constexpr OutputKind kPointFile{"a file of points",
                                        std::span(output_formats::kPoints).first(7)};
-/// For stores that may hold lines.
+/// The outputs of stores that may hold lines.
 inline constexpr OutputKind kPointOrLineFile{"a file of points", output_formats::kPoints};
 inline constexpr OutputKind kMeshFile{"a mesh", output_formats::kMesh};
 inline constexpr OutputKind kTetrahedraFile{"a file of tetrahedra", output_formats::kTetrahedra,
@@ -75,9 +75,10 @@ inline constexpr OutputKind kSite{"a site, which is a folder,", output_formats::
 /// Returns a list such as ".ply, .obj or .glb".
 std::string endings_of(const OutputKind& kind);
 
-/// Returns the format of the output `path`: `format` if given, otherwise by the ending, otherwise
-/// the only format; "-" gets the first format unless `format` is given. Throws: UsageError if there
-/// is no such format, or if the name has the ending of another one; both messages list the choices.
+/// Returns the format of the output `path`. This is `format` if given, otherwise the format of the
+/// ending, otherwise the only format. "-" gets the first format unless `format` is given. Throws:
+/// UsageError if there is no such format, or if the name has the ending of another one; both
+/// messages list the choices.
 std::string_view format_of_output(const OutputKind& kind, const std::string& path,
                                   const std::string& format = {});
 

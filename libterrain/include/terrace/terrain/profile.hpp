@@ -45,7 +45,7 @@ struct ProfilePoint {
 /// The linear surface is straight between these points, so the profile is exact.
 ///
 /// Distances are geodesics (line_distance.hpp), summed over pieces so short that the curvature of
-/// the line does not matter; without a CRS they are distances in the map.
+/// the line does not matter. Without a CRS they are distances in the map.
 ///
 /// take: receives the points in order, a few thousand at a time.
 /// Throws: stream::Error on a damaged store and for a latitude beyond a pole; stream::Stopped;
@@ -55,8 +55,8 @@ ProfileOutcome profile(const stream::Store& store, const ProfileRequest& request
                        const std::function<void(std::span<const ProfilePoint>)>& take,
                        const Context& context = {});
 
-/// Writes the same as text: a header line, then rows of distance,x,y,height. The height is empty
-/// where there is no surface.
+/// Writes the points of profile() as text: a header line, then rows of distance,x,y,height. The
+/// height is empty where there is no surface.
 ProfileOutcome write_profile(const stream::Store& store, const ProfileRequest& request,
                              const std::function<void(std::string_view)>& write,
                              const Context& context = {});

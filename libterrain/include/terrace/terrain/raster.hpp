@@ -35,18 +35,18 @@ struct RasterOutcome {
 
 /// Writes a Cloud Optimized GeoTIFF, PixelIsArea. The value of a cell is the surface's value at its
 /// centre. Overviews, down to 512 x 512 cells, contain the mean of the cells with data that they
-/// cover or, for aspect, which has no mean, the first of these cells.
+/// cover. Aspect has no mean, so its overviews contain the first of these cells.
 ///
-/// The grid: without a cell size, at level 0 and in the store's CRS, it is the raster's own lattice
-/// unless that is rotated. With a cell size, cell borders are at multiples of it (as with gdalwarp
-/// -tap), so that all rasters of one cell size match, whatever was selected; the grid covers the
-/// part of the region inside the store's area, ignoring conditions. Otherwise cells start at the
-/// upper left corner of the region or of the selected area; a cell has about the mean area per
-/// point of the level, with its size rounded to two digits. Cells with centres outside the region's
-/// polygons are nodata.
+/// At level 0 and in the store's CRS, the grid of a raster is its own lattice, unless `cell` is set
+/// or the lattice is rotated. If `cell` is set, cell borders are at multiples of it (as with
+/// gdalwarp -tap), so that all rasters of one cell size match. The grid then covers the part of the
+/// region inside the store's area, ignoring conditions. Otherwise cells start at the upper left
+/// corner of the region or of the selected area. A cell has about the mean area per point of the
+/// level, with its size rounded to two digits. Cells with centres outside the region's polygons are
+/// nodata.
 ///
-/// With `align` the grid is that of another raster, cell by cell: its CRS, origin, cell size and
-/// extent. Cells with centres outside the region, be it polygons or a box, are then nodata.
+/// With `align`, the grid is the grid of another raster: its CRS, origin, cell size and extent.
+/// Cells with centres outside the region are then nodata, also for a box.
 ///
 /// Slope, aspect and hillshade are computed from the 3 x 3 heights around a cell of this grid with
 /// Horn's formula (B. K. P. Horn, "Hill shading and the reflectance map",

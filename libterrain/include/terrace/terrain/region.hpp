@@ -67,14 +67,14 @@ class Region {
 
   /// The CRS of the places; nullopt: the CRS of the data.
   [[nodiscard]] const std::optional<PlacesCrs>& crs() const { return crs_; }
-  /// Returns the same coordinates labelled with another CRS.
+  /// Returns the region with the same coordinates and another CRS.
   [[nodiscard]] Region in_crs(std::optional<PlacesCrs> crs) const;
   /// The smallest box around the region. Its z is unbounded if the region has no heights.
   [[nodiscard]] const stream::Box3& box() const { return box_; }
-  /// The box that rasters of the region cover: box(), unless widened to include what rounding would
-  /// leave out.
+  /// The box that rasters of the region cover. It is box(), unless with_extent() widened it to
+  /// include cells that rounding would leave out.
   [[nodiscard]] const stream::Box3& extent() const { return extent_ ? *extent_ : box_; }
-  /// Empty if the region is its box.
+  /// The polygons; empty if the region is a box.
   [[nodiscard]] const std::vector<Polygon>& polygons() const;
   [[nodiscard]] bool contains(const stream::Point3& p) const;
   /// Whether the place is inside, at any height.
@@ -82,8 +82,8 @@ class Region {
   /// Restricts a source to the points inside; the box lets it skip reading. Polygons must be in the
   /// CRS of the source.
   void restrict(stream::Selection& selection) const;
-  /// The box is closed; an empty box overlaps nothing. Returns `part` also for boxes inside that
-  /// touch a ring.
+  /// Classifies a closed box. An empty box overlaps nothing. Also returns `part` for boxes inside
+  /// that touch a ring.
   [[nodiscard]] Overlap overlap(const stream::Box3& box) const;
   /// Whether the triangle, seen from above, has a point in common with the region, and their ranges
   /// of heights overlap. Requires finite corners.

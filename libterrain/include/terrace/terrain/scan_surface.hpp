@@ -20,7 +20,7 @@
 
 namespace terrace::terrain {
 
-/// The caller's own method of making a surface from points in metres.
+/// A method of the caller that makes a surface from points in metres.
 struct SurfaceMethod {
   /// RestoredSurface::input names the corners that are input points; it is empty for a surface with
   /// new corners. Calls check_stop at intervals and lets its exceptions pass.
@@ -47,8 +47,8 @@ struct ScanSurface {
   /// Number of samples that are not a corner of any face; samples at the same place count once.
   /// nullopt if the surface has new corners.
   std::optional<std::size_t> samples_off;
-  /// If nothing is enclosed: 0 if all points are at one place, 1 if they are on a line, 2 if they
-  /// are in a plane, otherwise 3.
+  /// Dimension of the points, if they enclose nothing: 0 if all are at one place, 1 if they are on
+  /// a line, 2 if they are in a plane, otherwise 3.
   unsigned spanned = 3;
   /// True if the scan is open: lids over unscanned parts were left out, see
   /// tri::BasicShape3::surface_without_lids(). Always false for tetrahedra, which fill the closed
@@ -57,7 +57,7 @@ struct ScanSurface {
   std::size_t lids = 0;  ///< number of lids left out or, if not open, kept as triangles
 };
 
-/// Restores the surface of the points that `detail` wants, in metres on the ground; degrees are
+/// Restores the surface of the points that `detail` wants, in metres on the ground. Degrees are
 /// converted about the middle of the points' box. Throws: stream::Error on a damaged store, and if
 /// the points do not fit in the context's memory (the message says how much they need); UsageError
 /// for tetrahedra together with a method; stream::Stopped; any exception of the method.

@@ -9,8 +9,8 @@
 namespace terrace::terrain {
 
 /// Connects libtri's multiresolution model to libstream's store, in stored coordinates. Values are
-/// the attributes, as records of the store's schema. In a view (stream::Store::where()) all points
-/// are delivered, because a model does not support conditions.
+/// the attributes, as records of the store's schema. Also delivers all points of a view
+/// (stream::Store::where()), because a model does not support conditions.
 class StoreSource final : public tri::ClusterSource {
  public:
   /// The store must outlive the source.

@@ -35,28 +35,29 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
 };
 
 /// Whether a store's points look like the scan of a body, to be shown by its surface. They do if
-/// they are not a raster, triangles or lines, have no CRS and no classes as laser clouds have, and
-/// if at the top more than half of the area of the Delaunay triangles of their horizontal places is
-/// steeper than 60 degrees, as triangles between two sides of a body are. ground: the linear map
-/// from stored coordinates to metres. O(n log n) for the n points of the top.
-/// Throws: stream::Error if the top is damaged; stream::MissingBytes.
+/// they are points without a CRS and without the classes of laser clouds, and if they are steep: at
+/// the top, more than half of the area of the Delaunay triangles of their horizontal places is
+/// steeper than 60 degrees. Triangles between two sides of a body are that steep. ground: the
+/// linear map from stored coordinates to metres. O(n log n) for the n points of the top. Throws:
+/// stream::Error if the top is damaged; stream::MissingBytes.
 [[nodiscard]] bool is_scan(const stream::Store& store, const stream::LinearMap& ground);
 
 /// A store seen by a camera. Clusters expand where the camera approaches and collapse where it has
-/// left, frame by frame, under budgets of time and memory. (J. Skala, Algorithms for manipulating
-/// large geometric data, section 8.4; tri::ViewControl decides, and this class feeds it.)
+/// left, frame by frame, under budgets of time and memory. tri::ViewControl decides, and this class
+/// supplies it with clusters. Source: J. Skala, Algorithms for manipulating large geometric data,
+/// section 8.4.
 ///
 /// Cameras, regions and focuses are in the *view frame*: metres east, north and up, with the origin
 /// above the middle of the store at height 0. The frame is flat: one linear map for the whole
 /// store, with the CRS's scale at the middle. The triangulation itself stays in stored coordinates;
 /// in_view_frame() converts its vertices.
 ///
-/// Shown: std::int32_t for rasters, with exact integer triangulation; double for any store;
-/// tri::PointCloud for points without triangles; tri::DynamicSurface<std::int32_t> for scans, with
-/// the surface in space that the points are on, for open scans without lids (tri::DynamicSurface).
-/// The surface takes part of a frame's budget. Its vertices are not in stored coordinates but
-/// rounded to a lattice in the view frame, with a spacing that is a power of two metres, 2^-29 to
-/// 2^-28 of the longest side of the store's box.
+/// Shown selects the structure: std::int32_t for rasters, with exact integer triangulation; double
+/// for any store; tri::PointCloud for points without triangles; or
+/// tri::DynamicSurface<std::int32_t> for scans. The last one is the surface in space that the
+/// points are on, without lids for open scans. The surface takes part of a frame's budget. Its
+/// vertices are not in stored coordinates but rounded to a lattice in the view frame, with a
+/// spacing that is a power of two metres, 2^-29 to 2^-28 of the longest side of the store's box.
 ///
 /// Shows all points of a store, even if a condition was set (stream::Store::where()).
 ///
@@ -94,13 +95,13 @@ class StoreView {
   /// added and removed. Throws: stream::Error once a cluster could not be read; stream::Stopped if
   /// the store was asked to stop.
   const Step& frame(const tri::View& view, double seconds, const std::array<double, 2>& after = {});
-  /// Recomputes from scratch what frames only update, see tri::ViewControl::restore(): the surface
-  /// of a scan, for a camera at rest. The delta is valid until the next frame.
+  /// Recomputes the surface of a scan from scratch, for a camera at rest. Frames only update it.
+  /// See tri::ViewControl::restore(). The delta is valid until the next frame.
   const typename Control::Delta& restore(unsigned threads = 1);
   /// Whether another frame with the same view would change nothing, now or later.
   [[nodiscard]] bool settled() const;
-  /// The byte ranges that the last frame lacked, the most important first; after they are given,
-  /// the next frame continues. Always empty with a reading thread. O(1).
+  /// The byte ranges that the last frame lacked, the most important first. The next frame continues
+  /// with those that have arrived. Always empty with a reading thread. O(1).
   [[nodiscard]] std::span<const stream::ByteRange> missing() const;
 
   /// As in tri::ViewControl.
@@ -117,20 +118,20 @@ class StoreView {
   /// Returns a point in stored coordinates as metres east, north and up.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
-  /// The same for a place in the model's coordinates, which slides use (tri::Geomorph).
+  /// As above for a place in the model's coordinates, which geomorphs use (tri::Geomorph).
   [[nodiscard]] stream::Point3 model_in_view_frame(const stream::Point3& place) const;
 
   /// Whether a triangle of a raster spans samples without data; false for other stores. Such a
   /// triangle's corners are not neighbours in columns and rows, and its centroid is farther than a
-  /// cell from the boxes of all collapsed clusters. Never true if every sample has data; misses
-  /// gaps narrower than the clusters next to them. 0.03 to 0.6 us.
+  /// cell from the boxes of all collapsed clusters. Never true if every sample has data. Does not
+  /// find gaps narrower than the clusters next to them. Takes 0.03 to 0.6 us.
   [[nodiscard]] bool spans_gap(tri::TriangleId triangle) const;
   /// Whether spans_gap() can be true for any triangle.
   [[nodiscard]] bool has_gaps() const;
 
   /// The attributes of a vertex's point, as a record of the store's schema; empty if its cluster is
-  /// no longer kept. Those of points that a frame added are kept until the next frame, those of the
-  /// root always.
+  /// no longer in the cache. Attributes of points that a frame added are available until the next
+  /// frame, those of the root always.
   [[nodiscard]] std::span<const std::byte> attributes(tri::VertexId vertex) const;
 
   /// The traffic until now, the root included.

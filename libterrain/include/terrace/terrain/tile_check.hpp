@@ -43,13 +43,13 @@ struct TileCheckResult {
 /// Whether `folder` contains a tile set, finished or not.
 bool is_tile_folder(const std::string& folder);
 
-/// Decodes and checks every tile of a set: layer.json against the files, each tile's bytes and
-/// mesh, its bytes against the checksum in the journal if there is one, the sides that neighbours
-/// share, also across the antimeridian, and, if a store is given, the heights against every sample.
-/// The result does not depend on the number of threads. Memory: the borders of one row of tiles,
-/// and a tile and a part of its samples per thread; at least 176 MiB. Throws: stream::Error if
-/// there is no set, layer.json cannot be read, the store is damaged or memory does not suffice;
-/// UsageError as write_tiles(); stream::Stopped.
+/// Decodes and checks every tile of a set. Compares layer.json with the files, and the bytes of
+/// each tile with the checksum in the journal, if there is one. Checks the mesh of each tile and
+/// the sides that neighbours share, also across the antimeridian. If a store is given, compares the
+/// heights with every sample. The result does not depend on the number of threads. Memory: the
+/// borders of one row of tiles, and a tile and a part of its samples per thread; at least 176 MiB.
+/// Throws: stream::Error if there is no set, layer.json cannot be read, the store is damaged or
+/// memory does not suffice; UsageError as write_tiles(); stream::Stopped.
 TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context = {});
 
 }  // namespace terrace::terrain

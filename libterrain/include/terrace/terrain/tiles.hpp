@@ -22,14 +22,14 @@ struct TilesRequest {
   std::string name{};  ///< in layer.json; empty: the store's name
   unsigned first_zoom = 0;
   std::optional<unsigned> last_zoom{};  ///< by default, the zoom that shows every sample
-  /// In metres at the deepest zoom; doubled at each zoom above. By default what globes expect at
-  /// each zoom: 77067 / 2^zoom.
+  /// Error bound in metres at the deepest zoom, doubled at each zoom above. By default the error
+  /// that globes expect at each zoom: 77067 / 2^zoom.
   std::optional<double> max_error{};
   tri::TinQuality quality = tri::TinQuality::removal;
   HeightReference vertical = HeightReference::recorded;
   std::string geoid{};  ///< a geoid grid file of GeographicLib; overrides PROJ's
   /// Globes have no holes, so `none` is not allowed. `interpolate` fills voids within the convex
-  /// outline of the data; beyond it the surface is 0 m above the ellipsoid.
+  /// outline of the data. Beyond it the surface is 0 m above the ellipsoid.
   Fill fill = Fill::interpolate;
   std::optional<double> flat_height{};  ///< of Fill::flat, metres above the ellipsoid
   /// Adds a water mask: water is where there is no data, or where the height equals water_height

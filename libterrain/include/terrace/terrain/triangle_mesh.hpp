@@ -33,13 +33,15 @@ struct TriangleMesh {
   /// clouds, are not scaled.
   std::vector<std::array<std::uint16_t, 3>> colours;
   std::vector<std::array<float, 3>> normals;  ///< unit length
-  /// For a cloud that is coarse in places: how many levels are left out around each point.
+  /// For a cloud that is coarse in places: the number of levels that are left out around each
+  /// point.
   std::vector<std::uint8_t> left_out;
 };
 
 /// Appends points in stored coordinates, with the attributes that a mesh has columns for, by their
-/// usual names: level; class, classification or cluster; red, green, blue (also of 16 bits); nx,
-/// ny, nz; representative (the number of the point that represents a point's cluster).
+/// usual names. These are level, class, classification or cluster, the colours red, green and blue
+/// (of 8 or 16 bits), the normals nx, ny and nz, and representative (the number of the point that
+/// represents a point's cluster).
 void append_points(TriangleMesh& mesh, const stream::Schema& schema,
                    const stream::PointBlock& points);
 /// Converts the mesh of a file (see stream::read_mesh()).
@@ -62,8 +64,8 @@ struct MeshUnits {
 /// by more than a tenth (Web Mercator), are multiplied by one scale east and one north, those of
 /// the middle of the mesh, about that middle; feet are multiplied by their length. Heights become
 /// metres above the same zero. The conversion is linear, so triangles keep their surfaces and a
-/// bound on heights still holds. Without known units nothing changes. Other formats store the
-/// coordinates unchanged.
+/// bound on heights still holds. Coordinates of unknown units stay unchanged. Other formats store
+/// all coordinates unchanged.
 struct MeshCoordinates {
   std::optional<stream::MeshFrame> frame{};  ///< nullopt: coordinates are unchanged
   stream::Point3 origin{};  ///< origin of the file's scene in the coordinates, if it has a frame
