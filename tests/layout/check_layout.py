@@ -62,7 +62,6 @@ SHORT_FILES = {
     'libterrain/src/base/geojson_crs.hpp': 'the CRS of GeoJSON, for its readers and writers',
     'libterrain/src/base/point_spacing.hpp': 'one algorithm',
     'libterrain/src/base/stopwatch.hpp': 'a class that all rooms use',
-    'libterrain/src/earth/crs/geo_keys.hpp': 'one encoding of a CRS',
     'libterrain/src/earth/crs/proj_reader.hpp': 'keeps PROJ out of definition.hpp',
     'libterrain/src/mesh/vtk_file.hpp': 'one file format',
     'libterrain/src/sample/raster_grid.hpp': 'the cells of a raster, apart from their heights',
