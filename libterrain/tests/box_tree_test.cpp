@@ -26,7 +26,7 @@ TEST(BoxTree, VisitsBoxesThatMeetAQuery) {
       }
       return box;
     };
-    // None, one, several; with arbitrary numbers.
+    // Trees of no box, one box and several boxes, with arbitrary numbers.
     std::vector<BoxTree::Item>& items = tree.start();
     for (std::uint64_t i = 0; i < seed * (seed - 1) / 2; ++i) {
       items.push_back({random_box(8), static_cast<std::uint32_t>(7 * i)});

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
-// Contour lines of random lattices with plateaus and holes: each crossing of an edge by a level is
-// on one line, ends are only at borders, and bands do not matter.
+// SPDX-License-Identifier: Apache-2.0 Checks contour lines of random lattices with plateaus and
+// holes. Each crossing of an edge by a level must be on one line, lines must end only at borders,
+// and bands must not matter.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Compares contour lines of Delaunay triangulations, in parts and whole, with the segments of every
-// single triangle.
+// SPDX-License-Identifier: Apache-2.0 Compares contour lines of Delaunay triangulations, divided
+// into parts or not, with the segments of every single triangle.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -211,7 +210,7 @@ TEST(ContourTriangles, MatchSegmentsOfTrianglesAndEndOnlyAtHull) {
   }
 }
 
-/// As draw(), with a tracer for each part.
+/// As draw(), but uses a tracer for each part.
 std::vector<ContourLine> trace(const Surface& surface, const Parts& parts, double interval,
                                const std::function<bool(tri::TriangleId)>& wanted) {
   const tri::Delaunay2<double>& whole = surface.whole;

@@ -130,7 +130,7 @@ TEST(CoordinateSystem, MatchesExactTransverseMercator) {
   EXPECT_LT(worst, 1e-8);
 }
 
-TEST(PlaceConversion, HearsAStop) {
+TEST(PlaceConversion, StopsWhenRequested) {
   struct Stop {};
   const PlaceConversion places(
       Transformation(CoordinateSystem::parse("EPSG:32632"), CoordinateSystem::parse("EPSG:4326")));

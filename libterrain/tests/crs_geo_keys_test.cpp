@@ -124,7 +124,7 @@ TEST(GeoKeys, UseDatumCodeThatMatchesEllipsoid) {
   ASSERT_TRUE(system);
   EXPECT_TRUE(system->same_places(CoordinateSystem::parse("EPSG:2994"))) << system->title();
   EXPECT_TRUE(system->reaches_wgs84());
-  // The ellipsoid of another datum.
+  // This is the ellipsoid of another datum.
   EXPECT_FALSE(CoordinateSystem::of(with(294.978698214), "file")->reaches_wgs84());
 }
 

@@ -125,7 +125,7 @@ TEST(CrsText, ReadsBackRecordsOfFiles) {
     ASSERT_TRUE(keyed);
     EXPECT_TRUE(keyed->same_places(known));
   }
-  // WKT 1 if it can express the system.
+  // Records have WKT 1 if it can express the system.
   EXPECT_TRUE(CoordinateSystem::parse("EPSG:32632").crs_with_wkt1().wkt.starts_with("PROJCS["));
 }
 
@@ -291,7 +291,7 @@ TEST(CrsText, ReadsAnySpellingInFiles) {
   }
   EXPECT_EQ(definition_of_contents("EPSG:25832+7837").vertical_epsg, 7837);
   EXPECT_EQ(title(" \n"), "refused: the definition is empty");
-  // It must not lead to another file.
+  // The text in a file must not name another file.
   const tests::TemporaryFolder folder;
   const std::string file = (folder.path() / "a.prj").string();
   std::ofstream(file) << "EPSG:32632";
@@ -339,7 +339,7 @@ TEST(CrsText, RejectsExpensiveText) {
   const std::string members = "{\"type\":\"GeographicCRS\",\"datum_ensemble\":{\"members\":[" +
                               repeated("{\"name\":\"a\"},", 3000) + "1]}}";
   EXPECT_NE(refusal(members).find("too many parts"), std::string::npos);
-  // From every source of text: a file's WKT, ESRI's citation in GeoTIFF, the caller.
+  // Test every source of text: the WKT of a file, ESRI's citation in GeoTIFF, and the caller.
   stream::Crs crs;
   crs.wkt = members;
   EXPECT_THROW(definition_of(crs), CrsError);

@@ -53,7 +53,7 @@ TEST(DatumChange, ShiftOverridesDatabase) {
   const Point2 back = shifted.from_geographic(place);
   EXPECT_NEAR(back[0], 530000, 0.01);  // heights between the ellipsoids are ignored
   EXPECT_NEAR(back[1], 180000, 0.01);
-  // As a store records it.
+  // Use the record of a store.
   const auto again = CoordinateSystem::of(shifted.crs(), "store");
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->same_places(shifted));

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Compares files of the points that a detail wants, and of those near a place, with points visited
-// one by one.
+// SPDX-License-Identifier: Apache-2.0 Compares files of selected points, and of points near a
+// place, with points visited one by one.
 #include "terrace/terrain/detail_points.hpp"
 
 #include <cstring>

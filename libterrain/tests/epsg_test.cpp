@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: Apache-2.0
-// Every projected system of the EPSG dataset in PROJ's database: it can be read, its WKT reads
-// back, conversion to it can be reversed, and GeographicLib and PROJ agree where both support it.
+// SPDX-License-Identifier: Apache-2.0 Checks every projected system of the EPSG dataset in PROJ's
+// database. It can be read, its WKT reads back, and conversion to it can be reversed. GeographicLib
+// and PROJ agree where both support it.
 #include <algorithm>
 #include <array>
 #include <atomic>

@@ -45,7 +45,7 @@ TEST(GeodesyData, MatchesTenThousandGeodesics) {
                           &lon2, &azi2, &metres),
               7);
     worst = std::max(worst, std::abs(distance.between({lon1, lat1}, {lon2, lat2}) - metres));
-    // Also in pieces along the geodesic: a polyline of sixteen.
+    // Also measure the geodesic as a polyline of sixteen pieces.
     if (rows++ % 10 != 0) continue;
     const GeographicLib::GeodesicLine path(GeographicLib::Geodesic::WGS84(), lat1, lon1, azi1);
     double sum = 0;

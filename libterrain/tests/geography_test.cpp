@@ -166,8 +166,8 @@ class Round {
   const auto& one_of(const List& list) {
     return list[below(std::size(list))];
   }
-  /// A place where conversions are difficult (poles, antimeridian, edges and middles of zones,
-  /// borders of grids), or any other.
+  /// Returns any place, or one where conversions are difficult: poles, antimeridian, edges and
+  /// middles of zones, borders of grids.
   Point2 place() {
     static constexpr double kLongitudes[] = {-180, 180, 0, 3, 6, 9, 12, 15, 7.4, 2.3, -75};
     static constexpr double kLatitudes[] = {-90, 90, -80, 84, 0, 47, 49, 51, 55, 60};

@@ -28,7 +28,7 @@ TEST(HeightGrid, AveragesSquares) {
   EXPECT_EQ(mesh.positions[2][2], (4 + 9) / 2.0);  // the last column has no partner
 }
 
-TEST(HeightGrid, EndsAtAStop) {
+TEST(HeightGrid, StopsWhenRequested) {
   struct Stop {};
   constexpr std::uint64_t kSide = 1000;
   std::size_t calls = 0, last = 0;

@@ -70,8 +70,8 @@ TEST(PolynomialPatch, RefusesAnErrorAtAnyCheckedPlace) {
   }
 }
 
-/// The stated bound: wherever a patch of a smooth function is made, it is within the tolerance in
-/// the whole box.
+/// Checks the documented bound: every patch of a smooth function is within the tolerance in the
+/// whole box.
 template <std::size_t kDegree>
 void expect_bound(double tolerance) {
   using Patch = PolynomialPatch<kDegree, 2>;
@@ -207,7 +207,7 @@ TEST_F(SmoothOffsets, MatchSingleQueriesOnSmoothFunctions) {
   const auto wave = [](const Point2& p) { return 50 * std::sin(p[0] / 9) * std::cos(p[1] / 7); };
   EXPECT_LT(check(places(20000, {170, -30}, {0.5, 0.5}), wave), 100u);
   check(places(20000, {-180, -90}, {360, 180}), wave);
-  // Along a line, at a single place, and for few places.
+  // Test places along a line, a single place, and few places.
   EXPECT_LT(check(places(5000, {12, 40}, {0, 0.5}), wave), 100u);
   EXPECT_LT(check(places(5000, {12, 40}, {0.5, 0}), wave), 100u);
   EXPECT_LT(check(places(5000, {12, 40}, {0, 0}), wave), 100u);

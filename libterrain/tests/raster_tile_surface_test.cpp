@@ -285,7 +285,7 @@ TEST_F(RasterOfDegrees, ConcurrentCacheReadsMatchStore) {
       make<float>(stream::ScalarType::f32, {0.01, 0, 10, 0, -0.01, 47}, 4326);
   std::vector<double> expected(kColumns * kRows);
   StoreWindow(store).heights({0, 0, kColumns, kRows}, std::span<double>(expected));
-  // Fewer squares than threads, then some of the six.
+  // Keep fewer squares than threads, then some of the six.
   for (const std::uint64_t bytes : {std::uint64_t{0}, std::uint64_t{1} << 20}) {
     HeightCache cache(store, bytes);
     std::atomic<std::size_t> wrong = 0;
@@ -308,7 +308,7 @@ TEST_F(RasterOfDegrees, ConcurrentCacheReadsMatchStore) {
 
 TEST_F(RasterOfDegrees, CachedHeightsMatchStore) {
   const auto check = [&](const stream::Store& store) {
-    // None, a few of the nine squares, all.
+    // Keep no square, a few of the nine squares, or all.
     for (const std::uint64_t bytes :
          {std::uint64_t{0}, std::uint64_t{1} << 20, std::uint64_t{1} << 30}) {
       HeightCache cache(store, bytes);

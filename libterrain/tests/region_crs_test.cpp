@@ -41,8 +41,8 @@ TEST(RegionCrs, ContainsSamePointsAsBox) {
     std::mt19937_64 random(7);
     const auto unit = [&random] { return static_cast<double>(random() >> 11) * 0x1p-53; };
     for (int i = 0; i < 2000; ++i) {
-      // Half again as large as the box, in its own system, except closer than a thousandth of its
-      // size to the border, where the polygon may differ.
+      // Test places in a box half again as large, in its own system. Skip those closer to the
+      // border than a thousandth of its size, where the polygon may differ.
       const double width = box.box().max[0] - box.box().min[0];
       const double height = box.box().max[1] - box.box().min[1];
       const double u = 1.4 * unit() - 0.2, v = 1.4 * unit() - 0.2;

@@ -1,5 +1,5 @@
-// SPDX-License-Identifier: Apache-2.0
-// Stores of scans seen by a camera: generated scans, and those in the data folder TERRACE_DATA.
+// SPDX-License-Identifier: Apache-2.0 Checks stores of scans seen by a camera, with generated scans
+// and those in the data folder TERRACE_DATA.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -55,7 +55,7 @@ TEST(VertexNormals, PointUpOnTerrainInAnyOrientation) {
   }
 }
 
-TEST(Scene, HearsAStop) {
+TEST(Scene, StopsWhenRequested) {
   struct Stop {};
   TriangleMesh mesh;
   for (std::uint32_t i = 0; i < 100'000; ++i) {

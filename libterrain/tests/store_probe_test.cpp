@@ -19,11 +19,11 @@
 #include <gtest/gtest.h>
 #include <terrace/stream/given_bytes.hpp>
 
-#include "made_raster.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/heights.hpp"
 #include "terrace/terrain/profile.hpp"
+#include "test_raster.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -41,7 +41,7 @@ std::filesystem::path built_raster(const tests::TemporaryFolder& folder) {
   options.world.xy = {30, 0, 500000, 0, -30, 5200000};
   options.crs.epsg = 32632;
   const std::string file = (folder.path() / "hills.tif").string();
-  tests::write_made_raster(file, options, [&](std::uint32_t column, std::uint32_t row) {
+  tests::write_test_raster(file, options, [&](std::uint32_t column, std::uint32_t row) {
     const bool lake = column > 100 && column < 160 && row > 90 && row < 140;
     if (lake || (column * 31 + row * 17) % 97 == 0) return -9999.0;
     return 300.0 + 150.0 * std::sin(column / 17.0) * std::cos(row / 23.0) + (column * row) % 7;

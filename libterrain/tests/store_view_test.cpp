@@ -21,10 +21,10 @@
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/given_bytes.hpp>
 
-#include "made_raster.hpp"
 #include "temporary_folder.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
+#include "test_raster.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -47,7 +47,7 @@ class StoreViews : public testing::Test {
     options.crs.epsg = epsg;
     options.crs.geographic = epsg == 4326;
     const std::string file = (folder_.path() / (name + ".tif")).string();
-    tests::write_made_raster(file, options, [&](std::uint32_t column, std::uint32_t row) {
+    tests::write_test_raster(file, options, [&](std::uint32_t column, std::uint32_t row) {
       if (!has_data(column, row)) return -9999.0;
       return 300.0 + 150.0 * std::sin(column / 17.0) * std::cos(row / 23.0) + (column * row) % 7;
     });
@@ -322,8 +322,8 @@ double area_with_data(const Places& triangle, const HasData& has_data) {
   return area;
 }
 
-// By the definition of the surface, for any ellipses and any missing data: no triangle covers cells
-// without data, and all of the land is covered once.
+// Checks the definition of the surface for any ellipses and any missing data: no triangle covers
+// cells without data, and all of the land is covered once.
 TEST_F(StoreViews, MeshesCoverSameAreaWithAMetric) {
   std::mt19937 random(5);
   const auto number = [&](double from, double to) {

@@ -55,7 +55,7 @@ TEST(ConvexHull, ReturnsCornersInOrder) {
       EXPECT_TRUE(supports(a, b, all));
       EXPECT_EQ(tri::orientation(a, b, c), 1);
     }
-    // With the points on the sides: every place of the border, each once.
+    // With the points on the sides, the hull has every place of the border once.
     const std::vector<Point2> border = convex_hull(all, true);
     for (std::size_t i = 0; i < border.size(); ++i) {
       EXPECT_TRUE(supports(border[i], border[(i + 1) % border.size()], all));

@@ -91,7 +91,7 @@ TEST_F(TileJournalFile, FinishedJournalListsExistingTiles) {
             [](const auto& a, const auto& b) { return a.first < b.first; });
   EXPECT_EQ(read_tile_records(folder_.string()), sorted);
   const std::string whole = text();
-  // In any order; and the file is not written if nothing changed.
+  // Records may be in any order. The file is not written if nothing changed.
   const auto time = fs::last_write_time(path());
   {
     TileJournal journal(folder_.string());

@@ -93,7 +93,7 @@ void expect_bound(const TileAddress& tile, const MadeTile& made, const ZoomPlan&
   EXPECT_EQ(parts.samples, samples.size());
   EXPECT_EQ(parts.uncovered, 0u);
   EXPECT_DOUBLE_EQ(parts.max_error, errors.largest);
-  // So do the tiles two zooms below.
+  // The tiles two zooms below give the same.
   TileHeights sum;
   for (const TileAddress& child : children_of(tile)) {
     for (const TileAddress& part : children_of(child)) {
@@ -169,7 +169,7 @@ TEST(TileMesher, LeavesDividedForDataInACornerMatch) {
   AnalyticSurface surface = alps();
   for (const unsigned zoom : {3U, 5U, 7U, 9U, 10U}) {
     TileRange range = tiles_in(surface.bounds(), zoom);
-    // Also adjacent tiles without samples.
+    // Also check adjacent tiles without samples.
     range = {range.x0 - 1, range.y0 - 1, range.x1 + 1, range.y1 + 1};
     if (zoom > 7) range = {range.x0, range.y0, range.x0 + 2, range.y0 + 2};
     check_zoom(zoom, range, 25, surface);
@@ -295,7 +295,7 @@ TEST(TileMesher, SharedSidesChangeNothing) {
   }
 }
 
-TEST(TileMesher, AStopEndsItBetweenLeaves) {
+TEST(TileMesher, StopsBetweenLeaves) {
   AnalyticSurface surface = alps();
   const TileAddress tile{0, 1, 0};
   const ZoomPlan plan = plan_of(0, expected_error(0), surface);

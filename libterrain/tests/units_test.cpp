@@ -119,7 +119,8 @@ TEST(DecimalMultiples, AreNearestDoublesToDecimalProducts) {
     EXPECT_EQ(DecimalMultiples(0.00025)(i), std::stod(std::to_string(25 * i) + "e-5"));
     EXPECT_EQ(DecimalMultiples(12.35)(i), std::stod(std::to_string(1235 * i) + "e-2"));
   }
-  // Steps without a short decimal, integers and huge counts: the product of the doubles.
+  // For steps without a short decimal, integers and huge counts, the result is the product of the
+  // doubles.
   for (const double step : {1.0 / 3.0, 20.0, 1e300, 5e-324, 2.5e18}) {
     EXPECT_EQ(DecimalMultiples(step)(std::int64_t{1}), step);
     EXPECT_EQ(DecimalMultiples(step)(std::int64_t{5}), 5 * step);

@@ -27,7 +27,6 @@
 #include <terrace/stream/store_query.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "made_raster.hpp"
 #include "surface/point_window.hpp"
 #include "surface/store_window.hpp"
 #include "temporary_folder.hpp"
@@ -43,6 +42,7 @@
 #include "terrace/terrain/tile_check.hpp"
 #include "terrace/terrain/tiles.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
+#include "test_raster.hpp"
 
 namespace terrace::terrain {
 namespace {
@@ -103,7 +103,7 @@ class ViewOfStore : public testing::Test {
     options.world.xy = {30, 0, 500000, 0, -30, 5200000};
     options.crs.epsg = 32632;
     options.nodata = -1;
-    tests::write_made_raster(raster, options, [](std::uint32_t column, std::uint32_t row) {
+    tests::write_test_raster(raster, options, [](std::uint32_t column, std::uint32_t row) {
       const double x = column, y = row;
       if (std::hypot(x - 60, y - 50) < 12) return -1.0;
       return 300 + 200 * std::sin(x / 9) * std::cos(y / 7) + x;

@@ -78,7 +78,7 @@ TEST(WindowMesh, VerticesThatAreNotSharedStayApart) {
   EXPECT_EQ(second.triangles.front(), (std::array{3U, 4U, 1U}));
 }
 
-TEST(WindowMesh, AStopEndsTheWorkBeforeTheNextWindow) {
+TEST(WindowMesh, StopsBeforeTheNextWindow) {
   int made = 0, taken = 0;
   const auto check = [&] {
     if (made == 3) throw std::runtime_error("stopped");

@@ -25,8 +25,8 @@
 #include <terrace/stream/store.hpp>
 #include <unistd.h>
 
-#include "../../libterrain/tests/made_raster.hpp"
 #include "../../libterrain/tests/temporary_folder.hpp"
+#include "../../libterrain/tests/test_raster.hpp"
 
 namespace terrace {
 namespace {
@@ -55,7 +55,7 @@ class Build : public testing::Test {
     options.columns = options.rows = kSize;
     options.world.xy = {30, 0, 500000, 0, -30, 5200000};
     options.nodata = -1;
-    tests::write_made_raster(dem(), options, [this](std::uint32_t column, std::uint32_t row) {
+    tests::write_test_raster(dem(), options, [this](std::uint32_t column, std::uint32_t row) {
       if ((column / 90 + row / 70) % 7 == 0) return -1;  // a lake
       ++valid_;
       return static_cast<int>(400 + (column * row) % 61 + (column * 7 + row * 3) % 37);

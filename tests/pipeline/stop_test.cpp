@@ -18,8 +18,8 @@
 #include <terrace/stream/geotiff_writer.hpp>
 #include <terrace/stream/store.hpp>
 
-#include "../../libterrain/tests/made_raster.hpp"
 #include "../../libterrain/tests/temporary_folder.hpp"
+#include "../../libterrain/tests/test_raster.hpp"
 #include "terrace/terrain/bounded_mesh.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/contours.hpp"
@@ -44,7 +44,7 @@ class Stop : public testing::Test {
     options.columns = options.rows = kSize;
     options.world.xy = {30, 0, 500000, 0, -30, 5200000};
     options.crs.epsg = 32632;
-    tests::write_made_raster(
+    tests::write_test_raster(
         folder_.path() / "dem.tif", options, [](std::uint32_t column, std::uint32_t row) {
           return static_cast<int>(400 + column * row % 61 + (column * 7 + row * 3) % 37);
         });

@@ -13,7 +13,7 @@ namespace terrace::tests {
 /// Writes a GeoTIFF of 16-bit samples, height(column, row). options: size, georeference, CRS,
 /// nodata.
 template <class Height>
-void write_made_raster(const std::filesystem::path& path, stream::GeoTiffOptions options,
+void write_test_raster(const std::filesystem::path& path, stream::GeoTiffOptions options,
                        const Height& height) {
   options.sample.type = stream::ScalarType::i16;
   std::vector<std::int16_t> samples;
