@@ -199,7 +199,7 @@ class Meshes(StoreCase):
                      model.mesh):
             with self.assertLogs('terrace', 'INFO') as notes:
                 result.save(path, replace=True)
-            self.assertIn('in metres, as glTF asks', notes.output[0])
+            self.assertIn('in metres, as glTF requires', notes.output[0])
             self.check_metres(path, np.ptp(result.vertices[:, :2], axis=0) * metres, np.ptp(result.vertices[:, 2]))
         with self.assertLogs('terrace', 'INFO') as notes:
             store.bounded_mesh(2, path=path, replace=True)

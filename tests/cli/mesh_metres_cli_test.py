@@ -180,7 +180,7 @@ class MetresTest(unittest.TestCase):
         for how in self.KINDS:
             with self.subTest(how):
                 summary, notes, path = self.mesh(store, 'dem.glb', *how)
-                self.assertIn('in metres, as glTF asks, east and north of 8.0', notes)
+                self.assertIn('in metres, as glTF requires, east and north of 8.0', notes)
                 glb = Glb(path)
                 self.assertEqual(glb.extras['crs'], 'EPSG:4326')
                 self.assertEqual(summary['frame'], {k: glb.extras[k] for k in ('crs', 'origin', 'metres_per_unit')})
@@ -273,7 +273,7 @@ class MetresTest(unittest.TestCase):
         self.assertEqual(terrace('build', self.path('cloud.xyz'), '--crs', 'EPSG:4326', '-o', cloud, '-q').returncode, 0)
         for verb, how in ('mesh', ('--max-error', 20)), ('mesh', ('--level', 0)), ('surface', ()):
             _, notes, path = self.mesh(cloud, 'cloud.glb', *how, verb=verb)
-            self.assertIn('in metres, as glTF asks', notes)
+            self.assertIn('in metres, as glTF requires', notes)
             glb = Glb(path)
             self.assertAlmostEqual(max(v[0] for v in glb.vertices) - min(v[0] for v in glb.vertices), 6960, delta=40)
             self.assertLess(max(v[2] for v in glb.vertices), 1200)

@@ -127,7 +127,7 @@ std::string_view format_of_output(const OutputKind& kind, const std::string& pat
   } else if (!ending.empty()) {
     throw refused(kind, path, cannot);
   } else if (kind.formats.size() > 1) {
-    throw refused(kind, path, "has no ending to choose its format by");
+    throw refused(kind, path, "has no ending, so its format is not known");
   }
   return kind.formats.front().name;
 }

@@ -43,7 +43,7 @@ std::optional<CoordinateSystem> system_of_sidecars(const stream::SourceInfo& inf
     if (sidecar.empty()) continue;
     const std::string contents = contents_of_file(sidecar);
     if (contents.empty()) {
-      note = fmt::format("{} is empty and says nothing of the CRS", sidecar);
+      note = fmt::format("{} is empty, so it does not name a CRS", sidecar);
       continue;
     }
     const std::optional<CoordinateSystem> other = read_sidecar(sidecar, contents, local);
@@ -81,7 +81,7 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
     if (!info.crs.geographic && !metres_in_unit(info.crs.horizontal_unit)) {
       throw stream::Error(file, error.what()).remedy(error.remedy());
     }
-    found.note = stream::message("{}: what needs places on the earth will not work ({})",
+    found.note = stream::message("{}: functions that need places on the earth will fail ({})",
                                  error.what(), error.remedy());
     return found;
   }
@@ -109,7 +109,7 @@ SourceCrs read_source_crs(const stream::SourceInfo& info, const std::optional<Da
       if (local->is_geocentric) {
         found.note = fmt::format(
             "the CRS \"{}\" is geocentric, with x, y and z from the centre of the earth: z is not "
-            "a height, and what needs a terrain will not work",
+            "a height, and functions that need a terrain will fail",
             record.name);
         return found;
       }

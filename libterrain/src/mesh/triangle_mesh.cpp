@@ -124,18 +124,19 @@ stream::Message note_in_metres(const Coordinates& here) {
   const std::string back = "; asset.extras says how to get the coordinates" + name + " back";
   if (!here.local && here.metres[0] == 1) {
     return "heights are converted from " + plural_unit(here.height_unit) +
-           " to metres, as glTF asks" + (here.known ? "" : ", and x and y taken for metres") + back;
+           " to metres, as glTF requires" + (here.known ? "" : ", and x and y taken for metres") +
+           back;
   }
   if (!here.local) {
     const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-9;
-    return "in metres, as glTF asks, in place of " + here.horizontal_unit() +
+    return "in metres, as glTF requires, in place of " + here.horizontal_unit() +
            (same                  ? ""
             : here.metres[2] == 1 ? "; heights are metres"
                                   : here.heights_too()) +
            back;
   }
   stream::Message note =
-      fmt::format("in metres, as glTF asks, east and north of {}, {}{}",
+      fmt::format("in metres, as glTF requires, east and north of {}, {}{}",
                   readable_number(here.middle[0], 10), readable_number(here.middle[1], 10), name);
   if (here.widest_error >= 0.001) {
     note += fmt::format(

@@ -121,7 +121,8 @@ struct CellRange {
 
 RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
                         const Context& context) {
-  if (request.cell) throw UsageError(stream::message("{align} gives the cells: leave {cell} out"));
+  if (request.cell)
+    throw UsageError(stream::message("{align} also sets the size of cells: leave {cell} out"));
   need_level(store, request.sampler.level);
   stream::SourceOptions options;
   options.stop = context.stop;

@@ -56,7 +56,7 @@ std::optional<double> flat_height(const stream::Store& store, const TilesRequest
   }
   if (request.fill == Fill::interpolate) return std::nullopt;
   if (request.flat_height && !(std::abs(*request.flat_height) <= kFarthest)) {
-    throw UsageError(stream::message("{fill} flat: heights beyond 10,000 km are not on a globe"));
+    throw UsageError(stream::message("{fill} flat: the height is beyond the limit of 10,000 km"));
   }
   const stream::Channel& z = store.schema().coordinates[2];
   const double lowest = (store.bounds().min[2] * z.scale + z.offset) * metres_per_unit;
@@ -71,8 +71,7 @@ void check_heights(const stream::Store& store, double metres) {
     if (std::abs(height) <= kFarthest) continue;
     throw stream::Error(
         store.path().string(),
-        fmt::format("has heights of {} m: heights beyond 10,000 km are not on a globe",
-                    plain_number(height)))
+        fmt::format("has heights of {} m, beyond the limit of 10,000 km", plain_number(height)))
         .remedy(stream::message("check the unit and the nodata value of the source, or leave "
                                 "wrong heights out: {where} 'z < 9000'"));
   }

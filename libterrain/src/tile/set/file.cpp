@@ -115,7 +115,7 @@ void sync_files(const std::string& folder) {
 
 void sync_names(const std::string& folder) {
   const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  // Some file systems cannot sync a folder and say so; nothing is lost by that.
+  // Some file systems report that they cannot sync a folder, which does no harm.
   if (file.number() < 0 || (::fsync(file.number()) != 0 && errno != EINVAL && errno != ENOTSUP)) {
     throw stream::system_error(folder, "cannot be synced", errno);
   }

@@ -276,7 +276,7 @@ void TileSetWriter::write_zooms() {
 
 void TileSetWriter::take_larger_steps(Zoom& zoom) {
   if (zoom.range > 1e7) {
-    throw stream::Error(options_.folder, "heights beyond 10,000 km are not on a globe")
+    throw stream::Error(options_.folder, "the heights are beyond the limit of 10,000 km")
         .at(fmt::format("zoom {}", zoom.plan.zoom))
         .remedy("check the unit and the nodata value of the source");
   }

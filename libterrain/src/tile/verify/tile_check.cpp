@@ -179,7 +179,8 @@ Checked SetCheck::check(const TileAddress& tile, const TileHeights& heights) con
   try {
     const std::vector<std::byte> bytes = read_tile_file(path_of(tile));
     if (!is_as_written(tile, bytes)) {
-      checked.faults.push_back({0, "not the bytes that were written: its checksum differs"});
+      checked.faults.push_back(
+          {0, "the file was changed after it was written: its checksum differs"});
     }
     decoded = unpack_tile(bytes, path_of(tile));
   } catch (const stream::Error& error) {
