@@ -72,11 +72,11 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
   classify(inside);
   sums_.assign((side_ + 1) * (side_ + 1), 0);
   for (std::size_t row = 0; row < side_; ++row) {
-    const std::size_t above = row * (side_ + 1), here = above + side_ + 1;
+    const std::size_t above = row * (side_ + 1), current = above + side_ + 1;
     std::uint32_t sum = 0;
     for (std::size_t column = 0; column < side_; ++column) {
       sum += cells_[row * side_ + column];
-      sums_[here + column + 1] = sum + sums_[above + column + 1];
+      sums_[current + column + 1] = sum + sums_[above + column + 1];
     }
   }
 }

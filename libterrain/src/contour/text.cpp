@@ -39,9 +39,9 @@ std::vector<std::vector<Point2>> cut_at_antimeridian(std::span<const Point2> lin
   };
   for (std::size_t i = 1; i < line.size(); ++i) {
     const Point2 &a = line[i - 1], &b = line[i];
-    const auto [least, most] = std::minmax(a[0], b[0]);
-    const double cut = 360 * std::floor((least + 180) / 360) + 180;
-    if (least < cut && cut < most) {
+    const auto [lower, upper] = std::minmax(a[0], b[0]);
+    const double cut = 360 * std::floor((lower + 180) / 360) + 180;
+    if (lower < cut && cut < upper) {
       const Point2 between{cut, a[1] + (b[1] - a[1]) * ((cut - a[0]) / (b[0] - a[0]))};
       add(a, between);
       add(between, b);

@@ -126,13 +126,13 @@ class PolynomialPatch {
 
   /// Whether all terms of a value except s, t and s t change it by at most `tolerance`.
   [[nodiscard]] bool is_bilinear(std::size_t value, double tolerance) const {
-    double most = 0.0;
+    double change = 0.0;
     for (std::size_t k = 0; k < kNodes; ++k) {
       for (std::size_t m = 0; m < kNodes; ++m) {
-        if (k > 1 || m > 1) most += std::abs(coefficients_[value][k][m]);
+        if (k > 1 || m > 1) change += std::abs(coefficients_[value][k][m]);
       }
     }
-    return most <= tolerance;
+    return change <= tolerance;
   }
   /// The value without those terms.
   [[nodiscard]] double bilinear_at(std::size_t value, double s, double t) const {

@@ -142,9 +142,9 @@ Region region_in(const Region& region, const Transformation& change, const strea
     for (Polygon& part : valid_polygons(polygon)) polygons.push_back(std::move(part));
   }
   if (polygons.empty()) throw fault(to, "the region has no area in");
-  const Region there =
+  const Region target =
       Region::of_polygons(std::move(polygons), region.box().min[2], region.box().max[2]);
-  return with_turns(there, to.turn(), bounds);
+  return with_turns(target, to.turn(), bounds);
 }
 
 Point2 middle_in(const Transformation& change, const stream::Box3& box) {

@@ -70,8 +70,8 @@ bool holds_lines(const stream::StoreSchema& schema) {
   return entities == stream::Entities::segments || entities == stream::Entities::polylines;
 }
 
-LineSet detail_lines(const stream::Store& given, const Detail& detail, const Context& context) {
-  const stream::Store store = given.with_stop(context.stop);
+LineSet detail_lines(const stream::Store& input, const Detail& detail, const Context& context) {
+  const stream::Store store = input.with_stop(context.stop);
   if (!holds_lines(store.schema())) throw UsageError(store.path().string() + " contains no lines");
   const LineColumns columns(store);
   const bool segments = entities_of(store.schema()) == stream::Entities::segments;

@@ -312,10 +312,10 @@ TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
                          collapsed ? &*collapsed : nullptr, store);
   };
   if (store.condition() != nullptr) return finish(MatchingPoints<Coord>(store, detail));
-  StoreSource whole(store);
+  StoreSource full_source(store);
   std::optional<ClusterTop> part;
   if (detail.cluster) part.emplace(store, *detail.cluster);
-  tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : whole;
+  tri::ClusterSource& source = part ? static_cast<tri::ClusterSource&>(*part) : full_source;
   tri::Delaunay2<Coord> empty;
   empty.set_check_stop([&] { store.check_stop(); });
   return finish(tri::Multiresolution2<Coord>(source, in_stored_coordinates(detail, placement),
@@ -374,9 +374,9 @@ TriangleMesh detail_triangles(const stream::Store& store, const Detail& detail,
 
 }  // namespace
 
-TriangleMesh detail_mesh(const stream::Store& given, const Detail& detail,
+TriangleMesh detail_mesh(const stream::Store& input, const Detail& detail,
                          const DetailMeshOptions& options, const Context& context) {
-  const stream::Store store = given.with_stop(context.stop);
+  const stream::Store store = input.with_stop(context.stop);
   const MetricChoice::Kind kind = options.metric.kind;
   if (holds_lines(store.schema())) need_points(store, "a mesh");
   if (is_geocentric(store.schema().crs)) need_terrain(store, "a mesh over x and y");

@@ -67,22 +67,23 @@ struct Coordinates {
       middle[axis] = bounds.min[axis] * 0.5 + bounds.max[axis] * 0.5;
     }
     // Without a place on the earth, only the unit is known.
-    const GroundMap unit = ground.map({}), there = ground.map(bounds);
+    const GroundMap unit = ground.map({}), local_map = ground.map(bounds);
     metres = {unit[0], unit[4], unit[8]};
     width = bounds.max[0] - bounds.min[0];
     // In their areas of use, maps stretch lengths by a few percent.
     constexpr double kStretched = 0.1;
-    const double east = there[0] / unit[0], north = there[4] / unit[4];
+    const double east = local_map[0] / unit[0], north = local_map[4] / unit[4];
     const bool stretched = std::abs(east - 1) > kStretched || std::abs(north - 1) > kStretched;
     // Far from its centre, a map does not preserve right angles either.
-    const bool straight = std::abs(there[1]) <= kStretched * std::min(there[0], there[4]);
+    const bool straight =
+        std::abs(local_map[1]) <= kStretched * std::min(local_map[0], local_map[4]);
     degrees = !ground.same_everywhere() && !ground.projected() && north > 10000;  // metres
     // Numbers beyond the poles are not latitudes.
     const bool apart = degrees && std::max(-bounds.min[1], bounds.max[1]) * north > 1.02e7;
     if (!stretched || !straight || apart) return;
     local = true;
     // At a pole there is no east.
-    metres = {std::max(there[0], 0x1p-20 * there[4]), there[4], there[8]};
+    metres = {std::max(local_map[0], 0x1p-20 * local_map[4]), local_map[4], local_map[8]};
     if (!degrees) return;
     for (const double latitude : {bounds.min[1], bounds.max[1]}) {
       const double length = ground.map({{0, latitude, 0}, {0, latitude, 0}})[0];
@@ -91,10 +92,10 @@ struct Coordinates {
   }
 
   /// Returns "; heights are converted from feet" or similar; empty if they are in metres.
-  [[nodiscard]] std::string heights_too() const {
+  [[nodiscard]] std::string height_note() const {
     return metres[2] == 1 ? "" : "; heights are converted from " + plural_unit(height_unit);
   }
-  [[nodiscard]] bool as_they_are() const { return !local && metres == stream::Point3{1, 1, 1}; }
+  [[nodiscard]] bool is_unchanged() const { return !local && metres == stream::Point3{1, 1, 1}; }
   [[nodiscard]] std::string name() const {
     return crs.epsg != 0 ? fmt::format("EPSG:{}", crs.epsg) : crs.name;
   }
@@ -119,50 +120,50 @@ struct Coordinates {
   double widest_error = 0;  ///< relative error of lengths from west to east
 };
 
-stream::Message note_in_metres(const Coordinates& here) {
-  const std::string name = here.name().empty() ? "" : " of " + here.name();
+stream::Message note_in_metres(const Coordinates& facts) {
+  const std::string name = facts.name().empty() ? "" : " of " + facts.name();
   const std::string back = "; asset.extras says how to get the coordinates" + name + " back";
-  if (!here.local && here.metres[0] == 1) {
-    return "heights are converted from " + plural_unit(here.height_unit) +
-           " to metres, as glTF requires" + (here.known ? "" : ", and x and y taken for metres") +
+  if (!facts.local && facts.metres[0] == 1) {
+    return "heights are converted from " + plural_unit(facts.height_unit) +
+           " to metres, as glTF requires" + (facts.known ? "" : ", and x and y taken for metres") +
            back;
   }
-  if (!here.local) {
-    const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-9;
-    return "in metres, as glTF requires, in place of " + here.horizontal_unit() +
-           (same                  ? ""
-            : here.metres[2] == 1 ? "; heights are metres"
-                                  : here.heights_too()) +
+  if (!facts.local) {
+    const bool same = std::abs(facts.metres[0] / facts.metres[2] - 1) < 1e-9;
+    return "in metres, as glTF requires, in place of " + facts.horizontal_unit() +
+           (same                   ? ""
+            : facts.metres[2] == 1 ? "; heights are metres"
+                                   : facts.height_note()) +
            back;
   }
   stream::Message note =
       fmt::format("in metres, as glTF requires, east and north of {}, {}{}",
-                  readable_number(here.middle[0], 10), readable_number(here.middle[1], 10), name);
-  if (here.widest_error >= 0.001) {
+                  readable_number(facts.middle[0], 10), readable_number(facts.middle[1], 10), name);
+  if (facts.widest_error >= 0.001) {
     note += fmt::format(
         "; lengths from west to east are exact there and off by up to {} % at the border",
-        readable_number(100 * here.widest_error, 2));
-    if (here.widest_error >= 0.01) {
+        readable_number(100 * facts.widest_error, 2));
+    if (facts.widest_error >= 0.01) {
       note +=
-          stream::message(" (a projection, as {to_crs}{}, is more accurate)", here.projection());
+          stream::message(" (a projection, as {to_crs}{}, is more accurate)", facts.projection());
     }
   }
-  return note + here.heights_too() + "; asset.extras says how to get the coordinates back";
+  return note + facts.height_note() + "; asset.extras says how to get the coordinates back";
 }
 
-stream::Message note_as_they_are(const Coordinates& here, const MeshUnits& units) {
-  const bool same = std::abs(here.metres[0] / here.metres[2] - 1) < 1e-3;
-  if (!here.known || (!here.local && same)) return {};
-  std::string heights = units.height_unit.empty() ? here.crs.vertical_unit : units.height_unit;
+stream::Message note_unchanged(const Coordinates& facts, const MeshUnits& units) {
+  const bool same = std::abs(facts.metres[0] / facts.metres[2] - 1) < 1e-3;
+  if (!facts.known || (!facts.local && same)) return {};
+  std::string heights = units.height_unit.empty() ? facts.crs.vertical_unit : units.height_unit;
   if (!metres_in_unit(heights)) heights = "metre";
-  const std::string what = here.degrees || !here.local
-                               ? here.horizontal_unit()
+  const std::string what = facts.degrees || !facts.local
+                               ? facts.horizontal_unit()
                                : "metres of a map that stretches lengths to " +
-                                     readable_number(1 / here.metres[0]) + " times";
+                                     readable_number(1 / facts.metres[0]) + " times";
   // A conversion leaves heights as they are.
   const stream::Message convert =
       metres_in_unit(heights) == 1.0
-          ? stream::message("pass {to_crs}{} for metres, or ", here.projection())
+          ? stream::message("pass {to_crs}{} for metres, or ", facts.projection())
           : "";
   return stream::message(
       "x and y are {} and heights {}, which most programs read as one unit; {}write GLB, which is "
@@ -185,16 +186,16 @@ MeshUnits::MeshUnits(const stream::Store& store, const PlaceConversion& places)
 
 MeshCoordinates mesh_coordinates(const std::string& path, const stream::WriterOptions& options,
                                  const MeshUnits& units, const stream::Box3& bounds) {
-  const Coordinates here(units, bounds);
+  const Coordinates facts(units, bounds);
   MeshCoordinates out;
   if (stream::mesh_format(path, options) != "glb") {
-    out.note = note_as_they_are(here, units);
-  } else if (!here.as_they_are()) {
+    out.note = note_unchanged(facts, units);
+  } else if (!facts.is_unchanged()) {
     const std::string text =
-        here.crs.epsg == 0 && !here.crs.wkt.empty() ? here.crs.wkt : here.name();
-    out.frame = {.metres = here.metres, .local = here.local, .crs = text};
-    if (here.local) out.origin = {here.middle[0], here.middle[1], 0};
-    out.note = note_in_metres(here);
+        facts.crs.epsg == 0 && !facts.crs.wkt.empty() ? facts.crs.wkt : facts.name();
+    out.frame = {.metres = facts.metres, .local = facts.local, .crs = text};
+    if (facts.local) out.origin = {facts.middle[0], facts.middle[1], 0};
+    out.note = note_in_metres(facts);
   }
   if (!out.note.empty()) out.note = stream::message("{}: {}", path, out.note);
   return out;

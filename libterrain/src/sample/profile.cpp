@@ -247,10 +247,10 @@ class ProfileRun {
     for_lattice_crossings(ground_.stored(a), ground_.stored(b),
                           [&](double t, const Point2& stored) {
                             context_.check_stop();
-                            const Point2 here = between(a, b, t);
-                            outcome_.metres += distance_.along(last, here);
-                            add(here, outcome_.metres, stored);
-                            last = here;
+                            const Point2 crossing_place = between(a, b, t);
+                            outcome_.metres += distance_.along(last, crossing_place);
+                            add(crossing_place, outcome_.metres, stored);
+                            last = crossing_place;
                           });
     outcome_.metres += distance_.along(last, b);
     add(b, outcome_.metres);
@@ -260,10 +260,10 @@ class ProfileRun {
   void cross_triangles(const Point2& a, const Point2& b) {
     Point2 last = a;
     (*crossings_)(ground_.stored(a), ground_.stored(b), [&](const auto& crossing) {
-      const Point2 here = between(a, b, crossing.t);
-      outcome_.metres += distance_.along(last, here);
-      add(here, outcome_.metres, crossing.place, crossing.height);
-      last = here;
+      const Point2 crossing_place = between(a, b, crossing.t);
+      outcome_.metres += distance_.along(last, crossing_place);
+      add(crossing_place, outcome_.metres, crossing.place, crossing.height);
+      last = crossing_place;
     });
     outcome_.metres += distance_.along(last, b);
     add(b, outcome_.metres);

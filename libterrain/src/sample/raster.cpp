@@ -59,8 +59,8 @@ class RasterShader {
     double east = 1, north = 1, up = 1;
   };
   [[nodiscard]] Scale scale(double column, double row) const {
-    const stream::Point3 here{column, row, 0};
-    const GroundMap map = ground_.map({here, here});
+    const stream::Point3 centre{column, row, 0};
+    const GroundMap map = ground_.map({centre, centre});
     return {map[0], -map[4], map[8]};
   }
 

@@ -138,24 +138,24 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
     throw stream::Error(request.align, "is rotated, which the output does not support")
         .remedy("align with a raster that is north up");
   }
-  const std::optional<CoordinateSystem> theirs = crs_of_source(info).system;
-  const std::optional<CoordinateSystem> ours =
+  const std::optional<CoordinateSystem> grid_crs = crs_of_source(info).system;
+  const std::optional<CoordinateSystem> store_crs =
       CoordinateSystem::of(store.schema().crs, store.path().string());
-  if (theirs && ours && !theirs->same_places(*ours)) {
-    if (request.to && !request.to->to().same_places(*theirs)) {
+  if (grid_crs && store_crs && !grid_crs->same_places(*store_crs)) {
+    if (request.to && !request.to->to().same_places(*grid_crs)) {
       throw UsageError(stream::message("{align} uses the CRS of {}, {}: leave {to_crs} out",
-                                       request.align, theirs->title()));
+                                       request.align, grid_crs->title()));
     }
     if (!request.to) {
-      request.to.emplace(system_of(store), *theirs);
+      request.to.emplace(system_of(store), *grid_crs);
       if (!request.to->note().empty()) context.say(request.to->note());
     }
   } else if (request.to) {
     throw UsageError(
         stream::message("{align} uses the CRS of {}: leave {to_crs} out", request.align));
-  } else if (theirs.has_value() != ours.has_value()) {
+  } else if (grid_crs.has_value() != store_crs.has_value()) {
     context.say(fmt::format("{}: its grid is read in the CRS of the store, because {} is not known",
-                            request.align, theirs ? "that of the store" : "its own"));
+                            request.align, grid_crs ? "that of the store" : "its own"));
   }
   return {.x = m[2],
           .y = m[5],
@@ -225,8 +225,8 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
         return base::hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
       };
       const auto length = [&](std::size_t i) {
-        const double there = one_way(i), back = one_way(i + 2);
-        return back < 0.5 * there ? back : there;
+        const double forward = one_way(i), backward = one_way(i + 2);
+        return backward < 0.5 * forward ? backward : forward;
       };
       cell = std::sqrt(length(1) * length(2));
     }

@@ -88,15 +88,16 @@ class Answers {
               check_latitudes({&places_[i], 1}, conversions.most_latitude, file_.name(),
                               fmt::format("line {}", batch.first_line + i));
             }
-            const std::span<Point2> here(places_.data() + piece * kLines,
-                                         end_of(piece) - piece * kLines);
+            const std::span<Point2> stored_part(places_.data() + piece * kLines,
+                                                end_of(piece) - piece * kLines);
             if (conversions.to_written) {
-              const std::span<Point2> there(written_.data() + piece * kLines, here.size());
-              std::copy(here.begin(), here.end(), there.begin());
-              conversions.to_written(there);
+              const std::span<Point2> written_part(written_.data() + piece * kLines,
+                                                   stored_part.size());
+              std::copy(stored_part.begin(), stored_part.end(), written_part.begin());
+              conversions.to_written(written_part);
             }
-            if (conversions.to_store) conversions.to_store(here);
-            for (Point2& p : here) p = ground_.stored(p);
+            if (conversions.to_store) conversions.to_store(stored_part);
+            for (Point2& p : stored_part) p = ground_.stored(p);
           },
           stop_);
       sampler_->sample(places_, surface_);

@@ -154,13 +154,13 @@ unsigned StoreProbe::descend(std::uint64_t max_points,
   std::uint64_t read = 0;
   unsigned level = top + 1;
   while (level > 0) {
-    Level& here = levels[level - 1];
-    read += here.points;
+    Level& current = levels[level - 1];
+    read += current.points;
     if (read > max_points) break;
     --level;
-    std::sort(here.ordinals.begin(), here.ordinals.end());
+    std::sort(current.ordinals.begin(), current.ordinals.end());
     std::uint64_t last = UINT64_MAX;
-    for (const std::uint64_t ordinal : here.ordinals) {
+    for (const std::uint64_t ordinal : current.ordinals) {
       if (ordinal == std::exchange(last, ordinal)) continue;  // only if the store is damaged
       if (!have([&] { store_.read(stream::cluster_id(level, ordinal), points_); })) continue;
       visit(points_);

@@ -32,14 +32,14 @@ bool Detail::wants(unsigned cluster_level, const stream::Box3& world_box) const 
   });
 }
 
-bool Detail::reaches_into(const Region& there, const stream::Box3& world_box) const {
-  if (!there.box().intersects(world_box)) return false;
+bool Detail::reaches_into(const Region& target, const stream::Box3& world_box) const {
+  if (!target.box().intersects(world_box)) return false;
   stream::Box3 wide = world_box;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     wide.min[axis] -= margin;
     wide.max[axis] += margin;
   }
-  return there.overlap(wide) != Overlap::none;
+  return target.overlap(wide) != Overlap::none;
 }
 
 void note_idle_focuses(const stream::Store& store, const Detail& detail, const Context& context) {

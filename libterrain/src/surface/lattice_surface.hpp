@@ -94,13 +94,13 @@ SurfacePoint linear_on_lines(const View& view, std::int64_t column, std::int64_t
     }
   }
   if (count > 0) result = {height, per_column / count, per_row / count};
-  const double here = view.at(column, row);
+  const double centre = view.at(column, row);
   if (u == 0 && v == 0) {
-    result.height = here;
+    result.height = centre;
   } else if (v == 0) {
-    result.height = here + u * (view.at(column + 1, row) - here);
+    result.height = centre + u * (view.at(column + 1, row) - centre);
   } else if (u == 0) {
-    result.height = here + v * (view.at(column, row + 1) - here);
+    result.height = centre + v * (view.at(column, row + 1) - centre);
   }
   return result;
 }

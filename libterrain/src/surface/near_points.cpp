@@ -35,9 +35,9 @@ Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
   const stream::Channel& height = schema.coordinates[2];
   Local result{.place = {xy[0], xy[1], 0.0}, .metric = {}};
   if (near.z) result.place[2] = (*near.z - height.offset) / height.scale;
-  stream::Box3 here;
-  here.include(result.place);
-  result.metric = Ground(schema).map(here);
+  stream::Box3 frame;
+  frame.include(result.place);
+  result.metric = Ground(schema).map(frame);
   if (!near.z) {
     for (std::size_t row = 0; row < 3; ++row) result.metric[3 * row + 2] = 0.0;
   }
@@ -48,8 +48,8 @@ Local local(const stream::Store& store, const NearPlace& near, unsigned level) {
 
 std::vector<stream::FoundPoint> nearest_points(stream::StoreQuery& query, const NearPlace& place,
                                                std::size_t count, unsigned level) {
-  const Local here = local(query.store(), place, level);
-  return query.nearest(here.place, count, here.metric, level);
+  const Local frame = local(query.store(), place, level);
+  return query.nearest(frame.place, count, frame.metric, level);
 }
 
 std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query, const NearPlace& place,
@@ -57,8 +57,8 @@ std::vector<stream::FoundPoint> points_within(stream::StoreQuery& query, const N
   if (!(radius >= 0.0) || !std::isfinite(radius)) {
     throw UsageError(stream::message("{radius} must be 0 or more"));
   }
-  const Local here = local(query.store(), place, level);
-  return query.within(here.place, radius, here.metric, level);
+  const Local frame = local(query.store(), place, level);
+  return query.within(frame.place, radius, frame.metric, level);
 }
 
 void write_found_points(const stream::StoreQuery& query, std::span<const stream::FoundPoint> found,

@@ -38,13 +38,13 @@ WindowTree::WindowTree(const stream::Store& store, unsigned level, std::size_t p
       static_cast<double>(std::max<std::uint64_t>(store.levels()[counted].points, 1));
   // A level without points has nothing to divide.
   const double sampled = each > 0 ? static_cast<double>(points) / each : 0.0;
-  const auto most = static_cast<std::size_t>(
+  const auto max_sample = static_cast<std::size_t>(
       std::clamp(sampled, 1.0, static_cast<double>(std::max<std::size_t>(sample.size(), 1))));
-  split(flat(store.bounds()), sample, each, most, 0);
+  split(flat(store.bounds()), sample, each, max_sample, 0);
 }
 
 std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, double each,
-                                std::size_t most, unsigned depth) {
+                                std::size_t max_sample, unsigned depth) {
   const auto number = static_cast<std::uint32_t>(parts_.size());
   const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
   Part part{.box = box,
@@ -54,7 +54,7 @@ std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, 
   const double low = box.min[part.axis], high = box.max[part.axis];
   part.middle = low + 0.5 * (high - low);
   parts_.push_back(part);
-  if (sample.size() <= most || depth == kDeepestTree ||
+  if (sample.size() <= max_sample || depth == kDeepestTree ||
       !(low < part.middle && part.middle < high)) {
     windows_.push_back(number);
   } else {
@@ -63,10 +63,10 @@ std::uint32_t WindowTree::split(const StoredBox& box, std::span<Point2> sample, 
     const auto before = static_cast<std::size_t>(cut - sample.begin());
     StoredBox half = box;
     half.max[part.axis] = part.middle;
-    const std::uint32_t below = split(half, sample.first(before), each, most, depth + 1);
+    const std::uint32_t below = split(half, sample.first(before), each, max_sample, depth + 1);
     half = box;
     half.min[part.axis] = part.middle;
-    const std::uint32_t above = split(half, sample.subspan(before), each, most, depth + 1);
+    const std::uint32_t above = split(half, sample.subspan(before), each, max_sample, depth + 1);
     parts_[number].below = below;
     parts_[number].above = above;
   }

@@ -57,8 +57,8 @@ class WindowTree {
   }
 
  private:
-  std::uint32_t split(const StoredBox& box, std::span<Point2> sample, double each, std::size_t most,
-                      unsigned depth);
+  std::uint32_t split(const StoredBox& box, std::span<Point2> sample, double each,
+                      std::size_t max_sample, unsigned depth);
 
   std::vector<Part> parts_;
   std::vector<std::uint32_t> windows_;  ///< numbers of their parts

@@ -42,8 +42,8 @@ struct Detail {
   /// Whether a cluster of `cluster_level` with descendants inside `world_box` must be expanded.
   [[nodiscard]] bool wants(unsigned cluster_level, const stream::Box3& world_box) const;
   /// Whether a cluster with descendants inside `world_box` may have points that are wanted in
-  /// `there`, which is `region` or the region of a focus.
-  [[nodiscard]] bool reaches_into(const Region& there, const stream::Box3& world_box) const;
+  /// `target`, which is `region` or the region of a focus.
+  [[nodiscard]] bool reaches_into(const Region& target, const stream::Box3& world_box) const;
 };
 
 /// Notes each focus that meets none of the store's points and so adds nothing.

@@ -24,9 +24,9 @@ class Planner {
       : tree_(cuts), hull_(hull), together_(together) {}
 
   PointMeshPlan make() {
-    Part whole;
-    whole.corners.assign(hull_.begin(), hull_.end());
-    divide(tree_.root, std::move(whole));
+    Part root;
+    root.corners.assign(hull_.begin(), hull_.end());
+    divide(tree_.root, std::move(root));
     add_sides();
     return std::move(plan_);
   }
@@ -308,15 +308,16 @@ double PointMeshSides::height_at(std::uint32_t knot) {
 
 double PointMeshSides::settle_knot(std::uint32_t knot) const {
   const Point2 place = plan_.knots[knot].place;
-  double reach = std::numeric_limits<double>::infinity(), most = 0.0;
+  double distance = std::numeric_limits<double>::infinity(), limit = 0.0;
   for (const std::uint32_t w : windows_at_[knot]) {
     const double spacing = plan_.windows[w].spacing;
-    if (spacing > 0.0) reach = std::min(reach, 2.0 * spacing);
-    most = std::max(most, spacing * plan_.windows[w].samples);
+    if (spacing > 0.0) distance = std::min(distance, 2.0 * spacing);
+    limit = std::max(limit, spacing * plan_.windows[w].samples);
   }
   MeshSamples around;
-  for (;; reach *= 2.0) {
-    const PlaneBox box{{place[0] - reach, place[1] - reach}, {place[0] + reach, place[1] + reach}};
+  for (;; distance *= 2.0) {
+    const PlaneBox box{{place[0] - distance, place[1] - distance},
+                       {place[0] + distance, place[1] + distance}};
     around = {};
     for (const std::uint32_t w : windows_at_[knot]) {
       samples_.read(plan_.windows[w].first_cell, plan_.windows[w].cells, box, around);
@@ -324,7 +325,7 @@ double PointMeshSides::settle_knot(std::uint32_t knot) const {
     if (around.size() >= 3) {
       if (const auto height = LocalSurface(around, duplicates_).height(place)) return *height;
     }
-    if (around.size() > kManySamples || !(reach < most)) break;
+    if (around.size() > kManySamples || !(distance < limit)) break;
   }
   return nearest_height(around, place).value_or(0.0);
 }
@@ -333,12 +334,12 @@ MeshSamples PointMeshSides::near_side(const PointMeshPlan::Side& side) const {
   MeshSamples near;
   for (const std::size_t upper : {0U, 1U}) {
     const PointMeshPlan::Window& window = plan_.windows[side.windows[upper]];
-    const double reach = kReach * window.spacing;
+    const double distance = kReach * window.spacing;
     PlaneBox strip;
-    strip.min[side.axis] = side.line - reach;
-    strip.max[side.axis] = side.line + reach;
-    strip.min[1 - side.axis] = plan_.knots[side.knots[0]].place[1 - side.axis] - reach;
-    strip.max[1 - side.axis] = plan_.knots[side.knots[1]].place[1 - side.axis] + reach;
+    strip.min[side.axis] = side.line - distance;
+    strip.max[side.axis] = side.line + distance;
+    strip.min[1 - side.axis] = plan_.knots[side.knots[0]].place[1 - side.axis] - distance;
+    strip.max[1 - side.axis] = plan_.knots[side.knots[1]].place[1 - side.axis] + distance;
     samples_.read(window.first_cell, window.cells, strip, near);
   }
   return near;

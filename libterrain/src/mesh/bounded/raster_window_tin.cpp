@@ -98,27 +98,27 @@ void WindowMesher::WindowTin::keep_what_touches(const Region& region) {
 void WindowMesher::WindowTin::order_by_use() {
   constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
   std::vector<std::uint32_t> numbers(vertices.size(), kNone);
-  std::vector<tri::GridVertex> used;
+  std::vector<tri::GridVertex> ordered;
   std::vector<stream::Point3> used_positions;
-  used.reserve(vertices.size());
+  ordered.reserve(vertices.size());
   used_positions.reserve(vertices.size());
   for (auto& triangle : triangles) {
     for (std::uint32_t& vertex : triangle) {
       std::uint32_t& number = numbers[vertex];
       if (number == kNone) {
-        number = static_cast<std::uint32_t>(used.size());
-        used.push_back(vertices[vertex]);
+        number = static_cast<std::uint32_t>(ordered.size());
+        ordered.push_back(vertices[vertex]);
         used_positions.push_back(positions[vertex]);
       }
       vertex = number;
     }
   }
-  vertices = std::move(used);
+  vertices = std::move(ordered);
   positions = std::move(used_positions);
 }
 
 double WindowMesher::WindowTin::rounding_of_errors() const {
-  double most = 0.0;
+  double bound = 0.0;
   for (const auto& [i, j, k] : triangles) {
     const tri::GridVertex &a = vertices[i], &b = vertices[j], &c = vertices[k];
     const auto [left, right] = std::minmax({a.column, b.column, c.column});
@@ -129,9 +129,9 @@ double WindowMesher::WindowTin::rounding_of_errors() const {
     const double cy = static_cast<double>(c.row) - a.row;
     const double box = static_cast<double>(right - left) * static_cast<double>(bottom - top);
     const double rise = std::fabs(b.height - a.height) + std::fabs(c.height - a.height);
-    most = std::max(most, 0x1p-48 * rise * box / std::fabs(bx * cy - by * cx));
+    bound = std::max(bound, 0x1p-48 * rise * box / std::fabs(bx * cy - by * cx));
   }
-  return most;
+  return bound;
 }
 
 /// The samples of a window and of the lines around it, as far as the raster extends.
@@ -252,10 +252,10 @@ void WindowMesher::measure_as_read(
     tri::Point3 p{static_cast<double>(vertex.column), static_cast<double>(vertex.row),
                   vertex.height};
     if (!exact && !moves) {
-      const stream::Point3 back = rounding_(tin.positions[i]);
-      const std::array<double, 2> stored = stored_place(placement_, {back[0], back[1]});
+      const stream::Point3 decoded = rounding_(tin.positions[i]);
+      const std::array<double, 2> stored = stored_place(placement_, {decoded[0], decoded[1]});
       p = {stored[0] - static_cast<double>(tin.window.column),
-           stored[1] - static_cast<double>(tin.window.row), back[2]};
+           stored[1] - static_cast<double>(tin.window.row), decoded[2]};
     }
     read.push_back(p);
   }

@@ -144,8 +144,9 @@ CloudSamples::CloudSamples(const stream::Store& store, const StoredPlaces& place
     vertical.convert(globe, heights);
     for (std::size_t k = 0; k < count; ++k) {
       // NaN for a point without a place or height on the globe, so that it is in no box.
-      const bool there = std::isfinite(heights[k]);
-      samples_[begin + k] = {there ? globe[k][0] : NAN, there ? globe[k][1] : NAN, heights[k]};
+      const bool is_placed = std::isfinite(heights[k]);
+      samples_[begin + k] = {is_placed ? globe[k][0] : NAN, is_placed ? globe[k][1] : NAN,
+                             heights[k]};
     }
   });
 }

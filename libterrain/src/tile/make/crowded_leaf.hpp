@@ -18,18 +18,18 @@ namespace terrace::terrain {
 class LeafPlaces {
  public:
   LeafPlaces(const TileAddress& tile, const TileLeaf& leaf)
-      : whole_(box_of(tile)),
-        units_(kTileUnits / (whole_.east - whole_.west)),
+      : tile_box_(box_of(tile)),
+        units_(kTileUnits / (tile_box_.east - tile_box_.west)),
         west_(leaf_unit(leaf.x, leaf.depth)),
         south_(leaf_unit(leaf.y, leaf.depth)),
         east_(leaf_unit(leaf.x + 1, leaf.depth)),
         north_(leaf_unit(leaf.y + 1, leaf.depth)) {}
 
   [[nodiscard]] double u(double longitude) const {
-    return std::clamp((longitude - whole_.west) * units_, west_, east_);
+    return std::clamp((longitude - tile_box_.west) * units_, west_, east_);
   }
   [[nodiscard]] double v(double latitude) const {
-    return std::clamp((latitude - whole_.south) * units_, south_, north_);
+    return std::clamp((latitude - tile_box_.south) * units_, south_, north_);
   }
   [[nodiscard]] double west() const { return west_; }
   [[nodiscard]] double south() const { return south_; }
@@ -37,7 +37,7 @@ class LeafPlaces {
   [[nodiscard]] double height() const { return north_ - south_; }
 
  private:
-  GeographicBox whole_;
+  GeographicBox tile_box_;
   double units_, west_, south_, east_, north_;
 };
 

@@ -18,8 +18,8 @@ namespace {
 class Measurement {
  public:
   Measurement(const TileAddress& address, const TileMesh& mesh, TileSurface& surface)
-      : mesh_(mesh), surface_(surface), whole_(box_of(address)), number_(mesh.size(), kNone) {
-    units_ = kTileUnits / (whole_.east - whole_.west);
+      : mesh_(mesh), surface_(surface), tile_box_(box_of(address)), number_(mesh.size(), kNone) {
+    units_ = kTileUnits / (tile_box_.east - tile_box_.west);
   }
 
   void part(const GeographicBox& box, const std::vector<std::uint32_t>& triangles);
@@ -38,7 +38,7 @@ class Measurement {
 
   const TileMesh& mesh_;
   TileSurface& surface_;
-  GeographicBox whole_;
+  GeographicBox tile_box_;
   double units_ = 0.0;
   std::vector<std::uint32_t> number_;  ///< of vertices in a part
   SurfaceSamples samples_;
@@ -51,8 +51,10 @@ bool Measurement::over(std::uint32_t triangle, const GeographicBox& box) const {
     // A unit more, to allow for rounding.
     return low - 1 <= to && high + 1 >= from;
   };
-  return meets(mesh_.u, (box.west - whole_.west) * units_, (box.east - whole_.west) * units_) &&
-         meets(mesh_.v, (box.south - whole_.south) * units_, (box.north - whole_.south) * units_);
+  return meets(mesh_.u, (box.west - tile_box_.west) * units_,
+               (box.east - tile_box_.west) * units_) &&
+         meets(mesh_.v, (box.south - tile_box_.south) * units_,
+               (box.north - tile_box_.south) * units_);
 }
 
 void Measurement::part(const GeographicBox& box, const std::vector<std::uint32_t>& triangles) {
@@ -74,11 +76,11 @@ void Measurement::measure(const GeographicBox& box, const std::vector<std::uint3
   std::vector<std::size_t> index;
   for (std::size_t i = 0; i < samples_.size(); ++i) {
     // Where parts meet, each sample counts once.
-    const bool elsewhere = (samples_.longitude[i] == box.east && box.east != whole_.east) ||
-                           (samples_.latitude[i] == box.north && box.north != whole_.north);
+    const bool elsewhere = (samples_.longitude[i] == box.east && box.east != tile_box_.east) ||
+                           (samples_.latitude[i] == box.north && box.north != tile_box_.north);
     if (elsewhere) continue;
-    u.push_back(unit(samples_.longitude[i], whole_.west));
-    v.push_back(unit(samples_.latitude[i], whole_.south));
+    u.push_back(unit(samples_.longitude[i], tile_box_.west));
+    v.push_back(unit(samples_.latitude[i], tile_box_.south));
     height.push_back(samples_.height[i]);
     index.push_back(i);
   }
@@ -136,13 +138,13 @@ TileHeights measure_tile(const TileAddress& address, const TileMesh& mesh, TileS
 }
 
 std::uint64_t count_samples(const TileAddress& address, TileSurface& surface) {
-  const GeographicBox whole = box_of(address);
+  const GeographicBox tile_box = box_of(address);
   std::uint64_t count = 0;
-  for_each_part(whole, surface, [&](const SurfaceSamples& samples) {
+  for_each_part(tile_box, surface, [&](const SurfaceSamples& samples) {
     for (std::size_t i = 0; i < samples.size(); ++i) {
       const double longitude = samples.longitude[i], latitude = samples.latitude[i];
-      const bool inside = longitude > whole.west && longitude < whole.east &&
-                          latitude > whole.south && latitude < whole.north;
+      const bool inside = longitude > tile_box.west && longitude < tile_box.east &&
+                          latitude > tile_box.south && latitude < tile_box.north;
       count += inside ? 1 : 0;
     }
   });

@@ -83,32 +83,32 @@ void Inventory::files() {
 }
 
 void Inventory::zoom(unsigned zoom) {
-  const std::vector<TileAddress>& there = result.tiles[zoom];
+  const std::vector<TileAddress>& existing = result.tiles[zoom];
   const std::vector<TileRange>& ranges = layer_.available[zoom];
   const std::string label = fmt::format("zoom {}", zoom);
   if (zoom < layer_.first_zoom && !ranges.empty()) {
     problem(layer_path_, label + " has tiles, but is above minzoom");
   }
   if (zoom >= layer_.first_zoom && ranges.empty()) problem(layer_path_, label + " has no tiles");
-  std::vector<unsigned> named(there.size());
+  std::vector<unsigned> named(existing.size());
   std::uint64_t missing = 0;
   for (const TileRange& range : ranges) {
     const std::uint64_t width = std::uint64_t{range.x1} - range.x0 + 1;
     const std::uint64_t height = std::uint64_t{range.y1} - range.y0 + 1;
     // A range that claims a whole planet is not enumerated.
-    if (width * height > 64 * (there.size() + (std::uint64_t{1} << 20))) {
+    if (width * height > 64 * (existing.size() + (std::uint64_t{1} << 20))) {
       problem(layer_path_, label + " claims " + counted(width * height, "tile") + ", but only " +
-                               with_commas(there.size()) +
-                               (there.size() == 1 ? " exists" : " exist"));
+                               with_commas(existing.size()) +
+                               (existing.size() == 1 ? " exists" : " exist"));
       continue;
     }
     for (std::uint32_t y = range.y0; y <= range.y1; ++y) {
-      auto at =
-          std::lower_bound(there.begin(), there.end(), TileAddress{zoom, range.x0, y}, by_row);
+      auto at = std::lower_bound(existing.begin(), existing.end(), TileAddress{zoom, range.x0, y},
+                                 by_row);
       for (std::uint32_t x = range.x0; x <= range.x1; ++x) {
         const TileAddress tile{zoom, x, y};
-        if (at != there.end() && *at == tile) {
-          ++named[static_cast<std::size_t>(at - there.begin())];
+        if (at != existing.end() && *at == tile) {
+          ++named[static_cast<std::size_t>(at - existing.begin())];
           ++at;
         } else if (missing++ < kMostNamed) {
           problem(folder_ + "/" + tile_path(tile),
@@ -122,9 +122,9 @@ void Inventory::zoom(unsigned zoom) {
                              counted(missing - kMostNamed, "more listed tile", "does not exist",
                                      "do not exist"));
   }
-  for (std::size_t i = 0; i < there.size(); ++i) {
+  for (std::size_t i = 0; i < existing.size(); ++i) {
     if (named[i] == 1) continue;
-    problem(folder_ + "/" + tile_path(there[i]),
+    problem(folder_ + "/" + tile_path(existing[i]),
             named[i] == 0 ? "a tile that layer.json does not list"
                           : "a tile that layer.json lists more than once");
   }
