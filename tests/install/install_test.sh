@@ -92,7 +92,7 @@ with_cmake "$kind" "$installed"
 # A build of shared libraries differs in the lists of libraries that programs link. The shared
 # libraries are made from the existing objects.
 if [ "$kind" = static ]; then
-  meson setup "$folder/shared-build" "$source" -Ddefault_library=shared -Dprefix="$prefix" -Dlibdir="$libdir" -Dterrace_tests=disabled \
+  meson setup "$folder/shared-build" "$source" -Ddefault_library=shared -Dunity=on -Dprefix="$prefix" -Dlibdir="$libdir" -Dterrace_tests=disabled \
     -Dterrace_python=disabled -Dterrace_bench=disabled -Dbuildtype=plain >"$folder/log" 2>&1 || { tail -n 30 "$folder/log"; exit 1; }
   shared=$folder/shared/$libdir
   mkdir -p "$shared/cmake/terrace" "$shared/pkgconfig"
