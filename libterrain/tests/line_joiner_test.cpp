@@ -94,10 +94,10 @@ TEST(LineJoiner, JoinsSegmentsInAnyOrder) {
       const JoinerSegment& s = segments[i];
       joiner.add(s.from, place_of(s.from.edge), s.to, place_of(s.to.edge));
       if (i + 1 == half) {
-        joiner.emit_whole([&](const Crossing& c) { return later.contains(c.edge); });
+        joiner.emit_complete([&](const Crossing& c) { return later.contains(c.edge); });
       }
     }
-    joiner.emit_whole([](const Crossing&) { return false; });
+    joiner.emit_complete([](const Crossing&) { return false; });
     EXPECT_TRUE(expected.empty());
     EXPECT_EQ(joiner.open_points(), 0U);
     EXPECT_EQ(joiner.segments(), segments.size());
@@ -120,7 +120,7 @@ TEST(LineJoiner, EmitsOpenLinesInOrderOfFirstSegments) {
   add(1, 2);
   add(2, 3);
   add(3, 10);  // joins the last to the first, which keeps its number
-  joiner.emit_whole([](const Crossing&) { return false; });
+  joiner.emit_complete([](const Crossing&) { return false; });
   EXPECT_EQ(first, (std::vector<double>{20, 1, 30}));
 }
 
@@ -209,8 +209,8 @@ TEST(LineJoiner, StretchesMatchTheirSegments) {
         ++later[segments[i].to.edge];
       }
       const auto goes_on = [&](const Crossing& c) { return later.contains(c.edge); };
-      singly.emit_whole(goes_on);
-      together.emit_whole(goes_on);
+      singly.emit_complete(goes_on);
+      together.emit_complete(goes_on);
       ASSERT_EQ(together.open_points(), singly.open_points());
       ASSERT_EQ(together.segments(), singly.segments());
     }

@@ -209,8 +209,8 @@ TEST_F(RasterOfDegrees, TilesDoNotDependOnKnownRange) {
           const TileRange tiles = tiles_in(known.bounds(), zoom);
           const TileAddress tile{zoom, (tiles.x0 + tiles.x1) / 2, (tiles.y0 + tiles.y1) / 2};
           SCOPED_TRACE(testing::Message() << tile_path(tile) << ", bound " << bound);
-          const MadeTile made = make_tile(tile, plan, known, {});
-          const MadeTile same = make_tile(tile, plan, unknown, {});
+          const BuiltTile made = make_tile(tile, plan, known, {});
+          const BuiltTile same = make_tile(tile, plan, unknown, {});
           EXPECT_EQ(encode_tile(made.mesh, made.header), encode_tile(same.mesh, same.header));
           EXPECT_EQ(made.max_error, same.max_error);
         }

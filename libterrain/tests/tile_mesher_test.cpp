@@ -62,7 +62,7 @@ void expect_whole(const TileMesh& mesh) {
 }
 
 /// Compares every sample in a tile with its mesh, using measure_surface on all at once.
-void expect_bound(const TileAddress& tile, const MadeTile& made, const ZoomPlan& plan,
+void expect_bound(const TileAddress& tile, const BuiltTile& made, const ZoomPlan& plan,
                   TileSurface& surface) {
   const GeographicBox box = box_of(tile);
   SurfaceSamples samples;
@@ -105,7 +105,7 @@ void expect_bound(const TileAddress& tile, const MadeTile& made, const ZoomPlan&
   EXPECT_DOUBLE_EQ(sum.max_error, parts.max_error);
 }
 
-void expect_sound(const TileAddress& tile, const MadeTile& made) {
+void expect_sound(const TileAddress& tile, const BuiltTile& made) {
   expect_whole(made.mesh);
   for (const TileFault& fault :
        check_tile_mesh(tile, {made.mesh, made.header, edges_of(made.mesh)}, {})) {
@@ -136,7 +136,7 @@ void check_zoom(unsigned zoom, const TileRange& range, double max_error, TileSur
     for (std::uint32_t x = range.x0; x <= range.x1; ++x) {
       const TileAddress tile{zoom, x, y};
       SCOPED_TRACE(tile_path(tile));
-      MadeTile made = make_tile(tile, plan, surface, {});
+      BuiltTile made = make_tile(tile, plan, surface, {});
       expect_sound(tile, made);
       expect_bound(tile, made, plan, surface);
       meshes[{x, y}] = std::move(made.mesh);
@@ -218,7 +218,7 @@ TEST(TileMesher, EveryQualityKeepsTheBound) {
     std::vector<std::size_t> triangles;
     for (const auto quality :
          {tri::TinQuality::greedy, tri::TinQuality::removal, tri::TinQuality::fitted}) {
-      const MadeTile made = make_tile(tile, plan, surface, {.quality = quality});
+      const BuiltTile made = make_tile(tile, plan, surface, {.quality = quality});
       expect_sound(tile, made);
       expect_bound(tile, made, plan, surface);
       triangles.push_back(made.mesh.triangles.size());
@@ -235,7 +235,7 @@ TEST(TileMesher, NormalsAndWaterMatchSurface) {
   const ZoomPlan plan = plan_zoom(8, 5, 8000, surface);
   for (std::uint32_t x = range.x0; x <= range.x1; ++x) {
     const TileAddress tile{8, x, range.y0};
-    const MadeTile made =
+    const BuiltTile made =
         make_tile(tile, plan, surface, {.quality = {}, .normals = true, .water = true});
     const GeographicBox box = box_of(tile);
     ASSERT_EQ(made.mesh.normals.size(), made.mesh.size());
@@ -283,8 +283,8 @@ TEST(TileMesher, SharedSidesChangeNothing) {
     SharedSides shared{kMostSharedVertices};
     for (std::uint32_t y = range.y0; y <= std::min(range.y1, range.y0 + 2); ++y) {
       for (std::uint32_t x = range.x0; x <= std::min(range.x1, range.x0 + 2); ++x) {
-        const MadeTile alone = make_tile({zoom, x, y}, plan, surface, {});
-        const MadeTile beside = make_tile({zoom, x, y}, plan, surface, {}, &shared);
+        const BuiltTile alone = make_tile({zoom, x, y}, plan, surface, {});
+        const BuiltTile beside = make_tile({zoom, x, y}, plan, surface, {}, &shared);
         EXPECT_EQ(encode_tile(alone.mesh, alone.header), encode_tile(beside.mesh, beside.header));
       }
     }

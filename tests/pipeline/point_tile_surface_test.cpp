@@ -386,7 +386,7 @@ TEST(StoreWindow, TheIndexGivesCountsAndHeightsOfABox) {
     const double growth = (bounds.max[2] - bounds.min[2]) / 1024;
     EXPECT_NEAR(heights->low, low, growth);
     EXPECT_NEAR(heights->high, high, growth);
-    for (const stream::Point3& p : heights->some) EXPECT_TRUE(box.contains(terrain::flat(p)));
+    for (const stream::Point3& p : heights->examples) EXPECT_TRUE(box.contains(terrain::flat(p)));
   }
 }
 

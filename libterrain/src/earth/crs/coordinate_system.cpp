@@ -186,13 +186,13 @@ double CoordinateSystem::most_latitude() const {
 }
 
 double CoordinateSystem::turn() const {
-  const CrsDefinition& definition_here = definition();
-  if (is_geographic()) return 360 / definition_here.degrees_per_unit;
-  const bool cylinder = definition_here.method == ProjectionMethod::web_mercator ||
-                        definition_here.method == ProjectionMethod::mercator_a ||
-                        definition_here.method == ProjectionMethod::mercator_b;
+  const CrsDefinition& system = definition();
+  if (is_geographic()) return 360 / system.degrees_per_unit;
+  const bool cylinder = system.method == ProjectionMethod::web_mercator ||
+                        system.method == ProjectionMethod::mercator_a ||
+                        system.method == ProjectionMethod::mercator_b;
   if (!cylinder) return 0;
-  const double middle = definition_here.prime_meridian + definition_here.parameters.longitude;
+  const double middle = system.prime_meridian + system.parameters.longitude;
   std::array<Point2, 2> half{{{middle - 90, 0}, {middle + 90, 0}}};
   from_own_geographic(half);
   return 2 * (half[1][0] - half[0][0]);
@@ -204,17 +204,16 @@ std::optional<double> CoordinateSystem::metres_per_height() const {
 }
 
 stream::Crs CoordinateSystem::crs() const {
-  const CrsDefinition& definition_here = definition();
+  const CrsDefinition& system = definition();
   stream::Crs crs;
-  crs.epsg = definition_here.epsg();
-  crs.vertical_epsg = definition_here.vertical_epsg;
-  crs.name = definition_here.name;
-  crs.wkt = wkt_of(definition_here);
+  crs.epsg = system.epsg();
+  crs.vertical_epsg = system.vertical_epsg;
+  crs.name = system.name;
+  crs.wkt = wkt_of(system);
   crs.geographic = is_geographic();
-  crs.horizontal_unit = is_geographic() ? angle_name(definition_here.degrees_per_unit)
-                                        : unit_name(definition_here.metres_per_unit);
-  if (definition_here.metres_per_height != 0)
-    crs.vertical_unit = recorded_unit(definition_here.metres_per_height);
+  crs.horizontal_unit =
+      is_geographic() ? angle_name(system.degrees_per_unit) : unit_name(system.metres_per_unit);
+  if (system.metres_per_height != 0) crs.vertical_unit = recorded_unit(system.metres_per_height);
   return crs;
 }
 
@@ -243,31 +242,31 @@ std::string CoordinateSystem::wgs84_note() const {
 }
 
 void CoordinateSystem::to_own_geographic(std::span<Point2> places) const {
-  const CrsDefinition& definition_here = definition();
+  const CrsDefinition& system = definition();
   if (is_geographic()) {
-    const double unit = definition_here.degrees_per_unit, meridian = definition_here.prime_meridian;
+    const double unit = system.degrees_per_unit, meridian = system.prime_meridian;
     for (Point2& place : places) {
       place = {place[0] * unit + meridian, latitude_on_earth(place[1] * unit)};
     }
     return;
   }
-  const double unit = definition_here.metres_per_unit;
+  const double unit = system.metres_per_unit;
   if (unit != 1) {
     for (Point2& place : places) place = {place[0] * unit, place[1] * unit};
   }
   data_->projection->reverse(places);
-  if (definition_here.prime_meridian != 0) {
+  if (system.prime_meridian != 0) {
     for (Point2& place : places) {
-      place[0] = GeographicLib::Math::AngNormalize(place[0] + definition_here.prime_meridian);
+      place[0] = GeographicLib::Math::AngNormalize(place[0] + system.prime_meridian);
     }
   }
 }
 
 void CoordinateSystem::from_own_geographic(std::span<Point2> places) const {
-  const CrsDefinition& definition_here = definition();
-  const double meridian = definition_here.prime_meridian;
+  const CrsDefinition& system = definition();
+  const double meridian = system.prime_meridian;
   if (is_geographic()) {
-    const double unit = definition_here.degrees_per_unit;
+    const double unit = system.degrees_per_unit;
     if (unit == 1 && meridian == 0) return;
     for (Point2& place : places) place = {(place[0] - meridian) / unit, place[1] / unit};
     return;
@@ -276,7 +275,7 @@ void CoordinateSystem::from_own_geographic(std::span<Point2> places) const {
     for (Point2& place : places) place[0] -= meridian;
   }
   data_->projection->forward(places);
-  const double unit = definition_here.metres_per_unit;
+  const double unit = system.metres_per_unit;
   if (unit != 1) {
     for (Point2& place : places) place = {place[0] / unit, place[1] / unit};
   }
