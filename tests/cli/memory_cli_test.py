@@ -513,7 +513,7 @@ class MachineMemoryTest(MemoryCase):
             file.write('a,b,height,size\n0,1,1,2\n')
             for i in range(2, points):
                 file.write(f'{i},{points + i - 2},{i},{i + 1}\n')
-        args = ('render', tree, '-o', self.path('tree.png'), '--size', '100x100', '--memory')
+        args = ('render', tree, '-o', self.path('tree.png'), '--force', '--size', '100x100', '--memory')
         low, high = 34, 200
         code, _, err, _ = run(*args, f'{low}M')
         self.assertEqual(code, 1, err)

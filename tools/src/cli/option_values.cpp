@@ -175,9 +175,7 @@ stream::ClusterId parse_cluster(const std::string& text) {
 
 Focus parse_focus(const std::string& text) {
   const std::size_t colon = text.rfind(':');
-  if (colon == std::string::npos) {
-    throw UsageError("'" + text + "' names no level; write BOX:L");
-  }
+  if (colon == std::string::npos) throw UsageError("names no level; write BOX:L");
   return {.region = Region::parse(text.substr(0, colon), stop_token()),
           .level = parse_level(text.substr(colon + 1))};
 }
