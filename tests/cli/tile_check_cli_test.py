@@ -187,7 +187,7 @@ class VerifyTest(TileTestCase):
         data = bytearray(self.set.tiles[key].data)
         data[3] ^= 1  # a byte of the centre, which no other check can find
         self.change(key, bytes(data))
-        problems = self.found('/'.join(map(str, key)) + '.terrain: not the bytes')
+        problems = self.found('/'.join(map(str, key)) + '.terrain: the file was changed after it was written')
         self.assertEqual(len(problems), 1)
 
     def test_a_step_at_the_antimeridian_is_found(self):
