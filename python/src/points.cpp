@@ -95,11 +95,10 @@ py::tuple write_points(const py::object& source, const py::dict& arguments, cons
     }
     const std::unique_ptr<stream::PointSource> from = open(options);
     const stream::SourceInfo& info = from->info();
-    stream::PointHeader header{
-        .attributes = info.attributes,
-        .crs = [&info] { return terrain::crs_of_point_file(info); },
-        .height_unit = [&info] { return terrain::height_unit_of_point_file(info); },
-        .lattice = lattice_of(info)};
+    stream::PointHeader header{.attributes = info.attributes,
+                               .crs = [&info] { return terrain::crs_of_point_file(info); },
+                               .units = [&info] { return terrain::units_of_point_file(info); },
+                               .lattice = lattice_of(info)};
     const auto writer = stream::open_point_writer(
         path, header,
         {.format = format, .replace = replace, .stop = context.stop, .threads = context.threads});

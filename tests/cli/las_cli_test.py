@@ -243,6 +243,22 @@ class LasFormatTest(LasCase):
         strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')
         self.assertIn(b"'NAVD88' in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
 
+    def test_csv_names_the_units_of_all_coordinates(self):
+        """Otherwise x and y in feet would be read as metres next to heights in feet."""
+        for header, expected in (('x (ft),y (ft),z (ft)', 'x (ft),y (ft),z (ft)'), ('x (ft),y (ft),z (m)', 'x (ft),y (ft),z (m)'),
+                                 ('x (ft),y (ft),z', 'x (ft),y (ft),z'), ('x (m),y (m),z (m)', 'x,y,z'), ('x,y,z (ft)', 'x,y,z (ft)')):
+            source = self.put('units.csv', f'{header}\n0,0,0\n100,0,50\n0,100,20\n100,100,70\n'.encode())
+            copy, store = self.path('copy.csv'), self.path('units.store')
+            self.run_ok('convert', source, '-o', copy, '--force')
+            with open(copy, encoding='ascii') as rows:
+                self.assertEqual(rows.readline().strip(), expected)
+            slopes = []
+            for file in source, copy:
+                shutil.rmtree(store, ignore_errors=True)
+                self.run_ok('build', file, '-o', store)
+                slopes.append(terrace('sample', store, input=b'50,10\n').stdout)
+            self.assertEqual(slopes[0], slopes[1], header)
+
     def test_ellipsoidal_heights_are_kept(self):
         """Also if only --vertical says so, and after a conversion of x and y."""
         for unit, name in (None, 'z'), ('metre', 'z (m)'), ('foot', 'z (ft)'):
@@ -259,6 +275,8 @@ class LasFormatTest(LasCase):
                     self.assertEqual(info['vertical'], 'ellipsoidal', (unit, crs, file))
                     if unit == 'foot':
                         self.assertEqual(info['crs']['vertical_unit'], 'foot', (crs, file))
+                self.run_ok('convert', self.path('own.las'), '-o', self.path('copy.las'), '--force')
+                self.assertEqual(self.info(self.path('copy.las'))['vertical'], 'ellipsoidal', (unit, crs))
 
     def test_wkt_after_the_points_is_read_from_files_and_requested_for_pipes(self):
         records = random_records(6, 20)

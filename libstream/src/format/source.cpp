@@ -167,19 +167,18 @@ const Format& common_format(std::span<const std::string> files, const SourceOpti
 /// Whether files from pipes or gzip must be copied before the format can read them. Throws: Error
 /// if copies would not help.
 bool needs_copies(const Format& format, std::span<const std::string> files) {
-  if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
-    throw Error("standard input", "is named twice")
-        .remedy("name it once: it can be read only once");
-  }
-  if (format.streams) return false;
   bool copies = false;
   for (const std::string& file : files) {
-    if (is_seekable(file) || packed_format_of(file) == &format) continue;
+    if (format.streams || is_seekable(file) || packed_format_of(file) == &format) continue;
     if (!format.self_contained) {
       throw Error(shown_name(file), format.name + " cannot be read from a pipe or from gzip")
           .remedy("name an unpacked file");
     }
     copies = true;
+  }
+  if (std::count(files.begin(), files.end(), kStandardStream) > 1) {
+    throw Error("standard input", "is named twice")
+        .remedy("name it once: it can be read only once");
   }
   return copies;
 }

@@ -86,14 +86,22 @@ stream::Crs crs_of_point_file(const stream::Placement& placement,
   return crs;
 }
 
-std::string height_unit_of_point_file(const stream::Placement& placement,
-                                      const std::optional<stream::Crs>& other) {
+stream::CoordinateUnits units_of_point_file(const stream::Placement& placement,
+                                            const std::optional<stream::Crs>& other) {
   if (is_geocentric(placement.crs)) return {};
-  try {
-    return unit_of_heights(placement, other.has_value());
-  } catch (const CrsError&) {
-    return {};
+  const std::string& named_unit = placement.coordinates[0].unit;
+  stream::CoordinateUnits units;
+  if (other) {
+    units.horizontal = other->horizontal_unit;
+  } else {
+    units.horizontal = named_unit.empty() ? placement.crs.horizontal_unit : named_unit;
   }
+  try {
+    units.height = unit_of_heights(placement, other.has_value());
+  } catch (const CrsError&) {
+    // Readers of the file make the same assumption.
+  }
+  return units;
 }
 
 std::string lost_height_unit(const std::string& path, const stream::PointWriter& writer,

@@ -86,14 +86,14 @@ void write_clustered_points(const std::string& path, stream::WriterOptions writi
   attributes.push_back({.name = "representative", .type = stream::ScalarType::i32});
   const std::uint64_t table_bytes = table.payload.size() + table.size() * sizeof(stream::Point3);
   writing.memory_bytes -= std::min(writing.memory_bytes, table_bytes);
-  const auto writer = stream::open_point_writer(
-      path,
-      {.attributes = std::move(attributes),
-       .comments = {kWriterMark},
-       .crs = [&table] { return crs_of_point_file(table.info); },
-       .height_unit = [&table] { return height_unit_of_point_file(table.info); },
-       .lattice = lattice_of(table.info)},
-      writing);
+  const auto writer =
+      stream::open_point_writer(path,
+                                {.attributes = std::move(attributes),
+                                 .comments = {kWriterMark},
+                                 .crs = [&table] { return crs_of_point_file(table.info); },
+                                 .units = [&table] { return units_of_point_file(table.info); },
+                                 .lattice = lattice_of(table.info)},
+                                writing);
   writing_within_memory(*writer, path, common.memory_or(0), table_bytes);
   const std::string unit_note = lost_height_unit(path, *writer, table.info);
   if (!unit_note.empty()) common.say(unit_note);

@@ -74,8 +74,12 @@ class ConvertCommand : public Command {
         output_,
         {.attributes = info.attributes,
          .comments = {kWriterMark},
-         .crs = [&info] { return crs_of_point_file(with_source_crs(info)); },
-         .height_unit = [&info] { return height_unit_of_point_file(with_source_crs(info)); },
+         .crs =
+             [&info] {
+               const LocatedSource located = with_source_crs(info);
+               return crs_of_point_file(located.placement, std::nullopt, name_of(located.heights));
+             },
+         .units = [&info] { return units_of_point_file(with_source_crs(info).placement); },
          .lattice = lattice_of(info)},
         writing);
     writing_within_memory(*writer, output_, memory, reading_bytes);
@@ -91,7 +95,8 @@ class ConvertCommand : public Command {
     }
     writer->finish();
     if (writer->points() == 0) common.say(inputs_.front() + ": contains no points");
-    const std::string unit_note = lost_height_unit(output_, *writer, with_source_crs(info));
+    const std::string unit_note =
+        lost_height_unit(output_, *writer, with_source_crs(info).placement);
     if (!unit_note.empty()) common.say(unit_note);
     note_spooled(info, common.context());
     if (!info.note.empty()) common.say(info.note);
@@ -168,17 +173,25 @@ class ConvertCommand : public Command {
     return progress.excluded > 0 ? with_commas(progress.excluded) + ' ' : std::string();
   }
 
-  /// Returns the placement with the CRS of the file or of the .prj file next to it.
-  static stream::Placement with_source_crs(const stream::SourceInfo& info) {
-    stream::Placement placement = info;
+  /// The placement of a source, and what its heights refer to.
+  struct LocatedSource {
+    stream::Placement placement;
+    Heights heights = Heights::unknown;
+  };
+
+  /// Takes the CRS from the file or from the .prj file next to it.
+  static LocatedSource with_source_crs(const stream::SourceInfo& info) {
+    LocatedSource located{.placement = info};
     try {
-      placement.crs = crs_of_source(info).crs;
+      const SourceCrs crs = crs_of_source(info);
+      located = {.placement = info, .heights = crs.heights};
+      located.placement.crs = crs.crs;
     } catch (const terrain::CrsDatabaseError&) {
       throw;
     } catch (const stream::Error&) {
       // The output repeats the file's own description.
     }
-    return placement;
+    return located;
   }
 
   std::vector<std::string> inputs_;

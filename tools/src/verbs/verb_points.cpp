@@ -136,17 +136,15 @@ class PointsCommand final : public Command {
   static stream::PointHeader header_of(const stream::Store& store,
                                        std::vector<stream::Channel> attributes,
                                        const std::optional<Transformation>& to) {
-    stream::PointHeader header{.attributes = std::move(attributes),
-                               .comments = {kWriterMark},
-                               .crs =
-                                   [&store, other = crs_of(to)] {
-                                     return crs_of_point_file(store.schema(), other,
-                                                              store.schema().vertical);
-                                   },
-                               .height_unit =
-                                   [&store, other = crs_of(to)] {
-                                     return height_unit_of_point_file(store.schema(), other);
-                                   }};
+    stream::PointHeader header{
+        .attributes = std::move(attributes),
+        .comments = {kWriterMark},
+        .crs =
+            [&store, other = crs_of(to)] {
+              return crs_of_point_file(store.schema(), other, store.schema().vertical);
+            },
+        .units = [&store,
+                  other = crs_of(to)] { return units_of_point_file(store.schema(), other); }};
     if (!to) {
       header.lattice = lattice_of(store.schema());
       header.bounds = world_box(store.schema(), store.whole().bounds());

@@ -14,6 +14,12 @@
 
 namespace terrace::stream {
 
+/// Units of coordinates, as in Channel::unit; empty if unknown.
+struct CoordinateUnits {
+  std::string horizontal{};  ///< of x and y
+  std::string height{};
+};
+
 /// The header of a point file.
 struct PointHeader {
   /// Columns after the coordinates, as in PointBlock::payload. Types are kept if the format has
@@ -25,9 +31,9 @@ struct PointHeader {
   /// if it has no WKT. Other formats do not call it, because finding the WKT may mean searching a
   /// database. Empty if the CRS is unknown.
   std::function<Crs()> crs{};
-  /// Returns the unit of heights, as in Channel::unit; empty if it is unknown. Formats that record
-  /// it apart from the CRS (CSV) call it.
-  std::function<std::string()> height_unit{};
+  /// Returns the units of the coordinates. Formats that record them apart from the CRS (CSV) call
+  /// it.
+  std::function<CoordinateUnits()> units{};
   /// The lattice of the coordinates, if they are on one. Text gets its decimals (849393.95, not
   /// 849393.9500000001), and formats with integer coordinates (LAS) use it. Without a lattice,
   /// these use a power of ten that suits the first points and the bounds.
@@ -68,7 +74,7 @@ class PointWriter {
   [[nodiscard]] virtual std::uint64_t points() const = 0;
   /// True if the file can state the CRS and the units of coordinates.
   [[nodiscard]] virtual bool records_units() const { return false; }
-  /// True if the file names the unit that PointHeader::height_unit returns.
+  /// True if the file names the unit that PointHeader::units returns for heights.
   [[nodiscard]] virtual bool names_height_unit() const { return false; }
   /// Maximum distance by which a coordinate was moved to fit the format's integers; 0 if none was
   /// moved by more than the rounding of doubles.

@@ -26,13 +26,25 @@ std::string csv_field(const std::string& name) {
   return out + "\"";
 }
 
-/// Returns the unit of heights as the reader finds it in a header; empty for metres, which readers
-/// assume, and for words that are not units of length.
+/// Returns the unit as the reader finds it in a header; empty for words that are not units of
+/// length.
 std::string unit_in_brackets(const std::string& unit) {
   const std::string name = canonical_unit(unit);
-  if (name == "metre" || !is_length_unit(name)) return {};
+  if (!is_length_unit(name)) return {};
+  if (name == "metre") return " (m)";
   if (name == "foot") return " (ft)";
   return " (" + (name == "US survey foot" ? "ftUS" : name) + ")";
+}
+
+/// Returns the names of the columns of coordinates. Units are left out if all are metres, which
+/// readers assume.
+std::string coordinate_names(const CoordinateUnits& units) {
+  std::string horizontal = unit_in_brackets(units.horizontal);
+  if (horizontal == " (m)") horizontal.clear();
+  std::string height = unit_in_brackets(units.height);
+  // Otherwise readers would take the unit of x and y for heights too.
+  if (height == " (m)" && horizontal.empty()) height.clear();
+  return 'x' + horizontal + ",y" + horizontal + ",z" + height;
 }
 
 /// Writes a coordinate. On a lattice with decimal steps (LAS) it is a rounded k * scale + offset,
@@ -90,9 +102,9 @@ class XyzWriter final : public PlainPointWriter {
     }
   }
 
-  void write_header(const std::string& height_unit) {
+  void write_header(const CoordinateUnits& units) {
     names_height_unit_ = true;
-    std::string text = "x,y,z" + unit_in_brackets(height_unit);
+    std::string text = coordinate_names(units);
     for (std::size_t i = 0; i < columns().size(); ++i) {
       text += ',';
       text += csv_field(columns().name(i));
@@ -132,7 +144,7 @@ std::unique_ptr<PointWriter> open_xyz_writer(const std::string& path, const Poin
 std::unique_ptr<PointWriter> open_csv_writer(const std::string& path, const PointHeader& header,
                                              const WriterOptions& options) {
   auto writer = std::make_unique<XyzWriter>(path, header, options, ',');
-  writer->write_header(header.height_unit ? header.height_unit() : std::string());
+  writer->write_header(header.units ? header.units() : CoordinateUnits());
   return writer;
 }
 

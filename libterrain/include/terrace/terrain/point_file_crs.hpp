@@ -20,9 +20,10 @@ stream::Crs crs_of_point_file(const stream::Placement& placement,
                               const std::optional<stream::Crs>& other = std::nullopt,
                               const std::string& vertical = {});
 
-/// Returns the unit that stream::PointHeader records for heights; empty if none is known.
-std::string height_unit_of_point_file(const stream::Placement& placement,
-                                      const std::optional<stream::Crs>& other = std::nullopt);
+/// Returns the units that stream::PointHeader records; empty ones if none are known. other: as in
+/// crs_of_point_file().
+stream::CoordinateUnits units_of_point_file(const stream::Placement& placement,
+                                            const std::optional<stream::Crs>& other = std::nullopt);
 
 /// Returns a note that the file does not record the unit of heights, so that readers assume another
 /// one; empty if it records the unit or if nothing is lost. path: the path of the file.
