@@ -39,8 +39,9 @@ class MissingBytes : public std::runtime_error {
 class GivenBytes {
  public:
   /// max_bytes: the limit of the bytes held. Beyond it, the least recently read or given parts are
-  /// dropped, and are missing again when they are read. The last part is always kept, however
-  /// large.
+  /// dropped, and are missing again when they are read. A single part may exceed the limit: the
+  /// last one is always kept. If some of its bytes were held before, it is stored in pieces, and
+  /// only the last piece is sure to be kept.
   explicit GivenBytes(std::uint64_t max_bytes = std::uint64_t{64} << 20);
   ~GivenBytes();
   GivenBytes(GivenBytes&&) noexcept;

@@ -16,8 +16,8 @@ void GridHeader::set(std::string_view key, std::string_view value) {
 }
 
 std::string GridHeader::text(const std::string& key) const {
-  const auto found = values_.find(key);
-  return found == values_.end() ? std::string() : found->second;
+  const auto entry = values_.find(key);
+  return entry == values_.end() ? std::string() : entry->second;
 }
 
 std::optional<double> GridHeader::number(const std::string& key) const {
@@ -33,9 +33,9 @@ std::optional<double> GridHeader::number(const std::string& key) const {
 }
 
 std::uint64_t GridHeader::count(const std::string& key,
-                                std::optional<std::uint64_t> otherwise) const {
+                                std::optional<std::uint64_t> default_value) const {
   const std::optional<double> value = number(key);
-  if (!value && otherwise) return *otherwise;
+  if (!value && default_value) return *default_value;
   if (!value) throw fault("is missing").at(key);
   if (!(*value >= 0 && *value < 0x1p53) || *value != std::floor(*value)) {
     throw fault("is " + in_quotes(text(key)) + ", not a count").at(key);

@@ -329,14 +329,15 @@ class XyzSource final : public PointSource {
     return parse_number(field.data(), end, type, value) == end;
   }
 
-  /// Returns the error of a line that is not a point.
+  /// Returns the error of a line that is not a point. The last return is for lines that only the
+  /// fast parser rejects.
   [[nodiscard]] Error fault(std::string_view line) const {
-    const auto line_fault = [&](std::string cause) {
+    const auto line_error = [&](std::string cause) {
       return Error(input_.name(), std::move(cause)).at_line(lines_.number());
     };
     const std::vector<std::string_view> fields = split_row(line, layout_);
     if (fields.size() != layout_.columns) {
-      return line_fault(fmt::format("has {}, but the previous lines have {}",
+      return line_error(fmt::format("has {}, but the previous lines have {}",
                                     counted(fields.size(), "column"), layout_.columns))
           .remedy("every line needs the same columns");
     }
@@ -350,11 +351,11 @@ class XyzSource final : public PointSource {
         const std::string cause =
             column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
         if (!real) {
-          return line_fault(fmt::format("{} an integer that fits into {}, as the previous ones do",
+          return line_error(fmt::format("{} an integer that fits into {}, as the previous ones do",
                                         cause, name_of(types_[i])))
               .remedy(message("correct it, or leave the column out ({drop} of build and convert)"));
         }
-        return line_fault(cause + " a number that fits into a double")
+        return line_error(cause + " a number that fits into a double")
             .remedy(
                 field.find(',') != field.npos ? "write numbers with a decimal point"
                 : coordinate
@@ -363,11 +364,11 @@ class XyzSource final : public PointSource {
                               "column out ({drop} of build and convert)"));
       }
       if (coordinate && std::isinf(value)) {
-        return line_fault(fmt::format("{} is {}, but a coordinate must be finite", column, field))
+        return line_error(fmt::format("{} is {}, but a coordinate must be finite", column, field))
             .remedy("leave the line out");
       }
     }
-    return line_fault("is not a point").remedy("each line needs the same number of columns");
+    return line_error("is not a point").remedy("correct it, or drop the line");
   }
 
   Input input_;

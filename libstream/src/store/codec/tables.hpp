@@ -31,7 +31,7 @@ struct Guide {
   static constexpr unsigned kNone = UINT32_MAX;
 
   unsigned attribute = kNone;
-  std::uint64_t min_jump = 0;  ///< a difference of at min_count this begins a line; not stored
+  std::uint64_t min_jump = 0;  ///< a difference of at least this begins a line; not stored
 
   [[nodiscard]] bool exists() const { return attribute != kNone; }
 };
