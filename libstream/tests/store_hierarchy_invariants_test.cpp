@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks the statements of FORMAT.md about the hierarchy one by one: a store that violates one of
-// them, with good checksums, is refused when it is opened or read, or reported by verify.
+// One test per statement of FORMAT.md about the hierarchy: a store with valid checksums that
+// violates it is rejected when it is opened or read, or reported by verify.
 #include <algorithm>
 #include <functional>
 #include <string>
@@ -31,7 +31,7 @@ TEST(StoreInvariants, UpdatingTheChecksumsOfASoundStoreChangesNothing) {
   }
 }
 
-/// Returns the store of testing::small_blocks(), written from its hierarchy after `edit`.
+/// Returns the store of testing::small_blocks() after `edit` changed its hierarchy.
 StoreFiles edited_store(const std::function<void(std::vector<OwnedBlock>&)>& edit) {
   std::vector<std::vector<Point3>> blocks;
   for (const auto& block : testing::small_blocks()) blocks.push_back(block.positions);
@@ -54,59 +54,73 @@ OwnedBlock& block_of(std::vector<OwnedBlock>& blocks, unsigned level) {
                        [&](const OwnedBlock& block) { return block.level == level; });
 }
 
-TEST(StoreInvariants, VerifyFindsInvalidHierarchies) {
+/// Returns a point of the block that does not represent one of its clusters.
+std::uint32_t first_non_representative(const OwnedBlock& block) {
+  std::uint32_t point = 0;
+  while (std::find(block.representatives.begin(), block.representatives.end(), point) !=
+         block.representatives.end()) {
+    ++point;
+  }
+  return point;
+}
+
+TEST(StoreInvariants, WritesTheSameStoreFromItsHierarchy) {
   EXPECT_TRUE(edited_store([](auto&) {}) == testing::grid_files());
-  // Returns a point of the first block of level 1 that does not represent a cluster there.
-  const auto plain_member = [](const OwnedBlock& block) {
-    std::uint32_t point = 0;
-    while (std::find(block.representatives.begin(), block.representatives.end(), point) !=
-           block.representatives.end()) {
-      ++point;
-    }
-    return point;
-  };
-  testing::expect_problem(edited_store([&](auto& blocks) {
-                            OwnedBlock& block = block_of(blocks, 1);
-                            const std::uint32_t point = plain_member(block);
-                            block.children[point] = block.children[point + 1];
-                          }),
-                          "is headed twice");
-  testing::expect_problem(edited_store([&](auto& blocks) {
-                            OwnedBlock& block = block_of(blocks, 1);
-                            const std::uint32_t point = plain_member(block);
-                            block.children[point] = block.children[point + 1];
-                          }),
-                          "no point above heads it");
-  testing::expect_unreadable(edited_store([&](auto& blocks) {
+}
+
+// If two points are parents of the same cluster, another cluster has no parent.
+TEST(StoreInvariants, ReportsClustersWithTwoParentPointsOrNone) {
+  const StoreFiles files = edited_store([](auto& blocks) {
+    OwnedBlock& block = block_of(blocks, 1);
+    const std::uint32_t point = first_non_representative(block);
+    block.children[point] = block.children[point + 1];
+  });
+  testing::expect_problem(files, "has two parent points");
+  testing::expect_problem(files, "has no parent point");
+}
+
+TEST(StoreInvariants, RejectsChildrenThatDoNotExist) {
+  testing::expect_unreadable(edited_store([](auto& blocks) {
                                OwnedBlock& block = block_of(blocks, 1);
-                               block.children[plain_member(block)] = 1000000;
+                               block.children[first_non_representative(block)] = 1000000;
                              }),
                              "heads a cluster that does not exist");
-  testing::expect_problem(edited_store([&](auto& blocks) {
+}
+
+TEST(StoreInvariants, ReportsRepresentativesAtAnotherPosition) {
+  testing::expect_problem(edited_store([](auto& blocks) {
                             OwnedBlock& block = block_of(blocks, 1);
-                            block.positions[plain_member(block)][2] += 1;
+                            block.positions[first_non_representative(block)][2] += 1;
                           }),
-                          "are not the points above that head its clusters");
-  // A representative whose children differ from those of the point above.
+                          "differ from their parent points");
+}
+
+TEST(StoreInvariants, ReportsRepresentativesWithOtherChildren) {
   testing::expect_problem(edited_store([](auto& blocks) {
                             OwnedBlock& block = block_of(blocks, 1);
                             std::swap(block.children[block.representatives[0]],
                                       block.children[block.representatives[1]]);
                           }),
-                          "are not the points above that head its clusters");
+                          "differ from their parent points");
+}
+
+TEST(StoreInvariants, ReportsWrongNumbersOfDescendants) {
   testing::expect_problem(
       edited_store([](auto& blocks) { --block_of(blocks, 1).summaries[0].descendants; }),
       "the descendants do not add up");
+}
+
+TEST(StoreInvariants, ReportsBoxesThatExcludeClustersBelow) {
   testing::expect_problem(edited_store([](auto& blocks) {
                             OwnedBlock& block = block_of(blocks, 1);
-                            const Point3 at = block.positions[block.representatives[0]];
-                            block.summaries[0].box = {at, at};
+                            const Point3 position = block.positions[block.representatives[0]];
+                            block.summaries[0].box = {position, position};
                           }),
                           "a cluster below exceeds its box");
 }
 
-/// Boxes of 32 columns from a multiple of 32 on look as if they had been enlarged to that size. The
-/// box above must still contain the points themselves.
+// Boxes that start at a multiple of 32 and have 32 columns look like rounded-up boxes. The box
+// above must still contain the points themselves.
 TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
   for (const int missed : {0, 1, 31}) {
     const TemporaryFolder folder;
@@ -117,29 +131,29 @@ TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
       positions.push_back({32.0 + i, 0, 0});
       order.push_back(i);
     }
-    const std::vector<std::uint32_t> first{0, 32, 64}, heads{31, 60}, all{0, 2},
-        none{kNoRepresentative};
+    const std::vector<std::uint32_t> block_starts{0, 32, 64}, representatives{31, 60},
+        root_starts{0, 2}, no_representative{kNoRepresentative};
     const std::vector<ClusterSummary> summaries{{{positions[0], positions[31]}, 40, 32},
                                                 {{positions[32], positions[63]}, 40, 32}};
-    const std::vector<Point3> top{positions[31], positions[60]};
+    const std::vector<Point3> parents{positions[31], positions[60]};
     const std::vector<std::uint64_t> children{0, 1};
-    const auto low = static_cast<std::size_t>(missed);
-    const std::vector<ClusterSummary> root{{{positions[low], positions[63]}, 40, 64}};
+    const auto first_covered = static_cast<std::size_t>(missed);
+    const std::vector<ClusterSummary> root{{{positions[first_covered], positions[63]}, 40, 64}};
     writer.append(writer.encode({.level = 0,
                                  .positions = positions,
                                  .payload = {},
                                  .children = {},
-                                 .first = first,
+                                 .first = block_starts,
                                  .order = order,
-                                 .representatives = heads,
+                                 .representatives = representatives,
                                  .summaries = summaries}));
     writer.finish({.level = 1,
-                   .positions = top,
+                   .positions = parents,
                    .payload = {},
                    .children = children,
-                   .first = all,
+                   .first = root_starts,
                    .order = std::span(order).first(2),
-                   .representatives = none,
+                   .representatives = no_representative,
                    .summaries = root});
     const std::string problems = testing::problems_of(Store::open(folder.path() / "s"));
     if (missed == 0) {

@@ -56,13 +56,13 @@ TEST_F(Xyz, LargeIntegersAreKeptOrRefused) {
                 .find("line 20001: column 4, '9007199254740993', is an integer that a double"),
             std::string::npos);
   EXPECT_NE(refusal("1 2 3 9007199254740993\n" + late + "1 2 3 0.5\n")
-                .find("'0.5', is not an integer that fits into int64"),
+                .find("'0.5', is not an integer of type int64, like the lines before it"),
             std::string::npos);
   std::string csv = "1,2,3,9007199254740993\n";
   for (int i = 0; i < 1000; ++i) csv += "1,2,3,4\n";
   EXPECT_NE(refusal(csv + "1,2,3,\n")
-                .find("line 1002: column 4 is empty, not an integer that fits into int64, as "
-                      "the previous ones do; correct it, or leave the column out"),
+                .find("line 1002: column 4 is empty, not an integer of type int64, like "
+                      "the lines before it; correct it, or leave the column out"),
             std::string::npos);
 }
 

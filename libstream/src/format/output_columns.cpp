@@ -39,52 +39,53 @@ OutputColumns::OutputColumns(std::span<const Channel> attributes) {
                          [&](const OutputColumn& column) { return column.name == name; });
     };
     for (int n = 2; is_taken(); ++n) name = fmt::format("{}_{}", word, n);
-    const bool real = channel.scale != 1.0 || channel.offset != 0.0;
+    const bool is_scaled = channel.scale != 1.0 || channel.offset != 0.0;
     columns_.push_back({.name = name,
-                        .stored = channel.type,
-                        .written = real ? ScalarType::f64 : channel.type,
+                        .stored_type = channel.type,
+                        .file_type = is_scaled ? ScalarType::f64 : channel.type,
                         .scale = channel.scale,
                         .offset = channel.offset,
-                        .real = real});
-    record_bytes_ += size_of(channel.type);
-    written_bytes_ += size_of(columns_.back().written);
+                        .is_scaled = is_scaled});
+    stored_bytes_ += size_of(channel.type);
+    file_bytes_ += size_of(columns_.back().file_type);
   }
 }
 
-void OutputColumns::check(const PointBlock& block) const {
-  assert(block.payload.size() == block.size() * record_bytes_);
+void OutputColumns::assert_matches(const PointBlock& block) const {
+  assert(block.payload.size() == block.size() * stored_bytes_);
   (void)block;
 }
 
 void OutputColumns::append_text(std::string& out, const PointBlock& block, std::size_t i,
                                 char separator) const {
-  const std::byte* raw = block.payload.data() + i * record_bytes_;
+  const std::byte* raw = block.payload.data() + i * stored_bytes_;
   for (const OutputColumn& column : columns_) {
     out += separator;
-    if (column.real) {
-      append_number(out, to_double(column.stored, raw) * column.scale + column.offset);
+    if (column.is_scaled) {
+      append_number(out, to_double(column.stored_type, raw) * column.scale + column.offset);
     } else {
-      with_type(column.stored, [&](auto value) {
+      with_type(column.stored_type, [&](auto value) {
         std::memcpy(&value, raw, sizeof value);
         append_number(out, value);
       });
     }
-    raw += size_of(column.stored);
+    raw += size_of(column.stored_type);
   }
 }
 
 char* OutputColumns::put_bytes(char* at, const PointBlock& block, std::size_t i) const {
-  const std::byte* raw = block.payload.data() + i * record_bytes_;
+  const std::byte* raw = block.payload.data() + i * stored_bytes_;
   for (const OutputColumn& column : columns_) {
-    if (column.real) {
-      at = store_little_endian(at, to_double(column.stored, raw) * column.scale + column.offset);
+    if (column.is_scaled) {
+      at = store_little_endian(at,
+                               to_double(column.stored_type, raw) * column.scale + column.offset);
     } else {
-      at = with_type(column.stored, [&](auto value) {
+      at = with_type(column.stored_type, [&](auto value) {
         std::memcpy(&value, raw, sizeof value);
         return store_little_endian(at, value);
       });
     }
-    raw += size_of(column.stored);
+    raw += size_of(column.stored_type);
   }
   return at;
 }

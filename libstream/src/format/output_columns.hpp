@@ -10,36 +10,37 @@
 
 namespace terrace::stream {
 
-/// The attributes of a stream being written to a file.
+/// The attributes of a stream as columns of an output file.
 class OutputColumns {
  public:
   explicit OutputColumns(std::span<const Channel> attributes);
 
   [[nodiscard]] std::size_t size() const { return columns_.size(); }
-  /// Returns the type in the file: the column's own, or float64 if real values are written.
-  [[nodiscard]] ScalarType type(std::size_t column) const { return columns_[column].written; }
-  /// Returns a name suitable for a header: unique, not empty, not x, y or z in either case, without
-  /// blanks and control characters.
+  /// Returns the type in the file: the attribute's type, or float64 if it has a scale or offset.
+  [[nodiscard]] ScalarType type(std::size_t column) const { return columns_[column].file_type; }
+  /// Returns a name suitable for a header: unique, not empty, without spaces or control characters,
+  /// and not x, y or z in lower or upper case.
   [[nodiscard]] const std::string& name(std::size_t column) const { return columns_[column].name; }
 
-  /// Asserts that the block has records of these columns.
-  void check(const PointBlock& block) const;
+  /// Asserts that the payload has the size of these columns.
+  void assert_matches(const PointBlock& block) const;
   /// Appends the values of point `i` as text, `separator` before each.
   void append_text(std::string& out, const PointBlock& block, std::size_t i, char separator) const;
   /// Returns the number of bytes that put_bytes() writes.
-  [[nodiscard]] std::size_t written_bytes() const { return written_bytes_; }
-  /// Writes the values of point `i` to `at` as little-endian bytes; returns their end.
+  [[nodiscard]] std::size_t written_bytes() const { return file_bytes_; }
+  /// Writes the values of point `i` to `at` as little-endian bytes. Returns the position after
+  /// them.
   char* put_bytes(char* at, const PointBlock& block, std::size_t i) const;
 
  private:
   struct OutputColumn {
     std::string name;
-    ScalarType stored, written;
+    ScalarType stored_type, file_type;
     double scale, offset;
-    bool real;  ///< whether scale and offset are applied
+    bool is_scaled;  ///< whether scale and offset are applied
   };
   std::vector<OutputColumn> columns_;
-  std::size_t record_bytes_ = 0, written_bytes_ = 0;
+  std::size_t stored_bytes_ = 0, file_bytes_ = 0;
 };
 
 }  // namespace terrace::stream

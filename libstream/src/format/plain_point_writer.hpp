@@ -20,7 +20,7 @@ class PlainPointWriter : public PointWriter {
       : sink_(path, options.replace, options.stop), columns_(header.attributes) {}
 
   [[nodiscard]] EncodedPtr encode(const PointBlock& block) const final {
-    columns_.check(block);
+    columns_.assert_matches(block);
     auto encoded = spares_.take();
     encoded->bytes.clear();
     put(block, encoded->bytes);

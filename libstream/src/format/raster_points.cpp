@@ -15,17 +15,17 @@
 namespace terrace::stream {
 namespace {
 
-/// A raster without georeferencing, with the cell size set by the caller.
-class WithCells final : public Raster {
+/// Gives a raster without georeferencing the caller's cell size.
+class RasterWithCellSize final : public Raster {
  public:
-  WithCells(std::unique_ptr<Raster> raster, double cell) : raster_(std::move(raster)) {
+  RasterWithCellSize(std::unique_ptr<Raster> raster, double cell) : raster_(std::move(raster)) {
     info_ = raster_->info();
     if (info_.world != kPlainWorld) {
-      throw Error(info_.files.front(), "is georeferenced, which sets its cell size")
+      throw Error(info_.files.front(), "is georeferenced, so its cell size is known")
           .remedy(message("leave {cell} out"));
     }
     std::erase(info_.comments, kNoGeoreferencing);
-    for (double& number : info_.world.xy) number *= cell;
+    for (double& coefficient : info_.world.xy) coefficient *= cell;
   }
 
   [[nodiscard]] const RasterInfo& info() const override { return info_; }
@@ -44,22 +44,24 @@ class WithCells final : public Raster {
 std::unique_ptr<PointSource> open_raster_points(std::span<const std::string> files,
                                                 const SourceOptions& options,
                                                 const OpenRaster& open) {
-  RasterOptions raster{.band = options.band,
-                       .memory_bytes = options.memory_bytes,
-                       .heights_of_colour = options.heights_of_colour};
+  RasterOptions raster_options{.band = options.band,
+                               .memory_bytes = options.memory_bytes,
+                               .heights_of_colour = options.heights_of_colour};
   const std::uint64_t window = window_bytes(options.memory_bytes);
-  raster.cache_bytes = window / 6;
+  // A sixth of the window's memory caches decoded blocks.
+  raster_options.cache_bytes = window / 6;
   const auto open_one = [open, cell = options.cell](const std::string& file,
-                                                    const RasterOptions& one) {
-    std::unique_ptr<Raster> found = open_with_aux_xml(open, file, one);
-    if (cell > 0) found = std::make_unique<WithCells>(std::move(found), cell);
-    return found;
+                                                    const RasterOptions& file_options) {
+    std::unique_ptr<Raster> raster = open_with_aux_xml(open, file, file_options);
+    if (cell > 0) raster = std::make_unique<RasterWithCellSize>(std::move(raster), cell);
+    return raster;
   };
-  if (files.size() == 1) return points_of(open_one(files.front(), raster), options);
+  if (files.size() == 1) return points_of(open_one(files.front(), raster_options), options);
   constexpr std::size_t kOpenAtOnce = 32;
-  raster.cache_bytes /= kOpenAtOnce / 4;  // few of them overlap one window
-  const RasterOpener opener = [raster, open_one](const std::string& file) {
-    return open_one(file, raster);
+  constexpr std::size_t kMaxOverlaps = 4;  // about as many open files overlap one window
+  raster_options.cache_bytes /= kOpenAtOnce / kMaxOverlaps;
+  const RasterOpener opener = [raster_options, open_one](const std::string& file) {
+    return open_one(file, raster_options);
   };
   return points_of(open_mosaic({files.begin(), files.end()}, opener, options.crs, kOpenAtOnce,
                                options.memory_bytes - window, options.same_crs),

@@ -330,7 +330,7 @@ class Verification {
         const std::uint64_t child = points.children[i * l + j];
         std::vector<bool>::reference headed = sums_[j].headed[static_cast<std::size_t>(child)];
         if (headed) {
-          problem(fmt::format("cluster {}/{} is headed twice", j, child));
+          problem(fmt::format("cluster {}/{} has two parent points", j, child));
         }
         headed = true;
         sums_[j].heads += hash_of(child, points.positions[i], payload,
@@ -375,12 +375,10 @@ class Verification {
       problem(levels_[l]->data().name(), 0,
               about_cluster(static_cast<unsigned>(l),
                             static_cast<std::uint64_t>(orphan - sums.headed.begin()),
-                            "no point above heads it"));
+                            "has no parent point"));
     } else if (sums.heads != sums.representatives) {
       problem(levels_[l]->data().name(), 0,
-              fmt::format(
-                  "the representatives of level {} are not the points above that head its clusters",
-                  l));
+              fmt::format("the representatives of level {} differ from their parent points", l));
     }
   }
 

@@ -321,8 +321,8 @@ std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& 
                                          options.on_damage);
 }
 
-RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
-                           const Octree& octree) {
+RecordParts copc_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
+                            const Octree& octree) {
   LazLayout layout{.vlr = laz_vlr(header, file->name())};
   if (layout.vlr.compressor != laz::Compressor::layered) {
     throw laz_fault(file->name(), "its points are not coded in layers, as COPC requires")

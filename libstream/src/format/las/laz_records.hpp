@@ -15,16 +15,17 @@
 
 namespace terrace::stream {
 
-/// Reads the records of a LAZ file. input: at the first byte after the header and VLRs. In a file
-/// with a chunk table, up to options.threads threads decode chunks ahead. From a pipe, without a
-/// table, or if chunks are too large for that, chunks are decoded one after the other. Throws:
-/// Error naming chunk and byte for damage, and if the layout cannot be read from a pipe.
+/// Reads the records of a LAZ file. input: positioned after the header and VLRs. In a file with a
+/// chunk table, up to options.threads threads decode chunks ahead. Without a chunk table, from a
+/// pipe, or if chunks do not fit into memory, decodes one chunk after the other. Throws: Error for
+/// damage, naming chunk and byte, and for a pipe whose layout needs random access.
 std::unique_ptr<RecordReader> open_laz_records(Input& input, const std::string& file,
                                                const LasHeader& header,
                                                const SourceOptions& options);
 
-/// One part per node of the octree, in its order. Throws: Error as open_laz_records().
-RecordParts laz_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
-                           const Octree& octree);
+/// Returns one part per node of the octree, in the octree's order. Throws: Error as
+/// open_laz_records().
+RecordParts copc_node_parts(std::unique_ptr<ByteSource> file, const LasHeader& header,
+                            const Octree& octree);
 
 }  // namespace terrace::stream

@@ -107,7 +107,7 @@ class LasOpener {
       Octree octree = read_copc_hierarchy(*bytes, header_.vlrs.front().data, header_.points_offset,
                                           header_.points);
       octree.keep(selection.region, selection.resolution, steps_of(stream_.info));
-      RecordParts parts = laz_node_parts(std::move(bytes), header_, octree);
+      RecordParts parts = copc_node_parts(std::move(bytes), header_, octree);
       if (selection.region) parts = parts_in_cubes(std::move(parts), octree, stream_, file_);
       stream_.records = records_of_parts(std::move(parts), options_);
       stream_.info.points = octree.points();

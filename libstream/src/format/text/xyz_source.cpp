@@ -31,10 +31,10 @@
 namespace terrace::stream {
 namespace {
 
-/// Reads a number and returns its end, null if there is none. If the type is a 64-bit integer,
-/// `value` gets its bits.
-const char* parse_number(const char* at, const char* end, ScalarType type, double& value) {
-  if (type == ScalarType::f64) return parse_real(at, end, value);
+/// Reads a number into the 64 bits of `cell` and returns its end, null if there is none. The bits
+/// are those of a double or, if the type is a 64-bit integer, of that integer.
+const char* parse_number(const char* at, const char* end, ScalarType type, double& cell) {
+  if (type == ScalarType::f64) return parse_real(at, end, cell);
   if (at != end && *at == '+') {
     ++at;
     if (at != end && *at == '-') return nullptr;
@@ -42,13 +42,13 @@ const char* parse_number(const char* at, const char* end, ScalarType type, doubl
   const auto parse = [&](auto number) -> const char* {
     const auto [rest, error] = std::from_chars(at, end, number);
     if (error != std::errc{}) return nullptr;
-    value = std::bit_cast<double>(number);
+    cell = std::bit_cast<double>(number);
     return rest;
   };
   return type == ScalarType::u64 ? parse(std::uint64_t{}) : parse(std::int64_t{});
 }
 
-/// True for what pandas and QGIS (nothing) and R (NA) write for a missing value. NaN is a number.
+/// True for a missing value: an empty field (pandas, QGIS) or NA (R). NaN counts as a number.
 bool is_missing_value(std::string_view field) {
   field = trim(unquoted(field));
   return field.empty() || field == "NA";
@@ -60,7 +60,7 @@ bool is_integer(std::string_view field) {
   return !field.empty() && field.find_first_not_of("0123456789") == field.npos;
 }
 
-/// True if `value` is the integer in `field`, not one near it.
+/// True if `value` is exactly the integer in `field`.
 bool is_exact(std::string_view field, double value) {
   field.remove_prefix(std::min(field.find_first_not_of("+-0"), field.size()));
   char digits[std::numeric_limits<double>::max_exponent10 + 2];
@@ -70,18 +70,22 @@ bool is_exact(std::string_view field, double value) {
   return field == std::string_view(digits, end);
 }
 
+/// The byte order mark of UTF-8, which may precede the text.
+constexpr std::string_view kUtf8Mark = "\xEF\xBB\xBF";
+
 /// Doubles hold every integer up to this one.
 constexpr std::int64_t kMaxExactInteger = std::int64_t{1} << 53;
 
 /// Properties of the first fields of a column.
 struct ColumnContent {
-  bool integers = true;  ///< all fields that are not empty are integers
-  bool empty = false;    ///< some fields are empty
-  bool large = false, negative = false, unsigned_alone = false;
+  bool integers = true;      ///< all fields that are not empty are integers
+  bool has_missing = false;  ///< some fields are empty
+  bool large = false, negative = false;
+  bool needs_unsigned = false;  ///< some integers fit only into 64 bits without a sign
 
   void add(std::string_view field) {
     if (is_missing_value(field)) {
-      empty = true;
+      has_missing = true;
       return;
     }
     integers = integers && is_integer(field);
@@ -93,18 +97,18 @@ struct ColumnContent {
       large = large || value > kMaxExactInteger || value < -kMaxExactInteger;
       negative = negative || value < 0;
     } else if (parse_number(field.data(), end, ScalarType::u64, bits) != nullptr) {
-      unsigned_alone = true;
+      needs_unsigned = true;
     }
   }
   [[nodiscard]] ScalarType type() const {
-    if (!integers || empty || !(large || unsigned_alone) || (unsigned_alone && negative)) {
+    if (!integers || has_missing || !(large || needs_unsigned) || (needs_unsigned && negative)) {
       return ScalarType::f64;
     }
-    return unsigned_alone ? ScalarType::u64 : ScalarType::i64;
+    return needs_unsigned ? ScalarType::u64 : ScalarType::i64;
   }
 };
 
-/// Reads a line of numbers of these types. Returns false if it has anything else.
+/// Reads a line of numbers of these types. Returns false for any other line.
 /// kSeparator: ',', ';' or a tab, or ' ' for runs of blanks. kReal: all types are f64.
 template <char kSeparator, bool kReal>
 bool parse_row(const char* at, const char* end, std::span<const ScalarType> types, double* row) {
@@ -150,12 +154,12 @@ ParseRow row_parser(char separator) {
 /// Reads points from lines of text.
 class XyzSource final : public PointSource {
  public:
-  /// first: the attributes of the first of several files, whose types all files must have.
-  XyzSource(const std::string& file, const SourceOptions& options, std::span<const Channel> first)
+  /// first_attributes: attributes of the first file. All files use their types.
+  XyzSource(const std::string& file, const SourceOptions& options,
+            std::span<const Channel> first_attributes)
       : input_(file, options.stop), lines_(input_), block_points_(options.block_points) {
-    constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
-    if (input_.fill(kByteOrderMark.size()).starts_with(kByteOrderMark)) {
-      input_.consume(kByteOrderMark.size());
+    if (input_.fill(kUtf8Mark.size()).starts_with(kUtf8Mark)) {
+      input_.consume(kUtf8Mark.size());
     }
     layout_ = read_text_layout(lines_, input_.name());
     row_.resize(layout_.columns);
@@ -176,12 +180,12 @@ class XyzSource final : public PointSource {
     integer_columns_.resize(layout_.columns);
     info_.comments = layout_.comments;
     const std::vector<std::string> needed = needed_attributes(info_, options.selection);
-    optional_.resize(layout_.columns);
+    is_ignored_.resize(layout_.columns);
     for (std::size_t i = 0; i < layout_.attributes.size(); ++i) {
-      optional_[layout_.attributes[i]] =
+      is_ignored_[layout_.attributes[i]] =
           std::find(needed.begin(), needed.end(), layout_.names[i]) == needed.end();
     }
-    choose_types(first);
+    choose_types(first_attributes);
     const bool real = std::all_of(types_.begin(), types_.end(),
                                   [](ScalarType type) { return type == ScalarType::f64; });
     parse_row_ = real ? row_parser<true>(layout_.separator) : row_parser<false>(layout_.separator);
@@ -204,12 +208,12 @@ class XyzSource final : public PointSource {
       if (!parse_row_(begin, end, types_, row_.data())) {
         const std::string_view text = trim_left(line);
         if (text.empty() || is_comment(text)) continue;
-        if (!parse_fields(line)) throw fault(line);
+        if (!parse_fields(line)) throw error_of_line(line);
       }
       const Point3 point{row_[ix], row_[iy], row_[iz]};
-      // A number minus itself is not zero only if it is infinite or NaN.
+      // x - x is 0 unless x is infinite or NaN.
       if (!((point[0] - point[0]) + (point[1] - point[1]) + (point[2] - point[2]) == 0.0)) {
-        if (is_infinite(point)) throw fault(line);
+        if (is_infinite(point)) throw error_of_line(line);
         ++nodata_;
         continue;
       }
@@ -253,11 +257,12 @@ class XyzSource final : public PointSource {
     }
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::string& unit = layout_.units[axis];
-      const bool known = axis < 2 && layout_.geographic ? unit == "degree" : is_length_unit(unit);
-      if (unit.empty() || known) continue;
-      info_.note += fmt::format(
-          "{}{} in the header, after the name of {}, is not a known unit and is ignored",
-          info_.note.empty() ? input_.name() + ": " : "; ", in_quotes(unit), "xyz"[axis]);
+      const bool is_valid =
+          axis < 2 && layout_.geographic ? unit == "degree" : is_length_unit(unit);
+      if (unit.empty() || is_valid) continue;
+      info_.note += fmt::format("{}the unit {} of {} in the header is unknown and ignored",
+                                info_.note.empty() ? input_.name() + ": " : "; ", in_quotes(unit),
+                                "xyz"[axis]);
     }
     if (!layout_.geographic && x != y && (is_length_unit(x) || is_length_unit(y))) {
       info_.note += (info_.note.empty() ? input_.name() + ": " : "; ") +
@@ -265,8 +270,8 @@ class XyzSource final : public PointSource {
     }
   }
   /// Makes columns 64-bit integers if the first lines have integers that doubles cannot hold.
-  void choose_types(std::span<const Channel> first) {
-    // About a hundred lines. This waits for a pipe, as recognising the format does.
+  void choose_types(std::span<const Channel> first_attributes) {
+    // About a hundred lines. Waits for them if the input is a pipe.
     constexpr std::size_t kHead = std::size_t{4} << 10;
     std::string_view head = input_.fill(kHead).substr(0, kHead);
     if (head.size() == kHead) head = head.substr(0, head.find_last_of("\r\n"));
@@ -282,12 +287,12 @@ class XyzSource final : public PointSource {
     }
     for (std::size_t i = 0; i < layout_.attributes.size(); ++i) {
       const std::size_t column = layout_.attributes[i];
-      if (optional_[column]) continue;
+      if (is_ignored_[column]) continue;
       Channel& attribute = info_.attributes[i];
-      const auto same = std::find_if(first.begin(), first.end(), [&](const Channel& other) {
-        return other.name == attribute.name;
-      });
-      attribute.type = same != first.end() ? same->type : contents[column].type();
+      const auto same =
+          std::find_if(first_attributes.begin(), first_attributes.end(),
+                       [&](const Channel& other) { return other.name == attribute.name; });
+      attribute.type = same != first_attributes.end() ? same->type : contents[column].type();
       types_[column] = attribute.type;
       integer_columns_[column] = contents[column].integers && attribute.type == ScalarType::f64;
     }
@@ -300,10 +305,8 @@ class XyzSource final : public PointSource {
     throw Error(input_.name(), fmt::format("column {}, {}, is an integer that a double cannot hold",
                                            column + 1, in_quotes(field)))
         .at_line(lines_.number())
-        .remedy(message(
-            "move this line to the top of the first file, which makes the column 64-bit integers "
-            "if all its values are integers and none is missing, or "
-            "leave the column out ({drop} of build and convert)"));
+        .remedy(message("move this line to the top of the first file, so that the column becomes "
+                        "64-bit integers, or drop the column with {drop}"));
   }
 
   /// Reads a line with fields that are empty, in quotes, or text that is not needed.
@@ -312,7 +315,7 @@ class XyzSource final : public PointSource {
     if (fields.size() != layout_.columns) return false;
     for (std::size_t i = 0; i < fields.size(); ++i) {
       if (parse_field(fields[i], types_[i], row_[i])) continue;
-      if (!optional_[i]) {
+      if (!is_ignored_[i]) {
         if (types_[i] != ScalarType::f64 || !is_missing_value(fields[i])) return false;
         if (!is_coordinate(i)) ++empty_fields_;
       }
@@ -331,7 +334,7 @@ class XyzSource final : public PointSource {
 
   /// Returns the error of a line that is not a point. The last return is for lines that only the
   /// fast parser rejects.
-  [[nodiscard]] Error fault(std::string_view line) const {
+  [[nodiscard]] Error error_of_line(std::string_view line) const {
     const auto line_error = [&](std::string cause) {
       return Error(input_.name(), std::move(cause)).at_line(lines_.number());
     };
@@ -339,7 +342,7 @@ class XyzSource final : public PointSource {
     if (fields.size() != layout_.columns) {
       return line_error(fmt::format("has {}, but the previous lines have {}",
                                     counted(fields.size(), "column"), layout_.columns))
-          .remedy("every line needs the same columns");
+          .remedy(fmt::format("give every line {}", counted(layout_.columns, "column")));
     }
     for (std::size_t i = 0; i < fields.size(); ++i) {
       const std::string_view field = fields[i];
@@ -347,12 +350,12 @@ class XyzSource final : public PointSource {
       const bool coordinate = is_coordinate(i);
       double value = 0;
       const bool real = types_[i] == ScalarType::f64, missing = is_missing_value(field);
-      if (!parse_field(field, types_[i], value) && !optional_[i] && !(real && missing)) {
+      if (!parse_field(field, types_[i], value) && !is_ignored_[i] && !(real && missing)) {
         const std::string cause =
             column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
         if (!real) {
-          return line_error(fmt::format("{} an integer that fits into {}, as the previous ones do",
-                                        cause, name_of(types_[i])))
+          return line_error(fmt::format("{} an integer of type {}, like the lines before it", cause,
+                                        name_of(types_[i])))
               .remedy(message("correct it, or leave the column out ({drop} of build and convert)"));
         }
         return line_error(cause + " a number that fits into a double")
@@ -376,9 +379,9 @@ class XyzSource final : public PointSource {
   std::size_t block_points_;
   TextLayout layout_;
   ParseRow parse_row_ = nullptr;
-  std::vector<double> row_;
-  std::vector<bool> optional_;         ///< columns that may contain anything
-  std::vector<ScalarType> types_;      ///< of the columns: f64, i64 or u64
+  std::vector<double> row_;            ///< 64 bits per column, see parse_number()
+  std::vector<bool> is_ignored_;       ///< columns that are not needed: any text is valid
+  std::vector<ScalarType> types_;      ///< one per column: f64, i64 or u64
   std::vector<bool> integer_columns_;  ///< columns of doubles that seem to be integers
   SourceInfo info_;
   std::uint64_t delivered_ = 0, nodata_ = 0, empty_values_ = 0;
@@ -393,7 +396,7 @@ bool recognise_xyz(std::span<const std::byte> head) {
     return byte >= 0x20 ? byte != 0x7f : c == '\n' || c == '\r' || c == '\t';
   };
   if (!std::all_of(text.begin(), text.end(), is_text)) return false;
-  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.starts_with(kUtf8Mark)) text.remove_prefix(kUtf8Mark.size());
   for (bool header_seen = false; !text.empty();) {
     const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
     const std::string_view line = trim_left(text.substr(0, end));
