@@ -20,7 +20,7 @@
 #include "store/read/index_page.hpp"
 
 /// Stores as bytes in memory that tests and fuzzers modify. update_checksums() recomputes all
-/// checksums, so that the code after their checks is reached.
+/// checksums, so that tests reach the code after the checksum tests.
 
 namespace terrace::stream::testing {
 
@@ -47,27 +47,30 @@ inline std::uint32_t crc32_of(const std::string& bytes, std::size_t begin, std::
   return store::crc32(0, bytes.data() + begin, end - begin);
 }
 
-/// Writes the CRC-32 of [begin, end - 4) after it.
-inline void sign(std::string& bytes, std::size_t begin, std::size_t end) {
+/// Coded sizes of a ChapterBox and a PageBox, in bytes: two numbers per axis.
+inline constexpr std::size_t kChapterBoxBytes = 12, kPageBoxBytes = 6;
+
+/// Writes the CRC-32 of [begin, end - 4) to the last four bytes.
+inline void put_crc32(std::string& bytes, std::size_t begin, std::size_t end) {
   const std::uint32_t checksum = crc32_of(bytes, begin, end - 4);
   std::memcpy(bytes.data() + end - 4, &checksum, 4);
 }
 
-/// A part of the index: its begin, and its end including the checksum.
+/// A byte range of the index, including its checksum.
 struct Part {
   std::size_t begin = 0, end = 0;
 };
 
-/// The index and data of a level, with the parts that can be found.
+/// The two files of a level, and the parts of the index that are intact.
 struct LevelBytes {
   std::string& data;
   std::string& index;
   std::size_t clusters = 0, directory_bytes = 0;
   store::Layout layout;
-  std::vector<Part> page_parts{}, contents{}, sets{};
-  std::vector<std::uint64_t> set_firsts{};  ///< the first clusters of the sets
+  std::vector<Part> pages{}, chapters{}, table_sets{};
+  std::vector<std::uint64_t> set_first_clusters{};
 
-  [[nodiscard]] std::size_t pages() const {
+  [[nodiscard]] std::size_t page_count() const {
     return (clusters + layout.page_clusters() - 1) / layout.page_clusters();
   }
   [[nodiscard]] std::size_t directory() const { return index.size() - directory_bytes; }
@@ -82,64 +85,69 @@ struct LevelBytes {
   /// Returns the tables of the page's first cluster. Throws: Damage.
   [[nodiscard]] store::Tables tables_of(std::size_t page) const {
     std::size_t set = 0;
-    while (set + 1 < sets.size() && set_firsts[set + 1] <= layout.page_clusters() * page) ++set;
-    if (sets.empty()) throw store::Damage("no tables");
-    const store::ByteView found = bytes(sets[set]);
-    return store::Tables::read(found.first(found.size() - 4), layout);
+    const std::uint64_t first_cluster = layout.page_clusters() * page;
+    while (set + 1 < table_sets.size() && set_first_clusters[set + 1] <= first_cluster) ++set;
+    if (table_sets.empty()) throw store::Damage("no tables");
+    const store::ByteView tables = bytes(table_sets[set]);
+    return store::Tables::read(tables.first(tables.size() - 4), layout);
   }
 
-  /// Writes the checksum of a page.
-  void sign_page(std::size_t page) {
-    const Part part = page_parts[page];
+  /// Recomputes the checksum of a page.
+  void put_page_crc16(std::size_t page) {
+    const Part part = pages[page];
     const std::uint16_t checksum = store::crc16(bytes({part.begin, part.end - 2}));
     std::memcpy(&index[part.end - 2], &checksum, 2);
   }
-  /// Finds the parts, as far as the bytes are valid.
-  void find() {
+  /// Locates the parts, up to the first invalid byte.
+  void locate_parts() {
     try {
       store::ByteReader in(bytes({directory(), index.size()}));
-      find_parts(in);
+      locate_parts(in);
     } catch (const store::Damage&) {
     }
   }
 
  private:
-  Part part(std::uint64_t begin, std::uint64_t bytes, std::uint64_t min_bytes) const {
-    if (bytes < min_bytes || begin > index.size() || bytes > index.size() - begin)
-      throw store::Damage("not in the file");
+  /// Returns the part of `bytes` bytes from `begin` on. Throws: Damage.
+  [[nodiscard]] Part checked_part(std::uint64_t begin, std::uint64_t bytes,
+                                  std::uint64_t min_bytes) const {
+    if (bytes < min_bytes || begin > index.size() || bytes > index.size() - begin) {
+      throw store::Damage("exceeds the file");
+    }
     return {static_cast<std::size_t>(begin), static_cast<std::size_t>(begin + bytes)};
   }
-  void find_parts(store::ByteReader& in) {
-    const std::size_t chapters = (pages() + store::kChapterPages - 1) / store::kChapterPages;
-    std::uint64_t at = 0;
-    std::vector<std::uint64_t> of_contents;
-    for (std::size_t c = 0; c < chapters; ++c) {
-      at = part(at, in.varint(), 0).end;
-      of_contents.push_back(in.varint());
-      in.take(12);
+  void locate_parts(store::ByteReader& in) {
+    const std::size_t chapter_count =
+        (page_count() + store::kChapterPages - 1) / store::kChapterPages;
+    std::uint64_t offset = 0;
+    std::vector<std::uint64_t> chapter_sizes;
+    for (std::size_t c = 0; c < chapter_count; ++c) {
+      offset = checked_part(offset, in.varint(), 0).end;
+      chapter_sizes.push_back(in.varint());
+      in.take(kChapterBoxBytes);
     }
-    for (const std::uint64_t size : of_contents) {
-      contents.push_back(part(at, size, 4));
-      at += size;
+    for (const std::uint64_t size : chapter_sizes) {
+      chapters.push_back(checked_part(offset, size, 4));
+      offset += size;
     }
     for (auto remaining = in.varint(); remaining > 0; --remaining) {
-      set_firsts.push_back(in.varint());
-      sets.push_back(part(at, in.varint() + 4, 4));
-      at = sets.back().end;
+      set_first_clusters.push_back(in.varint());
+      table_sets.push_back(checked_part(offset, in.varint() + 4, 4));
+      offset = table_sets.back().end;
     }
-    std::uint64_t page_at = 0;
-    for (const Part& chapter : contents) {
-      store::ByteReader of(bytes(chapter).first(chapter.end - chapter.begin - 4));
-      for (std::size_t p = 0; p < store::kChapterPages && page_parts.size() < pages(); ++p) {
-        page_parts.push_back(part(page_at, of.varint(), 4));
-        page_at = page_parts.back().end;
-        of.take(6);
+    std::uint64_t page_offset = 0;
+    for (const Part& chapter : chapters) {
+      store::ByteReader chapter_reader(bytes(chapter).first(chapter.end - chapter.begin - 4));
+      for (std::size_t p = 0; p < store::kChapterPages && pages.size() < page_count(); ++p) {
+        pages.push_back(checked_part(page_offset, chapter_reader.varint(), 4));
+        page_offset = pages.back().end;
+        chapter_reader.take(kPageBoxBytes);
       }
     }
   }
 };
 
-/// The parts of an index, which can be changed and put together again.
+/// An index split into its parts, which tests edit and reassemble.
 struct IndexParts {
   struct Page {
     std::string bytes, box;
@@ -153,30 +161,30 @@ struct IndexParts {
       return level.index.substr(part.begin, part.end - part.begin);
     };
     store::ByteReader in(level.bytes({level.directory(), level.index.size()}));
-    for (const Part& chapter : level.contents) {
-      in.varint();
-      in.varint();
-      chapter_boxes.emplace_back(level.index, level.directory() + in.offset(), 12);
-      in.take(12);
-      store::ByteReader of(level.bytes(chapter));
-      while (of.remaining() > 4) {
-        of.varint();
-        const std::string box(level.index, chapter.begin + of.offset(), 6);
-        of.take(6);
-        pages.push_back({text(level.page_parts[pages.size()]), box});
+    for (const Part& chapter : level.chapters) {
+      in.varint();  // size of the pages
+      in.varint();  // size of the contents
+      chapter_boxes.emplace_back(level.index, level.directory() + in.offset(), kChapterBoxBytes);
+      in.take(kChapterBoxBytes);
+      store::ByteReader chapter_reader(level.bytes(chapter));
+      while (chapter_reader.remaining() > 4) {
+        chapter_reader.varint();
+        const std::string box(level.index, chapter.begin + chapter_reader.offset(), kPageBoxBytes);
+        chapter_reader.take(kPageBoxBytes);
+        pages.push_back({text(level.pages[pages.size()]), box});
       }
     }
-    for (std::size_t s = 0; s < level.sets.size(); ++s) {
-      const std::string set = text(level.sets[s]);
-      sets.emplace_back(level.set_firsts[s], set.substr(0, set.size() - 4));
+    for (std::size_t s = 0; s < level.table_sets.size(); ++s) {
+      const std::string set = text(level.table_sets[s]);
+      sets.emplace_back(level.set_first_clusters[s], set.substr(0, set.size() - 4));
     }
   }
-  /// Sets the index and directory_bytes of `level`.
+  /// Writes the parts to the index of `level` and sets directory_bytes.
   void assemble(LevelBytes& level) const {
     std::string all_pages, all_contents, all_sets;
     store::Bytes directory;
-    const auto append = [](std::string& to, const store::Bytes& bytes) {
-      to.append(bytes.begin(), bytes.end());
+    const auto append = [](std::string& text, const store::Bytes& bytes) {
+      text.append(bytes.begin(), bytes.end());
     };
     for (std::size_t c = 0; c < chapter_boxes.size(); ++c) {
       store::Bytes contents;
@@ -209,8 +217,9 @@ struct IndexParts {
   }
 };
 
+/// Recomputes the checksums of a page and its clusters. Does nothing if the page is damaged.
 inline void update_cluster_checksums(LevelBytes& level, std::size_t page) {
-  const Part part = level.page_parts[page];
+  const Part part = level.pages[page];
   try {
     const store::Tables tables = level.tables_of(page);
     const store::DecodingTables decoding(tables);
@@ -230,17 +239,17 @@ inline void update_cluster_checksums(LevelBytes& level, std::size_t page) {
     store::PageContent{coded.offset, coded.entries,
                        store::read_ranges(coded.ranges, clusters, level.layout, decoding)}
         .write(level.layout, store::EncodingTables(tables), encoded);
+    // A page whose coded length changes keeps the old checksums of its clusters.
     if (encoded.size() == part.end - part.begin) {
       std::memcpy(&level.index[part.begin], encoded.data(), encoded.size());
     }
   } catch (const store::Damage&) {
     return;  // not a page
   }
-  level.sign_page(page);
+  level.put_page_crc16(page);
 }
 
-/// Visits the levels whose files exist. manifest: as JSON; its sizes of directories and numbers of
-/// clusters may be wrong.
+/// Calls use() for each level whose files exist. The manifest may be invalid.
 inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
                            const std::function<void(LevelBytes&, nlohmann::ordered_json&)>& use) {
   if (!manifest.contains("levels") || !manifest["levels"].is_array()) return;
@@ -266,7 +275,7 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
       LevelBytes bytes{data->second, index->second, level.at("clusters").get<std::size_t>(),
                        segment.at("directory_bytes").get<std::size_t>(), layout};
       if (bytes.directory_bytes < 4 || bytes.directory_bytes > bytes.index.size()) continue;
-      bytes.find();
+      bytes.locate_parts();
       use(bytes, segment);
     } catch (const nlohmann::json::exception&) {
       continue;  // not a level
@@ -274,20 +283,20 @@ inline void for_each_level(StoreFiles& files, nlohmann::ordered_json& manifest,
   }
 }
 
-/// Corrects sizes and checksums: of clusters, pages, directories, files and the manifest. Files too
-/// damaged to locate their parts stay as they are.
+/// Recomputes the sizes and checksums of clusters, pages, directories, files and the manifest.
+/// Leaves files alone whose parts cannot be located.
 inline void update_checksums(StoreFiles& files) {
   std::string& text = files[kManifestName];
   auto manifest = nlohmann::ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!manifest.is_object()) return;
   for_each_level(files, manifest, [](LevelBytes& level, nlohmann::ordered_json& segment) {
-    for (std::size_t page = 0; page < level.page_parts.size(); ++page) {
-      level.sign_page(page);
+    for (std::size_t page = 0; page < level.pages.size(); ++page) {
+      level.put_page_crc16(page);
       update_cluster_checksums(level, page);
     }
-    for (const Part& part : level.contents) sign(level.index, part.begin, part.end);
-    for (const Part& part : level.sets) sign(level.index, part.begin, part.end);
-    sign(level.index, level.directory(), level.index.size());
+    for (const Part& part : level.chapters) put_crc32(level.index, part.begin, part.end);
+    for (const Part& part : level.table_sets) put_crc32(level.index, part.begin, part.end);
+    put_crc32(level.index, level.directory(), level.index.size());
     for (const auto& [name, bytes] :
          {std::pair<const char*, const std::string&>{"data", level.data}, {"index", level.index}}) {
       segment[name]["bytes"] = bytes.size();
@@ -298,7 +307,7 @@ inline void update_checksums(StoreFiles& files) {
   text = manifest.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
   constexpr std::size_t kDigitsFromEnd = 12;  // eight digits, a quote, newline, brace, newline
   const std::string checksum = store::hexadecimal(crc32_of(text, 0, text.size()));
-  // If an edit has put a key after the checksum, the manifest keeps a wrong checksum.
+  // Requires that the checksum is the last key; otherwise it stays wrong.
   text.replace(text.size() - kDigitsFromEnd, 8, checksum);
 }
 
@@ -311,8 +320,8 @@ inline void edit_manifest(StoreFiles& files,
   update_checksums(files);
 }
 
-/// Calls edit(entries, offset of the first in the data file) for a page of a level, writes the
-/// result, moves the bytes after it, and updates the checksums.
+/// Calls edit(entries, offset) for a page of a level, rebuilds the index and updates the checksums.
+/// offset: of the first cluster in the data file.
 inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
                       const std::function<void(std::vector<store::Entry>&, std::uint64_t&)>& edit) {
   auto manifest = nlohmann::ordered_json::parse(files[kManifestName]);
@@ -321,7 +330,7 @@ inline void edit_page(StoreFiles& files, unsigned level, std::size_t page,
     if (number++ != level) return;
     const store::Tables tables = bytes.tables_of(page);
     const store::DecodingTables decoding(tables);
-    const store::IndexPage old(bytes.bytes(bytes.page_parts[page]), bytes.clusters_of(page),
+    const store::IndexPage old(bytes.bytes(bytes.pages[page]), bytes.clusters_of(page),
                                bytes.layout, decoding);
     std::vector<store::Entry> entries;
     for (std::uint32_t i = 0; i < old.clusters(); ++i) entries.push_back(old.entry(i));

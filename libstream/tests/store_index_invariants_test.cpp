@@ -166,16 +166,16 @@ TEST(StoreInvariants, RefusesInvalidDirectories) {
       store::ByteReader in(level.bytes({level.directory(), level.index.size()}));
       if (field > kPages) in.varint();
       if (field > kContents) in.varint();
-      if (field > kContents) in.take(12);
+      if (field > kContents) in.take(testing::kChapterBoxBytes);
       if (field > kSets) in.varint();
       level.index[level.directory() + in.offset()] = byte;
     };
   };
   const auto parts = [](const std::function<void(testing::IndexParts&)>& edit) -> Edit {
     return [edit](testing::LevelBytes& level) {
-      testing::IndexParts found(level);
-      edit(found);
-      found.assemble(level);
+      testing::IndexParts index(level);
+      edit(index);
+      index.assemble(level);
     };
   };
   const auto more = [](std::size_t bytes) -> Edit {
@@ -204,7 +204,7 @@ TEST(StoreInvariants, RefusesInvalidDirectories) {
 TEST(StoreInvariants, RefusesInvalidContentsOfChapters) {
   for (const int more : {-1, 1}) {
     const StoreFiles files = with_edited_index([&](testing::LevelBytes& level) {
-      char& size_of_first = level.index[level.contents[0].begin];
+      char& size_of_first = level.index[level.chapters[0].begin];
       size_of_first = static_cast<char>(size_of_first + more);
     });
     testing::expect_unreadable(files, "the sizes of a chapter's pages do not add up");

@@ -21,25 +21,29 @@
 namespace terrace::stream::store {
 namespace {
 
+/// Bytes that OutputFile buffers.
 constexpr std::size_t kBufferSize = 1u << 18;
 
-Error failed(const std::filesystem::path& path, const char* action) {
+/// Returns an error with the cause and the meaning of errno.
+Error errno_error(const std::filesystem::path& path, const char* cause) {
   const int number = errno;
-  return system_error(path.string(), action, number, remedy_for(number));
+  return system_error(path.string(), cause, number, remedy_for(number));
 }
 
-/// Blocks of at most this many bytes are looked up among earlier ones.
+/// Blocks up to this size in bytes are deduplicated against earlier blocks of the segment.
 constexpr std::size_t kMaxSharedBytes = 1024;
 /// Maximum number of training blocks that are used to choose how columns are coded. Rasters have
 /// columns only above level 0, where the choice matters little.
 constexpr std::size_t kTrialBlocks = 8, kRasterTrialBlocks = 2;
-/// All blocks of a level are written in the order that is best for the first ones. Their sizes are
-/// only an estimate, so keeping the points' sequence must save more than this share of the bits.
-constexpr std::uint64_t kOrderShare = 64;
-/// Number of 64-bit attributes, from the first, that are tried as guides.
+/// The first blocks decide the point order of the whole level. Keeping the input order must save
+/// more than 1/kMinOrderGainDivisor of the bits, because the sizes of the first blocks are only an
+/// estimate.
+constexpr std::uint64_t kMinOrderGainDivisor = 64;
+/// Number of 64-bit attributes, from the first, that are tried as guides (see Guide).
 constexpr std::size_t kMaxGuides = 2;
-/// At least one in this many differences of a guide begins a line, and at least as many do not.
-constexpr std::uint64_t kMinShare = 50;
+/// A threshold separates scan lines only if at least 1/kMinSideDivisor of the differences are on
+/// either side of it.
+constexpr std::uint64_t kMinSideDivisor = 50;
 
 template <class Box>
 void put_box(Bytes& out, const Box& box) {
@@ -53,10 +57,10 @@ std::string file_name(unsigned level, const char* what) {
   return fmt::format("level-{}.0.{}", level, what);
 }
 
-void add(const Counts& counts, Counts& to) {
-  to.resize(std::max(to.size(), counts.size()));
+void add_to(Counts& total, const Counts& counts) {
+  total.resize(std::max(total.size(), counts.size()));
   for (std::size_t c = 0; c < counts.size(); ++c) {
-    for (unsigned s = 0; s < kSymbols; ++s) to[c][s] += counts[c][s];
+    for (unsigned s = 0; s < kSymbols; ++s) total[c][s] += counts[c][s];
   }
 }
 
@@ -77,7 +81,7 @@ Descriptor::~Descriptor() {
 OutputFile::OutputFile(std::filesystem::path path, std::filesystem::path shown)
     : path_(std::move(path)), shown_(std::move(shown)) {
   fd_ = Descriptor(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (!fd_.open()) throw failed(shown_, "cannot be created");
+  if (!fd_.open()) throw errno_error(shown_, "cannot be created");
   buffer_.reserve(kBufferSize);
 }
 
@@ -95,7 +99,7 @@ void OutputFile::flush() {
   while (remaining > 0) {
     const ssize_t written = ::write(fd_.get(), next, remaining);
     if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw failed(shown_, "cannot be written");
+    if (written < 0) throw errno_error(shown_, "cannot be written");
     next += written;
     remaining -= static_cast<std::size_t>(written);
   }
@@ -112,8 +116,8 @@ void OutputFile::flush() {
 void OutputFile::finish() {
   flush();
   const FileSizeSignalBlock no_signal;
-  if (::fsync(fd_.get()) != 0) throw failed(shown_, "cannot be synced");
-  if (::close(fd_.release()) != 0) throw failed(shown_, "cannot be closed");
+  if (::fsync(fd_.get()) != 0) throw errno_error(shown_, "cannot be synced");
+  if (::close(fd_.release()) != 0) throw errno_error(shown_, "cannot be closed");
 }
 
 LevelWriter::LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
@@ -132,12 +136,11 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
     segment_start_ = clusters_;
   }
   ++blocks_;
-  const std::uint64_t ordinal = clusters_;
+  const std::uint64_t first_cluster = clusters_;
   clusters_ += block.clusters;
 
   if (block.raw == nullptr && block.tables != tables_) {
-    // The block was encoded ahead of its turn with tables of the previous segment, so it is
-    // decoded.
+    // Encoded with the tables of the previous segment: decode it.
     block.raw =
         std::make_unique<RawBlock>(decoded_block(layout_, block.tables->tables, block.bytes,
                                                  block.entries, std::move(block.summaries), root));
@@ -145,7 +148,7 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
   if (tables_ == nullptr) {
     training_blocks_.push_back(std::move(*block.raw));
     if (training_blocks_.size() == kTrainingBlocks) train();
-    return ordinal;
+    return first_cluster;
   }
   if (block.raw != nullptr) {
     block.bytes.clear();
@@ -157,7 +160,7 @@ std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
                              block.ranges);
   }
   write(block);
-  return ordinal;
+  return first_cluster;
 }
 
 std::uint64_t LevelWriter::Trial::bits() const {
@@ -174,33 +177,33 @@ std::uint64_t LevelWriter::bits_of_column(const Counts& counts, unsigned column)
   return bits;
 }
 
-template <class Count>
-void LevelWriter::each_block(std::size_t step, Count&& count) {
+template <class Visit>
+void LevelWriter::for_every(std::size_t step, Visit&& visit) {
   team_.run((training_blocks_.size() + step - 1) / step, [&](std::size_t i, std::size_t worker) {
     const ClusteredBlock view = training_blocks_[i * step].view();
     encoders_[worker].load(layout_, view);
-    count(encoders_[worker], worker);
+    visit(encoders_[worker], worker);
   });
 }
 
-std::vector<LevelWriter::Trial> LevelWriter::count(const Predictor& predictor,
-                                                   std::span<const Columns> columns,
-                                                   std::size_t step) {
+std::vector<LevelWriter::Trial> LevelWriter::count_symbols(const Predictor& predictor,
+                                                           std::span<const Columns> columns,
+                                                           std::size_t step) {
   std::vector<std::vector<Trial>> parts(encoders_.size(), std::vector<Trial>(columns.size()));
-  each_block(step, [&](BlockEncoder& encoder, std::size_t worker) {
+  for_every(step, [&](BlockEncoder& encoder, std::size_t worker) {
     for (std::size_t i = 0; i < columns.size(); ++i) {
       Trial& part = parts[worker][i];
       part.raw_bits += encoder.count(predictor, columns[i], part.counts);
     }
   });
-  std::vector<Trial> all(columns.size());
+  std::vector<Trial> sums(columns.size());
   for (const std::vector<Trial>& part : parts) {
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      add(part[i].counts, all[i].counts);
-      all[i].raw_bits += part[i].raw_bits;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      add_to(sums[i].counts, part[i].counts);
+      sums[i].raw_bits += part[i].raw_bits;
     }
   }
-  return all;
+  return sums;
 }
 
 /// Returns the step between the blocks that are used to choose how columns are coded.
@@ -210,21 +213,22 @@ std::size_t LevelWriter::trial_step() const {
   return (training_blocks_.size() + count_limit - 1) / count_limit;
 }
 
-bool LevelWriter::possible(ColumnKind kind, unsigned column, const Guide& guide) const {
+bool LevelWriter::is_allowed(ColumnKind kind, unsigned column, const Guide& guide) const {
   if (column == guide.attribute) return kind == ColumnKind::plain || kind == ColumnKind::recent;
   if (along_line(kind) == ColumnKind::preceding && !layout_.may_use_preceding(column)) return false;
   return guide.exists() || static_cast<unsigned>(kind) < kUnguidedKinds;
 }
 
-/// Returns attributes that may be guides. Times are doubles or 64-bit integers. Points of scanners
-/// are microseconds apart, their lines milliseconds, so differences are taken for jumps above the
-/// rarest size, if there are enough on either side.
+/// Returns attributes that may be guides. Candidates are 64-bit attributes, such as GPS times.
+/// Points of a scan line are microseconds apart, lines are milliseconds apart. So the threshold is
+/// the least frequent size of difference, if enough differences are on either side.
 std::vector<Guide> LevelWriter::find_guides() {
   std::vector<unsigned> attributes;
   for (unsigned a = 0; a < layout_.attributes.size() && attributes.size() < kMaxGuides; ++a) {
     if (size_of(layout_.attributes[a]) == sizeof(double)) attributes.push_back(a);
   }
-  std::vector<std::array<std::uint64_t, 65>> widths(attributes.size());
+  constexpr unsigned kWidths = 65;  // a difference of 64 bits has 0 to 64 significant bits
+  std::vector<std::array<std::uint64_t, kWidths>> widths(attributes.size());
   const std::size_t step = (training_blocks_.size() + kTrialBlocks - 1) / kTrialBlocks;
   for (std::size_t b = 0; b < training_blocks_.size() && !attributes.empty(); b += step) {
     const ClusteredBlock view = training_blocks_[b].view();
@@ -235,16 +239,18 @@ std::vector<Guide> LevelWriter::find_guides() {
   }
   std::vector<Guide> guides;
   for (std::size_t i = 0; i < attributes.size(); ++i) {
-    const std::uint64_t all =
+    const std::uint64_t total =
         std::accumulate(widths[i].begin() + 1, widths[i].end(), std::uint64_t{0});
     std::uint64_t below = 0, minimum = UINT64_MAX;
     Guide guide;
-    for (unsigned width = 1; width < 63; ++width) {
+    // Thresholds 2^width, with widths on either side.
+    for (unsigned width = 1; width + 2 < kWidths; ++width) {
       below += widths[i][width];
-      const std::uint64_t near = widths[i][width] + widths[i][width + 1];
-      const bool divides = below >= all / kMinShare && all - below >= all / kMinShare;
-      if (!divides || below == 0 || below == all || near >= minimum) continue;
-      minimum = near;
+      const std::uint64_t at_threshold = widths[i][width] + widths[i][width + 1];
+      const std::uint64_t min_side = std::max<std::uint64_t>(total / kMinSideDivisor, 1);
+      const bool separates = below >= min_side && total - below >= min_side;
+      if (!separates || at_threshold >= minimum) continue;
+      minimum = at_threshold;
       guide = {attributes[i], std::uint64_t{1} << width};
     }
     if (guide.exists()) guides.push_back(guide);
@@ -252,8 +258,8 @@ std::vector<Guide> LevelWriter::find_guides() {
   return guides;
 }
 
-/// Chooses the kind of each column that takes the fewest bits, with the guide that saves the most;
-/// the first time also the order of points.
+/// Chooses the kind of each column that takes the fewest bits, and the guide that saves the most.
+/// The first call also fixes the point order of the level.
 void LevelWriter::choose_columns(Tables& tables) {
   tables.kinds.assign(layout_.columns(), ColumnKind::plain);
   if (layout_.attributes.empty() && !layout_.has_point_columns()) {
@@ -261,19 +267,19 @@ void LevelWriter::choose_columns(Tables& tables) {
     return;
   }
   std::vector<Guide> guides = find_guides();
-  guides.emplace(guides.begin());
+  guides.emplace(guides.begin());  // no guide
   std::vector<Columns> choices;
   for (const bool sequence : {false, true}) {
     const bool is_fixed = sequence_ || !layout_.has_point_columns();
     if (is_fixed && sequence != sequence_.value_or(false)) continue;
     for (const Guide& guide : guides) choices.push_back({sequence, guide, tables.kinds});
   }
-  const std::vector<Trial> trials = count(tables.predictor, choices, trial_step());
+  const std::vector<Trial> trials = count_symbols(tables.predictor, choices, trial_step());
   std::uint64_t minimum = UINT64_MAX;
   std::size_t best = 0;
   for (std::size_t i = 0; i < choices.size(); ++i) {
     std::uint64_t bits = trials[i].bits();
-    if (choices[i].sequence) bits += bits / kOrderShare;
+    if (choices[i].sequence) bits += bits / kMinOrderGainDivisor;
     if (bits >= minimum) continue;
     minimum = bits;
     best = i;
@@ -283,27 +289,28 @@ void LevelWriter::choose_columns(Tables& tables) {
   choose_kinds(tables, trials[best].counts);
 }
 
-/// plain: the counts with all columns coded as ColumnKind::plain.
-void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
-  std::vector<std::vector<ColumnKind>> possible_kinds(layout_.columns());
+/// Chooses the kind of each column. plain_counts: the counts with all columns coded as
+/// ColumnKind::plain.
+void LevelWriter::choose_kinds(Tables& tables, const Counts& plain_counts) {
+  std::vector<std::vector<ColumnKind>> allowed_kinds(layout_.columns());
   for (unsigned c = 0; c < layout_.columns(); ++c) {
     for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
-      if (possible(static_cast<ColumnKind>(kind), c, tables.guide)) {
-        possible_kinds[c].push_back(static_cast<ColumnKind>(kind));
+      if (is_allowed(static_cast<ColumnKind>(kind), c, tables.guide)) {
+        allowed_kinds[c].push_back(static_cast<ColumnKind>(kind));
       }
     }
   }
-  std::vector<KindCounts> parts(encoders_.size(), {possible_kinds, {}});
-  each_block(trial_step(), [&](BlockEncoder& encoder, std::size_t worker) {
+  std::vector<KindCounts> parts(encoders_.size(), {allowed_kinds, {}});
+  for_every(trial_step(), [&](BlockEncoder& encoder, std::size_t worker) {
     encoder.count_kinds(tables.predictor, *sequence_, tables.guide, parts[worker]);
   });
   std::array<Counts, kColumnKinds> counts;
   for (unsigned kind = 1; kind < kColumnKinds; ++kind) {
-    for (const KindCounts& part : parts) add(part.counts[kind], counts[kind]);
+    for (const KindCounts& part : parts) add_to(counts[kind], part.counts[kind]);
   }
   for (unsigned c = 0; c < layout_.columns(); ++c) {
-    std::uint64_t minimum = bits_of_column(plain, c);
-    for (const ColumnKind kind : possible_kinds[c]) {
+    std::uint64_t minimum = bits_of_column(plain_counts, c);
+    for (const ColumnKind kind : allowed_kinds[c]) {
       const std::uint64_t bits = bits_of_column(counts[static_cast<std::size_t>(kind)], c);
       if (bits >= minimum) continue;
       minimum = bits;
@@ -314,12 +321,13 @@ void LevelWriter::choose_kinds(Tables& tables, const Counts& plain) {
 
 void LevelWriter::train() {
   encoders_.resize(team_.threads());
-  // If there are many blocks, counts only some of them, because other threads wait for this.
-  const bool many = training_blocks_.size() == kTrainingBlocks;
+  // Count only some of many blocks, because other threads wait.
+  const bool is_full_set = training_blocks_.size() == kTrainingBlocks;
+  const std::size_t fit_step = is_full_set ? 4 : 1, count_step = is_full_set ? 2 : 1;
   Tables tables;
   if (layout_.grid && layout_.level == 0) {
     PredictorFit sums;
-    for (std::size_t b = 0; b < training_blocks_.size(); b += many ? 4 : 1) {
+    for (std::size_t b = 0; b < training_blocks_.size(); b += fit_step) {
       const ClusteredBlock view = training_blocks_[b].view();
       encoders_.front().load(layout_, view);
       encoders_.front().fit(sums);
@@ -328,10 +336,10 @@ void LevelWriter::train() {
   }
   choose_columns(tables);
   const Columns columns{*sequence_, tables.guide, tables.kinds};
-  Counts counts = std::move(count(tables.predictor, {&columns, 1}, many ? 2 : 1)[0].counts);
-  // A symbol costs its table at least two bytes. If the tables serve only the counted blocks, a
-  // symbol that occurred once is not worth them.
-  const std::uint32_t minimum = many ? 1 : 2;
+  Counts counts = std::move(count_symbols(tables.predictor, {&columns, 1}, count_step)[0].counts);
+  // A symbol costs two bytes in the table, too much for one occurrence unless further blocks use
+  // the table.
+  const std::uint32_t minimum = is_full_set ? 1 : 2;
   for (const auto& context : counts) tables.frequencies.push_back(normalised(context, minimum));
 
   std::vector<PreparedBlock> prepared(training_blocks_.size());
@@ -361,7 +369,7 @@ void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& cou
   std::vector<Entry> entries;
   std::vector<KeyRange> ranges;
   const std::size_t attributes = layout_.attributes.size();
-  const auto enter = [&] {
+  const auto count_page = [&] {
     PageContent{0, PageColumns(entries), RangeColumns(ranges, layout_.attributes)}.count(layout_,
                                                                                          counts);
     entries.clear();
@@ -372,19 +380,19 @@ void LevelWriter::count_index(std::span<const PreparedBlock> blocks, Counts& cou
       entries.push_back(block.entries[i]);
       for (std::size_t a = 0; a < attributes; ++a)
         ranges.push_back(block.ranges[i * attributes + a]);
-      if (entries.size() == layout_.page_clusters()) enter();
+      if (entries.size() == layout_.page_clusters()) count_page();
     }
   }
-  if (!entries.empty()) enter();
+  if (!entries.empty()) count_page();
 }
 
 void LevelWriter::write(const PreparedBlock& block) {
-  std::uint64_t at = data_.size();
+  std::uint64_t offset = data_.size();
   bool is_shared = false;
   if (layout_.small() && block.bytes.size() <= kMaxSharedBytes) {
-    const auto [found, inserted] =
-        small_blocks_.try_emplace(std::string(block.bytes.begin(), block.bytes.end()), at);
-    at = found->second;
+    const auto [entry, inserted] =
+        small_blocks_.try_emplace(std::string(block.bytes.begin(), block.bytes.end()), offset);
+    offset = entry->second;
     is_shared = !inserted;
   }
   if (!is_shared) data_.write(block.bytes);
@@ -392,12 +400,12 @@ void LevelWriter::write(const PreparedBlock& block) {
   for (std::size_t i = 0; i < block.entries.size(); ++i) {
     if (page_.empty()) {
       page_tables_ = tables_;
-      page_offset_ = last_end_ = at;
+      page_offset_ = last_end_ = offset;
     }
     Entry entry = block.entries[i];
-    entry.jump = static_cast<std::int64_t>(at - last_end_);
+    entry.jump = static_cast<std::int64_t>(offset - last_end_);
     page_.push_back(entry);
-    last_end_ = at += entry.bytes;
+    last_end_ = offset += entry.bytes;
     const auto ranges = block.ranges.begin() + static_cast<std::ptrdiff_t>(i * attributes);
     page_ranges_.insert(page_ranges_.end(), ranges,
                         ranges + static_cast<std::ptrdiff_t>(attributes));
@@ -425,23 +433,24 @@ std::uint64_t LevelWriter::write_directory(const Box3& bounds) {
   for (std::size_t first = 0; first < pages_.size(); first += kChapterPages) {
     const auto pages = std::span(pages_).subspan(
         first, std::min<std::size_t>(kChapterPages, pages_.size() - first));
-    Box3 all;
-    std::uint64_t bytes = 0;
+    Box3 chapter_bounds;
+    std::uint64_t page_bytes = 0;
     for (const PageAt& page : pages) {
-      if (!page.box.empty()) all.include(page.box);
-      bytes += page.bytes;
+      if (!page.box.empty()) chapter_bounds.include(page.box);
+      page_bytes += page.bytes;
     }
-    const ChapterBox chapter = all.empty() ? ChapterBox() : ChapterBox::around(all, bounds);
-    Bytes contents;
+    const ChapterBox chapter =
+        chapter_bounds.empty() ? ChapterBox() : ChapterBox::around(chapter_bounds, bounds);
+    Bytes chapter_bytes;
     for (const PageAt& page : pages) {
-      put_varint(contents, page.bytes);
-      put_box(contents,
+      put_varint(chapter_bytes, page.bytes);
+      put_box(chapter_bytes,
               page.box.empty() ? PageBox() : PageBox::around(page.box, chapter.in(bounds)));
     }
-    put(contents, crc32(contents));
-    index_.write(contents);
-    put_varint(directory, bytes);
-    put_varint(directory, contents.size());
+    put(chapter_bytes, crc32(chapter_bytes));
+    index_.write(chapter_bytes);
+    put_varint(directory, page_bytes);
+    put_varint(directory, chapter_bytes.size());
     put_box(directory, chapter);
   }
   put_varint(directory, sets_.size());

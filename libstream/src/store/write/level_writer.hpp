@@ -123,16 +123,16 @@ class LevelWriter {
 
     [[nodiscard]] std::uint64_t bits() const;
   };
-  /// Calls `count` with an encoder for every step-th training block.
-  template <class Count>
-  void each_block(std::size_t step, Count&& count);
-  /// Counts every step-th training block, with each of these columns.
-  std::vector<Trial> count(const Predictor& predictor, std::span<const Columns> columns,
-                           std::size_t step);
+  /// Calls visit(encoder, worker) for every step-th training block.
+  template <class Visit>
+  void for_every(std::size_t step, Visit&& visit);
+  /// Counts the symbols of every step-th training block, with each of these columns.
+  std::vector<Trial> count_symbols(const Predictor& predictor, std::span<const Columns> columns,
+                                   std::size_t step);
   [[nodiscard]] std::size_t trial_step() const;
   [[nodiscard]] std::uint64_t bits_of_column(const Counts& counts, unsigned column) const;
-  void choose_kinds(Tables& tables, const Counts& plain);
-  [[nodiscard]] bool possible(ColumnKind kind, unsigned column, const Guide& guide) const;
+  void choose_kinds(Tables& tables, const Counts& plain_counts);
+  [[nodiscard]] bool is_allowed(ColumnKind kind, unsigned column, const Guide& guide) const;
   std::vector<Guide> find_guides();
   void choose_columns(Tables& tables);
   void train();
