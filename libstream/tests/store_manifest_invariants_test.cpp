@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "store_invariants_testing.hpp"
+#include "terrace/stream/source.hpp"
 
 namespace terrace::stream {
 namespace {

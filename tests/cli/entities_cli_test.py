@@ -184,7 +184,7 @@ class TrianglesTest(EntitiesCase):
         for name in (self.store, store):
             summary = json.loads(self.run_ok('render', name, '-o', self.path('soup.png'), '--force', '--json'))
             self.assertEqual(summary['triangles'], len(self.faces))
-            self.assertIn('(of the first corners)\n', self.run_ok('info', name))
+            self.assertIn('(first corner of each entity)\n', self.run_ok('info', name))
 
     def test_unusable_inputs_say_so(self):
         out = self.path('no.st')

@@ -313,9 +313,9 @@ class GeodesyTest(unittest.TestCase):
 
     def test_info_says_which_systems_count_as_wgs84(self):
         etrs = self.raster({1024: 1, 1025: 1, 3072: 25832, 3076: 9001, 4096: 5783})
-        self.assertIn('counts as WGS 84 within 1 m', self.ok('info', etrs))
+        self.assertIn('within 1 m of WGS 84', self.ok('info', etrs))
         self.assertEqual(self.info(etrs)['vertical'], 'orthometric')
-        self.assertIn('counts as WGS 84 within 1 m', self.ok('info', self.build(etrs)))
+        self.assertIn('within 1 m of WGS 84', self.ok('info', self.build(etrs)))
         with open(self.path('own.prj'), 'w', encoding='utf-8') as file:
             file.write(OWN_DATUM)
         own = self.raster({1025: 1}, name='own.tif')

@@ -153,7 +153,7 @@ class LasFormatTest(LasCase):
         withheld = sum(unpack_record(1, record)['withheld'] for record in records)
         path = self.put('w.las', las(1, records))
         self.assertEqual(self.info(path)['withheld'], withheld)
-        self.assertIn(f'withheld:  {withheld} of them', self.run_ok('info', path).decode())
+        self.assertIn(f'withheld:  {withheld} point', self.run_ok('info', path).decode())
         result = terrace('build', path, '-o', self.path('w.st'), '--json')
         self.assertIn(f'{withheld} points are marked as withheld', result.stderr.decode())
         self.assertEqual(json.loads(result.stdout)['withheld'], withheld)

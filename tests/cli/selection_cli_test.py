@@ -94,7 +94,7 @@ class SelectionTest(unittest.TestCase):
             self.assertEqual(result.returncode, 0, result.stderr)
             self.assertIn('3 points (2 without a coordinate left out)', result.stderr)
             self.assertEqual(json.loads(self.run_ok('info', store, '--json'))['nodata'], 2)
-            self.assertIn('3, and 2 without a coordinate', self.run_ok('info', file))
+            self.assertIn('3, and 2 without coordinates', self.run_ok('info', file))
             for keep in ('x > -1', 'z < 3'):
                 built = json.loads(self.run_ok('build', file, '--where', keep, '-o', store, '--force', '--json'))
                 self.assertEqual((built['points'] + built['excluded'], built['nodata']), (3, 2))
@@ -487,7 +487,7 @@ class SelectionTest(unittest.TestCase):
                 (['contour', self.path('all.st'), '-o', self.path('e.geojson'), '--interval', '1', '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
                 (['verify', self.path('all.st'), '--where', 'z > 1'], 2, 'are for tile sets'),
                 (['points', self.path('all.st'), '-o', self.path('e.csv'), '--where', 'class == 2'], 1, "no 'class'; known are x, y, z, classification"),
-                (['info', self.path('all.st'), self.file], 2, 'is a store: name it alone'),
+                (['info', self.path('all.st'), self.file], 2, 'is a store: pass it alone'),
                 (['info', self.path('all.st'), '--input-format', 'ply'], 2, '--input-format do not apply'),
                 (['mesh', self.path('all.st'), 'a', 'b', 'c', '-o', 'e.ply'], 2, "'a' and 2 more: no such argument or option"),
                 (['render', self.file, '-o', self.path('e.png'), '--where', 'z > 1'], 2, 'is not a store')):

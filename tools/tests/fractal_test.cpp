@@ -43,14 +43,14 @@ TEST(Fractal, StepEqualsRoughnessForAnyHurst) {
   for (const double hurst : {0.3, 0.5, 0.8, 0.95}) {
     for (const std::uint64_t seed : {1u, 2u}) {
       SCOPED_TRACE(hurst);
-      const Fractal fractal({.seed = seed, .hurst = hurst, .roughness = 2.65});
+      const Fractal fractal({.seed = seed, .hurst = hurst, .rms_step = 2.65});
       EXPECT_NEAR(rms_step(field(fractal, 2048, 2048), 2048) / 2.65, 1.0, 0.03);
     }
   }
 }
 
 TEST(Fractal, StepIncludesRounding) {
-  const Fractal fractal({.roughness = 1.5, .rounded = true});
+  const Fractal fractal({.rms_step = 1.5, .rounded = true});
   std::vector<float> heights = field(fractal, 2048, 1024);
   for (float& h : heights) h = std::nearbyint(h);
   EXPECT_NEAR(rms_step(heights, 2048) / 1.5, 1.0, 0.03);
@@ -72,8 +72,8 @@ TEST(Fractal, StaysWithinItsBound) {
   const Fractal fractal({.seed = 3, .hurst = 0.5});
   const std::vector<float> heights = field(fractal, 4096, 512);
   const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
-  EXPECT_LT(std::max(-*low, *high), 5 * fractal.deviation());
-  EXPECT_LT(5 * fractal.deviation(), fractal.bound());
+  EXPECT_LT(std::max(-*low, *high), 5 * fractal.standard_deviation());
+  EXPECT_LT(5 * fractal.standard_deviation(), fractal.bound());
 }
 
 TEST(Fractal, PiecesMatchTheFullField) {

@@ -138,8 +138,8 @@ void refuse_empty_values(const CLI::App& app) {
 
 /// Minimum --memory of a verb in MiB: the process itself and the smallest buffers. Verbs that need
 /// more for their input check that themselves.
-constexpr std::uint64_t kLeastMemory = 24;
-constexpr std::array<std::pair<std::string_view, std::uint64_t>, 6> kLeastMemoryOf{
+constexpr std::uint64_t kMinMemory = 24;
+constexpr std::array<std::pair<std::string_view, std::uint64_t>, 6> kMinMemoryOfVerbs{
     {{"cluster", 40},
      {"contour", 64},
      {"match", 40},
@@ -149,14 +149,14 @@ constexpr std::array<std::pair<std::string_view, std::uint64_t>, 6> kLeastMemory
 
 /// Refuses a --memory that is too small for any input.
 void check_memory(const Verb& verb, const CommonOptions& common) {
-  std::uint64_t least = kLeastMemory;
-  for (const auto& [name, mebibytes] : kLeastMemoryOf) {
-    if (name == verb.name) least = mebibytes;
+  std::uint64_t min_mebibytes = kMinMemory;
+  for (const auto& [name, mebibytes] : kMinMemoryOfVerbs) {
+    if (name == verb.name) min_mebibytes = mebibytes;
   }
-  if (!common.memory_bytes || *common.memory_bytes >= least << 20) return;
+  if (!common.memory_bytes || *common.memory_bytes >= min_mebibytes << 20) return;
   throw std::runtime_error(
       fmt::format("--memory is {}, but `terrace {}` needs {} MiB at least; raise --memory",
-                  readable_bytes(*common.memory_bytes), verb.name, least));
+                  readable_bytes(*common.memory_bytes), verb.name, min_mebibytes));
 }
 
 const Verb& find_verb(const std::string& name) {
@@ -347,12 +347,12 @@ std::string message_of(const std::exception& error) {
 double number_of_option(const std::string& name, const std::string& text,
                         const NumberRange& range) {
   const double value = parse_number(text, name);
-  if (value < range.least || (range.above_least && value == range.least) || value > range.most) {
-    std::string expected =
-        range.above_least ? "above " + plain_number(range.least)
-        : std::isinf(range.most)
-            ? "at least " + plain_number(range.least)
-            : fmt::format("from {} to {}", plain_number(range.least), plain_number(range.most));
+  if (value < range.min || (range.min_is_excluded && value == range.min) || value > range.max) {
+    const std::string expected =
+        range.min_is_excluded ? fmt::format("above {}", plain_number(range.min))
+        : std::isinf(range.max)
+            ? fmt::format("at least {}", plain_number(range.min))
+            : fmt::format("from {} to {}", plain_number(range.min), plain_number(range.max));
     throw UsageError(fmt::format("{} must be {}, not {}", name, expected, text));
   }
   return value;
@@ -403,7 +403,7 @@ void add_point_format(CLI::App& app, std::string& target) {
       ->type_name("NAME");
 }
 
-CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target) {
+CLI::Option* add_rgb_encoding(CLI::App& app, stream::HeightsOfColour& target) {
   return app
       .add_option_function<std::string>(
           "--rgb",
@@ -421,11 +421,11 @@ CLI::Option* add_skip_damaged(CLI::App& app, bool& target) {
                       "truncated LAS; count them");
 }
 
-CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target) {
+CLI::Option* add_source_cell_size(CLI::App& app, std::optional<double>& target) {
   return add_number(app, "--cell", target,
                     "cell size of rasters without georeferencing (PNG): the first cell's centre is "
                     "0,0, rows go down",
-                    kAboveZero);
+                    kPositive);
 }
 
 int run_command_line(int argc, const char* const* argv) {

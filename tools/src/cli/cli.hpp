@@ -20,8 +20,8 @@ class App;
 class Option;
 }  // namespace CLI
 
-/// The frame of the command line: the table of verbs, their common options, and error reporting.
-/// Each verb is one file, verb_NAME.cpp, with one Command.
+/// Framework of the command line: the table of verbs, their common options, and error reporting.
+/// Each verb is a Command in its own file, verb_NAME.cpp.
 
 namespace terrace::tools {
 
@@ -49,7 +49,7 @@ std::uint64_t peak_rss_bytes();
 
 /// Options common to all verbs.
 struct CommonOptions {
-  unsigned threads = 1;                       ///< --threads; all cores unless given
+  unsigned threads = 1;  ///< --threads; the command line's default is all cores
   std::optional<std::uint64_t> memory_bytes;  ///< --memory, if given
   std::uint64_t seed = 1;                     ///< --seed
   bool json = false;                          ///< --json
@@ -58,28 +58,28 @@ struct CommonOptions {
   bool force = false;                         ///< --force
   ProgressMode progress = ProgressMode::automatic;
 
-  /// Returns --memory in bytes, or the verb's default `standard` if it is not given. A default of 0
-  /// means half of the available memory.
-  [[nodiscard]] std::uint64_t memory_or(std::uint64_t standard) const;
-  /// Returns the bytes that a source may use: a `parts`-th of memory_or(0) less the program itself,
-  /// and at least 64 MiB. From 64 MiB on, the order of a raster's cells does not depend on it.
-  [[nodiscard]] std::uint64_t reading_memory(std::uint64_t parts = 1) const;
+  /// Returns --memory in bytes, or `default_bytes` if it is not given. 0 means half of the
+  /// available memory.
+  [[nodiscard]] std::uint64_t memory_or(std::uint64_t default_bytes) const;
+  /// Returns the memory for one source in bytes: memory_or(0) minus kProgramMemory, divided by
+  /// `divisor`, but at least 64 MiB. Above 64 MiB the amount does not change the order of a
+  /// raster's cells.
+  [[nodiscard]] std::uint64_t reading_memory(std::uint64_t divisor = 1) const;
   /// Prints a message on standard error, unless -q is given.
   void say(const stream::Message& line) const;
   /// Prints an explanation on standard error, only with -v.
-  void explain(const std::string& line) const;
+  void say_verbose(const std::string& line) const;
   /// Returns the context for the libraries: progress and notes go to standard error, and Ctrl-C
   /// requests a stop. These options must outlive it.
   [[nodiscard]] terrain::Context context() const;
 };
 
-/// Memory for the program itself, for what PROJ reads to identify a CRS, and for blocks in flight.
+/// Memory for the program, PROJ's CRS database and blocks in flight, in bytes.
 inline constexpr std::uint64_t kProgramMemory = std::uint64_t{32} << 20;
 /// Default --memory of `synth`.
 inline constexpr std::uint64_t kStreamingMemory = std::uint64_t{256} << 20;
 
-/// A verb. It is constructed, define() is called, the options are parsed into its members, then
-/// run() is called.
+/// A verb. define() adds its options, parsing fills in its members, then run() does the work.
 class Command {
  public:
   virtual ~Command() = default;
@@ -104,24 +104,24 @@ std::span<const Verb> verbs();
 
 /// The range of finite numbers that an option accepts.
 struct NumberRange {
-  double least = -std::numeric_limits<double>::infinity();
-  double most = std::numeric_limits<double>::infinity();
-  bool above_least = false;  ///< excludes `least`
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool min_is_excluded = false;
 };
-inline constexpr NumberRange kAboveZero{.least = 0.0, .above_least = true};
-inline constexpr NumberRange kNotNegative{.least = 0.0};
+inline constexpr NumberRange kPositive{.min = 0.0, .min_is_excluded = true};
+inline constexpr NumberRange kNonNegative{.min = 0.0};
 /// Range of factors for lengths and costs, chosen so that products stay finite.
-inline constexpr NumberRange kFactor{.least = 1e-12, .most = 1e12};
-inline constexpr NumberRange kFactorOrZero{.least = 0.0, .most = 1e12};
+inline constexpr NumberRange kFactor{.min = 1e-12, .max = 1e12};
+inline constexpr NumberRange kFactorOrZero{.min = 0.0, .max = 1e12};
 
 /// Adds an option that takes a real number. The current `value` is its default, shown in the help.
 CLI::Option* add_number(CLI::App& app, const std::string& name, double& value,
                         const std::string& description, const NumberRange& range = {});
-/// The same, without a default.
+/// Adds an option that takes a real number and has no default.
 CLI::Option* add_number(CLI::App& app, const std::string& name, std::optional<double>& value,
                         const std::string& description, const NumberRange& range = {});
 
-/// Calls parse_count() for an option; a UsageError names the option.
+/// Parses the count given to an option. Throws UsageError, which names the option.
 std::uint64_t count_of_option(const std::string& name, const std::string& text);
 
 /// Adds the required option -o, --output, stored in `target`.
@@ -132,11 +132,11 @@ void add_input_format(CLI::App& app, std::string& target);
 /// Adds --format, for point files.
 void add_point_format(CLI::App& app, std::string& target);
 /// Adds --rgb, stored in `target`.
-CLI::Option* add_heights_of_colour(CLI::App& app, stream::HeightsOfColour& target);
+CLI::Option* add_rgb_encoding(CLI::App& app, stream::HeightsOfColour& target);
 /// Adds --skip-damaged, for laser data.
 CLI::Option* add_skip_damaged(CLI::App& app, bool& target);
 /// Adds --cell, the cell size of rasters without georeferencing.
-CLI::Option* add_cell_of_source(CLI::App& app, std::optional<double>& target);
+CLI::Option* add_source_cell_size(CLI::App& app, std::optional<double>& target);
 
 /// Runs the command line and returns the exit code. Never throws.
 int run_command_line(int argc, const char* const* argv);

@@ -34,21 +34,21 @@ void Summary::add_cost(const Stopwatch& watch) {
   json["peak_rss_bytes"] = peak_rss_bytes();
 }
 
-std::uint64_t CommonOptions::memory_or(std::uint64_t standard) const {
-  return Context{.memory_bytes = memory_bytes}.memory_or(standard);
+std::uint64_t CommonOptions::memory_or(std::uint64_t default_bytes) const {
+  return Context{.memory_bytes = memory_bytes}.memory_or(default_bytes);
 }
 
-std::uint64_t CommonOptions::reading_memory(std::uint64_t parts) const {
-  constexpr std::uint64_t kLeast = std::uint64_t{64} << 20;
+std::uint64_t CommonOptions::reading_memory(std::uint64_t divisor) const {
+  constexpr std::uint64_t kMinMemoryOfSource = std::uint64_t{64} << 20;
   const std::uint64_t memory = memory_or(0);
-  return std::max(kLeast, (memory - std::min(memory, kProgramMemory)) / parts);
+  return std::max(kMinMemoryOfSource, (memory - std::min(memory, kProgramMemory)) / divisor);
 }
 
 void CommonOptions::say(const stream::Message& line) const {
   if (!quiet) print_message(option_text(line));
 }
 
-void CommonOptions::explain(const std::string& line) const {
+void CommonOptions::say_verbose(const std::string& line) const {
   if (verbose && !quiet) print_message(line);
 }
 

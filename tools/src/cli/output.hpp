@@ -17,7 +17,6 @@ inline constexpr std::string_view kPairsHead = "a,b,distance";
 inline constexpr std::string_view kTreeHead = "a,b,distance,size,level";
 inline constexpr std::string_view kBoxTreeHead =
     "a,b,distance,size,level,minx,miny,minz,maxx,maxy,maxz";
-inline constexpr std::string_view kDendrogramHead = "a,b,height,size";
 
 /// Returns true if the regular file at `path` is empty or terrace wrote it. Most formats have a
 /// place for a mark: a header comment (PLY, OBJ, VTK), the generator (GLB, GeoJSON, LAS), the

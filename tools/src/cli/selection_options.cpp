@@ -60,7 +60,7 @@ void SelectionOptions::define(CLI::App& app) {
                  "for GeoJSON the one that the file names, or else longitude and latitude)")
       ->needs("--region");
   add_number(app, "--resolution", resolution_,
-             "COPC and EPT: only points down to this spacing, in units of the CRS", kAboveZero);
+             "COPC and EPT: only points down to this spacing, in units of the CRS", kPositive);
   app.add_option("--keep", keep_,
                  "only these attributes, or none; put a name with a comma in double quotes")
       ->type_name("NAME,NAME");

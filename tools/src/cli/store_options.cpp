@@ -116,7 +116,7 @@ void SurfaceOptions::define_triangles(CLI::App& app) {
       app, "--max-edge", max_edge,
       "irregular points and coarser levels: triangles with a side longer than this, in metres on "
       "the ground, count as no data, as over water and in shadows (default: no limit)",
-      kAboveZero)
+      kPositive)
       ->type_name("METRES");
   add_where(app, where);
 }

@@ -28,14 +28,14 @@ std::size_t character_length(std::string_view text, std::uint32_t& code) {
     return 1;
   }
   const std::size_t length = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
-  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
+  constexpr std::array<std::uint32_t, 5> kMinCode{0, 0, 0x80, 0x800, 0x10000};
   if (first < 0xC0 || first > 0xF4) return 0;
   code = first & (0xFFU >> (length + 1));
   for (std::size_t i = 1; i < length; ++i) {
     if ((byte_at(text, i) & 0xC0) != 0x80) return 0;
     code = code << 6 | (byte_at(text, i) & 0x3FU);
   }
-  if (code < kLeast[length] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000)) return 0;
+  if (code < kMinCode[length] || code > 0x10FFFF || (code >= 0xD800 && code < 0xE000)) return 0;
   return length;
 }
 

@@ -50,8 +50,13 @@ void convert_to_ground(PictureInput& input, const stream::Placement& placement,
   input.assumption = ground.assumption();
 }
 
-/// Returns whether x and y of a mesh file are probably longitude and latitude: a comment says so,
-/// or they could be degrees while the heights could not. Mesh files rarely name their CRS.
+/// In a mesh in degrees, the height range exceeds the larger extent by more than this factor,
+/// because heights in metres span far more than degrees.
+constexpr double kMinReliefRatio = 5;
+
+/// Returns whether x and y of a mesh file are probably longitude and latitude: a comment names
+/// EPSG:4326, or x and y fit into degrees but the height range is far larger. Mesh files rarely
+/// name their CRS.
 bool looks_geographic(const stream::MeshFile& file) {
   for (const std::string& comment : file.info.comments) {
     if (comment.find("EPSG:4326") != std::string::npos) return true;
@@ -64,7 +69,7 @@ bool looks_geographic(const stream::MeshFile& file) {
   if (box.empty()) return false;
   const double extent = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
   return box.min[0] >= -360 && box.max[0] <= 360 && box.min[1] >= -90 && box.max[1] <= 90 &&
-         box.max[2] - box.min[2] > 5 * extent;
+         box.max[2] - box.min[2] > kMinReliefRatio * extent;
 }
 
 PictureInput input_from_mesh(stream::MeshFile file) {
@@ -75,13 +80,18 @@ PictureInput input_from_mesh(stream::MeshFile file) {
   placement.crs.horizontal_unit = geographic ? "degree" : "metre";
   input.mesh = triangle_mesh_of(std::move(file));
   convert_to_ground(input, placement, Ground(placement));
-  if (geographic) input.guess = "x and y are taken for longitude and latitude";
+  if (geographic) input.guess = "assuming that x and y are longitude and latitude";
   return input;
 }
 
-/// Peak bytes per pixel: colours, depths and radii of its samples, two smoothing passes, and the
-/// pixel itself.
-constexpr std::uint64_t kBytesPerPixel = 4 * (16 + 12) + 3;
+/// Samples of a pixel, and their bytes: a colour and a depth; for smoothing, a radius and the
+/// depths after each of two passes.
+constexpr std::uint64_t kSamplesPerPixel = 4, kCanvasBytes = 16, kSmoothingBytes = 12;
+/// Bytes of a pixel of the picture.
+constexpr std::uint64_t kColourBytes = 3;
+/// Peak bytes per pixel.
+constexpr std::uint64_t kBytesPerPixel =
+    kSamplesPerPixel * (kCanvasBytes + kSmoothingBytes) + kColourBytes;
 /// Peak bytes per point of a cloud, or per vertex with its two triangles, while drawing.
 constexpr std::uint64_t kBytesPerPoint = 112;
 /// Memory for reading a file, in bytes.
@@ -93,7 +103,7 @@ std::uint64_t max_cells(const ImageSize& size) { return 2 * size.width * size.he
 PictureInput input_from_source(const std::string& path, stream::HeightsOfColour colours,
                                const ImageSize& size, const CommonOptions& common) {
   const std::uint64_t cell_limit = max_cells(size);
-  memory_for_points(path, size, kReadingBytes, common);
+  check_picture_memory(path, size, kReadingBytes, common);
   const std::array<std::string, 1> files{path};
   const std::unique_ptr<stream::PointSource> source = stream::open_source(
       files, {.memory_bytes = kReadingBytes, .heights_of_colour = colours, .stop = stop_token()});
@@ -119,7 +129,8 @@ PictureInput input_from_source(const std::string& path, stream::HeightsOfColour 
     } else {
       append_points(input.mesh, info, block);
       if (input.mesh.positions.size() > memory / kBytesPerPoint) {
-        throw stream::Error(path, "has more points than " + readable_bytes(memory) + " can hold")
+        throw stream::Error(
+            path, fmt::format("has too many points for {} of memory", readable_bytes(memory)))
             .remedy("build a store and render that, or raise --memory");
       }
     }
@@ -134,8 +145,8 @@ PictureInput input_from_source(const std::string& path, stream::HeightsOfColour 
   return input;
 }
 
-/// Returns the finest level with no more points than a picture needs. Counts the points of all
-/// clusters that reach into the region.
+/// Returns the finest level with no more points than a picture needs. Counts all points of clusters
+/// that intersect the region.
 std::string finest_level(const stream::Store& store, const std::string& region) {
   const RegionConversion regions(store);
   constexpr std::uint64_t kMaxPoints = 4000000;
@@ -147,8 +158,8 @@ std::string finest_level(const stream::Store& store, const std::string& region) 
   return "top";
 }
 
-/// Reads the triangles of a part of a store. Points that are not a height field give the surface of
-/// a scan instead.
+/// Reads the triangles of a part of a store. For points that are not a height field, reads the scan
+/// surface instead.
 PictureInput input_from_triangles(const stream::Store& store, const Detail& detail,
                                   bool height_field, const stream::Placement& crs_placement,
                                   const CommonOptions& common) {
@@ -162,7 +173,7 @@ PictureInput input_from_triangles(const stream::Store& store, const Detail& deta
   if (height_field || is_mesh || !mostly_steep(input.mesh, check_interrupt)) return input;
   input = {};
   input.mesh = scan_surface(store, detail, {}, common.context()).mesh;
-  input.guess = "not a height field: drawn as by 'terrace surface'";
+  input.guess = "not a height field: drawn as a scan surface, as 'terrace surface' does";
   convert_to_ground(input, crs_placement, ground);
   return input;
 }
@@ -172,34 +183,35 @@ PictureInput input_from_store(const std::string& path, const PictureSelection& s
   const std::uint64_t cell_limit = max_cells(size);
   const stream::Store store = open_store(path, selection.where);
   const stream::StoreSchema& schema = store.schema();
-  const stream::Placement& stored = schema;
+  const stream::Placement& store_placement = schema;
   PictureInput input;
   input.height_field = schema.grid || schema.crs.epsg != 0;
 
   // Reading more cells than this for one picture takes too long by default.
   constexpr std::uint64_t kMaxCellsRead = std::uint64_t{1} << 27;
   const bool whole_area = selection.focuses.empty() && selection.region.empty();
-  const bool all_cells =
+  const bool read_all_cells =
       selection.level == "0" || (selection.level.empty() && store.points() <= kMaxCellsRead);
-  if (schema.grid && whole_area && all_cells && !selection.triangles) {
+  if (schema.grid && whole_area && read_all_cells && !selection.triangles) {
     const std::uint64_t cells = HeightGrid::cells(schema.columns, schema.rows, cell_limit);
-    memory_for_points(path, size, cells * kBytesPerPoint, common);
+    check_picture_memory(path, size, cells * kBytesPerPoint, common);
     input.mesh = reduced_raster(store, cell_limit, common.context());
-    convert_to_ground(input, stored, Ground(stored));
+    convert_to_ground(input, store_placement, Ground(store_placement));
     return input;
   }
+  // With focuses an empty level means the detail that the focuses ask for.
   const bool level_chosen = !selection.level.empty() || !selection.focuses.empty();
   const std::string level = level_chosen ? selection.level : finest_level(store, selection.region);
   RegionConversion regions(store);
   regions.on_note([&common](const std::string& line) { common.say(line); });
   const Detail detail = parse_detail(store, level, selection.region, selection.focuses, regions);
   note_idle_focuses(store, detail, common.context());
-  memory_for_points(path, size, wanted_points(store, detail) * kBytesPerPoint, common);
+  check_picture_memory(path, size, wanted_points(store, detail) * kBytesPerPoint, common);
   // The functions below return positions in the CRS, not stored coordinates.
   stream::Placement crs_placement;
-  crs_placement.crs = stored.crs;
-  crs_placement.coordinates[0].unit = stored.coordinates[0].unit;
-  crs_placement.coordinates[2].unit = stored.coordinates[2].unit;
+  crs_placement.crs = store_placement.crs;
+  crs_placement.coordinates[0].unit = store_placement.coordinates[0].unit;
+  crs_placement.coordinates[2].unit = store_placement.coordinates[2].unit;
   if (holds_lines(schema)) {
     LineSet set = detail_lines(store, detail, common.context());
     input.mesh.positions = std::move(set.vertices);
@@ -224,34 +236,39 @@ std::uint64_t memory_for_points(const std::string& path, const ImageSize& size, 
   const std::uint64_t memory = common.memory_or(0);
   if (fixed + bytes <= memory) return memory - fixed;
   throw stream::Error(
-      path, fmt::format("drawing it with {} x {} pixels needs {} MiB, --memory is {}", size.width,
+      path, fmt::format("drawing {} x {} pixels needs {} MiB, but --memory is {}", size.width,
                         size.height, ((fixed + bytes) >> 20) + 1, readable_bytes(memory)))
       .remedy("give a smaller --size, a coarser --level, or more --memory");
 }
 
+void check_picture_memory(const std::string& path, const ImageSize& size, std::uint64_t bytes,
+                          const CommonOptions& common) {
+  static_cast<void>(memory_for_points(path, size, bytes, common));
+}
+
 PictureInput read_picture_input(const std::string& path, const PictureSelection& selection,
                                 const ImageSize& size, const CommonOptions& common) {
-  const auto refuse_rgb = [&] {
+  const auto check_no_rgb = [&] {
     if (selection.colours == stream::HeightsOfColour::none) return;
-    throw UsageError("'" + path + "' is not a PNG: --rgb does not apply");
+    throw UsageError(fmt::format("'{}' is not a PNG: --rgb does not apply", path));
   };
   if (std::filesystem::is_directory(path) || stream::Store::exists(path)) {
-    refuse_rgb();
+    check_no_rgb();
     return input_from_store(path, selection, size, common);
   }
   if (!selection.level.empty() || !selection.region.empty() || !selection.focuses.empty() ||
       !selection.where.empty()) {
-    throw UsageError("'" + path +
-                     "' is not a store: --level, --region, --focus and --where do not apply");
+    throw UsageError(fmt::format(
+        "'{}' is not a store: --level, --region, --focus and --where do not apply", path));
   }
   if (auto file = stream::read_mesh(path, {.stop = stop_token()})) {
-    refuse_rgb();
+    check_no_rgb();
     const std::size_t points =
         std::max(file->vertices.positions.size(), file->triangles.size() / 2);
-    memory_for_points(path, size, points * kBytesPerPoint, common);
+    check_picture_memory(path, size, points * kBytesPerPoint, common);
     if (file->nodata > 0) {
-      common.context().say(counted(file->nodata, "triangle") +
-                           " are left out: a coordinate of a corner is NaN");
+      common.context().say(fmt::format("{} skipped: a corner has a NaN coordinate",
+                                       counted(file->nodata, "triangle")));
     }
     return input_from_mesh(std::move(*file));
   }

@@ -31,7 +31,7 @@ struct PictureInput {
   terrain::TriangleMesh mesh;                 ///< positions in metres from the centre
   std::vector<double> heights;                ///< of the vertices, in the source's unit
   std::vector<terrain::LineSet::Line> lines;  ///< between vertices, instead of triangles
-  bool height_field = false;                  ///< known to be one; otherwise decided from the mesh
+  bool height_field = false;                  ///< the input is one; otherwise the mesh decides
   std::string guess;                          ///< a guess that the picture depends on
   std::string assumption;                     ///< an assumption about units
 };
@@ -40,6 +40,9 @@ struct PictureInput {
 /// pixels. Throws stream::Error, which names the file, if that is less than `bytes`.
 std::uint64_t memory_for_points(const std::string& path, const terrain::ImageSize& size,
                                 std::uint64_t bytes, const CommonOptions& common);
+/// Checks that memory_for_points() is at least `bytes`. Throws stream::Error, which names the file.
+void check_picture_memory(const std::string& path, const terrain::ImageSize& size,
+                          std::uint64_t bytes, const CommonOptions& common);
 
 /// Reads a store, a raster (reduced to about four cells per pixel), a mesh, or a cloud of points.
 /// Throws: stream::Error, UsageError, stream::Stopped.

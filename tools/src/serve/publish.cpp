@@ -24,10 +24,10 @@ constexpr std::size_t kCopyBytes = std::size_t{1} << 20;
 
 /// Returns the contents of stores.json; null unless terrace published the folder.
 nlohmann::json read_stores_json(const fs::path& folder) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{64} << 20;
+  constexpr std::uint64_t kMaxBytes = std::uint64_t{64} << 20;
   try {
     const auto file = stream::open_file(folder / kMarkFile);
-    if (file->size() > kMostBytes) return nullptr;
+    if (file->size() > kMaxBytes) return nullptr;
     std::string text(file->size(), '\0');
     file->read(0, std::as_writable_bytes(std::span(text)));
     auto json = nlohmann::json::parse(text, nullptr, false);

@@ -154,9 +154,9 @@ std::uint8_t class_of_value(double value) {
 /// there are none or finding them takes too long. Reads only clusters whose range of values
 /// contains a class not found yet.
 std::optional<std::vector<int>> classes_of(const stream::Store& store) {
-  constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 26;
+  constexpr std::uint64_t kMaxPoints = std::uint64_t{1} << 26;
   const stream::StoreSchema& schema = store.schema();
-  if (schema.grid || store.points() > kMostPoints) return std::nullopt;
+  if (schema.grid || store.points() > kMaxPoints) return std::nullopt;
   std::size_t number = 0;
   const auto find = [&](std::string_view name) {
     const auto is_it = [&](const stream::Channel& channel) { return channel.name == name; };

@@ -12,7 +12,6 @@
 
 namespace terrace::tools {
 
-using namespace terrain;
 namespace {
 
 /// The noise of a lattice point is the sum of two 16-bit numbers around 0, in units of 2^-16. Its
@@ -108,7 +107,7 @@ Variances variances(unsigned octave) {
 }  // namespace
 
 Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
-  assert(options.hurst > 0 && options.hurst < 1 && options.roughness >= 0);
+  assert(options.hurst > 0 && options.hurst < 1 && options.rms_step >= 0);
   // The variance of the step is the sum over the lattices, which gives the common factor of the
   // amplitudes.
   const double growth = base::exp2(options.hurst);
@@ -121,21 +120,21 @@ Fractal::Fractal(const FractalOptions& options) : seed_(options.seed) {
     field += weight[octave] * weight[octave] * kNoiseVariance * variance.field;
     largest += weight[octave];
   }
-  double target_variance = options.roughness * options.roughness;
-  if (options.rounded && options.roughness >= 1.0) target_variance -= kRoundingStepVariance;
+  double target_variance = options.rms_step * options.rms_step;
+  if (options.rounded && options.rms_step >= 1.0) target_variance -= kRoundingStepVariance;
   const double factor = std::sqrt(target_variance / step);
   for (unsigned octave = 0; octave < kOctaves; ++octave) {
     amplitude_[octave] = static_cast<float>(weight[octave] * factor);
   }
-  roughness_ = std::sqrt(target_variance);
-  deviation_ = factor * std::sqrt(field);
+  rms_step_ = std::sqrt(target_variance);
+  standard_deviation_ = factor * std::sqrt(field);
   bound_ = factor * largest;
 }
 
 void Fractal::scale(double factor) {
   for (float& amplitude : amplitude_) amplitude = static_cast<float>(amplitude * factor);
-  roughness_ *= factor;
-  deviation_ *= factor;
+  rms_step_ *= factor;
+  standard_deviation_ *= factor;
   bound_ *= factor;
 }
 
@@ -147,11 +146,11 @@ Fractal::Rows::Rows(const Fractal& fractal, std::uint32_t first_column, std::uin
   for (Lattice& lattice : lattices_) {
     lattice.first = first;
     lattice.width = static_cast<std::size_t>(last - first + 1);
-    lattice.row_of.fill(INT64_MIN);
+    lattice.buffered_row.fill(INT64_MIN);
     for (std::vector<float>& values : lattice.values) values.resize(lattice.width);
     first = (first >> 1) - 1;
     last = (last >> 1) + 1;
-    lattice.blend.resize(static_cast<std::size_t>(last - first + 1));
+    lattice.coarse_row.resize(static_cast<std::size_t>(last - first + 1));
   }
 }
 
@@ -163,25 +162,26 @@ const float* Fractal::Rows::lattice_row(unsigned octave, std::int64_t row) {
   Lattice& lattice = lattices_[octave];
   const auto slot = static_cast<std::size_t>(row & 3);
   std::vector<float>& values = lattice.values[slot];
-  if (lattice.row_of[slot] == row) return values.data();
+  if (lattice.buffered_row[slot] == row) return values.data();
 
   if (octave + 1 < kOctaves) {
     const std::int64_t m = row >> 1;
-    float* const blend = lattice.blend.data();
-    const std::size_t width = lattice.blend.size();
+    float* const coarse_row = lattice.coarse_row.data();
+    const std::size_t width = lattice.coarse_row.size();
     if ((row & 1) == 0) {
       const float* const above = lattice_row(octave + 1, m - 1);
       const float* const middle = lattice_row(octave + 1, m);
       const float* const below = lattice_row(octave + 1, m + 1);
       for (std::size_t i = 0; i < width; ++i) {
-        blend[i] = 0.125F * (above[i] + below[i]) + 0.75F * middle[i];
+        coarse_row[i] = 0.125F * (above[i] + below[i]) + 0.75F * middle[i];
       }
     } else {
       const float* const middle = lattice_row(octave + 1, m);
       const float* const below = lattice_row(octave + 1, m + 1);
-      for (std::size_t i = 0; i < width; ++i) blend[i] = 0.5F * (middle[i] + below[i]);
+      for (std::size_t i = 0; i < width; ++i) coarse_row[i] = 0.5F * (middle[i] + below[i]);
     }
-    double_columns(blend, lattices_[octave + 1].first, lattice.first, values.data(), lattice.width);
+    double_columns(coarse_row, lattices_[octave + 1].first, lattice.first, values.data(),
+                   lattice.width);
   } else {
     std::fill(values.begin(), values.end(), 0.0F);
   }
@@ -189,7 +189,7 @@ const float* Fractal::Rows::lattice_row(unsigned octave, std::int64_t row) {
       base::splitmix64(base::splitmix64(fractal_->seed_ + (std::uint64_t{octave} << 56)) ^
                        static_cast<std::uint64_t>(row));
   add_noise(key, lattice.first, fractal_->amplitude_[octave], values.data(), lattice.width);
-  lattice.row_of[slot] = row;
+  lattice.buffered_row[slot] = row;
   return values.data();
 }
 

@@ -10,9 +10,9 @@ namespace terrace::tools {
 
 struct FractalOptions {
   std::uint64_t seed = 1;
-  double hurst = 0.8;       ///< 0 < H < 1; amplitude spectrum k^-(H+1)
-  double roughness = 2.65;  ///< RMS difference of neighbouring cells, in units of height
-  bool rounded = false;     ///< heights will be rounded to whole units; compensates for it
+  double hurst = 0.8;      ///< 0 < H < 1; amplitude spectrum k^-(H+1)
+  double rms_step = 2.65;  ///< RMS step between neighbouring cells, in units of height
+  bool rounded = false;    ///< heights will be rounded to whole units; compensates for it
 };
 
 /// A fractal height field on the infinite plane of cells. Each height depends only on the options
@@ -34,15 +34,15 @@ class Fractal {
  public:
   static constexpr unsigned kOctaves = 13;  ///< spacings 1 to 4096
 
-  /// Requires 0 < hurst < 1 and roughness >= 0.
+  /// Requires 0 < hurst < 1 and rms_step >= 0.
   explicit Fractal(const FractalOptions& options);
 
   /// Multiplies all heights.
   void scale(double factor);
-  /// Returns the RMS step over the infinite plane, before rounding.
-  [[nodiscard]] double roughness() const { return roughness_; }
+  /// Returns the RMS step between neighbouring cells over the infinite plane, before rounding.
+  [[nodiscard]] double rms_step() const { return rms_step_; }
   /// Returns the standard deviation of the heights over the infinite plane.
-  [[nodiscard]] double deviation() const { return deviation_; }
+  [[nodiscard]] double standard_deviation() const { return standard_deviation_; }
   /// Returns an upper bound of the absolute heights.
   [[nodiscard]] double bound() const { return bound_; }
 
@@ -60,9 +60,9 @@ class Fractal {
     struct Lattice {
       std::int64_t first = 0;  ///< lattice column of values[..][0]
       std::size_t width = 0;
-      std::array<std::int64_t, 4> row_of{};  ///< row held by each of the four buffers
+      std::array<std::int64_t, 4> buffered_row{};  ///< row held by each of the four buffers
       std::array<std::vector<float>, 4> values;
-      std::vector<float> blend;  ///< combined coarser rows, before columns are doubled
+      std::vector<float> coarse_row;  ///< combined coarser rows, before columns are doubled
     };
 
     const float* lattice_row(unsigned octave, std::int64_t row);
@@ -74,8 +74,8 @@ class Fractal {
  private:
   std::uint64_t seed_;
   std::array<float, kOctaves> amplitude_{};  ///< largest value of each lattice's noise
-  double roughness_ = 0.0;
-  double deviation_ = 0.0;
+  double rms_step_ = 0.0;
+  double standard_deviation_ = 0.0;
   double bound_ = 0.0;
 };
 

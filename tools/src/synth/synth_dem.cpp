@@ -236,17 +236,17 @@ SynthDemResult write_synth_dem(const std::string& path, const SynthDemOptions& o
                                const std::function<void(std::uint64_t)>& progress) {
   FractalOptions fractal_options{.seed = options.seed,
                                  .hurst = options.hurst,
-                                 .roughness = options.roughness,
+                                 .rms_step = options.roughness,
                                  .rounded = !options.floats};
   Fractal fractal(fractal_options);
   constexpr std::uint64_t kSmall = 1u << 22;
   if (options.size.width * options.size.height <= kSmall) {
     const double step = measured_step(fractal, options.size);
-    if (step > 0) fractal.scale(fractal.roughness() / step);
+    if (step > 0) fractal.scale(fractal.rms_step() / step);
   }
 
   constexpr double kLargest = 32767;
-  const double four_deviations = std::ceil(4 * fractal.deviation());
+  const double four_deviations = std::ceil(4 * fractal.standard_deviation());
   const double base = options.floats
                           ? four_deviations
                           : std::min(four_deviations, std::floor(kLargest - fractal.bound()));

@@ -18,6 +18,9 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
+/// First line of the table, which identifies it.
+constexpr std::string_view kDendrogramHead = "a,b,height,size";
+
 std::string row_text(const cluster::Merge& merge) {
   return fmt::format("{},{},{},{}\n", merge.a, merge.b, number_text(merge.height), merge.size);
 }
@@ -30,8 +33,8 @@ bool parse_row(std::string_view text, cluster::Merge& merge) {
 }  // namespace
 
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
-                      const stream::Naming& replace) {
-  stream::Sink file(path, replace, stop_token());
+                      const stream::Naming& naming) {
+  stream::Sink file(path, naming, stop_token());
   file.write(kDendrogramHead);
   file.write("\n");
   for (const cluster::Merge& merge : dendrogram.merges) file.write(row_text(merge));
@@ -40,32 +43,33 @@ void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendro
 
 std::optional<cluster::Dendrogram> read_dendrogram(
     const std::string& path, const std::function<void(std::uint64_t rows)>& check_rows) {
-  constexpr std::size_t kBetweenChecks = 4096;
+  constexpr std::size_t kRowsPerCheck = 4096;
   std::optional<CsvRows> rows = CsvRows::open(path, kDendrogramHead);
   if (!rows) return std::nullopt;
   cluster::Dendrogram dendrogram;
   const auto format_error = [&](const std::string& cause) {
     return stream::Error(path, cause)
-        .remedy(
-            "rows must be a,b,height,size as written by 'terrace cluster --dendrogram' and SciPy's "
-            "linkage()");
+        .remedy("write one row a,b,height,size per merge, as 'terrace cluster --dendrogram' does");
   };
   for (std::string_view line; rows->next(line);) {
     cluster::Merge merge{};
-    if (!parse_row(line, merge))
+    if (!parse_row(line, merge)) {
       throw format_error("is not a row of a dendrogram").at(rows->where());
+    }
     dendrogram.merges.push_back(merge);
-    if (check_rows && dendrogram.merges.size() % kBetweenChecks == 0) {
+    if (check_rows && dendrogram.merges.size() % kRowsPerCheck == 0) {
       check_rows(dendrogram.merges.size());
     }
     if (dendrogram.merges.size() >= cluster::kMostDendrogramPoints) {
-      throw format_error("is one row too many").at(rows->where());
+      throw format_error(
+          fmt::format("exceeds the limit of {} points", cluster::kMostDendrogramPoints))
+          .at(rows->where());
     }
   }
   if (check_rows) check_rows(dendrogram.merges.size());
   dendrogram.points = dendrogram.merges.size() + 1;
   const std::string fault = cluster::dendrogram_fault(dendrogram);
-  if (!fault.empty()) throw format_error("is not a dendrogram: " + fault);
+  if (!fault.empty()) throw format_error(fmt::format("is not a dendrogram: {}", fault));
   return dendrogram;
 }
 

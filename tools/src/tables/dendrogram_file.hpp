@@ -15,7 +15,7 @@ namespace terrace::tools {
 /// Writes SciPy's linkage matrix as text rows "a,b,height,size"; "-" is standard output. Heights
 /// are the shortest decimals that read back as the same double. Throws stream::Error.
 void write_dendrogram(const std::string& path, const cluster::Dendrogram& dendrogram,
-                      const stream::Naming& replace);
+                      const stream::Naming& naming);
 
 /// Reads the dendrogram from a file that starts with the line "a,b,height,size"; returns nullopt
 /// for any other file. Throws stream::Error, which names the line, if a row is malformed or the

@@ -72,8 +72,8 @@ class BuildCommand final : public Command {
     selection_.define(app);
     app.add_option("--band", request_.band, "band of rasters, from 1")->check(CLI::Range(1, 65535));
     add_skip_damaged(app, request_.skip_damaged);
-    add_heights_of_colour(app, request_.heights_of_colour);
-    add_cell_of_source(app, request_.cell);
+    add_rgb_encoding(app, request_.heights_of_colour);
+    add_source_cell_size(app, request_.cell);
     define_clustering(app);
     app.add_option(
            "--order", order_,

@@ -245,7 +245,7 @@ class ClusterCommand final : public Command {
         ->check(CLI::Range(1U, 4294967295U))
         ->type_name("K");
     add_number(app, "--height", request_.height, "linkage: cut the tree at this distance",
-               kNotNegative)
+               kNonNegative)
         ->type_name("H");
     add_number(app, "--facility-cost", facility_cost_,
                "times the diagonal of the points: larger makes fewer clusters", kFactor);
@@ -302,7 +302,7 @@ class ClusterCommand final : public Command {
   ClusterOutcome cluster_table(const PointTable& table, const MetricChoice& metric,
                                const CommonOptions& common) {
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
-    if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
+    if (!ground.assumption.empty()) common.say_verbose(input_ + ": " + ground.assumption);
     std::vector<cluster::Point3> positions(table.size());
     std::transform(table.positions.begin(), table.positions.end(), positions.begin(), ground);
     const std::vector<double> weights =

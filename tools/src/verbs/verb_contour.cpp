@@ -30,7 +30,7 @@ class ContourCommand final : public Command {
         "GeoJSON: lines in longitude and latitude, elev is the height; - is standard output");
     add_number(app, "--interval", interval_,
                "contour interval in the store's vertical unit; lines are at its multiples",
-               kAboveZero)
+               kPositive)
         ->required()
         ->type_name("HEIGHT");
     app.add_option("--region", region_,

@@ -33,7 +33,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-class ConvertCommand : public Command {
+class ConvertCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option(
@@ -46,8 +46,8 @@ class ConvertCommand : public Command {
     add_input_format(app, input_format_);
     selection_.define(app);
     add_skip_damaged(app, skip_damaged_);
-    add_heights_of_colour(app, colours_);
-    add_cell_of_source(app, cell_);
+    add_rgb_encoding(app, colours_);
+    add_source_cell_size(app, cell_);
   }
 
   Summary run(const CommonOptions& common) override {

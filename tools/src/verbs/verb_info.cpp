@@ -34,13 +34,12 @@
 namespace terrace::tools {
 
 using namespace terrain;
-
 namespace {
 
 using Json = nlohmann::ordered_json;
 
 /// Returns {"min": [x, y, z], "max": [x, y, z]}, or null for an empty box.
-Json json_of(const stream::Box3& box) {
+Json box_json(const stream::Box3& box) {
   if (box.empty()) return nullptr;
   Json json;
   json["min"] = box.min;
@@ -51,8 +50,8 @@ Json json_of(const stream::Box3& box) {
 /// Returns the text, or null if it is empty.
 Json text_or_null(const std::string& text) { return text.empty() ? Json(nullptr) : Json(text); }
 
-/// Returns {"epsg": n, "name": ..., "wkt": ...}, with null for unknown values.
-Json json_of(const stream::Crs& crs) {
+/// Returns the CRS as in docs/reference/json.md, with null for unknown values.
+Json crs_json(const stream::Crs& crs) {
   if (crs == stream::Crs{}) return nullptr;
   Json json;
   json["epsg"] = crs.epsg == 0 ? Json(nullptr) : Json(crs.epsg);
@@ -68,8 +67,8 @@ Json json_of(const stream::Crs& crs) {
 /// Adds the extent of the points, the CRS, and the lattice of a raster.
 void add_placement(const stream::Schema& schema, const stream::Box3& bounds, const stream::Crs& crs,
                    const std::string& vertical, Json& json) {
-  json["bounds"] = json_of(bounds);
-  json["crs"] = json_of(crs);
+  json["bounds"] = box_json(bounds);
+  json["crs"] = crs_json(crs);
   json["vertical"] = text_or_null(vertical);
   if (schema.grid) {
     json["columns"] = schema.columns;
@@ -92,25 +91,25 @@ Json channels_of(const stream::Schema& schema) {
   return list;
 }
 
-/// Returns "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", with the operation to WGS 84 that
-/// applies to the data. `bounds` is in the CRS.
-std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
+/// Returns "EPSG:32632 (WGS 84 / UTM zone 32N)" or "unknown", followed by the operation to WGS 84
+/// that applies within `bounds`, a box in the CRS.
+std::string crs_text(const stream::Crs& crs, const stream::Box3& bounds) {
   std::string text = crs.epsg != 0 ? fmt::format("EPSG:{}", crs.epsg) : "";
   if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
   if (text.empty()) text = crs.wkt.empty() ? "unknown" : crs.wkt.substr(0, 60) + "...";
   if (crs.vertical_epsg != 0) text += fmt::format(" + EPSG:{}", crs.vertical_epsg);
   try {
-    const std::optional<CrsDefinition> known = definition_of(crs);
-    if (!known) return text;
-    const CoordinateSystem system = CoordinateSystem(*known).over(bounds);
+    const std::optional<CrsDefinition> definition = definition_of(crs);
+    if (!definition) return text;
+    const CoordinateSystem system = CoordinateSystem(*definition).over(bounds);
     const DatumChange& change = system.to_wgs84();
     if (!change.possible()) {
-      text += ", datum " + known->datum + " without a transformation to WGS 84";
+      text += fmt::format(", datum {} without a transformation to WGS 84", definition->datum);
       if (!change.better().empty()) text += ": " + change.better();
     } else if (!change.identity()) {
       text += ", to WGS 84 by " + change.description();
     } else if (change.accuracy().value_or(0) > 0) {
-      text += ", counts as WGS 84 within " + plain_number(*change.accuracy()) + " m";
+      text += fmt::format(", within {} m of WGS 84", plain_number(*change.accuracy()));
       if (!change.better().empty()) text += " (" + change.better() + ")";
     }
   } catch (const CrsError& error) {
@@ -120,7 +119,7 @@ std::string text_of(const stream::Crs& crs, const stream::Box3& bounds) {
 }
 
 /// Returns "1.5 2 3  to  4 5 6" or "none".
-std::string text_of(const stream::Box3& box) {
+std::string box_text(const stream::Box3& box) {
   if (box.empty()) return "none";
   const auto corner = [](const stream::Point3& p) {
     // Precise to a nanodegree, or a millimetre of projected coordinates.
@@ -131,7 +130,7 @@ std::string text_of(const stream::Box3& box) {
 }
 
 /// Returns "height int16 (metre)", with scale and offset if they are not 1 and 0.
-std::string text_of(const stream::Channel& channel) {
+std::string channel_text(const stream::Channel& channel) {
   std::string text = channel.name + ' ' + std::string(stream::name_of(channel.type));
   if (channel.scale != 1) text += " x " + plain_number(channel.scale);
   if (channel.offset != 0) text += " + " + plain_number(channel.offset);
@@ -141,7 +140,7 @@ std::string text_of(const stream::Channel& channel) {
 
 std::string raster_line(const stream::Schema& schema) {
   return fmt::format("raster:    {} x {} cells of {}\n", schema.columns, schema.rows,
-                     text_of(schema.coordinates[2]));
+                     channel_text(schema.coordinates[2]));
 }
 
 std::string heights_line(double low, double high, double mean) {
@@ -152,8 +151,9 @@ std::string heights_line(double low, double high, double mean) {
 std::string channels_line(const stream::Schema& schema) {
   std::string text = "channels: ";
   for (const stream::Channel& c : schema.coordinates)
-    text += ' ' + printable_line(text_of(c)) + ',';
-  for (const stream::Channel& c : schema.attributes) text += ' ' + printable_line(text_of(c)) + ',';
+    text += ' ' + printable_line(channel_text(c)) + ',';
+  for (const stream::Channel& c : schema.attributes)
+    text += ' ' + printable_line(channel_text(c)) + ',';
   text.back() = '\n';
   return text;
 }
@@ -178,8 +178,8 @@ class CompensatedSum {
 struct SourceScan {
   std::uint64_t points = 0, nodata = 0, empty_values = 0, withheld = 0;
   stream::Box3 stored, world;  ///< in stored coordinates, and in the CRS
-  double mean = 0;             ///< of stored coordinate 2
-  std::string note;            ///< about heights; empty if there is none
+  double mean_height = 0;      ///< mean height, stored
+  std::string note;            ///< about heights, or empty
 };
 
 /// Reads a source to its end. Throws what for_each_block() throws.
@@ -205,7 +205,7 @@ SourceScan scan_points(stream::PointSource& source, const CommonOptions& common)
   scan.empty_values = source.progress().empty_values;
   scan.withheld = source.progress().withheld;
   if (unrotated) scan.world = world_box(placement, scan.stored);
-  if (scan.points > 0) scan.mean = heights.value() / static_cast<double>(scan.points);
+  if (scan.points > 0) scan.mean_height = heights.value() / static_cast<double>(scan.points);
   return scan;
 }
 
@@ -228,16 +228,15 @@ std::optional<std::uint64_t> bytes_of(const stream::SourceInfo& info) {
   return bytes;
 }
 
-/// Percentiles 0, 5, 50, 95 and 100 of the sizes of a level's clusters, and their mean. A size
-/// includes the representative.
+/// Percentiles and mean of the sizes of a level's clusters. A size includes the representative.
 struct ClusterSizes {
-  std::array<std::uint64_t, 5> percentiles{};
+  std::uint64_t min = 0, p5 = 0, median = 0, p95 = 0, max = 0;
   double mean = 0;
 };
 
 /// Returns the sizes of a level's clusters.
 ClusterSizes sizes_of_clusters(const stream::Store& store, const stream::LevelInfo& level) {
-  // Of a level with very many clusters, every n-th one is enough.
+  // Sample at most this many clusters of a level.
   constexpr std::uint64_t kMaxClusters = 200000;
   const std::uint64_t stride = level.clusters / kMaxClusters + 1;
   const std::uint64_t representative = level.level == store.top() ? 0 : 1;
@@ -249,19 +248,18 @@ ClusterSizes sizes_of_clusters(const stream::Store& store, const stream::LevelIn
   ClusterSizes result;
   if (sizes.empty()) return result;
   std::sort(sizes.begin(), sizes.end());
-  constexpr std::array<std::size_t, 5> kPercent{0, 5, 50, 95, 100};
-  for (std::size_t k = 0; k < kPercent.size(); ++k) {
-    result.percentiles[k] = sizes[(sizes.size() - 1) * kPercent[k] / 100];
-  }
+  const auto percentile = [&](std::size_t percent) {
+    return sizes[(sizes.size() - 1) * percent / 100];
+  };
+  result.min = sizes.front();
+  result.p5 = percentile(5);
+  result.median = percentile(50);
+  result.p95 = percentile(95);
+  result.max = sizes.back();
   std::uint64_t sum = 0;
   for (const std::uint64_t size : sizes) sum += size;
   result.mean = static_cast<double>(sum) / static_cast<double>(sizes.size());
   return result;
-}
-
-/// Returns the text aligned to the right in a column of `width` characters.
-std::string align_right(const std::string& text, std::size_t width) {
-  return std::string(width - std::min(width, text.size()), ' ') + text;
 }
 
 /// The description of files that `info` prints.
@@ -292,7 +290,7 @@ SourceCrs crs_with_note(const stream::SourceInfo& info) {
   }
 }
 
-Json json_of(const FileInfo& file) {
+Json file_json(const FileInfo& file) {
   const stream::SourceInfo& info = file.source;
   const SourceScan& scan = file.scan;
   Json json;
@@ -317,7 +315,7 @@ Json json_of(const FileInfo& file) {
     const auto to_height = [&z](double raw) { return raw * z.scale + z.offset; };
     const auto [low, high] =
         std::minmax({to_height(scan.stored.min[2]), to_height(scan.stored.max[2])});
-    json["height"] = {{"min", low}, {"max", high}, {"mean", to_height(scan.mean)}};
+    json["height"] = {{"min", low}, {"max", high}, {"mean", to_height(scan.mean_height)}};
   }
   json["channels"] = channels_of(info);
   json["parameters"] = Json::object();
@@ -339,14 +337,14 @@ std::string contents_lines(const FileInfo& file) {
     text += fmt::format("cell:      {} {}\n", readable_number(info.world.xy[0], 10),
                         readable_number(info.world.xy[4], 10));
     text += fmt::format("nodata:    {}{}\n", counted(scan.nodata, "cell"),
-                        info.nodata ? ", value " + plain_number(*info.nodata) : std::string());
+                        info.nodata ? fmt::format(", value {}", plain_number(*info.nodata)) : "");
   }
   text += fmt::format("points:    {}{}\n", with_commas(scan.points),
                       !info.grid && scan.nodata > 0
-                          ? ", and " + with_commas(scan.nodata) + " without a coordinate"
+                          ? fmt::format(", and {} without coordinates", with_commas(scan.nodata))
                           : std::string());
   if (info.octree) {
-    text += fmt::format("octree:    {} of {}, the root's points {} apart\n",
+    text += fmt::format("octree:    {} at {}, spacing {} at the root\n",
                         counted(info.octree->nodes, "node"), counted(info.octree->depths, "depth"),
                         readable_number(info.octree->spacing, 6));
   }
@@ -354,21 +352,21 @@ std::string contents_lines(const FileInfo& file) {
     text +=
         "empty:     " + counted(scan.empty_values, "attribute") + " without a value, read as NaN\n";
   }
-  if (scan.withheld > 0) text += "withheld:  " + with_commas(scan.withheld) + " of them\n";
+  if (scan.withheld > 0) text += fmt::format("withheld:  {}\n", counted(scan.withheld, "point"));
   return text;
 }
 
-/// Returns the text for people. `height` is the value of that name in json_of().
-std::string text_of(const FileInfo& file, const Json& height) {
+/// Returns the text for people. `height` is the value of that name in file_json().
+std::string file_text(const FileInfo& file, const Json& height) {
   std::string text = contents_lines(file);
-  text += "crs:       " + printable_line(text_of(file.crs.crs, file.scan.world)) + '\n';
+  text += "crs:       " + printable_line(crs_text(file.crs.crs, file.scan.world)) + '\n';
   if (!file.crs.note.empty()) {
     text += "note:      " + printable_line(option_text(file.crs.note)) + '\n';
   }
   if (const std::string vertical = file.vertical(); !vertical.empty()) {
     text += "vertical:  " + vertical + '\n';
   }
-  text += "bounds:    " + text_of(file.scan.world) + '\n';
+  text += "bounds:    " + box_text(file.scan.world) + '\n';
   if (!height.is_null()) text += heights_line(height["min"], height["max"], height["mean"]);
   text += channels_line(file.source);
   for (const std::string& comment : file.comments) {
@@ -400,8 +398,8 @@ Summary info_of_files(std::span<const std::string> files, const std::string& for
                       .comments = std::move(comments)};
   Summary summary;
   summary.text_is_result = true;
-  summary.json = json_of(file);
-  summary.text = text_of(file, summary.json["height"]);
+  summary.json = file_json(file);
+  summary.text = file_text(file, summary.json["height"]);
   return summary;
 }
 
@@ -417,19 +415,15 @@ void add_levels(const stream::Store& store, Json& json, std::string& text) {
                     {"members", level.members},
                     {"index_bytes", level.index_bytes},
                     {"cluster_sizes",
-                     {{"min", sizes.percentiles[0]},
-                      {"p5", sizes.percentiles[1]},
-                      {"median", sizes.percentiles[2]},
-                      {"p95", sizes.percentiles[3]},
-                      {"max", sizes.percentiles[4]},
+                     {{"min", sizes.min},
+                      {"p5", sizes.p5},
+                      {"median", sizes.median},
+                      {"p95", sizes.p95},
+                      {"max", sizes.max},
                       {"mean", sizes.mean}}}});
-    text += align_right(fmt::format("{}", level.level), 5) +
-            align_right(with_commas(level.points), 16) +
-            align_right(with_commas(level.clusters), 12) +
-            align_right(readable_bytes(level.bytes), 13) +
-            align_right(fmt::format("{}", sizes.percentiles[1]), 20) +
-            align_right(fmt::format("{}", sizes.percentiles[2]), 8) +
-            align_right(fmt::format("{}", sizes.percentiles[3]), 7) + '\n';
+    text += fmt::format("{:>5}{:>16}{:>12}{:>13}{:>20}{:>8}{:>7}\n", level.level,
+                        with_commas(level.points), with_commas(level.clusters),
+                        readable_bytes(level.bytes), sizes.p5, sizes.median, sizes.p95);
   }
 }
 
@@ -464,11 +458,11 @@ Summary info_of_store(const std::string& path) {
   if (schema.grid) text += raster_line(schema);
   text += fmt::format("points:    {}, nodata {}\n", with_commas(store.points()),
                       with_commas(schema.nodata));
-  text += "crs:       " + printable_line(text_of(schema.crs, bounds)) + '\n';
+  text += "crs:       " + printable_line(crs_text(schema.crs, bounds)) + '\n';
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
-  text += "bounds:    " + text_of(bounds);
-  if (entities_of(schema) != stream::Entities::points) text += " (of the first corners)";
+  text += "bounds:    " + box_text(bounds);
+  if (entities_of(schema) != stream::Entities::points) text += " (first corner of each entity)";
   text += '\n';
   text += heights_line(bounds.min[2], bounds.max[2], mean);
   text += channels_line(schema);
@@ -478,26 +472,27 @@ Summary info_of_store(const std::string& path) {
   return summary;
 }
 
-class InfoCommand : public Command {
+class InfoCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("input", inputs_,
-                   "a store; or files of points or cells, as one: also a folder, @FILE with one "
-                   "name per line, or a quoted pattern; - is standard input")
+                   "a store, or one or more files of points or cells: paths, folders, quoted "
+                   "patterns, @FILE with one name per line, or - for standard input")
         ->required()
         ->type_name("STORE|FILE");
     add_input_format(app, format_);
-    add_heights_of_colour(app, colours_);
+    add_rgb_encoding(app, colours_);
   }
 
   Summary run(const CommonOptions& common) override {
     for (const std::string& input : inputs_) {
       if (!stream::Store::exists(input)) continue;
       if (inputs_.size() > 1) {
-        throw UsageError("'" + input + "' is a store: name it alone");
+        throw UsageError(fmt::format("'{}' is a store: pass it alone", input));
       }
       if (colours_ != stream::HeightsOfColour::none || !format_.empty()) {
-        throw UsageError("'" + input + "' is a store: --rgb and --input-format do not apply");
+        throw UsageError(
+            fmt::format("'{}' is a store: --rgb and --input-format do not apply", input));
       }
       return info_of_store(input);
     }

@@ -239,7 +239,7 @@ class MatchCommand final : public Command {
            "monotone, monte-carlo: maximum number of iterations (default: the number of points)")
         ->type_name("N");
     add_number(app, "--seconds", seconds_,
-               "monotone, monte-carlo: start no iteration after S seconds", kAboveZero)
+               "monotone, monte-carlo: start no iteration after S seconds", kPositive)
         ->type_name("S");
     add_number(app, "--z-weight", z_weight_, "weight of heights in distances", kFactorOrZero);
     app.add_flag("--tree", tree_,
@@ -269,7 +269,7 @@ class MatchCommand final : public Command {
     std::vector<base::Box3> boxes;
     if (triangles) boxes = to_centroids(table);
     const GroundFrame ground = GroundFrame::of(table, z_weight_);
-    if (!ground.assumption.empty()) common.explain(input_ + ": " + ground.assumption);
+    if (!ground.assumption.empty()) common.say_verbose(input_ + ": " + ground.assumption);
     std::vector<std::uint32_t> labels;
     if (!labels_.empty()) labels = read_labels(labels_, table.size());
     request.labels = labels;

@@ -77,7 +77,7 @@ class MeshCommand final : public Command {
     add_number(app, "--max-error", max_error_,
                "few triangles within this vertical distance of every sample, in metres, verified "
                "on the written values",
-               kNotNegative)
+               kNonNegative)
         ->type_name("METRES");
     app.add_option("--max-points", max_points_,
                    "the mesh with the smallest error that has at most this many points")

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// profile: the heights along a line.
 #include <memory>
 #include <optional>
 #include <string>
@@ -29,15 +30,15 @@ class ProfileCommand final : public Command {
     add_output(app, output_,
                "CSV: distance (metres along the line), x, y, height; - is standard output");
     app.add_option("--line", line_,
-                   "x1,y1,x2,y2[,...] or a GeoJSON file with one LineString; straight in the "
-                   "store's CRS between its places")
+                   "x1,y1,x2,y2[,...] or a GeoJSON file with one LineString; segments are "
+                   "straight in the store's CRS")
         ->required()
         ->type_name("LINE");
-    crs_.define_input(app, "--line-crs", "the line's places");
+    crs_.define_input(app, "--line-crs", "the line's coordinates");
     add_number(app, "--step", step_,
-               "metres between rows (default: a row wherever the line crosses the lattice, one of "
-               "its diagonals, or an edge of the triangulated points)",
-               kAboveZero)
+               "metres between rows (default: a row at each grid line, cell diagonal or triangle "
+               "edge that the line crosses)",
+               kPositive)
         ->type_name("METRES");
   }
 
@@ -59,14 +60,14 @@ class ProfileCommand final : public Command {
     const ProfileOutcome outcome = write_profile(
         store, request, [&](std::string_view text) { output.write(text); }, common.context());
     output.commit();
-    if (outcome.answered == 0) common.say("the line does not meet the store's data");
+    if (outcome.answered == 0) common.say("the line does not cross any data of the store");
 
     Summary summary;
     summary.json = {
         {"points", outcome.points}, {"answered", outcome.answered}, {"metres", outcome.metres}};
     summary.add_cost(watch);
     summary.text =
-        fmt::format("{}: {} on {} m in {}\n", output_, counted(outcome.points, "place"),
+        fmt::format("{}: {} along {} m in {}\n", output_, counted(outcome.points, "point"),
                     readable_number(outcome.metres, 6), readable_seconds(watch.seconds()));
     return summary;
   }

@@ -38,7 +38,7 @@ class RasterCommand final : public Command {
                "multiples, so that rasters with the same cell size align (default: the raster's "
                "own cells; for points and coarser levels, about as many cells as there are "
                "points)",
-               kAboveZero)
+               kPositive)
         ->type_name("SIZE");
     app.add_option("--align", align_, "use all cells of this raster, in its CRS")
         ->type_name("FILE")

@@ -54,7 +54,7 @@ void define_selection(CLI::App& app, PictureSelection& selection) {
       ->allow_extra_args(false)
       ->type_name("BOX:L");
   add_where(app, selection.where);
-  add_heights_of_colour(app, selection.colours);
+  add_rgb_encoding(app, selection.colours);
 }
 
 /// Returns the slope in degrees at a vertex with this normal.
@@ -64,7 +64,7 @@ double slope_degrees(const std::array<float, 3>& normal) {
   return tri::slope_degrees({normal[0] / up, normal[1] / up});
 }
 
-class RenderCommand : public Command {
+class RenderCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option("input", input_,
@@ -101,14 +101,14 @@ class RenderCommand : public Command {
     const ViewDirection view = parse_view(view_);
     const stream::Naming replace = may_replace(output_, common.force);
 
-    memory_for_points(input_, size, 0, common);
+    check_picture_memory(input_, size, 0, common);
     if (is_matching_result(input_)) return render_matching(size, view, replace, common, watch);
     if (!points_file_.empty()) {
       throw UsageError("--points applies to results of 'terrace match'; '" + input_ +
                        "' is something else");
     }
     const auto check_rows = [&](std::uint64_t rows) {
-      memory_for_points(input_, size, rows * kBytesPerMerge, common);
+      check_picture_memory(input_, size, rows * kBytesPerMerge, common);
     };
     if (const auto tree = read_dendrogram(input_, check_rows)) {
       return render_tree(*tree, size, replace, watch);
@@ -124,7 +124,7 @@ class RenderCommand : public Command {
     selection_.triangles = wire_;
     PictureInput input = read_picture_input(input_, selection_, size, common);
     if (!input.guess.empty()) common.say(input_ + ": " + input.guess);
-    if (!input.assumption.empty()) common.explain(input_ + ": " + input.assumption);
+    if (!input.assumption.empty()) common.say_verbose(input_ + ": " + input.assumption);
     check_interrupt();
     TriangleMesh& mesh = input.mesh;
     if (mesh.positions.empty()) {
@@ -216,8 +216,8 @@ class RenderCommand : public Command {
     }
     MatchingPicture picture = read_matching_picture(
         input_, points_file_, common,
-        [&](std::uint64_t bytes) { memory_for_points(points_file_, size, bytes, common); });
-    if (!picture.assumption.empty()) common.explain(points_file_ + ": " + picture.assumption);
+        [&](std::uint64_t bytes) { check_picture_memory(points_file_, size, bytes, common); });
+    if (!picture.assumption.empty()) common.say_verbose(points_file_ + ": " + picture.assumption);
     picture.keep_levels(selection_.level);
     if (exaggerate_) {
       for (stream::Point3& p : picture.positions) p[2] *= *exaggerate_;

@@ -28,7 +28,7 @@ namespace terrace::tools {
 using namespace terrain;
 namespace {
 
-class SynthCommand : public Command {
+class SynthCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     app.add_option(
@@ -44,11 +44,11 @@ class SynthCommand : public Command {
                        ->type_name("WxH");
     points_option_ =
         app.add_option("--points", points_, "number of points (default: 1M)")->type_name("N");
-    add_number(app, "--cell", dem_.cell, "dem: side of a cell, in units of the CRS", kAboveZero);
+    add_number(app, "--cell", dem_.cell, "dem: side of a cell, in units of the CRS", kPositive);
     add_number(app, "--hurst", dem_.hurst, "dem: smoothness, between 0 and 1",
-               {.least = 0.01, .most = 0.99});
+               {.min = 0.01, .max = 0.99});
     add_number(app, "--roughness", dem_.roughness,
-               "dem: RMS difference of neighbouring cells in metres, at any size", kNotNegative);
+               "dem: RMS difference of neighbouring cells in metres, at any size", kNonNegative);
     app.add_option("--type", type_, "dem: int16 or float32")
         ->capture_default_str()
         ->check(CLI::IsMember({"int16", "float32"}));

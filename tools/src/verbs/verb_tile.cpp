@@ -62,7 +62,7 @@ class TileCommand final : public Command {
     add_number(app, "--max-error", max_error_,
                "error bound of the deepest zoom in metres, doubled at each zoom above (default: "
                "what globes expect, 77067 / 2^zoom)",
-               kAboveZero)
+               kPositive)
         ->type_name("METRES");
     app.add_option("--quality", quality_, "greedy, removal (fewer triangles) or fitted")
         ->capture_default_str();

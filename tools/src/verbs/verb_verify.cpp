@@ -42,7 +42,7 @@ class VerifyCommand final : public Command {
     add_number(app, "--max-error", max_error_,
                "error bound of the deepest zoom in metres, doubled at each zoom above (default: "
                "from layer.json)",
-               kAboveZero)
+               kPositive)
         ->type_name("METRES");
     app.add_option("--vertical", vertical_,
                    "reference of the store's heights: ellipsoidal; orthometric, as for `terrace "
