@@ -122,19 +122,19 @@ class Where::Parser {
     unsigned compared = 0;
     while (true) {
       const std::size_t before = at_;
-      const auto* const found = std::find_if(kBinary.begin(), kBinary.end(),
-                                             [&](const Binary& b) { return take(b.sign); });
-      if (found == kBinary.end()) return;
-      if (found->precedence < least) {
+      const auto* const binary = std::find_if(kBinary.begin(), kBinary.end(),
+                                              [&](const Binary& b) { return take(b.sign); });
+      if (binary == kBinary.end()) return;
+      if (binary->precedence < least) {
         at_ = before;
         return;
       }
-      if (found->precedence == compared) {
+      if (binary->precedence == compared) {
         throw fault("comparisons cannot be chained").remedy("join two with &&: a < b && b < c");
       }
-      if (found->precedence == 3 || found->precedence == 4) compared = found->precedence;
-      expression(found->precedence + 1);
-      emit({.operation = found->operation, .operands = 2});
+      if (binary->precedence == 3 || binary->precedence == 4) compared = binary->precedence;
+      expression(binary->precedence + 1);
+      emit({.operation = binary->operation, .operands = 2});
     }
   }
 
@@ -201,9 +201,9 @@ class Where::Parser {
       }
     }
     at_ = begin;
-    std::string known = "x, y, z";
-    for (const Channel& attribute : schema_->attributes) known += ", " + attribute.name;
-    throw fault("the points have no " + in_quotes(word)).remedy("known are " + known);
+    std::string names = "x, y, z";
+    for (const Channel& attribute : schema_->attributes) names += ", " + attribute.name;
+    throw fault("the points have no " + in_quotes(word)).remedy("known are " + names);
   }
 
   [[nodiscard]] std::optional<std::size_t> attribute_named(std::string_view word) const {

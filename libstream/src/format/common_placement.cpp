@@ -89,9 +89,9 @@ std::optional<Lattice> common_lattice(std::span<const Lattice> lattices, const B
   for (std::size_t i = 0; i < 3; ++i) {
     for (const Lattice& lattice : lattices)
       axes[i].push_back({lattice.scale[i], lattice.offset[i]});
-    const std::optional<std::uint64_t> found = common_parts(axes[i]);
-    if (!found) return std::nullopt;
-    parts[i] = *found;
+    const std::optional<std::uint64_t> axis_parts = common_parts(axes[i]);
+    if (!axis_parts) return std::nullopt;
+    parts[i] = *axis_parts;
   }
   // Equal steps in x and y stay equal, because triangulations are Delaunay in units of steps.
   if (lattices.front().scale[0] == lattices.front().scale[1]) {

@@ -69,10 +69,10 @@ class PartsAhead final : public RecordReader {
         std::min<std::uint64_t>(max_records,
                                 (current_.records.size() - at_) / parts_.record_bytes) *
         parts_.record_bytes);
-    const std::string_view found(reinterpret_cast<const char*>(current_.records.data()) + at_,
-                                 bytes);
+    const std::string_view records(reinterpret_cast<const char*>(current_.records.data()) + at_,
+                                   bytes);
     at_ += bytes;
-    return found;
+    return records;
   }
 
   std::uint64_t lost() const override { return lost_; }

@@ -127,9 +127,9 @@ constexpr ForeignRow kForeignFormats[] = {
 
 bool shows(const Mark& mark, std::string_view head) {
   if (mark.bytes.empty() || head.size() < mark.at + mark.bytes.size()) return false;
-  const std::string_view found = head.substr(mark.at, mark.bytes.size());
+  const std::string_view bytes = head.substr(mark.at, mark.bytes.size());
   const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c + 32) : c; };
-  return std::equal(found.begin(), found.end(), mark.bytes.begin(),
+  return std::equal(bytes.begin(), bytes.end(), mark.bytes.begin(),
                     [&](char a, char b) { return a == b || (mark.any_case && lower(a) == b); });
 }
 
@@ -172,8 +172,8 @@ std::string ending_of(const std::filesystem::path& file) {
 /// Returns the format with that file ending; nullptr if there is none.
 const Format* format_of_ending(const std::string& ending) {
   for (const Format& format : formats()) {
-    const auto& known = format.endings;
-    if (std::find(known.begin(), known.end(), ending) != known.end()) return &format;
+    const auto& endings = format.endings;
+    if (std::find(endings.begin(), endings.end(), ending) != endings.end()) return &format;
   }
   return nullptr;
 }

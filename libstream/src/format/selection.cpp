@@ -34,31 +34,33 @@ class SelectedSource final : public PointSource {
   SelectedSource(std::unique_ptr<PointSource> source, const SourceOptions& options,
                  const std::vector<std::size_t>& selected)
       : source_(std::move(source)), block_points_(options.block_points) {
-    const SourceInfo& all = source_->info();
+    const SourceInfo& source_info = source_->info();
     const Selection& selection = options.selection;
-    info_ = all;
+    info_ = source_info;
     region_ = selection.region;
     if (region_) {
-      const std::array<double, 2> tolerance = border_tolerance(all);
+      const std::array<double, 2> tolerance = border_tolerance(source_info);
       for (std::size_t axis = 0; axis < 2; ++axis) {
         region_->min[axis] -= tolerance[axis];
         region_->max[axis] += tolerance[axis];
       }
     }
     covers_ = selection.covers;
-    if (!selection.where.empty()) where_.emplace(selection.where, all);
+    if (!selection.where.empty()) where_.emplace(selection.where, source_info);
     if (where_ || region_) {
-      if (!all.grid) info_.points.reset();
-      for (std::size_t i = 0; i < all.attributes.size(); ++i) {
-        if (all.attributes[i].name == "withheld" && size_of(all.attributes[i].type) == 1) {
+      if (!source_info.grid) info_.points.reset();
+      for (std::size_t i = 0; i < source_info.attributes.size(); ++i) {
+        if (source_info.attributes[i].name == "withheld" &&
+            size_of(source_info.attributes[i].type) == 1) {
           withheld_attribute_ = i;
         }
       }
     }
     info_.attributes.clear();
     for (const std::size_t i : selected) {
-      info_.attributes.push_back(all.attributes[i]);
-      const std::size_t offset = all.attribute_offset(i), bytes = size_of(all.attributes[i].type);
+      info_.attributes.push_back(source_info.attributes[i]);
+      const std::size_t offset = source_info.attribute_offset(i),
+                        bytes = size_of(source_info.attributes[i].type);
       if (!pieces_.empty() && pieces_.back().offset + pieces_.back().bytes == offset) {
         pieces_.back().bytes += bytes;
       } else {
@@ -188,9 +190,9 @@ std::vector<std::string> needed_attributes(const SourceInfo& info, const Selecti
 void check_attributes(const std::vector<std::string>& names, const std::vector<Channel>& attributes,
                       const std::string& file) {
   for (const std::string& name : names) {
-    const bool known = std::any_of(attributes.begin(), attributes.end(),
-                                   [&](const Channel& c) { return c.name == name; });
-    if (known) continue;
+    const bool exists = std::any_of(attributes.begin(), attributes.end(),
+                                    [&](const Channel& c) { return c.name == name; });
+    if (exists) continue;
     std::string list;
     for (const Channel& attribute : attributes) {
       if (!list.empty()) list += ", ";
@@ -206,14 +208,15 @@ std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
   const Selection& selection = options.selection;
   if (selection.where.empty() && !selection.keep && selection.drop.empty() && !selection.region)
     return source;
-  const SourceInfo& all = source->info();
-  const std::string file = all.files.empty() ? std::string() : all.files.front();
+  const SourceInfo& source_info = source->info();
+  const std::string file = source_info.files.empty() ? std::string() : source_info.files.front();
   // A chain of files has already checked and dropped these attributes.
-  if (all.files.size() <= 1 || all.grid) check_attributes(selection.drop, all.attributes, file);
-  if (selection.keep) check_attributes(*selection.keep, all.attributes, file);
+  if (source_info.files.size() <= 1 || source_info.grid)
+    check_attributes(selection.drop, source_info.attributes, file);
+  if (selection.keep) check_attributes(*selection.keep, source_info.attributes, file);
   std::vector<std::size_t> selected;
-  for (std::size_t i = 0; i < all.attributes.size(); ++i) {
-    if (is_selected(all.attributes[i].name, selection)) selected.push_back(i);
+  for (std::size_t i = 0; i < source_info.attributes.size(); ++i) {
+    if (is_selected(source_info.attributes[i].name, selection)) selected.push_back(i);
   }
   return std::make_unique<SelectedSource>(std::move(source), options, selected);
 }

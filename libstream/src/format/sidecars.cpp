@@ -39,16 +39,16 @@ std::vector<std::string> world_endings(const std::string& ending) {
     lower.push_back(ending + 'w');
   }
   lower.emplace_back(".wld");
-  std::vector<std::string> all;
+  std::vector<std::string> endings;
   for (std::string& name : lower) {
     std::string upper = name;
     for (char& c : upper) {
       if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 32);
     }
-    all.push_back(std::move(name));
-    all.push_back(std::move(upper));
+    endings.push_back(std::move(name));
+    endings.push_back(std::move(upper));
   }
-  return all;
+  return endings;
 }
 
 /// Decimal commas are read as points.
@@ -113,11 +113,11 @@ XmlElement read_pam(const std::string& file) {
 const XmlElement* band_of(const XmlElement& root, const RasterOptions& options) {
   // The sidecar describes the colours, not the heights that are decoded from them.
   if (options.heights_of_colour != HeightsOfColour::none) return nullptr;
-  const auto found =
+  const auto band_element =
       std::find_if(root.children.begin(), root.children.end(), [&](const XmlElement& band) {
         return band.name == kPamBand && finite_number(band.attribute("band")) == options.band;
       });
-  return found == root.children.end() ? nullptr : &*found;
+  return band_element == root.children.end() ? nullptr : &*band_element;
 }
 
 /// As in GDAL, the sidecar of a GeoTIFF overrides the file's georeferencing, CRS, nodata value and
@@ -311,9 +311,9 @@ std::optional<WorldFile> world_file_of(const std::string& file) {
 void place_by_world_file(const std::string& file, RasterInfo& info) {
   const auto comment = std::find(info.comments.begin(), info.comments.end(), kNoGeoreferencing);
   if (comment == info.comments.end()) return;
-  const std::optional<WorldFile> found = world_file_of(file);
-  if (!found) return;
-  info.world = found->world;
+  const std::optional<WorldFile> world_file = world_file_of(file);
+  if (!world_file) return;
+  info.world = world_file->world;
   info.comments.erase(comment);
 }
 

@@ -201,9 +201,9 @@ std::string_view name_of(Entities entities) {
 }
 
 std::optional<Entities> entities_named(std::string_view name) {
-  const auto found = std::find(kEntityNames.begin(), kEntityNames.end(), name);
-  if (found == kEntityNames.end()) return std::nullopt;
-  return static_cast<Entities>(found - kEntityNames.begin());
+  const auto entry = std::find(kEntityNames.begin(), kEntityNames.end(), name);
+  if (entry == kEntityNames.end()) return std::nullopt;
+  return static_cast<Entities>(entry - kEntityNames.begin());
 }
 
 std::unique_ptr<PointSource> open_source(std::span<const std::string> names,

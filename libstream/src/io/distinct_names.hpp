@@ -15,8 +15,8 @@ class DistinctNames {
   std::string add(const std::string& name) {
     std::string distinct = name;
     std::size_t number = 2;
-    if (const auto known = next_.find(name); known != next_.end()) {
-      number = known->second;
+    if (const auto entry = next_.find(name); entry != next_.end()) {
+      number = entry->second;
       do {
         distinct.assign(name).append("_").append(std::to_string(number++));
       } while (next_.count(distinct) > 0);

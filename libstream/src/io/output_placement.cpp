@@ -45,10 +45,10 @@ Ownership ownership_of_entries(
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (!result.ours && first < name) continue;
-    const Ownership found = of_entry(*entry);
-    if (found.ours) continue;
+    const Ownership ownership = of_entry(*entry);
+    if (ownership.ours) continue;
     first = name;
-    result = Ownership::except(found.stranger.empty() ? name : name + "/" + found.stranger);
+    result = Ownership::except(ownership.stranger.empty() ? name : name + "/" + ownership.stranger);
   }
   return error ? Ownership(false) : result;
 }
@@ -112,10 +112,10 @@ bool OutputPlacement::publish_by_exchange() {
   if (number != 0) throw failed(number);
   state_ = State::exchanged;
   // Another process may have taken the name since it was checked.
-  const Ownership found = ownership_of(temporary_);
-  if (found.ours) return true;
+  const Ownership ownership = ownership_of(temporary_);
+  if (ownership.ours) return true;
   undo();
-  throw not_replaced(shown_.string(), found);
+  throw not_replaced(shown_.string(), ownership);
 }
 
 /// For file systems that cannot exchange names.
@@ -124,11 +124,11 @@ bool OutputPlacement::publish_by_renames() {
   if (!is_folder(temporary_)) {
     // A file is replaced by one rename. A second name keeps the old one until all has gone well.
     const bool has_backup = ::link(place_.c_str(), old.c_str()) == 0;
-    const Ownership found = ownership_of(has_backup ? old : place_);
-    if (!found.ours || ::rename(temporary_.c_str(), place_.c_str()) != 0) {
+    const Ownership ownership = ownership_of(has_backup ? old : place_);
+    if (!ownership.ours || ::rename(temporary_.c_str(), place_.c_str()) != 0) {
       const int error = errno;
       if (has_backup) ::unlink(old.c_str());
-      if (!found.ours) throw not_replaced(shown_.string(), found);
+      if (!ownership.ours) throw not_replaced(shown_.string(), ownership);
       throw failed(error);
     }
     state_ = has_backup ? State::backed_up : State::lost;
@@ -138,11 +138,11 @@ bool OutputPlacement::publish_by_renames() {
     if (errno == ENOENT) return false;
     throw failed(errno);
   }
-  const Ownership found = ownership_of(old);
-  const int number = found.ours ? rename_exclusively(temporary_, place_) : 0;
-  if (!found.ours || number != 0) {
+  const Ownership ownership = ownership_of(old);
+  const int number = ownership.ours ? rename_exclusively(temporary_, place_) : 0;
+  if (!ownership.ours || number != 0) {
     rename_exclusively(old, place_);
-    if (!found.ours) throw not_replaced(shown_.string(), found);
+    if (!ownership.ours) throw not_replaced(shown_.string(), ownership);
     throw failed(number);
   }
   state_ = State::backed_up;
@@ -161,11 +161,11 @@ void OutputPlacement::publish() {
       throw failed(number);
     }
     if (!naming_.replace) throw already_exists(shown_.string());
-    const Ownership found = ownership_of(place_);
-    if (!found.ours) {
+    const Ownership ownership = ownership_of(place_);
+    if (!ownership.ours) {
       std::error_code ignored;
       if (!fs::exists(fs::symlink_status(place_, ignored))) continue;
-      throw not_replaced(shown_.string(), found);
+      throw not_replaced(shown_.string(), ownership);
     }
     if (publish_by_exchange()) return;
   }

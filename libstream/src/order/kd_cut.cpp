@@ -111,9 +111,9 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
   // Only the points in bin `middle` are compared with one another.
   const auto order = [axis](const Point& a, const Point& b) { return comes_before(a, b, axis); };
   const auto select = [&](std::span<Point> in_middle) {
-    const auto found = in_middle.begin() + static_cast<std::ptrdiff_t>(first - begin);
-    std::nth_element(in_middle.begin(), found, in_middle.end(), order);
-    return *found;
+    const auto middle_point = in_middle.begin() + static_cast<std::ptrdiff_t>(first - begin);
+    std::nth_element(in_middle.begin(), middle_point, in_middle.end(), order);
+    return *middle_point;
   };
   if constexpr (std::is_same_v<Coordinate, double>) {
     // The order on both sides matters when a window is thinned, so it must depend only on the
@@ -130,14 +130,14 @@ KdPlane divide(std::span<Numbered<Coordinate>> points, std::size_t first,
     // Saves a pass: first moves all points up to the bin before the others, then those in the bin
     // to the end of these.
     std::vector<std::size_t> in_middle(counts[middle] + 1);
-    std::size_t found = 0;
+    std::size_t count = 0;
     std::size_t end = partition(points, [&](const Point& point, std::size_t at) {
       const std::size_t bin = bins.of(point.place[axis]);
-      in_middle[found] = at;
-      found += bin == middle ? 1 : 0;
+      in_middle[count] = at;
+      count += bin == middle ? 1 : 0;
       return bin <= middle;
     });
-    while (found > 0) exchange(points[in_middle[--found]], points[--end]);
+    while (count > 0) exchange(points[in_middle[--count]], points[--end]);
     return {axis, static_cast<double>(select(points.subspan(begin, counts[middle])).place[axis])};
   }
 }

@@ -392,9 +392,9 @@ class SpatialSource final : public OrderedSource {
       join(buckets.subspan(buckets.size() / 2), joined);
       return;
     }
-    Bucket all;
-    for (Bucket& bucket : buckets) all.append(std::move(bucket));
-    joined.push_back(std::move(all));
+    Bucket merged;
+    for (Bucket& bucket : buckets) merged.append(std::move(bucket));
+    joined.push_back(std::move(merged));
   }
 
   /// Fills the block with the next points; leaves it empty at the end.

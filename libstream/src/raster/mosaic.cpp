@@ -350,10 +350,10 @@ class Mosaic final : public Raster {
   }
 
   Raster& member_raster(std::size_t member) {
-    const auto found =
+    const auto entry =
         std::find_if(open_.begin(), open_.end(), [&](const Open& o) { return o.member == member; });
-    if (found != open_.end()) {
-      open_.splice(open_.begin(), open_, found);
+    if (entry != open_.end()) {
+      open_.splice(open_.begin(), open_, entry);
       return *open_.front().raster;
     }
     const std::uint64_t needed_bytes = members_[member].held_bytes;

@@ -64,15 +64,15 @@ SourceInfo source_info(const RasterInfo& raster, const SourceOptions& options) {
 /// Returns the cells that may be in a region, with some around its border; all cells without a
 /// region.
 CellWindow cells_in(const SourceInfo& info, const std::optional<Box3>& region) {
-  const CellWindow all{.column = 0, .row = 0, .columns = info.columns, .rows = info.rows};
-  if (!region) return all;
+  const CellWindow whole{.column = 0, .row = 0, .columns = info.columns, .rows = info.rows};
+  if (!region) return whole;
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<double, 2> low{kInfinity, kInfinity}, high{-kInfinity, -kInfinity};
   for (const double x : {region->min[0], region->max[0]}) {
     for (const double y : {region->min[1], region->max[1]}) {
       const std::array<double, 2> place = stored_place(info, {x, y});
       for (std::size_t axis = 0; axis < 2; ++axis) {
-        if (!std::isfinite(place[axis])) return all;
+        if (!std::isfinite(place[axis])) return whole;
         low[axis] = std::min(low[axis], place[axis]);
         high[axis] = std::max(high[axis], place[axis]);
       }

@@ -188,9 +188,9 @@ class JsonParser {
 JsonValue JsonValue::parse(std::string_view text) { return JsonParser(text).document(); }
 
 const JsonValue& JsonValue::at(std::string_view key) const {
-  const auto found = std::find(keys_.rbegin(), keys_.rend(), key);
-  if (found == keys_.rend()) throw Damage('"' + std::string(key) + "\" is missing");
-  return items_[static_cast<std::size_t>(keys_.rend() - found) - 1];
+  const auto entry = std::find(keys_.rbegin(), keys_.rend(), key);
+  if (entry == keys_.rend()) throw Damage('"' + std::string(key) + "\" is missing");
+  return items_[static_cast<std::size_t>(keys_.rend() - entry) - 1];
 }
 
 const std::vector<JsonValue>& JsonValue::items() const {

@@ -209,9 +209,9 @@ std::span<const OverlayValue> Overlay::find(ClusterId cluster) {
   if (next == pages.begin()) return {};
   impl_->load_page(static_cast<std::size_t>(next - pages.begin()) - 1);
   const auto& clusters = impl_->page.clusters;
-  const auto found = std::lower_bound(clusters.begin(), clusters.end(), cluster);
-  if (found == clusters.end() || *found != cluster) return {};
-  return impl_->page.of(static_cast<std::size_t>(found - clusters.begin()));
+  const auto entry = std::lower_bound(clusters.begin(), clusters.end(), cluster);
+  if (entry == clusters.end() || *entry != cluster) return {};
+  return impl_->page.of(static_cast<std::size_t>(entry - clusters.begin()));
 }
 
 void Overlay::for_each(const std::function<void(ClusterId, std::span<const OverlayValue>)>& visit) {

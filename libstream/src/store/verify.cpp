@@ -262,11 +262,11 @@ class Verification {
         const std::uint64_t key = key_of(type, record + at);
         return reader.ranges[a].low <= key && key <= reader.ranges[a].high;
       };
-      bool all = !points.has_representative || inside(points.representative_payload.data());
+      bool all_inside = !points.has_representative || inside(points.representative_payload.data());
       for (std::size_t i = 0; i < points.size(); ++i) {
-        all &= inside(points.payload.data() + i * stride);
+        all_inside &= inside(points.payload.data() + i * stride);
       }
-      if (!all) {
+      if (!all_inside) {
         page.problem(
             level.data().name(), offset,
             about_cluster(l, ordinal,

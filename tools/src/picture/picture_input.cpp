@@ -199,7 +199,7 @@ PictureInput input_from_store(const std::string& path, const PictureSelection& s
     convert_to_ground(input, store_placement, Ground(store_placement));
     return input;
   }
-  // With focuses an empty level means the detail that the focuses ask for.
+  // With focuses, an empty level means the top level outside them.
   const bool level_chosen = !selection.level.empty() || !selection.focuses.empty();
   const std::string level = level_chosen ? selection.level : finest_level(store, selection.region);
   RegionConversion regions(store);

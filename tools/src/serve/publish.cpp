@@ -126,8 +126,8 @@ SiteSize publish(std::span<const stream::Store> stores, const fs::path& folder, 
     if (!replace)
       throw stream::Error(target.string(), "exists already")
           .remedy("name another folder, or give --force");
-    if (const stream::Ownership found = ownership_of_site(target); !found.ours) {
-      throw stream::not_replaced(target.string(), found);
+    if (const stream::Ownership ownership = ownership_of_site(target); !ownership.ours) {
+      throw stream::not_replaced(target.string(), ownership);
     }
   }
   SiteSize size;

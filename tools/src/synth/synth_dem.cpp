@@ -115,7 +115,7 @@ class DemWriter {
 
   /// Writes the file. Returns the statistics of its samples.
   Statistics run() {
-    Statistics all;
+    Statistics total;
     std::uint64_t cells = 0;
     base::in_order(
         pieces_, options_.threads, [this](unsigned, std::size_t i) { return generate(piece(i)); },
@@ -123,12 +123,12 @@ class DemWriter {
           check_interrupt();
           const Piece p = piece(i);
           write(p, result.tiles);
-          all.add(result.statistics);
+          total.add(result.statistics);
           cells += std::uint64_t{p.columns} * p.rows;
           progress_(cells);
         });
     writer_.commit();
-    return all;
+    return total;
   }
 
  private:
@@ -199,10 +199,10 @@ class DemWriter {
 
   void write(const Piece& p, const std::vector<Sample>& tiles) {
     constexpr std::size_t kTileSize = std::size_t{kSynthTile} * kSynthTile;
-    const std::span<const Sample> all(tiles);
+    const std::span<const Sample> samples(tiles);
     for (std::uint32_t t = 0; t < p.tiles; ++t) {
       writer_.write_tile(p.first_column / kSynthTile + t, p.first_row / kSynthTile,
-                         std::as_bytes(all.subspan(t * kTileSize, kTileSize)));
+                         std::as_bytes(samples.subspan(t * kTileSize, kTileSize)));
     }
   }
 

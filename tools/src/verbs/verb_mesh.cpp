@@ -136,15 +136,15 @@ class MeshCommand final : public Command {
                     {"meshing_seconds", result.meshing_seconds},
                     {"peak_rss_bytes", peak_rss_bytes()}};
     report_coordinates(result.coordinates, common, summary);
-    const bool all = result.uncovered == 0;
+    const bool all_covered = result.uncovered == 0;
     summary.text =
         fmt::format("{}: {}, {}, within {} m of {}{} (RMS {} m), in {}\n", output_,
                     counted(result.vertices, "vertex"), counted(result.triangles, "triangle"),
                     readable_bound(result.max_error),
-                    all ? "all " : with_commas(result.samples - result.uncovered) + " of ",
+                    all_covered ? "all " : with_commas(result.samples - result.uncovered) + " of ",
                     counted(result.samples, "sample"), readable_number(result.rms_error),
                     readable_seconds(watch.seconds()));
-    if (!all) {
+    if (!all_covered) {
       summary.text +=
           fmt::format("{} on no triangle: {}\n", counted(result.uncovered, "sample", "is", "are"),
                       why_uncovered(result, store.schema().grid, options.region.has_value()));

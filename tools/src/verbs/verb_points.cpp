@@ -186,10 +186,10 @@ class PointsCommand final : public Command {
     NearPlace place{.xy = WholeTurns(store.schema(), store.whole().bounds())({xyz[0], xyz[1]})};
     if (xyz.size() == 3) place.z = xyz[2];
     stream::StoreQuery query(store);
-    const std::vector<stream::FoundPoint> found =
+    const std::vector<stream::FoundPoint> selected =
         count_ ? nearest_points(query, place, *count_, detail.level)
                : points_within(query, place, *radius_, detail.level);
-    if (found.empty() && store.whole().points() > 0) {
+    if (selected.empty() && store.whole().points() > 0) {
       throw stream::Error(part_.path,
                           "no point is selected " +
                               (radius_ ? "within " + plain_number(*radius_) + " m of " : "near ") +
@@ -212,17 +212,17 @@ class PointsCommand final : public Command {
                                   point_writer_options(output_, format_, common));
     writing_within_memory(*writer, output_, common.memory_or(0));
     report_lost_unit(*writer, store, to, common);
-    write_found_points(query, found, *writer, conversion_to(to));
+    write_found_points(query, selected, *writer, conversion_to(to));
     writer->finish();
     Summary summary;
-    summary.json = {{"vertices", found.size()}, {"triangles", 0}};
+    summary.json = {{"vertices", selected.size()}, {"triangles", 0}};
     summary.add_cost(watch);
-    summary.text = output_ + ": " + counted(found.size(), "point");
-    if (!found.empty()) {
-      summary.json["nearest_metres"] = found.front().distance;
-      summary.json["farthest_metres"] = found.back().distance;
-      summary.text += fmt::format(", {} to {} m away", readable_number(found.front().distance),
-                                  readable_number(found.back().distance));
+    summary.text = output_ + ": " + counted(selected.size(), "point");
+    if (!selected.empty()) {
+      summary.json["nearest_metres"] = selected.front().distance;
+      summary.json["farthest_metres"] = selected.back().distance;
+      summary.text += fmt::format(", {} to {} m away", readable_number(selected.front().distance),
+                                  readable_number(selected.back().distance));
     }
     summary.text += ", in " + readable_seconds(watch.seconds()) + "\n";
     report_rounding(*writer, summary);

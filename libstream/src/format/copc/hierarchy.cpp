@@ -203,10 +203,10 @@ Octree read_copc_hierarchy(const ByteSource& file, std::string_view info, std::u
   // A file without points has an empty page.
   if (points > 0 || root.bytes > 0) octree.nodes = HierarchyReader(file, first_chunk).read(root);
   check_disjoint(file, octree);
-  if (const std::uint64_t found = octree.points(); found != points) {
+  if (const std::uint64_t node_points = octree.points(); node_points != points) {
     throw damaged(file, root.offset,
                   fmt::format("the nodes of the COPC hierarchy have {}, but the header promises {}",
-                              counted(found, "point"), points));
+                              counted(node_points, "point"), points));
   }
   return octree;
 }

@@ -178,9 +178,9 @@ OctreeBuilder::NodePoints OctreeBuilder::visit(const OctreeNode& node, std::span
     return sum;
   };
   if (records(buckets) <= batch_records_) {
-    Bucket all;
-    for (Bucket& bucket : buckets) all.append(std::move(bucket));
-    return build_in_memory(node, std::move(all));
+    Bucket merged;
+    for (Bucket& bucket : buckets) merged.append(std::move(bucket));
+    return build_in_memory(node, std::move(merged));
   }
   Bucket promoted;
   const std::size_t each = buckets.size() / kChildren;

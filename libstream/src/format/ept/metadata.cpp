@@ -106,10 +106,10 @@ class EptMetadataReader {
   [[nodiscard]] Json parse() const {
     const std::unique_ptr<ByteSource> bytes = open_file(file_);
     if (bytes->size() > kMaxBytes) throw fault("is too large for the description of a data set");
-    std::string all(bytes->size(), '\0');
-    bytes->read(0, std::as_writable_bytes(std::span(all)));
+    std::string text(bytes->size(), '\0');
+    bytes->read(0, std::as_writable_bytes(std::span(text)));
     try {
-      return parse_bounded_json(all, {}, [this](const char* cause) { throw fault(cause); });
+      return parse_bounded_json(text, {}, [this](const char* cause) { throw fault(cause); });
     } catch (const Json::parse_error& error) {
       throw fault("it is not JSON").at_byte(error.byte);
     } catch (const Json::out_of_range&) {
@@ -118,9 +118,9 @@ class EptMetadataReader {
   }
 
   [[nodiscard]] const Json& member(const Json& json, const char* name) const {
-    const auto found = json.find(name);
-    if (found == json.end()) throw fault("is missing").at(name);
-    return *found;
+    const auto entry = json.find(name);
+    if (entry == json.end()) throw fault("is missing").at(name);
+    return *entry;
   }
 
   [[nodiscard]] std::string text(const Json& json, const char* name,
@@ -132,11 +132,11 @@ class EptMetadataReader {
   }
 
   [[nodiscard]] double number(const Json& json, const char* name, double fallback) const {
-    const auto found = json.find(name);
-    if (found == json.end()) return fallback;
-    if (!found->is_number() || !std::isfinite(found->get<double>()))
+    const auto entry = json.find(name);
+    if (entry == json.end()) return fallback;
+    if (!entry->is_number() || !std::isfinite(entry->get<double>()))
       throw fault("is not a number").at(name);
-    return found->get<double>();
+    return entry->get<double>();
   }
 
   void read_cube(const Json& json, Octree& octree) const {

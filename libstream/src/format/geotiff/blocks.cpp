@@ -140,10 +140,10 @@ std::uint64_t GeoTiffBlocks::held_bytes() const {
            max_stored_ + 2 * layout_.row_bytes();
   }
   // Never more than all blocks of the band, which are fewer than 2^32.
-  const std::uint64_t all = std::min<std::uint64_t>(
+  const std::uint64_t cached_blocks = std::min<std::uint64_t>(
       std::uint64_t{layout_.blocks_across} * layout_.blocks_down, cache_bytes_ / block_bytes());
   return tables + codec_bytes(layout_.compression, block_bytes()) + max_stored_ +
-         (1 + all) * block_bytes();
+         (1 + cached_blocks) * block_bytes();
 }
 
 bool GeoTiffBlocks::read_over(const CellWindow& window, const CellBuffer& out) {
@@ -328,9 +328,9 @@ bool GeoTiffBlocks::overlay_cells(const Part& part, const SampleRow& samples, st
 const std::vector<std::byte>& GeoTiffBlocks::decoded(const Part& part, std::uint64_t offset,
                                                      std::uint64_t bytes) {
   const std::uint32_t number = layout_.block(part.across, part.down);
-  if (const auto found = cached_.find(number); found != cached_.end()) {
-    cache_.splice(cache_.begin(), cache_, found->second);
-    return found->second->samples;
+  if (const auto entry = cached_.find(number); entry != cached_.end()) {
+    cache_.splice(cache_.begin(), cache_, entry->second);
+    return entry->second->samples;
   }
   if (decoded_ == number && !block_.empty()) return block_;
   decoded_.reset();

@@ -136,23 +136,23 @@ void place_geotiff(const GeoTiffHandle& handle, const GeoKeys& keys, RasterInfo&
 }
 
 BandMetadata band_metadata(const std::string& xml, unsigned band) {
-  BandMetadata found;
+  BandMetadata metadata;
   std::string_view rest = xml;
   const std::string sample = fmt::format("{}", band);
   for (;;) {
     const std::size_t begin = rest.find("<Item");
-    if (begin == rest.npos) return found;
+    if (begin == rest.npos) return metadata;
     rest.remove_prefix(begin + 5);
     const std::size_t end = rest.find('>');
-    if (end == rest.npos) return found;
+    if (end == rest.npos) return metadata;
     const std::string_view tag = rest.substr(0, end);
     rest.remove_prefix(end + 1);
     const std::string_view text = rest.substr(0, rest.find('<'));
     if (attribute(tag, "sample") != sample) continue;
     const std::string_view role = attribute(tag, "role");
-    if (role == "scale") found.scale = number_in(text);
-    if (role == "offset") found.offset = number_in(text);
-    if (role == "unittype") found.unit = canonical_unit(text);
+    if (role == "scale") metadata.scale = number_in(text);
+    if (role == "offset") metadata.offset = number_in(text);
+    if (role == "unittype") metadata.unit = canonical_unit(text);
   }
 }
 

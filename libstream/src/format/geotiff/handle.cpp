@@ -165,15 +165,15 @@ GeoTiffHandle::GeoTiffHandle(const std::string& file, std::uint64_t memory_bytes
 GeoTiffHandle::~GeoTiffHandle() { TIFFClose(tiff_); }
 
 bool GeoTiffHandle::go_to_mask() {
-  bool found = false, is_image = true;
+  bool is_mask = false, is_image = true;
   // A damaged directory after the image must not prevent reading the image.
-  while (!found && is_image && TIFFLastDirectory(tiff_) == 0 && TIFFReadDirectory(tiff_) == 1) {
+  while (!is_mask && is_image && TIFFLastDirectory(tiff_) == 0 && TIFFReadDirectory(tiff_) == 1) {
     const auto kind = value_or<std::uint32_t>(TIFFTAG_SUBFILETYPE, 0);
-    found = (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == FILETYPE_MASK;
+    is_mask = (kind & (FILETYPE_REDUCEDIMAGE | FILETYPE_MASK)) == FILETYPE_MASK;
     is_image = kind != 0;
   }
   take_complaint();
-  return found;
+  return is_mask;
 }
 
 bool GeoTiffHandle::read(std::uint64_t offset, std::span<std::byte> out) const {

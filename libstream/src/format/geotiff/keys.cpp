@@ -99,31 +99,31 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
 }
 
 std::optional<std::uint16_t> GeoKeys::number(std::uint16_t key) const {
-  const auto found = numbers_.find(key);
-  if (found == numbers_.end()) return std::nullopt;
-  return found->second;
+  const auto entry = numbers_.find(key);
+  if (entry == numbers_.end()) return std::nullopt;
+  return entry->second;
 }
 
 std::string GeoKeys::text(std::uint16_t key) const {
-  const auto found = texts_.find(key);
-  return found == texts_.end() ? std::string() : found->second;
+  const auto entry = texts_.find(key);
+  return entry == texts_.end() ? std::string() : entry->second;
 }
 
 std::vector<GeoKey> GeoKeys::range(std::uint16_t first, std::uint16_t last) const {
-  std::vector<GeoKey> found;
+  std::vector<GeoKey> keys;
   const auto within = [first, last](std::uint16_t key) { return first <= key && key <= last; };
   for (const auto& [key, value] : numbers_) {
-    if (within(key)) found.push_back({.key = key, .values = {static_cast<double>(value)}});
+    if (within(key)) keys.push_back({.key = key, .values = {static_cast<double>(value)}});
   }
   for (const auto& [key, values] : doubles_) {
-    if (within(key)) found.push_back({.key = key, .values = values});
+    if (within(key)) keys.push_back({.key = key, .values = values});
   }
   for (const auto& [key, text] : texts_) {
-    if (within(key)) found.push_back({.key = key, .text = text});
+    if (within(key)) keys.push_back({.key = key, .text = text});
   }
-  std::stable_sort(found.begin(), found.end(),
+  std::stable_sort(keys.begin(), keys.end(),
                    [](const GeoKey& a, const GeoKey& b) { return a.key < b.key; });
-  return found;
+  return keys;
 }
 
 Crs crs_of(const GeoKeys& keys) {
@@ -184,9 +184,9 @@ void GeoKeyDirectory::add(const GeoKey& key) {
 }
 
 std::vector<std::uint16_t> GeoKeyDirectory::shorts() const {
-  std::vector<std::uint16_t> all{1, 1, 1, static_cast<std::uint16_t>(entries_.size())};
-  for (const auto& entry : entries_) all.insert(all.end(), entry.begin(), entry.end());
-  return all;
+  std::vector<std::uint16_t> directory{1, 1, 1, static_cast<std::uint16_t>(entries_.size())};
+  for (const auto& entry : entries_) directory.insert(directory.end(), entry.begin(), entry.end());
+  return directory;
 }
 
 GeoKeyDirectory keys_of(const Crs& crs, std::optional<std::uint16_t> raster_type) {

@@ -115,7 +115,7 @@ ZipArchive::ZipArchive(const std::string& file) : file_(file) {
 ZipArchive::~ZipArchive() { zip_discard(archive_); }
 
 std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
-  std::vector<PackedFile> found;
+  std::vector<PackedFile> matches;
   const auto files =
       static_cast<std::uint64_t>(std::max<zip_int64_t>(0, zip_get_num_entries(archive_, 0)));
   for (std::uint64_t number = 0; number < files; ++number) {
@@ -126,13 +126,13 @@ std::vector<PackedFile> ZipArchive::find(std::string_view ending) const {
     // macOS packs a companion file with each file.
     if (std::string_view(status.name).starts_with("__MACOSX/")) continue;
     check_growth(file_, status.name, status.comp_size, status.size);
-    found.push_back({.name = status.name, .size = status.size, .number = number});
+    matches.push_back({.name = status.name, .size = status.size, .number = number});
   }
-  if (found.empty()) {
+  if (matches.empty()) {
     throw grid_fault(file_, fmt::format("has no {} file", ending))
         .remedy("unpack it: 'unzip FILE'");
   }
-  return found;
+  return matches;
 }
 
 std::unique_ptr<ByteSource> ZipArchive::unpack(const PackedFile& packed) const {

@@ -250,9 +250,9 @@ std::string_view read_bytes(Input& input, LasHeader& header) {
     throw header_fault(input, fmt::format("says that it has {}; LAS 1.{} has {}",
                                           counted(bytes, "byte"), header.minor, min_bytes));
   }
-  const std::string_view all = input.fill(bytes);
-  if (all.size() < bytes) throw header_fault(input, "the file ends in its header");
-  return all.substr(0, bytes);
+  const std::string_view bytes_read = input.fill(bytes);
+  if (bytes_read.size() < bytes) throw header_fault(input, "the file ends in its header");
+  return bytes_read.substr(0, bytes);
 }
 
 /// Fields of the header that only the reading of the header needs.

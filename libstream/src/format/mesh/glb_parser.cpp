@@ -211,19 +211,19 @@ class GlbParser final : public MeshParser {
   /// Returns the list of that name; an empty one if there is none.
   const Json& list(const Json& object, const char* name) const {
     static const Json none = Json::array();
-    const auto found = object.find(name);
-    if (found == object.end()) return none;
-    if (!found->is_array()) throw fault("is not a list").at(name);
-    return *found;
+    const auto entry = object.find(name);
+    if (entry == object.end()) return none;
+    if (!entry->is_array()) throw fault("is not a list").at(name);
+    return *entry;
   }
 
   /// Returns entry `index` of a list at the top level. Throws: Error if it is not an object.
   const Json& entry(const char* name, std::uint64_t index) const {
-    const Json& all = list(json_, name);
-    if (index >= all.size() || !all[index].is_object()) {
+    const Json& entries = list(json_, name);
+    if (index >= entries.size() || !entries[index].is_object()) {
       throw fault("is missing").at(fmt::format("{} {}", name, index));
     }
-    return all[index];
+    return entries[index];
   }
 
   static std::optional<std::uint64_t> unsigned_integer(const Json& value) {
@@ -232,9 +232,9 @@ class GlbParser final : public MeshParser {
   }
 
   std::optional<std::uint64_t> count(const Json& object, const char* name) const {
-    const auto found = object.find(name);
-    if (found == object.end()) return std::nullopt;
-    const std::optional<std::uint64_t> value = unsigned_integer(*found);
+    const auto entry = object.find(name);
+    if (entry == object.end()) return std::nullopt;
+    const std::optional<std::uint64_t> value = unsigned_integer(*entry);
     if (!value) throw fault(fmt::format("is not a number from 0 to {}", kMax)).at(name);
     return value;
   }
@@ -242,13 +242,13 @@ class GlbParser final : public MeshParser {
   /// Reads a list of out.size() finite numbers; false if there is no such list.
   bool read_numbers(const Json& object, const char* name, std::span<double> out) const {
     if (!object.contains(name)) return false;
-    const Json& all = list(object, name);
-    if (all.size() != out.size()) {
+    const Json& numbers = list(object, name);
+    if (numbers.size() != out.size()) {
       throw fault("does not have " + counted(out.size(), "number")).at(name);
     }
     for (std::size_t i = 0; i < out.size(); ++i) {
-      if (!all[i].is_number()) throw fault("is not a list of numbers").at(name);
-      out[i] = all[i].get<double>();
+      if (!numbers[i].is_number()) throw fault("is not a list of numbers").at(name);
+      out[i] = numbers[i].get<double>();
       if (!std::isfinite(out[i])) throw fault("has a number that is not finite").at(name);
     }
     return true;

@@ -36,13 +36,13 @@ class Welder {
  public:
   explicit Welder(MeshFile& mesh) : mesh_(&mesh) {}
   std::uint32_t number_of(const Point3& place) {
-    std::vector<Point3>& all = mesh_->vertices.positions;
+    std::vector<Point3>& positions = mesh_->vertices.positions;
     if (is_missing(place)) {  // NaN has no order
-      all.push_back(place);
-      return static_cast<std::uint32_t>(all.size() - 1);
+      positions.push_back(place);
+      return static_cast<std::uint32_t>(positions.size() - 1);
     }
-    const auto [at, is_new] = numbers_.emplace(place, static_cast<std::uint32_t>(all.size()));
-    if (is_new) all.push_back(place);
+    const auto [at, is_new] = numbers_.emplace(place, static_cast<std::uint32_t>(positions.size()));
+    if (is_new) positions.push_back(place);
     return at->second;
   }
 

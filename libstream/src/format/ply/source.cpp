@@ -520,9 +520,10 @@ std::optional<MeshFile> read_ply_mesh(const std::string& file, const SourceOptio
   MeshFile mesh;
   mesh.info = source.info();
   for (PointBlock block; source.next(block);) {
-    PointBlock& all = mesh.vertices;
-    all.positions.insert(all.positions.end(), block.positions.begin(), block.positions.end());
-    all.payload.insert(all.payload.end(), block.payload.begin(), block.payload.end());
+    PointBlock& vertices = mesh.vertices;
+    vertices.positions.insert(vertices.positions.end(), block.positions.begin(),
+                              block.positions.end());
+    vertices.payload.insert(vertices.payload.end(), block.payload.begin(), block.payload.end());
   }
   while (source.next_triangles(mesh.triangles)) {
   }

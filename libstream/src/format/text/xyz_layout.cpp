@@ -45,52 +45,52 @@ struct NamedAxes {
 /// Letters take precedence over words, so that in "x,y,z,lat,lon" the last two are attributes. Of
 /// several words for the height, the first one is used.
 NamedAxes named_axes(const std::vector<std::string_view>& names) {
-  NamedAxes found;
+  NamedAxes axes;
   for (std::size_t kind = 0; kind < kAxisNameKinds; ++kind) {
-    const auto before = found.columns;
+    const auto before = axes.columns;
     for (std::size_t i = 0; i < names.size(); ++i) {
       const auto name = axis_named(names[i]);
       if (!name || name->kind != static_cast<AxisNameKind>(kind) || before[name->axis]) continue;
-      auto& column = found.columns[name->axis];
+      auto& column = axes.columns[name->axis];
       if (column) {
         const bool height = name->axis == 2 && name->kind != AxisNameKind::letter;
-        if (!height && !found.duplicate) found.duplicate = i;
+        if (!height && !axes.duplicate) axes.duplicate = i;
         continue;
       }
       column = i;
-      found.angle[name->axis] = name->angle;
+      axes.angle[name->axis] = name->angle;
     }
   }
-  return found;
+  return axes;
 }
 
 /// Finds the coordinates among the names of a header. Throws: Error if one of them is missing or
 /// ambiguous.
 void find_axes(const std::vector<std::string_view>& names, TextLayout& layout,
                const std::string& file, const std::string& where) {
-  const NamedAxes found = named_axes(names);
-  if (found.duplicate) {
-    const std::size_t axis = axis_named(names[*found.duplicate])->axis;
-    throw Error(file, fmt::format("columns {} and {} name the same coordinate",
-                                  in_quotes(names[*found.columns[axis]]),
-                                  in_quotes(names[*found.duplicate])))
+  const NamedAxes axes = named_axes(names);
+  if (axes.duplicate) {
+    const std::size_t axis = axis_named(names[*axes.duplicate])->axis;
+    throw Error(
+        file, fmt::format("columns {} and {} name the same coordinate",
+                          in_quotes(names[*axes.columns[axis]]), in_quotes(names[*axes.duplicate])))
         .at(where)
         .remedy("rename one of them");
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!found.columns[axis]) {
+    if (!axes.columns[axis]) {
       throw Error(file, fmt::format("the header names no {} column", "xyz"[axis]))
           .at(where)
-          .remedy(found.none() ? "name the columns x, y and z, or lon, lat and height; "
-                                 "without the header, the first three are x, y and z"
-                               : "name the columns x, y and z, or lon, lat and height");
+          .remedy(axes.none() ? "name the columns x, y and z, or lon, lat and height; "
+                                "without the header, the first three are x, y and z"
+                              : "name the columns x, y and z, or lon, lat and height");
     }
-    layout.xyz[axis] = *found.columns[axis];
+    layout.xyz[axis] = *axes.columns[axis];
   }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     layout.units[axis] = axis_unit(names[layout.xyz[axis]]);
   }
-  layout.geographic = (found.angle[0] && found.angle[1]) ||
+  layout.geographic = (axes.angle[0] && axes.angle[1]) ||
                       (layout.units[0] == "degree" && layout.units[1] == "degree");
 }
 
@@ -133,7 +133,7 @@ bool is_separated_by_tabs(std::string_view header, std::string_view line) {
 /// True if blanks or tabs separate numbers, some of which have a decimal comma ("1,5 2,5 3").
 bool has_decimal_commas(std::string_view line) {
   const std::vector<std::string_view> words = split_fields(line, ' ');
-  bool found = false;
+  bool has_comma = false;
   const bool numbers = std::all_of(words.begin(), words.end(), [&](std::string_view word) {
     std::string number(unquoted(word));
     const std::size_t comma = number.find(',');
@@ -143,13 +143,13 @@ bool has_decimal_commas(std::string_view line) {
     if (comma != std::string::npos) {
       if (comma == 0 || !is_digit(comma - 1) || !is_digit(comma + 1)) return false;
       number[comma] = '.';
-      found = true;
+      has_comma = true;
     }
     double value = 0;
     const char* const end = number.data() + number.size();
     return parse_real(number.data(), end, value) == end;
   });
-  return words.size() > 1 && numbers && found;
+  return words.size() > 1 && numbers && has_comma;
 }
 
 std::vector<std::string_view> header_names(std::string_view line, char separator) {
@@ -184,18 +184,18 @@ struct Preamble {
 /// Reads to the first row of numbers, which `line` then is.
 Preamble read_preamble(LineReader& lines, const std::string& file, std::string_view& line,
                        std::vector<std::string>& comments) {
-  Preamble found;
+  Preamble preamble;
   while (lines.next(line)) {
     const std::string_view text = trim(line);
     if (text.empty()) continue;
     if (is_comment(text)) {
-      found.last_comment = comment_text(text);
-      if (comments.size() < kMaxComments) comments.push_back(found.last_comment);
-    } else if (!found.has_header() && is_header(split_fields(line, separator_of(line)))) {
-      found.header = line;
-      found.header_line = lines.number();
+      preamble.last_comment = comment_text(text);
+      if (comments.size() < kMaxComments) comments.push_back(preamble.last_comment);
+    } else if (!preamble.has_header() && is_header(split_fields(line, separator_of(line)))) {
+      preamble.header = line;
+      preamble.header_line = lines.number();
     } else {
-      return found;
+      return preamble;
     }
   }
   throw Error(file, lines.number() == 0 ? "the file is empty" : "it has no points")

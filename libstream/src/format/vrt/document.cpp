@@ -232,12 +232,12 @@ class VrtReader {
   void place(const XmlElement& element, VrtSource& source) {
     using Rect = std::array<double, 4>;  // offset and size, as in the file
     const auto rect = [&](const char* name) -> std::optional<Rect> {
-      const XmlElement* const found = element.child(name);
-      if (found == nullptr) return std::nullopt;
+      const XmlElement* const child = element.child(name);
+      if (child == nullptr) return std::nullopt;
       Rect r{};
       constexpr std::array kNames{"xOff", "yOff", "xSize", "ySize"};
       for (std::size_t i = 0; i < 4; ++i) {
-        const double value = number(found->attribute(kNames[i]), name);
+        const double value = number(child->attribute(kNames[i]), name);
         r[i] = std::round(value);
         const double distance = std::abs(value - r[i]);
         if (distance > kNearestCell) {

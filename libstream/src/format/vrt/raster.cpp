@@ -249,29 +249,29 @@ class VrtRaster final : public Raster {
     if (raster->info().format == ascii_grid_format().name && !reals) {
       raster = std::make_unique<WholeNumbers>(std::move(raster), type);
     }
-    const RasterInfo& found = raster->info();
+    const RasterInfo& info = raster->info();
     const auto fault = [&](const std::string& cause) {
       return Error(info_.files.front(), cause)
           .at(source.file)
           .remedy("convert it to GeoTIFF: gdal_translate FILE out.tif");
     };
-    if (found.sample.type != info_.sample.type) {
+    if (info.sample.type != info_.sample.type) {
       throw fault(fmt::format("its samples are {}, but those of the virtual raster are {}",
-                              name_of(found.sample.type), name_of(info_.sample.type)));
+                              name_of(info.sample.type), name_of(info_.sample.type)));
     }
-    if (source.source_column + source.columns > found.columns ||
-        source.source_row + source.rows > found.rows) {
-      throw fault(fmt::format("has {} x {} cells, fewer than the virtual raster uses",
-                              found.columns, found.rows));
+    if (source.source_column + source.columns > info.columns ||
+        source.source_row + source.rows > info.rows) {
+      throw fault(fmt::format("has {} x {} cells, fewer than the virtual raster uses", info.columns,
+                              info.rows));
     }
     return raster;
   }
 
   Raster& opened(std::size_t source) {
-    const auto found =
+    const auto entry =
         std::find_if(open_.begin(), open_.end(), [&](const Open& o) { return o.source == source; });
-    if (found != open_.end()) {
-      open_.splice(open_.begin(), open_, found);
+    if (entry != open_.end()) {
+      open_.splice(open_.begin(), open_, entry);
       return *open_.front().raster;
     }
     while (!open_.empty() &&

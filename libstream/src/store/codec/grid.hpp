@@ -56,7 +56,7 @@ class GridCodec {
     // Pointers, because the compiler must assume that writing a byte changes the vectors.
     std::uint32_t* const cells = cells_.data();
     [[maybe_unused]] std::uint8_t* const mask = mask_.data();
-    std::uint32_t found = 0;
+    std::uint32_t cell_count = 0;
     Border<false> left(borders, width);
     Border<true> right(borders, width);
     std::uint64_t runs_above = 0;
@@ -81,7 +81,7 @@ class GridCodec {
             if (row + 1 < height || runs > 1) {
               right.move(coder, lower_half, end);
             } else if constexpr (Coder::kDecoding) {
-              end = begin + (n - found);  // all remaining cells
+              end = begin + (n - cell_count);  // all remaining cells
             }
           }
           row_above = true;
@@ -89,24 +89,24 @@ class GridCodec {
           code_later_run(coder, width, column, begin, end);
         }
         if constexpr (Coder::kDecoding) {
-          if (begin >= end || end > width || end - begin > n - found) {
+          if (begin >= end || end > width || end - begin > n - cell_count) {
             throw Damage("a run is outside its cluster");
           }
         }
         auto cell = static_cast<std::uint32_t>(cell_of(static_cast<std::uint32_t>(begin), row));
-        for (std::uint64_t c = begin; c < end; ++c, ++cell, ++found) {
-          cells[found] = cell;
+        for (std::uint64_t c = begin; c < end; ++c, ++cell, ++cell_count) {
+          cells[cell_count] = cell;
           if constexpr (Coder::kDecoding) {
             mask[cell] = 1;
-            x[found] = c;
-            y[found] = row;
+            x[cell_count] = c;
+            y[cell_count] = row;
           }
         }
         column = end;
       }
       runs_above = runs;
     }
-    if (found != n) throw Damage("a cluster has too few cells");
+    if (cell_count != n) throw Damage("a cluster has too few cells");
     if constexpr (Coder::kDecoding) shared = coder;
   }
 

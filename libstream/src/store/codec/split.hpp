@@ -145,12 +145,12 @@ struct NarrowPoints {
   template <class Coder>
   TERRACE_STORE_INLINE static void place(Coder& coder, const Box& box, Point point) {
     const Point offset = point - box.low;
-    RawBits all;
+    RawBits bits;
     for (unsigned axis = 0; axis < 3; ++axis) {
       const RawBits coded = uniform_bits(field(offset, axis), field(box.extent, axis) + 1);
-      all = {all.value << coded.bits | coded.value, all.bits + coded.bits};
+      bits = {bits.value << coded.bits | coded.value, bits.bits + coded.bits};
     }
-    coder.raw(all.value, all.bits);
+    coder.raw(bits.value, bits.bits);
   }
 
  private:

@@ -175,8 +175,8 @@ const StoreQuery::Node& StoreQuery::node(ClusterId id) {
     return uncached_;
   }
   const auto key = static_cast<std::uint64_t>(id);
-  if (const auto found = cache.by_id.find(key); found != cache.by_id.end()) {
-    cache.nodes.splice(cache.nodes.begin(), cache.nodes, found->second);
+  if (const auto entry = cache.by_id.find(key); entry != cache.by_id.end()) {
+    cache.nodes.splice(cache.nodes.begin(), cache.nodes, entry->second);
     return cache.nodes.front();
   }
   // The memory of a dropped node is reused for the new one. The new node is not in a map until it
@@ -214,23 +214,23 @@ std::vector<std::byte> StoreQuery::attributes(std::span<const FoundPoint> found)
 }
 
 std::vector<FoundPoint> StoreQuery::in_box(const Box3& box, unsigned level) {
-  std::vector<FoundPoint> found;
+  std::vector<FoundPoint> points;
   descend(
       level, [&](unsigned, const Branch& branch) { return box.intersects(branch.box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
           if (!box.contains(node.positions[i])) continue;
-          found.push_back(
+          points.push_back(
               {.position = node.positions[i], .cluster = node.id, .member = node.member(i)});
         }
       });
-  return found;
+  return points;
 }
 
 std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
                                            const LinearMap& metric, unsigned level) {
   assert(radius - radius == 0.0);
-  std::vector<FoundPoint> found;
+  std::vector<FoundPoint> points;
   descend(
       level,
       [&](unsigned, const Branch& branch) {
@@ -240,20 +240,20 @@ std::vector<FoundPoint> StoreQuery::within(const Point3& place, double radius,
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
           const double distance = distance_of(metric, node.positions[i], place);
           if (!(distance <= radius)) continue;
-          found.push_back({.position = node.positions[i],
-                           .cluster = node.id,
-                           .member = node.member(i),
-                           .distance = distance});
+          points.push_back({.position = node.positions[i],
+                            .cluster = node.id,
+                            .member = node.member(i),
+                            .distance = distance});
         }
       });
-  std::sort(found.begin(), found.end(), is_nearer);
-  return found;
+  std::sort(points.begin(), points.end(), is_nearer);
+  return points;
 }
 
 std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t count,
                                             const LinearMap& metric, unsigned level) {
-  std::vector<FoundPoint> found;  // a heap with the farthest on top
-  if (count == 0) return found;
+  std::vector<FoundPoint> points;  // a heap with the farthest on top
+  if (count == 0) return points;
   best_first(
       level, [&](const Box3& box) { return min_distance(metric, place, box); },
       [&](const Node& node) {
@@ -262,19 +262,19 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
                                  .cluster = node.id,
                                  .member = node.member(i),
                                  .distance = distance_of(metric, node.positions[i], place)};
-          if (found.size() == count) {
-            if (!is_nearer(point, found.front())) continue;
-            std::pop_heap(found.begin(), found.end(), is_nearer);
-            found.back() = point;
+          if (points.size() == count) {
+            if (!is_nearer(point, points.front())) continue;
+            std::pop_heap(points.begin(), points.end(), is_nearer);
+            points.back() = point;
           } else {
-            found.push_back(point);
+            points.push_back(point);
           }
-          std::push_heap(found.begin(), found.end(), is_nearer);
+          std::push_heap(points.begin(), points.end(), is_nearer);
         }
-        return found.size() < count ? kFar : found.front().distance;
+        return points.size() < count ? kFar : points.front().distance;
       });
-  std::sort_heap(found.begin(), found.end(), is_nearer);
-  return found;
+  std::sort_heap(points.begin(), points.end(), is_nearer);
+  return points;
 }
 
 std::uint64_t StoreQuery::count(const Box3& box, unsigned level) {
@@ -345,16 +345,16 @@ class Store::ConditionView final : public Store::View {
 
  private:
   void find_bounds(const Store& view) const {
-    Box3 found;
+    Box3 bounds;
     StoreQuery(view).descend(
         0,
         [&](unsigned, const StoreQuery::Branch& branch) {
-          return !(found.contains(branch.box.min) && found.contains(branch.box.max));
+          return !(bounds.contains(branch.box.min) && bounds.contains(branch.box.max));
         },
         [&](const StoreQuery::Node& node) {
-          for (const Point3& p : node.positions) found.include(p);
+          for (const Point3& p : node.positions) bounds.include(p);
         });
-    bounds_ = found;
+    bounds_ = bounds;
   }
 
   Where condition_;

@@ -33,7 +33,7 @@ struct QuantisedBox {
   }
   /// Returns the smallest quantised box that contains the intersection of `box` and `outer`.
   static QuantisedBox around(const Box3& box, const Box3& outer) {
-    QuantisedBox found;
+    QuantisedBox quantised;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = outer.min[axis], high = outer.max[axis];
       const auto place = [&](double value) {
@@ -42,14 +42,14 @@ struct QuantisedBox {
         return static_cast<Number>(share > 0 ? std::min<double>(share, kMax) : 0);
       };
       // Rounding may have moved an end inside.
-      Number& first = found.low[axis];
+      Number& first = quantised.low[axis];
       first = place(box.min[axis]);
       while (first > 0 && !(interpolate(low, high, first) <= box.min[axis])) --first;
-      Number& last = found.high[axis];
+      Number& last = quantised.high[axis];
       last = place(box.max[axis]);
       while (last < kMax && !(interpolate(low, high, last) >= box.max[axis])) ++last;
     }
-    return found;
+    return quantised;
   }
 
  private:

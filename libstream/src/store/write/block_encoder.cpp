@@ -488,9 +488,9 @@ void BlockEncoder::count_kinds(const Predictor& predictor, bool sequence, const 
 std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
   const std::uint32_t point = block_->representatives[cluster];
   if (point == kNoRepresentative) return 0;
-  const auto found = std::find(coded_.begin(), coded_.end(), point);
-  assert(found != coded_.end() && "a representative is a point of its cluster");
-  return centred(static_cast<std::uint32_t>(found - coded_.begin()),
+  const auto entry = std::find(coded_.begin(), coded_.end(), point);
+  assert(entry != coded_.end() && "a representative is a point of its cluster");
+  return centred(static_cast<std::uint32_t>(entry - coded_.begin()),
                  static_cast<std::uint32_t>(coded_.size()));
 }
 

@@ -144,8 +144,8 @@ StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, 
     if (!replace) {
       throw Error(path.string(), "exists already").remedy("choose another name or remove it");
     }
-    if (const Ownership found = Store::ownership_of(path); !found.ours) {
-      throw not_replaced(path.string(), found);
+    if (const Ownership ownership = Store::ownership_of(path); !ownership.ours) {
+      throw not_replaced(path.string(), ownership);
     }
   }
   if (schema.attributes.size() > kMaxAttributes) {
