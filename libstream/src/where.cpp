@@ -297,7 +297,7 @@ class Values {
   std::span<const std::byte> records_;
 };
 
-/// The same operations on ranges of values, by interval arithmetic. Every operation on doubles,
+/// Performs the operations on ranges of values, by interval arithmetic. Every operation on doubles,
 /// including its rounding, is monotonic in each operand, so the ends of the result come from ends
 /// of the operands.
 class Ranges {

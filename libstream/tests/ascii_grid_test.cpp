@@ -55,13 +55,13 @@ TEST_F(Grids, ReadsAsciiGridsWithAnyLineBreaks) {
   EXPECT_EQ(odd.value(0), 0.25);
   EXPECT_EQ(odd.value(7), 16777216);
   // The first number that is not exact as a float widens all.
-  std::string many =
+  std::string text =
       "ncols 200\nnrows 300\nxllcorner 0\nyllcorner 0\ncellsize 1\nnodata_value "
       "-1.7976931348623157e+308\n";
   for (int i = 0; i < 60000; ++i) {
-    many += i == 777 ? "-1.7976931348623157e+308 " : std::to_string(i) + (i == 50000 ? ".1 " : " ");
+    text += i == 777 ? "-1.7976931348623157e+308 " : std::to_string(i) + (i == 50000 ? ".1 " : " ");
   }
-  const std::string file = put("c.asc", many);
+  const std::string file = put("c.asc", text);
   const WholeRaster wide = read_whole(*open_ascii_grid(file));
   EXPECT_EQ(wide.info.sample.type, ScalarType::f64);
   EXPECT_EQ(type_of_ascii_grid(file), ScalarType::f64);

@@ -290,11 +290,11 @@ TEST_P(CopcFiles, ReadAsLazIfTheHierarchyIsDamaged) {
   std::string bytes = read_text(file);
   put(bytes, 375 + 54 + 40, ~std::uint64_t{0});
   const std::string damaged = write_text(folder.path() / "damaged.laz", bytes);
-  const AllPoints found = read_file(damaged);
-  EXPECT_EQ(found.info.format, "laz");
-  ASSERT_FALSE(found.info.comments.empty());
-  EXPECT_NE(found.info.comments.back().find("in the order of the file"), std::string::npos);
-  EXPECT_TRUE(records(found, kEverywhere) == records(read_file(file), kEverywhere));
+  const AllPoints as_laz = read_file(damaged);
+  EXPECT_EQ(as_laz.info.format, "laz");
+  ASSERT_FALSE(as_laz.info.comments.empty());
+  EXPECT_NE(as_laz.info.comments.back().find("in the order of the file"), std::string::npos);
+  EXPECT_TRUE(records(as_laz, kEverywhere) == records(read_file(file), kEverywhere));
   SourceOptions coarse;
   coarse.selection.resolution = 1;
   EXPECT_NE(error_of([&] { read_file(damaged, coarse); }).find("hierarchy"), std::string::npos);

@@ -165,12 +165,12 @@ TEST(OctreeBuilder, PointsInOnePlaceEndAtTheDeepestNode) {
   const std::vector<BuiltNode> nodes = build_nodes(places, 1);
   EXPECT_TRUE(nodes == build_nodes(places, std::size_t{1} << 19));
   EXPECT_TRUE(nodes == build_nodes(places, 1, 3));
-  std::size_t found = 0, largest = 0;
+  std::size_t node_points = 0, largest = 0;
   for (const BuiltNode& node : nodes) {
-    found += node.points.size();
+    node_points += node.points.size();
     largest = std::max(largest, node.points.size());
   }
-  EXPECT_EQ(found, places.size());
+  EXPECT_EQ(node_points, places.size());
   EXPECT_GT(largest, 39'000u);
 }
 
@@ -202,9 +202,9 @@ TEST(OctreeBuilder, BoundsNodesOfCloudsThatFillSpace) {
   }
   const std::vector<BuiltNode> nodes = build_nodes(places, std::size_t{1} << 19);
   EXPECT_TRUE(nodes == build_nodes(places, 1));
-  std::size_t found = 0;
-  for (const BuiltNode& node : nodes) found += node.points.size();
-  EXPECT_EQ(found, places.size());
+  std::size_t node_points = 0;
+  for (const BuiltNode& node : nodes) node_points += node.points.size();
+  EXPECT_EQ(node_points, places.size());
   EXPECT_EQ(nodes.back().points.size(), 8 * OctreeBuilder::kMaxPromoted);
 }
 
@@ -280,12 +280,12 @@ TEST(CopcWriter, OctreesHaveTheRecordsThatWereWritten) {
     SourceOptions selection_options;
     selection_options.selection.keep.emplace();
     for (const Channel& c : attributes) selection_options.selection.keep->push_back(c.name);
-    const AllPoints found = read_file(file, selection_options);
-    EXPECT_EQ(found.info.format, "copc");
-    EXPECT_EQ(found.info.attributes, attributes);
-    EXPECT_TRUE(found.info.comments.empty());
-    EXPECT_GT(found.info.octree->nodes, 2u);
-    EXPECT_TRUE(records(found) == records(all));
+    const AllPoints copy = read_file(file, selection_options);
+    EXPECT_EQ(copy.info.format, "copc");
+    EXPECT_EQ(copy.info.attributes, attributes);
+    EXPECT_TRUE(copy.info.comments.empty());
+    EXPECT_GT(copy.info.octree->nodes, 2u);
+    EXPECT_TRUE(records(copy) == records(all));
     // The point format.
     EXPECT_EQ(static_cast<unsigned char>(read_text(file)[104]), 0x80u | format);
     const AllPoints whole = read_file(file);
@@ -302,10 +302,10 @@ TEST(CopcWriter, WritesFilesWithZeroAndOnePoints) {
   for (const std::size_t points : {0u, 1u}) {
     const AllPoints all = made_scan(points, {});
     const std::string file = write_copc((folder.path() / "few.copc.laz").string(), all);
-    const AllPoints found = read_file(file);
-    EXPECT_EQ(found.info.format, "copc");
-    EXPECT_TRUE(found.info.comments.empty());
-    EXPECT_TRUE(found.points.positions == all.points.positions);
+    const AllPoints copy = read_file(file);
+    EXPECT_EQ(copy.info.format, "copc");
+    EXPECT_TRUE(copy.info.comments.empty());
+    EXPECT_TRUE(copy.points.positions == all.points.positions);
   }
 }
 
@@ -313,13 +313,13 @@ TEST(CopcWriter, ConvertsRanksToAngles) {
   const TempFolder folder;
   AllPoints all = made_scan(255, {{.name = "scan_angle_rank", .type = ScalarType::i8}});
   for (std::size_t i = 0; i < 255; ++i) all.points.payload[i] = static_cast<std::byte>(i - 127);
-  const AllPoints found = read_file(write_copc((folder.path() / "a.copc.laz").string(), all));
-  const auto& attributes = found.info.attributes;
+  const AllPoints copy = read_file(write_copc((folder.path() / "a.copc.laz").string(), all));
+  const auto& attributes = copy.info.attributes;
   const auto angle = std::find_if(attributes.begin(), attributes.end(),
                                   [](const Channel& c) { return c.name == "scan_angle"; });
   ASSERT_NE(angle, attributes.end());
   const auto angles =
-      found.values<std::int16_t>(static_cast<std::size_t>(angle - attributes.begin()));
+      copy.values<std::int16_t>(static_cast<std::size_t>(angle - attributes.begin()));
   for (std::size_t i = 0; i < 255; ++i) {
     EXPECT_EQ(std::round(angles[i] * 0.006), static_cast<double>(i) - 127);
   }
@@ -346,10 +346,10 @@ TEST_P(CopcCopies, HaveTheRecordsOfTheScan) {
   const TempFolder folder;
   const AllPoints all = read_file(fs::path(data) / "lidar" / GetParam());
   const std::string file = write_copc((folder.path() / "copy.copc.laz").string(), all);
-  const AllPoints found = read_file(file);
-  EXPECT_EQ(found.info.format, "copc");
-  EXPECT_EQ(found.info.attributes, all.info.attributes);
-  EXPECT_TRUE(records(found) == records(all));
+  const AllPoints copy = read_file(file);
+  EXPECT_EQ(copy.info.format, "copc");
+  EXPECT_EQ(copy.info.attributes, all.info.attributes);
+  EXPECT_TRUE(records(copy) == records(all));
   expect_coarser_parts(file);
 }
 

@@ -65,11 +65,11 @@ TEST(Ept, RejectsInvalidDataSets) {
   // Time is linear in their number.
   EXPECT_EQ(with("more", Json(400'000, Json::object())), "");
   EXPECT_PRED2(has, with("more", Json(600'000, Json::object())), "has too many values");
-  Json many = Json::array();
+  Json dimensions = Json::array();
   for (int i = 0; i < 5000; ++i) {
-    many.push_back({{"name", std::to_string(i)}, {"type", "unsigned"}, {"size", 1}});
+    dimensions.push_back({{"name", std::to_string(i)}, {"type", "unsigned"}, {"size", 1}});
   }
-  EXPECT_PRED2(has, with("schema", many), "has too many dimensions");
+  EXPECT_PRED2(has, with("schema", dimensions), "has too many dimensions");
   {
     const TempFolder folder;
     const std::string file = small_parts().write(folder.path());

@@ -226,14 +226,14 @@ TEST(Ept, ReadsLoneStarInAllThreeEncodings) {
   expect_coarser_parts((folder / "ept.json").string());
 
   const auto values_of = [](const AllPoints& points, std::initializer_list<const char*> names) {
-    std::vector<std::size_t> found;  // hashes
+    std::vector<std::size_t> hashes;  // hashes
     std::vector<std::pair<ScalarType, std::size_t>> columns;
     for (const char* const name : names) {
       const auto& attributes = points.info.attributes;
       const auto channel = std::find_if(attributes.begin(), attributes.end(),
                                         [&](const Channel& c) { return c.name == name; });
       EXPECT_NE(channel, attributes.end()) << name;
-      if (channel == attributes.end()) return found;
+      if (channel == attributes.end()) return hashes;
       const auto number = static_cast<std::size_t>(channel - attributes.begin());
       columns.emplace_back(channel->type, points.info.attribute_offset(number));
     }
@@ -249,10 +249,10 @@ TEST(Ept, ReadsLoneStarInAllThreeEncodings) {
       }
       const std::string_view text(reinterpret_cast<const char*>(values.data()),
                                   values.size() * sizeof(double));
-      found.push_back(std::hash<std::string_view>()(text));
+      hashes.push_back(std::hash<std::string_view>()(text));
     }
-    std::sort(found.begin(), found.end());
-    return found;
+    std::sort(hashes.begin(), hashes.end());
+    return hashes;
   };
   const auto shared = {"intensity", "return_number", "classification", "gps_time"};
   EXPECT_TRUE(values_of(all, shared) ==

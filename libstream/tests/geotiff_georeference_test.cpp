@@ -136,13 +136,13 @@ TEST(GeoReference, DeliversKeysOfTheCrsUnchanged) {
       std::vector<std::uint16_t>{1,    1,     0, 5, 1024, 0,     1, 1, 3072, 0,     1, 32767,
                                  3080, 34736, 1, 1, 3092, 34736, 1, 0, 3073, 34737, 4, 0},
       std::vector<double>{0.9996, 9.0}, "own|");
-  const std::vector<GeoKey> found = crs_of(keys).geo_keys;
-  ASSERT_EQ(found.size(), 5u);
-  EXPECT_EQ(found[0], (GeoKey{1024, {1}, ""}));
-  EXPECT_EQ(found[1], (GeoKey{3072, {32767}, ""}));
-  EXPECT_EQ(found[2], (GeoKey{3073, {}, "own"}));
-  EXPECT_EQ(found[3], (GeoKey{3080, {9.0}, ""}));
-  EXPECT_EQ(found[4], (GeoKey{3092, {0.9996}, ""}));
+  const std::vector<GeoKey> geo_keys = crs_of(keys).geo_keys;
+  ASSERT_EQ(geo_keys.size(), 5u);
+  EXPECT_EQ(geo_keys[0], (GeoKey{1024, {1}, ""}));
+  EXPECT_EQ(geo_keys[1], (GeoKey{3072, {32767}, ""}));
+  EXPECT_EQ(geo_keys[2], (GeoKey{3073, {}, "own"}));
+  EXPECT_EQ(geo_keys[3], (GeoKey{3080, {9.0}, ""}));
+  EXPECT_EQ(geo_keys[4], (GeoKey{3092, {0.9996}, ""}));
   const GeoKeys cut(std::vector<std::uint16_t>{1, 1, 0, 1, 3080, 34736, 2, 1},
                     std::vector<double>{1.0, 2.0}, "");
   EXPECT_EQ(cut.faults().size(), 1u);

@@ -266,9 +266,9 @@ void expect_overviews(std::mt19937_64& random, GeoTiffOverviews overviews,
   // Scattered squares of 100 cells with data, with holes.
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const std::size_t column = i % options.columns, row = i / options.columns;
-    const bool there =
+    const bool has_data =
         !nodata || (((column / 100 * 7 + row / 100 * 5) % 3 == 0) && random() % 5 != 0);
-    samples[i] = there ? static_cast<T>(1 + random() % 250) : static_cast<T>(*nodata);
+    samples[i] = has_data ? static_cast<T>(1 + random() % 250) : static_cast<T>(*nodata);
   }
   write_with_overviews(path, options, samples, random);
   const std::string first = geotiff_bytes_of(path);

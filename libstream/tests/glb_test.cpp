@@ -430,8 +430,8 @@ TEST_F(GlbFiles, ErrorsNameTheFault) {
            {with("/scenes", {{{"nodes", {0, 0}}}}), "in the scene twice"},
            {with("/scenes", {{{"nodes", {1}}}}), "is missing"},
            {with("/scenes", 3), "not a list"}}) {
-    const std::string found = message(content);
-    EXPECT_NE(found.find(words), std::string::npos) << words << ": " << found;
+    const std::string error = message(content);
+    EXPECT_NE(error.find(words), std::string::npos) << words << ": " << error;
   }
   // A node that is its own child is not a root, so the mesh has no faces.
   EXPECT_FALSE(read_mesh(put(with("/nodes/0/children", {0}))));

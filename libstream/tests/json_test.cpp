@@ -109,9 +109,9 @@ TEST(StoreJson, RefusesTextsThatWouldTakeMuchMemory) {
   EXPECT_THROW(JsonValue::parse(deep), Damage);
   EXPECT_THROW(JsonValue::parse(closed), Damage);
   EXPECT_NO_THROW(JsonValue::parse(std::string_view(closed).substr(1, 32)));
-  std::string many = "[0";
-  for (std::size_t i = 0; i < 1 << 20; ++i) many += ",0";
-  EXPECT_THROW(JsonValue::parse(many + "]"), Damage);
+  std::string long_array = "[0";
+  for (std::size_t i = 0; i < 1 << 20; ++i) long_array += ",0";
+  EXPECT_THROW(JsonValue::parse(long_array + "]"), Damage);
 }
 
 TEST(StoreJson, RefusesOtherKindsAndNumbersThatAreTooLarge) {

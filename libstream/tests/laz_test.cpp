@@ -192,11 +192,11 @@ TEST(LazChunkTable, RefusesTablesThatDoNotAddUp) {
   for (std::size_t size = 0; size < table.size(); ++size) {
     EXPECT_THROW(read_chunk_table(std::span(table).first(size), vlr, 100123, 2069), Corrupt);
   }
-  ByteVector many = table;
-  for (std::size_t i = 4; i < 8; ++i) many[i] = std::byte{0xff};
-  EXPECT_THROW(read_chunk_table(many, vlr, 100123, 2069), Corrupt);
-  many[0] = std::byte{1};
-  EXPECT_THROW(read_chunk_table(many, vlr, 100123, 2069), Corrupt);
+  ByteVector damaged = table;
+  for (std::size_t i = 4; i < 8; ++i) damaged[i] = std::byte{0xff};
+  EXPECT_THROW(read_chunk_table(damaged, vlr, 100123, 2069), Corrupt);
+  damaged[0] = std::byte{1};
+  EXPECT_THROW(read_chunk_table(damaged, vlr, 100123, 2069), Corrupt);
   const std::vector<Chunk> uneven{{0, 1000, 49999}, {1000, 999, 50000}};
   EXPECT_THROW(write_chunk_table(uneven, vlr), std::invalid_argument);
 }

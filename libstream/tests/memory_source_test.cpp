@@ -172,10 +172,10 @@ TEST(MemorySource, RastersSkipCellsWithoutData) {
   PointBlock block;
   while (source->next(block)) {
     for (const Point3& p : block.positions) {
-      const auto found = expected.find({p[0], p[1]});
-      ASSERT_NE(found, expected.end());
-      EXPECT_EQ(found->second, p[2]);
-      expected.erase(found);
+      const auto cell = expected.find({p[0], p[1]});
+      ASSERT_NE(cell, expected.end());
+      EXPECT_EQ(cell->second, p[2]);
+      expected.erase(cell);
     }
   }
   EXPECT_TRUE(expected.empty());

@@ -186,11 +186,11 @@ TEST_F(MeshFormats, AllFormatsGiveTheSameFaces) {
       const auto file = read_mesh(put(name, content));
       ASSERT_TRUE(file);
       ASSERT_EQ(file->triangles.size(), mesh.faces.size());
-      std::vector<Point3> found;
+      std::vector<Point3> file_corners;
       for (const TriangleIndices& t : file->triangles) {
-        for (const std::uint32_t v : t) found.push_back(file->vertices.positions.at(v));
+        for (const std::uint32_t v : t) file_corners.push_back(file->vertices.positions.at(v));
       }
-      EXPECT_EQ(found, corners);
+      EXPECT_EQ(file_corners, corners);
       // Coincident corners are merged to one vertex.
       const std::set<Point3> places(corners.begin(), corners.end());
       const bool soup = name.ends_with("stl");
@@ -264,9 +264,9 @@ TEST_F(MeshFormats, ErrorsNameTheDamage) {
            {"n.stl", "solid a\nvertex 0 0 0\n", "outside a loop"}}) {
     SCOPED_TRACE(name);
     const std::string file = put(name, content);
-    const std::string found = message([&] { read_all({file}); });
-    EXPECT_NE(found.find(words), std::string::npos) << found;
-    EXPECT_NE(found.find(name), std::string::npos) << found;
+    const std::string error = message([&] { read_all({file}); });
+    EXPECT_NE(error.find(words), std::string::npos) << error;
+    EXPECT_NE(error.find(name), std::string::npos) << error;
   }
   for (const auto& [name, content] : std::vector<std::pair<std::string, std::string>>{
            {"p.off", "OFF\n1 1 0\n0 0 0\n3 0 0 1\n"},

@@ -31,17 +31,17 @@ using Record = std::pair<Point3, std::size_t>;
 /// Returns the records inside a region, sorted, so that they are equal for the same points in any
 /// order.
 inline std::vector<Record> records(const AllPoints& all, const Box3& region = kEverywhere) {
-  std::vector<Record> found;
+  std::vector<Record> records_inside;
   const std::size_t bytes = all.info.payload_size();
   for (std::size_t i = 0; i < all.points.size(); ++i) {
     const Point3 at = world_point(all.info, all.points.positions[i]);
     if (!region.contains(at)) continue;
     const auto* const payload = reinterpret_cast<const char*>(all.points.payload.data());
     const std::string_view packed(payload + i * bytes, bytes);
-    found.emplace_back(at, std::hash<std::string_view>()(packed));
+    records_inside.emplace_back(at, std::hash<std::string_view>()(packed));
   }
-  std::sort(found.begin(), found.end());
-  return found;
+  std::sort(records_inside.begin(), records_inside.end());
+  return records_inside;
 }
 
 /// Checks that regions of each file, which have the points `all`, contain exactly those inside.
@@ -86,12 +86,13 @@ inline void expect_coarser_parts(const std::string& file) {
     SourceOptions options;
     options.selection.resolution = *step;
     const AllPoints coarse = read_file(file, options);
-    const std::vector<Record> found = records(coarse);
+    const std::vector<Record> coarse_records = records(coarse);
     EXPECT_EQ(coarse.info.octree->depths, spacings.rend() - step);
-    EXPECT_TRUE(std::includes(finer.begin(), finer.end(), found.begin(), found.end()));
-    EXPECT_TRUE(step == spacings.rbegin() ? found.size() == finer.size()
-                                          : found.size() < finer.size());
-    finer = found;
+    EXPECT_TRUE(
+        std::includes(finer.begin(), finer.end(), coarse_records.begin(), coarse_records.end()));
+    EXPECT_TRUE(step == spacings.rbegin() ? coarse_records.size() == finer.size()
+                                          : coarse_records.size() < finer.size());
+    finer = coarse_records;
   }
 }
 

@@ -124,8 +124,9 @@ TEST(StoreOverlay, RoundTrips) {
              at != values.end() && at->first.first == cluster; ++at) {
           expected.push_back({at->first.second, at->second});
         }
-        const auto found = overlay.find(cluster);
-        ASSERT_EQ(std::vector<OverlayValue>(found.begin(), found.end()), expected);
+        const auto overlay_values = overlay.find(cluster);
+        ASSERT_EQ(std::vector<OverlayValue>(overlay_values.begin(), overlay_values.end()),
+                  expected);
       }
       std::shuffle(clusters.begin(), clusters.end(), std::mt19937_64(5));
       clusters.resize(std::min<std::size_t>(clusters.size(), 50));

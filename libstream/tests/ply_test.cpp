@@ -226,16 +226,17 @@ TEST_F(Ply, RefusesHostileHeaders) {
       {ascii + "comment " + std::string(2 << 20, 'c') + "\n", "longer than 65536 bytes"},
       {ascii + "element e 0\n" +
            [] {
-             std::string many;
-             for (int i = 0; i < 2000; ++i) many += "property int p" + std::to_string(i) + "\n";
-             return many;
+             std::string properties;
+             for (int i = 0; i < 2000; ++i)
+               properties += "property int p" + std::to_string(i) + "\n";
+             return properties;
            }(),
        "more than 1000 properties"},
       {ascii +
            [] {
-             std::string many;
-             for (int i = 0; i < 20000; ++i) many += "comment " + std::string(100, 'c') + "\n";
-             return many;
+             std::string comments;
+             for (int i = 0; i < 20000; ++i) comments += "comment " + std::string(100, 'c') + "\n";
+             return comments;
            }(),
        "the header is longer than"},
   };

@@ -149,11 +149,11 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
     options.selection.region = region;
     const auto part =
         points_of(std::make_unique<SyntheticRaster>(columns, rows, world, reading), options);
-    const std::vector<Point3> found = world_points(*part);
-    EXPECT_EQ(inside(found, region), expected);
-    EXPECT_EQ(std::adjacent_find(found.begin(), found.end()), found.end());
+    const std::vector<Point3> part_points = world_points(*part);
+    EXPECT_EQ(inside(part_points, region), expected);
+    EXPECT_EQ(std::adjacent_find(part_points.begin(), part_points.end()), part_points.end());
     const Progress progress = part->progress();
-    EXPECT_EQ(progress.points, found.size());
+    EXPECT_EQ(progress.points, part_points.size());
     EXPECT_EQ(progress.points + progress.nodata + progress.excluded, columns * rows);
     EXPECT_EQ(progress.points + progress.nodata, reading.cells);
     EXPECT_EQ(*part->info().points, reading.cells);
@@ -164,7 +164,7 @@ TEST(RasterRegion, ReadsTheBlocksInsideOnceAndNoOthers) {
     const double across = std::abs(world.xy[0]), down = std::abs(world.xy[4]);
     const Box3 around = flat_box(region.min[0] - 2 * across, region.min[1] - 2 * down,
                                  region.max[0] + 2 * across, region.max[1] + 2 * down);
-    EXPECT_EQ(inside(found, around), found);
+    EXPECT_EQ(inside(part_points, around), part_points);
   }
   EXPECT_GT(in_all, 500'000u);
   EXPECT_GT(without, 2u);
@@ -305,11 +305,11 @@ TEST(RasterRegion, AsciiGridGivesThePointsInside) {
   const std::vector<Point3> all = world_points(*open_source(std::span(&file, 1), options));
   options.selection.region = Box3{{1203, 2110, -1e9}, {1555, 2404, 60}};
   const auto part = open_source(std::span(&file, 1), options);
-  const std::vector<Point3> found = world_points(*part);
-  EXPECT_EQ(found, inside(all, *options.selection.region));
-  EXPECT_GT(found.size(), 500u);
+  const std::vector<Point3> part_points = world_points(*part);
+  EXPECT_EQ(part_points, inside(all, *options.selection.region));
+  EXPECT_GT(part_points.size(), 500u);
   const Progress progress = part->progress();
-  EXPECT_EQ(progress.points, found.size());
+  EXPECT_EQ(progress.points, part_points.size());
   EXPECT_EQ(progress.points + progress.nodata + progress.excluded, 97u * 83);
 }
 

@@ -34,7 +34,7 @@ std::size_t content_of(const Store& store) {
   const std::size_t stride = store.schema().payload_size();
   std::vector<std::vector<std::size_t>> contents;  // of clusters, by level
   for (unsigned level = 0; level <= store.top(); ++level) {
-    std::vector<std::size_t>& found = contents.emplace_back();
+    std::vector<std::size_t>& level_hashes = contents.emplace_back();
     store.for_each(level, [&](ClusterId, const ClusterRecord& record, const ClusterPoints& points) {
       std::string text;
       const auto point = [&](const Point3& position, const std::byte* payload,
@@ -61,7 +61,7 @@ std::size_t content_of(const Store& store) {
       for (const std::size_t member : members) append_bytes(text, member);
       append_bytes(text, record.summary.error);
       append_bytes(text, record.summary.descendants);
-      found.push_back(std::hash<std::string>()(text));
+      level_hashes.push_back(std::hash<std::string>()(text));
     });
   }
   return contents.back().front();

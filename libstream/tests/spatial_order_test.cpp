@@ -271,18 +271,18 @@ TEST(SpatialOrderTest, HoldsSmallBlocksTogether) {
       points_source->block_points(block_points);
       const auto source =
           in_spatial_order(std::move(points_source), {.order = order, .block_points = kBlock});
-      Read found;
+      Read result;
       std::uint64_t points = 0, room = 0;
       for (PointBlock block; source->next(block); block = {}) {
         points += block.size();
         // Only the first window counts, because it is held until its order is judged.
         if (points <= 1u << 18) room += block.positions.capacity();
         EXPECT_LE(block.size(), kBlock);
-        found.blocks.push_back(block);
+        result.blocks.push_back(block);
       }
-      expect_all(found, kCount, place);
+      expect_all(result, kCount, place);
       EXPECT_LT(room, 1.3 * (1u << 18));
-      EXPECT_LT(found.blocks.size(), block_points == 1 ? 40'000u : 600u);
+      EXPECT_LT(result.blocks.size(), block_points == 1 ? 40'000u : 600u);
     }
   }
 }
@@ -297,9 +297,9 @@ TEST(SpatialOrderTest, ThreadsDoNotChangeTheOrder) {
                                             .block_points = kBlock,
                                             .threads = threads,
                                             .parts_ahead = ahead});
-      Read found;
-      for (PointBlock block; source->next(block);) found.blocks.push_back(block);
-      EXPECT_TRUE(same(found, expected)) << threads << " threads, " << ahead << " ahead";
+      Read result;
+      for (PointBlock block; source->next(block);) result.blocks.push_back(block);
+      EXPECT_TRUE(same(result, expected)) << threads << " threads, " << ahead << " ahead";
       // Chunks of buckets are written in another order, so another chunk may be the last, shorter
       // one.
       EXPECT_NEAR(static_cast<double>(source->report().temporary_bytes),

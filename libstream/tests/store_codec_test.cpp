@@ -42,9 +42,9 @@ TEST(StoreCodec, ClassesContainTheirNumbers) {
   Random random(1);
   for (int i = 0; i < 100000; ++i) {
     const std::uint64_t number = any_number(random, 64);
-    const unsigned found = class_of(number);
-    ASSERT_LT(found, kClasses);
-    const ClassRange range = kClassRange[found];
+    const unsigned number_class = class_of(number);
+    ASSERT_LT(number_class, kClasses);
+    const ClassRange range = kClassRange[number_class];
     EXPECT_LE(range.base, number);
     EXPECT_LT((number - range.base) >> range.bits, 1u) << number;
   }
@@ -323,7 +323,7 @@ TEST(StoreCodec, RoundTripsIndexPages) {
     const auto n = static_cast<std::uint32_t>(entries.size());
     const IndexPage page(bytes, n, layout, decoding);
     EXPECT_EQ(page.offset(0), offset);
-    const RangeColumns found = page.ranges(layout, decoding);
+    const RangeColumns decoded = page.ranges(layout, decoding);
     for (std::uint32_t i = 0; i < n; ++i) {
       const Entry entry = page.entry(i), &wanted = entries[i];
       ASSERT_EQ(entry.bytes, wanted.bytes);
@@ -335,7 +335,8 @@ TEST(StoreCodec, RoundTripsIndexPages) {
       ASSERT_EQ(entry.descendants, wanted.descendants);
       ASSERT_EQ(entry.checksum, wanted.checksum);
       for (std::size_t a = 0; a < layout.attributes.size(); ++a) {
-        const KeyRange before = ranges[i * layout.attributes.size() + a], after = found.range(i, a);
+        const KeyRange before = ranges[i * layout.attributes.size() + a],
+                       after = decoded.range(i, a);
         ASSERT_LE(after.low, before.low);
         ASSERT_GE(after.high, before.high);
       }
@@ -371,13 +372,13 @@ void check_stored_boxes() {
       for (std::size_t a = 0; a < 3; ++a) p[a] = std::clamp(p[a], bounds.min[a], bounds.max[a]);
       box.include(p);
     }
-    const Box3 found = Box::around(box, bounds).in(bounds);
-    EXPECT_TRUE(found.contains(box.min) && found.contains(box.max));
-    EXPECT_TRUE(bounds.contains(found.min) && bounds.contains(found.max));
+    const Box3 rounded = Box::around(box, bounds).in(bounds);
+    EXPECT_TRUE(rounded.contains(box.min) && rounded.contains(box.max));
+    EXPECT_TRUE(bounds.contains(rounded.min) && bounds.contains(rounded.max));
     for (std::size_t a = 0; a < 3; ++a) {
       const double step = (bounds.max[a] / Box::kMax - bounds.min[a] / Box::kMax) * 1.001;
-      EXPECT_LE(box.min[a] - found.min[a], step);
-      EXPECT_LE(found.max[a] - box.max[a], step);
+      EXPECT_LE(box.min[a] - rounded.min[a], step);
+      EXPECT_LE(rounded.max[a] - box.max[a], step);
     }
   }
 }
@@ -421,15 +422,15 @@ TEST(StoreCodec, RoundTripsColumnsAlongLinesInEveryKind) {
     encoder.finish(7, bytes);
     const Bytes room = padded(bytes);
     SymbolDecoder decoder(tables.pointers, inside(room));
-    Lines found;
+    Lines lines_out;
     std::vector<std::int64_t> guide_out(n), values_out(n);
-    code_guide(decoder, 0, guide_kind, nullptr, found, 0, guide_out.data(), nullptr, n);
-    code_column(decoder, kOther, kind, nullptr, &found, before.data(), values_out.data(), nullptr,
-                n);
+    code_guide(decoder, 0, guide_kind, nullptr, lines_out, 0, guide_out.data(), nullptr, n);
+    code_column(decoder, kOther, kind, nullptr, &lines_out, before.data(), values_out.data(),
+                nullptr, n);
     EXPECT_EQ(decoder.finish(), 7u);
     ASSERT_EQ(guide_out, guide);
     ASSERT_EQ(values_out, values);
-    for (std::uint32_t i = 1; i < n; ++i) ASSERT_EQ(found[i], lines[i]);
+    for (std::uint32_t i = 1; i < n; ++i) ASSERT_EQ(lines_out[i], lines[i]);
   }
 }
 

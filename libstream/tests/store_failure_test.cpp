@@ -78,7 +78,7 @@ TEST(StoreDamage, FindsEveryFlippedBit) {
       for (unsigned bit = edge ? 0 : at % 8; bit < (edge ? 8 : at % 8 + 1); ++bit) {
         const char damaged = static_cast<char>(bytes[at] ^ (1 << bit));
         overwrite(path / name, at, damaged);
-        bool found = false;
+        bool is_detected = false;
         try {
           const Store store = Store::open(path);
           std::size_t problems = 0;
@@ -88,11 +88,11 @@ TEST(StoreDamage, FindsEveryFlippedBit) {
             EXPECT_FALSE(problem.what.empty());
           });
           EXPECT_EQ(good, problems == 0);
-          found = !good;
+          is_detected = !good;
         } catch (const Error&) {
-          found = true;
+          is_detected = true;
         }
-        ASSERT_TRUE(found) << name << ", byte " << at << ", bit " << bit;
+        ASSERT_TRUE(is_detected) << name << ", byte " << at << ", bit " << bit;
       }
       overwrite(path / name, at, bytes[at]);
     }

@@ -46,19 +46,19 @@ TEST(StoreInvariants, RefusesManifestsWithInvalidCounts) {
       // A number of clusters that is only possible if products wrap.
       {"more points than possible",
        [&](auto& m) {
-         const std::uint64_t many = std::numeric_limits<std::uint64_t>::max();
-         m["points"] = level(m, 0)["points"] = many;
-         level(m, 1)["points"] = level(m, 0)["clusters"] = many;
-         level(m, 0)["segments"][0]["clusters"] = many;
+         const std::uint64_t count = std::numeric_limits<std::uint64_t>::max();
+         m["points"] = level(m, 0)["points"] = count;
+         level(m, 1)["points"] = level(m, 0)["clusters"] = count;
+         level(m, 0)["segments"][0]["clusters"] = count;
          level(m, 0)["members"] = 0;
        }},
       {"more clusters than its index",
        [&](auto& m) {
-         const std::uint64_t many = std::uint64_t{1} << 40;
-         m["points"] = level(m, 0)["points"] = 2 * many;
-         level(m, 1)["points"] = level(m, 0)["clusters"] = many;
-         level(m, 0)["segments"][0]["clusters"] = many;
-         level(m, 0)["members"] = many;
+         const std::uint64_t count = std::uint64_t{1} << 40;
+         m["points"] = level(m, 0)["points"] = 2 * count;
+         level(m, 1)["points"] = level(m, 0)["clusters"] = count;
+         level(m, 0)["segments"][0]["clusters"] = count;
+         level(m, 0)["members"] = count;
        }},
       {"more points than its clusters",
        [&](auto& m) {
@@ -135,14 +135,14 @@ TEST(StoreInvariants, RefusesManifestsWithUnknownWords) {
     testing::edit_manifest(files, c.edit);
     testing::expect_refused(files, c.expected);
   }
-  for (const Entities known :
+  for (const Entities entities :
        {Entities::points, Entities::triangles, Entities::segments, Entities::polylines}) {
     StoreFiles files = testing::cloud_files();
     testing::edit_manifest(
-        files, [&](ordered_json& m) { parameter(m, std::string(name_of(known)).c_str()); });
+        files, [&](ordered_json& m) { parameter(m, std::string(name_of(entities)).c_str()); });
     const TemporaryFolder folder;
     testing::write_files(folder.path(), files);
-    EXPECT_EQ(testing::error_of_opening(folder.path()), "") << name_of(known);
+    EXPECT_EQ(testing::error_of_opening(folder.path()), "") << name_of(entities);
   }
 }
 

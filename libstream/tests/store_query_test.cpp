@@ -206,13 +206,13 @@ TEST(StoreQuery, RangesAndCountsAreThoseOfBruteForce) {
             expected.push_back(point);
           }
         }
-        const auto found = query.in_box(box, level);
+        const auto result = query.in_box(box, level);
         EXPECT_TRUE(std::is_sorted(
-            found.begin(), found.end(), [](const FoundPoint& a, const FoundPoint& b) {
+            result.begin(), result.end(), [](const FoundPoint& a, const FoundPoint& b) {
               return level_of(a.cluster) > level_of(b.cluster) ||
                      (level_of(a.cluster) == level_of(b.cluster) && a.cluster < b.cluster);
             }));
-        ASSERT_EQ(keys_of(found, false), keys_of(expected, false)) << "level " << level;
+        ASSERT_EQ(keys_of(result, false), keys_of(expected, false)) << "level " << level;
         if (level > 0) continue;
         ASSERT_EQ(query.count(box), expected.size());
         // Clusters on the border count in part, clusters inside count completely.
@@ -298,11 +298,11 @@ TEST(StoreQuery, FoundPointsLeadToTheirAttributes) {
   const QueriedStore queried = store_of_sums();
   StoreQuery query(queried.store());
   ClusterPoints points;
-  const std::vector<FoundPoint> found = query.nearest({50, 50, 50}, 100);
-  const std::vector<std::byte> sums = query.attributes(found);
-  ASSERT_EQ(sums.size(), found.size() * sizeof(double));
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    const FoundPoint& point = found[i];
+  const std::vector<FoundPoint> nearest = query.nearest({50, 50, 50}, 100);
+  const std::vector<std::byte> sums = query.attributes(nearest);
+  ASSERT_EQ(sums.size(), nearest.size() * sizeof(double));
+  for (std::size_t i = 0; i < nearest.size(); ++i) {
+    const FoundPoint& point = nearest[i];
     queried.store().read(point.cluster, points);
     EXPECT_EQ(points.positions[point.member], point.position);
     const double sum = point.position[0] + point.position[1] + point.position[2];
@@ -360,9 +360,10 @@ TEST(StoreQuery, FindsOnlyPointsThatMeetTheCondition) {
       std::sort(near.begin(), near.end(),
                 [](const FoundPoint& a, const FoundPoint& b) { return key_of(a) < key_of(b); });
       near.resize(std::min<std::size_t>(near.size(), 7));
-      const std::vector<FoundPoint> found = query.nearest(place, 7);
-      ASSERT_EQ(found.size(), near.size());
-      for (std::size_t i = 0; i < found.size(); ++i) EXPECT_EQ(key_of(found[i]), key_of(near[i]));
+      const std::vector<FoundPoint> nearest = query.nearest(place, 7);
+      ASSERT_EQ(nearest.size(), near.size());
+      for (std::size_t i = 0; i < nearest.size(); ++i)
+        EXPECT_EQ(key_of(nearest[i]), key_of(near[i]));
       if (near.empty()) continue;
       EXPECT_GE(query.within(place, near.back().distance).size(), near.size());
     }

@@ -99,13 +99,13 @@ TEST_F(Vrt, CellsMatchGdal) {
     ASSERT_EQ(
         std::system(("gdal_translate -q '" + vrt + "' '" + tif + "' >/dev/null 2>&1").c_str()), 0);
     const AllPoints expected = read_file(tif);
-    AllPoints found = read_file(vrt, {.block_points = 1 + random() % 500});
-    EXPECT_EQ(found.info.format, "vrt");
-    EXPECT_EQ(found.info.columns, expected.info.columns);
-    EXPECT_EQ(found.info.rows, expected.info.rows);
-    EXPECT_EQ(found.info.world.xy, expected.info.world.xy);
+    AllPoints result = read_file(vrt, {.block_points = 1 + random() % 500});
+    EXPECT_EQ(result.info.format, "vrt");
+    EXPECT_EQ(result.info.columns, expected.info.columns);
+    EXPECT_EQ(result.info.rows, expected.info.rows);
+    EXPECT_EQ(result.info.world.xy, expected.info.world.xy);
     // Cells without a source are 0 in GDAL if the VRT has no nodata value; here they have no data.
-    std::vector<Point3> all = sorted_cells(expected), others = sorted_cells(std::move(found));
+    std::vector<Point3> all = sorted_cells(expected), others = sorted_cells(std::move(result));
     if (expected.info.nodata) {
       EXPECT_EQ(others, all) << options;
     } else {
@@ -159,13 +159,13 @@ TEST_F(Vrt, MovesSlightlyMisalignedSourcesToTheNearestCells) {
         std::system(("gdal_translate -q '" + vrt + "' '" + path("whole.tif") + "' >/dev/null 2>&1")
                         .c_str()),
         0);
-    const AllPoints found = read_file(vrt);
+    const AllPoints result = read_file(vrt);
     // GDAL also fills the cells that a source only touches.
-    const std::vector<Point3> cells = sorted_cells(found);
+    const std::vector<Point3> cells = sorted_cells(result);
     const std::vector<Point3> all = sorted_cells(read_file(path("whole.tif")));
     EXPECT_EQ(cells.size(), 63U);
     EXPECT_TRUE(std::includes(all.begin(), all.end(), cells.begin(), cells.end()));
-    EXPECT_NE(found.info.note.find("nearest"), std::string::npos) << found.info.note;
+    EXPECT_NE(result.info.note.find("nearest"), std::string::npos) << result.info.note;
   }
   const std::string full = "xOff='1' yOff='0' xSize='9' ySize='7'";
   EXPECT_EQ(read_file(put_vrt(source(rects(full, full)))).info.note, "");

@@ -19,7 +19,7 @@ namespace terrace::stream {
 /// 3. Coordinates of the CRS as doubles, if the lattices have no common refinement, or if 32 bits
 ///    do not cover `bounds`.
 ///
-/// bounds: of the points, in the CRS; empty if unknown.
+/// bounds: the bounding box of the points, in the CRS; empty if unknown.
 Placement common_placement(std::span<const Placement> placements, const Box3& bounds);
 
 /// Moves stored coordinates to another placement: c * factor + shift.

@@ -42,9 +42,9 @@ void add_folder(const std::string& folder, const std::string& format,
       if (format.empty() || format == "ept") files.push_back((at->path() / kEptName).string());
       continue;
     }
-    const Format* const known = format_of_name(at->path().string());
+    const Format* const file_format = format_of_name(at->path().string());
     const bool hidden = at->path().filename().string().front() == '.';
-    if (hidden || known == nullptr || (!format.empty() && known->name != format) ||
+    if (hidden || file_format == nullptr || (!format.empty() && file_format->name != format) ||
         !at->is_regular_file(ignored)) {
       continue;
     }

@@ -39,8 +39,8 @@ bool precedes(const OctreeNode& a, const OctreeNode& b);
 struct Octree {
   Point3 centre{};
   double half_size = 0.0;  ///< of the root's cube, in the CRS
-  double spacing = 0.0;    ///< of the root's points, in the CRS
-  /// In the order of precedes(): consecutive nodes are close together.
+  double spacing = 0.0;    ///< spacing of the root's points, in the CRS
+  /// Nodes in the order of precedes(), so that consecutive nodes are close together.
   std::vector<OctreeNode> nodes;
 
   [[nodiscard]] Box3 box(const OctreeNode& node) const;

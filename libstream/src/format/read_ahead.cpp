@@ -57,7 +57,7 @@ class ReadAhead final : public PointSource {
     return true;
   }
 
-  /// As of the last block delivered.
+  /// Returns the progress at the last block delivered.
   [[nodiscard]] Progress progress() const override { return progress_; }
 
  private:

@@ -26,7 +26,7 @@
 namespace terrace::stream {
 namespace {
 
-/// In the order of Entities.
+/// Names of the entities, in the order of Entities.
 constexpr std::array<std::string_view, 4> kEntityNames{"points", "triangles", "segments",
                                                        "polylines"};
 

@@ -35,7 +35,8 @@ constexpr std::array<WriterFormat, 4> kMeshFormats{{{"obj", ".obj", "", true},
 constexpr std::array kMeshOpeners{&open_obj_writer, &open_ply_mesh_writer,
                                   &open_ply_ascii_mesh_writer, &open_glb_writer};
 
-std::string known(std::span<const WriterFormat> table) {
+/// Returns the names of the formats with their endings.
+std::string format_list(std::span<const WriterFormat> table) {
   std::string out;
   for (const WriterFormat& row : table) {
     if (!out.empty()) out += ", ";
@@ -74,10 +75,10 @@ std::size_t choose_format(std::span<const WriterFormat> table, const std::string
     return i;
   }
   if (!options.format.empty()) {
-    throw std::invalid_argument(
-        fmt::format("unknown output format '{}'; known are {}", options.format, known(table)));
+    throw std::invalid_argument(fmt::format("unknown output format '{}'; known are {}",
+                                            options.format, format_list(table)));
   }
-  throw Error(path, "no output format has its ending").remedy("known are " + known(table));
+  throw Error(path, "no output format has its ending").remedy("known are " + format_list(table));
 }
 
 std::unique_ptr<PointWriter> open_point_writer(const std::string& path, const PointHeader& header,

@@ -20,7 +20,7 @@ class GzipStream {
   /// Reads at most `max_bytes` compressed bytes; returns 0 at their end.
   using Read = std::function<std::size_t(char* out, std::size_t max_bytes)>;
 
-  /// name: of the input, for messages. first: compressed bytes that have already been read.
+  /// name: the input, named in errors. first: compressed bytes that have already been read.
   explicit GzipStream(std::string name, std::string_view first = {});
   ~GzipStream();
   GzipStream(const GzipStream&) = delete;

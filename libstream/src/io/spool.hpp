@@ -17,8 +17,8 @@ namespace terrace::stream {
 /// pipes) but needs random access.
 class Spool final : public ByteSource {
  public:
-  /// name: of the spooled input, for messages. folder: where to create the file; empty: $TMPDIR or
-  /// /tmp. Throws: Error if the file cannot be created.
+  /// Creates a temporary file. name: the spooled input, named in errors. folder: where to create
+  /// the file, or empty for $TMPDIR or /tmp. Throws: Error if the file cannot be created.
   explicit Spool(std::string name, const std::filesystem::path& folder = {});
   ~Spool() override;
   Spool(const Spool&) = delete;

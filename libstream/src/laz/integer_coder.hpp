@@ -18,7 +18,8 @@ struct IntegerModels {
   std::uint32_t magnitude;  ///< k of the last coded number
   BitModel zero_or_one;     ///< the correction if k is 0
   std::array<SymbolModel<Bits + 1>, Contexts> magnitudes;
-  /// At index k - 1, of 2^min(k, 8) symbols. A k of 32 needs none: the correction is 2^31.
+  /// Models of corrections of k bits, at index k - 1, with 2^min(k, 8) symbols. A k of 32 needs
+  /// none: the correction is 2^31.
   std::array<SymbolModel<256>, (Bits < 32 ? Bits : 31)> corrections;
 
   /// Codes `value`, which decoding ignores, and returns it; for 8 and 16 bits as an unsigned

@@ -87,7 +87,7 @@ struct Bucket {
 /// been read.
 class BucketFile {
  public:
-  /// name: of the points' source, for messages.
+  /// Creates the file in `folder`. name: the points' source, named in errors.
   BucketFile(const std::string& name, const std::filesystem::path& folder,
              std::size_t record_bytes);
 

@@ -38,7 +38,7 @@ void report_coordinates(const terrain::MeshCoordinates& coordinates, const Commo
 /// target of a link, exists and `force` is false or terrace did not write it.
 stream::Naming may_replace(const std::string& path, bool force);
 
-/// Does the same for one of several outputs of a run, which `group` publishes together.
+/// Checks one of several outputs of a run, which `group` publishes together.
 stream::Naming may_replace(const std::string& path, bool force, stream::OutputGroup& group);
 
 /// Returns the options for a point file at `path`, after may_replace(). `format` is the one that

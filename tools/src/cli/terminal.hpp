@@ -12,7 +12,7 @@ namespace terrace::tools {
 /// Returns `text` with everything that a terminal would act on escaped as \xNN: control characters
 /// (C0, DEL and C1), invalid UTF-8, and marks that change the writing direction. Line ends stay.
 std::string printable(std::string_view text);
-/// The same for a single line: line ends become \n.
+/// Returns printable(text) as a single line: line ends become \n.
 std::string printable_line(std::string_view text);
 
 /// Prints "terrace: LINE" on standard error. Joins several lines into one.

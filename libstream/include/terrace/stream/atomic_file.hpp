@@ -32,9 +32,9 @@ struct Ownership {
   Ownership(bool all) : ours(all) {}
   /// For a folder that terrace wrote, except for one file: its path in the folder.
   static Ownership except(std::string file) {
-    Ownership found(false);
-    found.stranger = std::move(file);
-    return found;
+    Ownership ownership(false);
+    ownership.stranger = std::move(file);
+    return ownership;
   }
 
   bool ours;

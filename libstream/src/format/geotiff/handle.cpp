@@ -186,20 +186,20 @@ bool GeoTiffHandle::read(std::uint64_t offset, std::span<std::byte> out) const {
 std::string GeoTiffHandle::take_complaint() { return std::exchange(complaint_, {}); }
 
 std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) const {
-  const TIFFField* const known = TIFFFindField(tiff_, tag, TIFF_ANY);
-  if (known == nullptr) return {};
+  const TIFFField* const tag_field = TIFFFindField(tiff_, tag, TIFF_ANY);
+  if (tag_field == nullptr) return {};
   // For a field that libtiff does not know it passes a 32-bit count. If the program around us has
   // registered these fields, the count may have 16 bits, or a text may have none.
   const void* data = nullptr;
   std::uint32_t count = 0;
   int found = 0;
-  if (TIFFFieldPassCount(known) == 0) {
+  if (TIFFFieldPassCount(tag_field) == 0) {
     if (type != TIFF_ASCII) return {};
     found = TIFFGetField(tiff_, tag, &data);
     if (found == 1 && data != nullptr) {
       count = static_cast<std::uint32_t>(std::strlen(static_cast<const char*>(data)));
     }
-  } else if (TIFFFieldReadCount(known) == TIFF_VARIABLE2) {
+  } else if (TIFFFieldReadCount(tag_field) == TIFF_VARIABLE2) {
     found = TIFFGetField(tiff_, tag, &count, &data);
   } else {
     std::uint16_t short_count = 0;
@@ -207,9 +207,9 @@ std::span<const std::byte> GeoTiffHandle::field(std::uint32_t tag, int type) con
     count = short_count;
   }
   if (found != 1 || data == nullptr) return {};
-  if (TIFFFieldDataType(known) != type) {
+  if (TIFFFieldDataType(tag_field) != type) {
     throw fault(fmt::format("has TIFF type {} instead of {}",
-                            static_cast<int>(TIFFFieldDataType(known)), type))
+                            static_cast<int>(TIFFFieldDataType(tag_field)), type))
         .at(fmt::format("field {}", tag))
         .remedy("check that it is a complete GeoTIFF file (gdalinfo)");
   }

@@ -28,7 +28,7 @@ namespace {
 /// cells where it is 0 have no data.
 class GeoTiffMask {
  public:
-  /// Null if there is none.
+  /// Returns the mask of the raster, or null if it has none.
   static std::unique_ptr<GeoTiffMask> find(const GeoTiffHandle& raster, const GeoTiffLayout& layout,
                                            const RasterOptions& options) {
     const auto open = [&options](const std::string& file) {

@@ -42,7 +42,7 @@ class TileEncoder {
   TileEncoder(const TileEncoder&) = delete;
   TileEncoder& operator=(const TileEncoder&) = delete;
 
-  /// samples: of a whole tile; overwritten. The result is valid until the next call.
+  /// Returns the coded bytes of a whole tile, valid until the next call. Overwrites `samples`.
   std::span<const std::byte> encode(std::span<std::byte> samples);
 
  private:

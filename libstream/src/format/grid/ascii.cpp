@@ -38,7 +38,7 @@ constexpr std::array<std::string_view, 15> kKeys{
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 
-/// key: in lower case.
+/// Returns whether `word` is `key` in lower or upper case. `key` must be in lower case.
 bool is_word(std::string_view word, std::string_view key) {
   return std::equal(word.begin(), word.end(), key.begin(), key.end(),
                     [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a + 32 : a) == b; });

@@ -203,18 +203,18 @@ void LasRecords::put_attribute(const std::byte* values, const Channel& channel,
 template <class Value>
 Value LasRecords::convert(const std::byte* values, const Channel& channel, const LasField& field,
                           double exact, std::uint64_t point) const {
-  const double real = to_double(channel.type, values) * channel.scale + channel.offset;
+  const double scaled = to_double(channel.type, values) * channel.scale + channel.offset;
   if constexpr (std::is_floating_point_v<Value>) {
-    return static_cast<Value>(real);
+    return static_cast<Value>(scaled);
   } else {
-    const double step = (real - field.channel.offset) / field.channel.scale;
+    const double step = (scaled - field.channel.offset) / field.channel.scale;
     const double rounded = std::nearbyint(step);
     const double max_value = field.bits == 0
                                  ? static_cast<double>(std::numeric_limits<Value>::max())
                                  : static_cast<double>((1U << field.bits) - 1);
     if (!(rounded >= static_cast<double>(std::numeric_limits<Value>::min()) &&
           rounded <= max_value && std::abs(step - rounded) <= exact)) {
-      throw Error(path_, fmt::format("{} does not fit into the field {} of LAS", text_of(real),
+      throw Error(path_, fmt::format("{} does not fit into the field {} of LAS", text_of(scaled),
                                      field.channel.name))
           .at(fmt::format("point {}", point))
           .remedy("rename the column, so that it becomes extra bytes");

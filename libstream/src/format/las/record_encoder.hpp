@@ -22,7 +22,7 @@ struct LasSums {
   static constexpr std::size_t kReturns = 15;
 
   std::uint64_t points = 0;
-  /// In steps of the lattice; without points `lowest` exceeds `highest`.
+  /// Bounds of the points in steps of the lattice. Without points `lowest` exceeds `highest`.
   std::array<std::int32_t, 3> lowest{INT32_MAX, INT32_MAX, INT32_MAX},
       highest{INT32_MIN, INT32_MIN, INT32_MIN};
   std::array<std::uint64_t, kReturns> returns{};
@@ -38,7 +38,7 @@ class LasRecords {
   LasRecords(const std::string& path, const PointHeader& header, LasFormats formats);
   ~LasRecords();
 
-  /// As PointWriter::encode(), for take().
+  /// Encodes a block for take(), as PointWriter::encode() does.
   [[nodiscard]] PointWriter::EncodedPtr encode(const PointBlock& block) const;
   /// Returns the records of the next points and includes them in sums(); valid until the next call.
   /// Throws: Error for a coordinate outside the lattice's range and for a value that does not fit

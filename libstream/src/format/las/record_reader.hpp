@@ -16,9 +16,9 @@ class RecordReader {
  public:
   virtual ~RecordReader() = default;
   /// Returns the next records, at least one and at most `max_records`; valid until the next call.
-  /// Empty if all remaining records are lost. The caller never asks for more than the header's
-  /// count minus the records read and lost(). Throws: Error if records are missing and no handler
-  /// for damage is set; Stopped on a stop request.
+  /// Returns nothing if all remaining records are lost. The caller never asks for more than the
+  /// header's count minus the records read and lost(). Throws: Error if records are missing and no
+  /// handler for damage is set; Stopped on a stop request.
   virtual std::string_view read(std::uint64_t max_records) = 0;
   /// Number of records in damaged parts so far (see SourceOptions::on_damage).
   [[nodiscard]] virtual std::uint64_t lost() const { return 0; }
@@ -29,7 +29,7 @@ class RecordReader {
 /// Reads uncompressed records.
 class PlainRecords final : public RecordReader {
  public:
-  /// points: the expected number.
+  /// Reads records of `record_bytes` bytes. points: the expected number of records.
   PlainRecords(Input& input, std::size_t record_bytes, std::uint64_t points,
                OnDamage on_damage = {})
       : input_(&input),

@@ -118,8 +118,9 @@ std::optional<MeshFile> read_any_mesh(const std::string& file, const SourceOptio
   const auto is_in = [&](const Format& format) {
     if (!options.format.empty()) return options.format == format.name;
     if (!head.empty() && format.recognise(std::as_bytes(std::span(head)))) return true;
-    const Format* const known = format_of_name(file);
-    return known != nullptr && known->name == format.name && format.name != ply_format().name;
+    const Format* const named_format = format_of_name(file);
+    return named_format != nullptr && named_format->name == format.name &&
+           format.name != ply_format().name;
   };
   if (is_in(ply_format())) return read_ply_mesh(file, options);
   for (const SimpleFormat& kind : kSimpleFormats) {

@@ -186,9 +186,10 @@ class XyzSource final : public PointSource {
           std::find(needed.begin(), needed.end(), layout_.names[i]) == needed.end();
     }
     choose_types(first_attributes);
-    const bool real = std::all_of(types_.begin(), types_.end(),
-                                  [](ScalarType type) { return type == ScalarType::f64; });
-    parse_row_ = real ? row_parser<true>(layout_.separator) : row_parser<false>(layout_.separator);
+    const bool all_doubles = std::all_of(types_.begin(), types_.end(),
+                                         [](ScalarType type) { return type == ScalarType::f64; });
+    parse_row_ =
+        all_doubles ? row_parser<true>(layout_.separator) : row_parser<false>(layout_.separator);
   }
 
   const SourceInfo& info() const override { return info_; }
@@ -349,11 +350,11 @@ class XyzSource final : public PointSource {
       const std::string column = fmt::format("column {}", i + 1);
       const bool coordinate = is_coordinate(i);
       double value = 0;
-      const bool real = types_[i] == ScalarType::f64, missing = is_missing_value(field);
-      if (!parse_field(field, types_[i], value) && !is_ignored_[i] && !(real && missing)) {
+      const bool is_double = types_[i] == ScalarType::f64, missing = is_missing_value(field);
+      if (!parse_field(field, types_[i], value) && !is_ignored_[i] && !(is_double && missing)) {
         const std::string cause =
             column + (field.empty() ? " is empty, not" : ", " + in_quotes(field) + ", is not");
-        if (!real) {
+        if (!is_double) {
           return line_error(fmt::format("{} an integer of type {}, like the lines before it", cause,
                                         name_of(types_[i])))
               .remedy(message("correct it, or leave the column out ({drop} of build and convert)"));

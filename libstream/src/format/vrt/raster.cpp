@@ -67,9 +67,10 @@ std::unique_ptr<Raster> open_member(const std::string& file, const RasterOptions
   for (const Kind& kind : kKinds) {
     if (kind.format().recognise(std::as_bytes(std::span(head)))) return kind.open(file, options);
   }
-  const Format* const known = format_of_name(file);
+  const Format* const named_format = format_of_name(file);
   for (const Kind& kind : kKinds) {
-    if (known != nullptr && known->name == kind.format().name) return kind.open(file, options);
+    if (named_format != nullptr && named_format->name == kind.format().name)
+      return kind.open(file, options);
   }
   return open_geotiff(file, options);
 }

@@ -181,7 +181,7 @@ class GridCodec {
   template <bool kRight>
   class Border {
    public:
-    /// borders: as for positions().
+    /// Codes the left or right borders of runs. borders: as for positions().
     Border(unsigned borders, std::uint32_t width) : borders_(borders), width_(width) {}
 
     /// Codes the border in the first row that has cells.

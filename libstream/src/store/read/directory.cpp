@@ -124,8 +124,8 @@ Bytes Directory::read(std::uint64_t offset, std::uint64_t size) const {
 }
 
 const Directory::Contents& Directory::contents(std::uint64_t number) const {
-  std::atomic<const Contents*>& known = contents_[static_cast<std::size_t>(number)];
-  if (const Contents* const contents = known.load(std::memory_order_acquire)) return *contents;
+  std::atomic<const Contents*>& cached = contents_[static_cast<std::size_t>(number)];
+  if (const Contents* const contents = cached.load(std::memory_order_acquire)) return *contents;
   const Chapter& chapter = chapters_[static_cast<std::size_t>(number)];
   const Bytes bytes = read(chapter.contents_at, chapter.contents_bytes);
   ByteReader in(checked(bytes, "the checksum of a chapter's contents is wrong"));
@@ -149,10 +149,10 @@ const Directory::Contents& Directory::contents(std::uint64_t number) const {
   if (offset != chapter.pages_end) throw Damage("the sizes of a chapter's pages do not add up");
   if (in.remaining() != 0) throw Damage("bytes follow the contents of a chapter");
   const std::lock_guard lock(mutex_);
-  if (known.load(std::memory_order_relaxed) == nullptr) {
-    known.store(contents.release(), std::memory_order_release);
+  if (cached.load(std::memory_order_relaxed) == nullptr) {
+    cached.store(contents.release(), std::memory_order_release);
   }
-  return *known.load(std::memory_order_relaxed);
+  return *cached.load(std::memory_order_relaxed);
 }
 
 Directory::Range Directory::page_range(std::uint64_t page) const {
@@ -169,11 +169,11 @@ Box3 Directory::page_box(std::uint64_t page) const {
 
 Box3 Directory::coarse_box(std::uint64_t page) const {
   const auto number = static_cast<std::size_t>(page / kChapterPages);
-  const Contents* const known = contents_[number].load(std::memory_order_acquire);
+  const Contents* const loaded = contents_[number].load(std::memory_order_acquire);
   const Box3& chapter = chapters_[number].box;
-  return known == nullptr
+  return loaded == nullptr
              ? chapter
-             : known->boxes[static_cast<std::size_t>(page % kChapterPages)].in(chapter);
+             : loaded->boxes[static_cast<std::size_t>(page % kChapterPages)].in(chapter);
 }
 
 Bytes Directory::read_tables(const TablesPosition& at) const {
