@@ -120,7 +120,7 @@ std::string suggested_option(const CLI::App& app, const std::string& argument) {
   if (!argument.starts_with("--")) return {};
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options({})) {
-    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_lnames()) names.push_back(fmt::format("--{}", name));
   }
   return suggestion(argument.substr(0, argument.find('=')), names);
 }
@@ -160,7 +160,8 @@ void check_memory(const Verb& verb, const CommonOptions& common) {
 }
 
 const Verb& find_verb(const std::string& name) {
-  if (name == kPlannedVerb) throw UsageError("the verb '" + name + "' is not available yet");
+  if (name == kPlannedVerb)
+    throw UsageError(fmt::format("the verb '{}' is not available yet", name));
   for (const Verb& verb : verbs()) {
     if (verb.name == name) return verb;
   }
@@ -234,7 +235,7 @@ int run_verb(const Verb& verb, std::vector<std::string> arguments) {
   CLI::App app{verb.brief.empty() ? "" : fmt::format("terrace {}: {}.", verb.name, verb.brief),
                "terrace " + verb.name};
   app.set_help_flag("-h,--help", "print this help")->group("Common options");
-  app.footer("Example:\n  " + verb.example);
+  app.footer(fmt::format("Example:\n  {}", verb.example));
 
   CommonOptions common;
   common.threads = std::max(1U, std::thread::hardware_concurrency());
@@ -306,7 +307,8 @@ int dispatch(const std::vector<std::string>& arguments) {
   }
   if (first == "help") return run_verb(find_verb(arguments[1]), {"--help"});
   if (first.size() > 1 && first.front() == '-') {
-    throw UsageError("the verb comes first, then '" + first + "'; `terrace --help` lists verbs");
+    throw UsageError(
+        fmt::format("the verb comes first, then '{}'; `terrace --help` lists verbs", first));
   }
   return run_verb(find_verb(first), {arguments.begin() + 1, arguments.end()});
 }

@@ -113,11 +113,12 @@ cluster::FacilityStrategy parse_strategy(const std::string& text) {
 std::pair<std::string, double> parse_channel(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   if (colon == std::string::npos || colon == 0) {
-    throw UsageError("--channel " + text + ": write NAME:WEIGHT, as in intensity:0.5");
+    throw UsageError(fmt::format("--channel {}: write NAME:WEIGHT, as in intensity:0.5", text));
   }
-  const double weight = parse_number(text.substr(colon + 1), "the weight of --channel " + text);
+  const double weight =
+      parse_number(text.substr(colon + 1), fmt::format("the weight of --channel {}", text));
   if (!(weight >= 0.0) || !std::isfinite(weight)) {
-    throw UsageError("--channel " + text + ": the weight must not be negative");
+    throw UsageError(fmt::format("--channel {}: the weight must not be negative", text));
   }
   return {text.substr(0, colon), weight};
 }
@@ -132,7 +133,7 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
   }
   if (!region.empty()) detail.region = conversion(Region::parse(region, stop_token()));
   for (const std::string& text : focuses) {
-    const std::string name = "--focus " + text;
+    const std::string name = fmt::format("--focus {}", text);
     try {
       Focus focus = parse_focus(text);
       detail.focuses.push_back(
@@ -155,7 +156,8 @@ std::optional<unsigned> parse_level(const std::string& text) {
   if (text == "top") return std::nullopt;
   const auto level = number_from<unsigned>(text);
   if (!level || *level > 255) {
-    throw UsageError("'" + text + "' is not a level; write a number from 0 (full detail) or 'top'");
+    throw UsageError(
+        fmt::format("'{}' is not a level; write a number from 0 (full detail) or 'top'", text));
   }
   return level;
 }
@@ -207,7 +209,7 @@ Line parse_line(const std::string& text) {
   } catch (const nlohmann::json::exception& error) {
     throw line_error(fmt::format("is not GeoJSON ({})", error.what()));
   }
-  if (lines.size() != 1) throw line_error("holds " + counted(lines.size(), "line"));
+  if (lines.size() != 1) throw line_error(fmt::format("holds {}", counted(lines.size(), "line")));
   if (lines.front().size() < 2) throw line_error("the line has fewer than two places");
   line.places = std::move(lines.front());
   return line;

@@ -88,7 +88,7 @@ bool is_of_this_session(std::uint32_t address, std::uint16_t client_port,
   const std::string socket = socket_of_client(endpoint_text(address, client_port), server_port);
   const pid_t session = ::getsid(0);
   if (socket.empty() || session <= 0) return false;
-  const std::string link = "socket:[" + socket + "]";
+  const std::string link = fmt::format("socket:[{}]", socket);
   std::error_code error;
   for (fs::directory_iterator process("/proc", error), end; !error && process != end;
        process.increment(error)) {

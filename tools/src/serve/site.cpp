@@ -252,7 +252,7 @@ Site make_site(std::span<const stream::Store> stores) {
   for (std::size_t i = 0; i < stores.size(); ++i) {
     const stream::Store& store = stores[i];
     const std::string& name = names[i];
-    const std::string folder = "stores/" + name + "/";
+    const std::string folder = fmt::format("stores/{}/", name);
     const std::string checksum = hexadecimal(store.checksum());
     for (const std::string& file : files_of(store)) {
       const fs::path path = store.path() / file;

@@ -36,7 +36,7 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     const std::string where = fmt::format("line {}", labels.size() + 1);
     const std::uint32_t label = number_from<std::uint32_t>(line).value_or(kNoCluster);
     if (label == kNoCluster && line != "-1") {
-      throw stream::Error(path, "'" + line.substr(0, 40) + "' is not a cluster number")
+      throw stream::Error(path, fmt::format("'{}' is not a cluster number", line.substr(0, 40)))
           .at(where)
           .remedy(
               "write one whole number from 0 to 4294967294 per line, or -1 for a point without a "
@@ -44,7 +44,7 @@ std::vector<std::uint32_t> read_labels(const std::string& path, std::size_t poin
     }
     labels.push_back(label);
     if (labels.size() > points) {
-      throw stream::Error(path, "has more lines than the " + counted(points, "point"))
+      throw stream::Error(path, fmt::format("has more lines than the {}", counted(points, "point")))
           .at(where)
           .remedy("give the labels of these points, in the order of the input");
     }

@@ -110,7 +110,8 @@ MatchingResult read_matching_result(const std::string& path, std::size_t points)
           .at(rows->where());
     }
     if (result.lines.size() == max_rows) {
-      throw format_error("is one row too many for " + counted(points, "point")).at(rows->where());
+      throw format_error(fmt::format("is one row too many for {}", counted(points, "point")))
+          .at(rows->where());
     }
     const std::string fault = row_checker.fault(row, result.lines.size());
     if (!fault.empty()) throw format_error(fault).at(rows->where());

@@ -33,9 +33,9 @@ std::vector<double> PointTable::column(const std::string& name) const {
     }
     return values;
   }
-  throw UsageError(
-      fmt::format("the points have no column '{}'{}", name,
-                  names.empty() ? ": they have only x, y and z" : "; there are: " + names));
+  throw UsageError(fmt::format(
+      "the points have no column '{}'{}", name,
+      names.empty() ? ": they have only x, y and z" : fmt::format("; there are: {}", names)));
 }
 
 void writing_within_memory(const stream::PointWriter& writer, const std::string& file,

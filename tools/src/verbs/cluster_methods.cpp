@@ -191,7 +191,7 @@ ClusterOutcome cluster_by_k_median(const ClusterRequest& request, const Facility
 /// linear. Throws UsageError if the linkage method does not support the metric.
 cluster::Dendrogram linkage_on_cpu(const ClusterRequest& request, const FacilityPoints& problem,
                                    const std::optional<std::vector<Point3>>& points) {
-  const std::string method = "--method " + request.linkage_name;
+  const std::string method = fmt::format("--method {}", request.linkage_name);
   cluster::LinkageOptions options;
   options.threads = request.threads;
   options.entry =

@@ -187,7 +187,7 @@ class BuildCommand final : public Command {
       exclusions += (exclusions.empty() ? "" : " and ") +
                     counted(outcome.excluded, "point", "that was", "that were") + " not selected";
     }
-    if (!exclusions.empty()) exclusions = " (" + exclusions + " left out)";
+    if (!exclusions.empty()) exclusions = fmt::format(" ({} left out)", exclusions);
     summary.text =
         fmt::format("{}{} in {}, {}\n{}{}: {}, {}, peak memory {}\n",
                     counted(outcome.points, entity()), exclusions, readable_seconds(seconds),
@@ -257,12 +257,12 @@ class BuildCommand final : public Command {
                       {"store_bytes", bytes},
                       {"seconds", seconds * scale},
                       {"temporary_bytes", temporary}};
-      summary.text =
-          fmt::format("about {}, {} of disk{}, {}; nothing was written\n",
-                      counted(static_cast<std::uint64_t>(points), entity()), readable_bytes(bytes),
-                      temporary > 0 ? " and " + readable_bytes(temporary) + " more while it runs"
-                                    : std::string(),
-                      readable_seconds(seconds * scale));
+      summary.text = fmt::format(
+          "about {}, {} of disk{}, {}; nothing was written\n",
+          counted(static_cast<std::uint64_t>(points), entity()), readable_bytes(bytes),
+          temporary > 0 ? fmt::format(" and {} more while it runs", readable_bytes(temporary))
+                        : std::string(),
+          readable_seconds(seconds * scale));
     }
     return summary;
   }

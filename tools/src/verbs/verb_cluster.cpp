@@ -153,17 +153,17 @@ Summary summary_of(const ClusterOutcome& outcome, std::uint64_t points, const St
   text = counted(points, "point") + ", ";
   if (!outcome.labels.empty()) {
     text += counted(outcome.representatives.size(), "cluster");
-    if (outliers > 0) text += " and " + counted(outliers, "outlier");
+    if (outliers > 0) text += fmt::format(" and {}", counted(outliers, "outlier"));
     text += ", ";
   }
   text += readable_seconds(watch.seconds()) + "\n";
   if (cost) {
-    text += "cost " + rounded(*cost);
+    text += fmt::format("cost {}", rounded(*cost));
     if (outcome.opening_cost) {
       text += fmt::format(" = {} for opening + {} for connecting", rounded(*outcome.opening_cost),
                           rounded(*outcome.connection_cost));
     }
-    if (outliers > 0) text += " + " + rounded(*outcome.outlier_cost) + " for outliers";
+    if (outliers > 0) text += fmt::format(" + {} for outliers", rounded(*outcome.outlier_cost));
     text += "\n";
   }
   if (gap) {
@@ -201,7 +201,7 @@ class ClusterCommand final : public Command {
     request_.memory_bytes = common.memory_or(0);
     const PointTable table = read_point_table(input_, input_format_, request_.memory_bytes, common);
     if (table.size() > std::numeric_limits<std::int32_t>::max()) {
-      throw stream::Error(input_, "has " + counted(table.size(), "point"))
+      throw stream::Error(input_, fmt::format("has {}", counted(table.size(), "point")))
           .remedy("at most 2,147,483,647 are clustered in memory; build a store");
     }
     check_memory(table, common);
@@ -398,11 +398,13 @@ class ClusterCommand final : public Command {
       throw UsageError("--device cuda is for the methods single and complete");
     }
     if (linkage && needs_clusters && request_.k == 0 && !request_.height) {
-      throw UsageError("--method " + method_ + " gives a tree; cut it with -k K or --height H");
+      throw UsageError(
+          fmt::format("--method {} gives a tree; cut it with -k K or --height H", method_));
     }
     if (request_.k != 0 && request_.height) throw UsageError("give either -k or --height");
     const bool needs_k = method == ClusterMethod::k_means || method == ClusterMethod::k_median;
-    if (needs_k && request_.k == 0) throw UsageError("--method " + method_ + " needs -k K");
+    if (needs_k && request_.k == 0)
+      throw UsageError(fmt::format("--method {} needs -k K", method_));
     if (!needs_k && !linkage && request_.k != 0) {
       throw UsageError("--method " + method_ +
                        " finds the number of clusters itself, by --facility-cost; -k is for "

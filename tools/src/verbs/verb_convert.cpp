@@ -161,9 +161,9 @@ class ConvertCommand final : public Command {
       remarks += (remarks.empty() ? "" : ", ") + counted(progress.empty_values, "attribute") +
                  " without a value are NaN";
     }
-    summary.text =
-        fmt::format("{}: {}{}, {}\n", output_, counted(points, "point"),
-                    remarks.empty() ? "" : " (" + remarks + ")", readable_seconds(watch.seconds()));
+    summary.text = fmt::format("{}: {}{}, {}\n", output_, counted(points, "point"),
+                               remarks.empty() ? "" : fmt::format(" ({})", remarks),
+                               readable_seconds(watch.seconds()));
     return summary;
   }
 

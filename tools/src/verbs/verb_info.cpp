@@ -95,7 +95,7 @@ Json channels_of(const stream::Schema& schema) {
 /// that applies within `bounds`, a box in the CRS.
 std::string crs_text(const stream::Crs& crs, const stream::Box3& bounds) {
   std::string text = crs.epsg != 0 ? fmt::format("EPSG:{}", crs.epsg) : "";
-  if (!crs.name.empty()) text += text.empty() ? crs.name : " (" + crs.name + ")";
+  if (!crs.name.empty()) text += text.empty() ? crs.name : fmt::format(" ({})", crs.name);
   if (text.empty()) text = crs.wkt.empty() ? "unknown" : crs.wkt.substr(0, 60) + "...";
   if (crs.vertical_epsg != 0) text += fmt::format(" + EPSG:{}", crs.vertical_epsg);
   try {
@@ -105,12 +105,12 @@ std::string crs_text(const stream::Crs& crs, const stream::Box3& bounds) {
     const DatumChange& change = system.to_wgs84();
     if (!change.possible()) {
       text += fmt::format(", datum {} without a transformation to WGS 84", definition->datum);
-      if (!change.better().empty()) text += ": " + change.better();
+      if (!change.better().empty()) text += fmt::format(": {}", change.better());
     } else if (!change.identity()) {
-      text += ", to WGS 84 by " + change.description();
+      text += fmt::format(", to WGS 84 by {}", change.description());
     } else if (change.accuracy().value_or(0) > 0) {
       text += fmt::format(", within {} m of WGS 84", plain_number(*change.accuracy()));
-      if (!change.better().empty()) text += " (" + change.better() + ")";
+      if (!change.better().empty()) text += fmt::format(" ({})", change.better());
     }
   } catch (const CrsError& error) {
     text += std::string(", ") + error.what();
@@ -132,9 +132,9 @@ std::string box_text(const stream::Box3& box) {
 /// Returns "height int16 (metre)", with scale and offset if they are not 1 and 0.
 std::string channel_text(const stream::Channel& channel) {
   std::string text = channel.name + ' ' + std::string(stream::name_of(channel.type));
-  if (channel.scale != 1) text += " x " + plain_number(channel.scale);
-  if (channel.offset != 0) text += " + " + plain_number(channel.offset);
-  if (!channel.unit.empty()) text += " (" + channel.unit + ")";
+  if (channel.scale != 1) text += fmt::format(" x {}", plain_number(channel.scale));
+  if (channel.offset != 0) text += fmt::format(" + {}", plain_number(channel.offset));
+  if (!channel.unit.empty()) text += fmt::format(" ({})", channel.unit);
   return text;
 }
 
@@ -328,9 +328,9 @@ Json file_json(const FileInfo& file) {
 std::string contents_lines(const FileInfo& file) {
   const stream::SourceInfo& info = file.source;
   const SourceScan& scan = file.scan;
-  std::string text = "format:    " + info.format;
-  if (info.files.size() > 1) text += ", " + counted(info.files.size(), "file");
-  if (file.bytes) text += ", " + readable_bytes(*file.bytes);
+  std::string text = fmt::format("format:    {}", info.format);
+  if (info.files.size() > 1) text += fmt::format(", {}", counted(info.files.size(), "file"));
+  if (file.bytes) text += fmt::format(", {}", readable_bytes(*file.bytes));
   text += '\n';
   if (info.grid) {
     text += raster_line(info);
@@ -461,7 +461,7 @@ Summary info_of_store(const std::string& path) {
   text += "crs:       " + printable_line(crs_text(schema.crs, bounds)) + '\n';
   text +=
       "vertical:  " + (schema.vertical.empty() ? std::string("unknown") : schema.vertical) + '\n';
-  text += "bounds:    " + box_text(bounds);
+  text += fmt::format("bounds:    {}", box_text(bounds));
   if (entities_of(schema) != stream::Entities::points) text += " (first corner of each entity)";
   text += '\n';
   text += heights_line(bounds.min[2], bounds.max[2], mean);

@@ -109,8 +109,8 @@ class PointsCommand final : public Command {
   void refuse_empty_selection(const stream::Store& store, const Detail& detail) const {
     if (store.whole().points() == 0) return;
     if (detail.region) throw_none_inside(store);
-    throw stream::Error(
-        part_.path, "no point is selected; all of the store's have " + extent_text(store.whole()))
+    throw stream::Error(part_.path, fmt::format("no point is selected; all of the store's have {}",
+                                                extent_text(store.whole())))
         .remedy("give another --where, --focus or --cluster");
   }
 
@@ -224,7 +224,7 @@ class PointsCommand final : public Command {
       summary.text += fmt::format(", {} to {} m away", readable_number(selected.front().distance),
                                   readable_number(selected.back().distance));
     }
-    summary.text += ", in " + readable_seconds(watch.seconds()) + "\n";
+    summary.text += fmt::format(", in {}\n", readable_seconds(watch.seconds()));
     report_rounding(*writer, summary);
     return summary;
   }

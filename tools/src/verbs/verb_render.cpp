@@ -149,7 +149,7 @@ class RenderCommand final : public Command {
     summary.text += counted(mesh.positions.size(), "point") + ", " +
                     (input.lines.empty() ? counted(mesh.triangles.size(), "triangle")
                                          : counted(input.lines.size(), "line"));
-    if (factor != 1) summary.text += ", heights x " + readable_number(factor);
+    if (factor != 1) summary.text += fmt::format(", heights x {}", readable_number(factor));
     summary.text += ", " + readable_seconds(watch.seconds()) + '\n';
     return summary;
   }

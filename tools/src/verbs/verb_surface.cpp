@@ -118,7 +118,7 @@ class SurfaceCommand final : public Command {
       summary.json["triangles"] = surface.mesh.triangles.size();
       summary.text += counted(surface.mesh.triangles.size(), "triangle");
       if (!surface.open && surface.lids > 0) {
-        summary.text += " (" + with_commas(surface.lids) + " over gaps of the scan)";
+        summary.text += fmt::format(" ({} over gaps of the scan)", with_commas(surface.lids));
       }
       if (!surface.mesh.triangles.empty()) {
         summary.text +=
@@ -127,9 +127,9 @@ class SurfaceCommand final : public Command {
     }
     if (surface.open) summary.text += ", without the faces over the gaps of the scan";
     if (surface.samples_off.value_or(0) > 0) {
-      summary.text += ", " + counted(*surface.samples_off, "sample") + " not on it";
+      summary.text += fmt::format(", {} not on it", counted(*surface.samples_off, "sample"));
     }
-    summary.text += " in " + readable_seconds(watch.seconds()) + "\n";
+    summary.text += fmt::format(" in {}\n", readable_seconds(watch.seconds()));
     return summary;
   }
 

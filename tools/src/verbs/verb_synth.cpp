@@ -71,7 +71,7 @@ class SynthCommand final : public Command {
       throw UsageError("synth dem takes --size, not --points or --shuffle");
     }
     if (!dem && size_option_->count() > 0) {
-      throw UsageError("synth " + kind_ + " takes --points, not --size");
+      throw UsageError(fmt::format("synth {} takes --points, not --size", kind_));
     }
     return dem ? make_dem(common) : make_cloud(common);
   }

@@ -30,7 +30,7 @@ void set_zooms(const std::string& text, TilesRequest& request) {
   if (text.empty()) return;
   const auto number = [&](std::string_view part) {
     const auto value = number_from<unsigned>(part);
-    if (!value) throw UsageError("--zoom '" + text + "': FIRST-LAST, as in 0-14");
+    if (!value) throw UsageError(fmt::format("--zoom '{}': FIRST-LAST, as in 0-14", text));
     return *value;
   };
   const std::size_t dash = text.find('-');
@@ -46,7 +46,7 @@ void set_fill(const std::string& text, TilesRequest& request) {
   if (text.starts_with("flat:")) {
     request.flat_height = parse_number(text.substr(5), "--fill flat");
   } else if (text != "interpolate" && text != "flat") {
-    throw UsageError("--fill '" + text + "': interpolate, flat or flat:METRES");
+    throw UsageError(fmt::format("--fill '{}': interpolate, flat or flat:METRES", text));
   }
   request.fill = text == "interpolate" ? Fill::interpolate : Fill::flat;
 }
@@ -109,7 +109,7 @@ class TileCommand final : public Command {
     summary.text += fmt::format("{}: {}, {}, in {}", output_, counted(result.tiles, "tile"),
                                 readable_bytes(result.bytes), readable_seconds(watch.seconds()));
     if (result.made < result.tiles) {
-      summary.text += "; " + with_commas(result.tiles - result.made) + " already existed";
+      summary.text += fmt::format("; {} already existed", with_commas(result.tiles - result.made));
     }
     summary.text += "\n";
     return summary;
@@ -118,7 +118,7 @@ class TileCommand final : public Command {
  private:
   [[nodiscard]] TilesRequest request(const CommonOptions& common) const {
     if (format_ != "quantized-mesh") {
-      throw UsageError("--format '" + format_ + "': only quantized-mesh is supported");
+      throw UsageError(fmt::format("--format '{}': only quantized-mesh is supported", format_));
     }
     TilesRequest request{.folder = output_, .name = name_};
     set_zooms(zoom_, request);
