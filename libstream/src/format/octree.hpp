@@ -25,7 +25,7 @@ inline constexpr unsigned kDeepestNode = 30;
 struct OctreeNode {
   unsigned depth = 0;
   std::array<std::uint32_t, 3> place{};  ///< along x, y and z, below 2^depth
-  std::uint64_t offset = 0;              ///< of its points in the file
+  std::uint64_t offset = 0;              ///< offset of its points in the file
   std::uint64_t bytes = 0, points = 0;
 };
 
@@ -38,7 +38,7 @@ bool precedes(const OctreeNode& a, const OctreeNode& b);
 /// The cube of the root, and the nodes that have points.
 struct Octree {
   Point3 centre{};
-  double half_size = 0.0;  ///< of the root's cube, in the CRS
+  double half_size = 0.0;  ///< half the side of the root's cube, in the CRS
   double spacing = 0.0;    ///< spacing of the root's points, in the CRS
   /// Nodes in the order of precedes(), so that consecutive nodes are close together.
   std::vector<OctreeNode> nodes;

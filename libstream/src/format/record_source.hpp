@@ -21,7 +21,7 @@ struct RecordStream {
   SourceInfo info{};
   std::size_t record_bytes = 0;
   std::array<std::size_t, 3> coordinate_offsets{0, 4, 8};
-  std::vector<LasField> fields{};  ///< of info.attributes
+  std::vector<LasField> fields{};  ///< fields of info.attributes
   std::unique_ptr<Input> input{};  ///< the input of `records`, unless they have their own file
   std::unique_ptr<RecordReader> records{};
   std::uint64_t points = 0;  ///< number in the file, including those not selected

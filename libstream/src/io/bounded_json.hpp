@@ -12,7 +12,7 @@ namespace terrace::stream {
 
 /// Limits of JSON from a file.
 struct JsonLimits {
-  int depth = 16;                             ///< of nested lists and objects
+  int depth = 16;                             ///< maximum depth of nested lists and objects
   std::size_t values = std::size_t{1} << 20;  ///< values, names and brackets
 };
 

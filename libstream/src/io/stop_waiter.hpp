@@ -22,7 +22,7 @@ class StopWaiter {
 
  private:
   std::stop_token stop_;
-  int read_end_ = -1, write_end_ = -1;  ///< of a pipe that becomes readable with the stop request
+  int read_end_ = -1, write_end_ = -1;  ///< pipe that becomes readable with the stop request
   std::optional<std::stop_callback<std::function<void()>>> on_stop_;
 };
 

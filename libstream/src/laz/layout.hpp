@@ -15,7 +15,7 @@ struct RecordLayout {
   std::size_t nir = 0;
   std::size_t wave_packet = 0;
   std::size_t extra = 0, extra_bytes = 0;
-  unsigned version = 0;  ///< of the items
+  unsigned version = 0;  ///< version of the items
 };
 
 /// Returns the layout of a VLR's records. Throws: std::invalid_argument for items that do not form

@@ -123,7 +123,7 @@ class BucketFile {
   RecordPacker packer_;
   std::vector<std::byte> packed_;
   std::mutex mutex_;                    ///< guards the members below
-  std::uint32_t pages_ = 0;             ///< of the file, including chunks to be written
+  std::uint32_t pages_ = 0;             ///< pages of the file, including chunks to be written
   std::uint64_t unwritten_page_ = 0;    ///< end of the pages written
   std::vector<std::byte> unwritten_;    ///< to be written from there on
   std::vector<std::byte> free_buffer_;  ///< an empty buffer

@@ -17,8 +17,8 @@ struct NodataRule {
   std::optional<double> value;                     ///< the value in the file, if it has one
   bool unmatched = false;                          ///< no sample of this type can have that value
   double low = 1, high = 0;                        ///< the range of floats
-  std::int64_t low_integer = 1, high_integer = 0;  ///< of integers except u64
-  std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< of u64
+  std::int64_t low_integer = 1, high_integer = 0;  ///< range for integers except u64
+  std::uint64_t low_unsigned = 1, high_unsigned = 0;  ///< range for u64
 
   /// Parses a file's text (GDAL_NODATA) for samples of `type`, as GDAL does. Accepts "nan", "inf"
   /// and "-inf" in any case, and decimals for integer samples ("-9999.0"). Floats match within two

@@ -52,7 +52,7 @@ struct Manifest {
   Box3 bounds;
   double mean_height = 0.0;
   std::vector<LevelEntry> levels;  ///< level 0 first
-  std::uint32_t checksum = 0;      ///< of the text; set by parse_manifest()
+  std::uint32_t checksum = 0;      ///< checksum of the text; set by parse_manifest()
 };
 
 /// True if the corners of the box in the CRS are finite.

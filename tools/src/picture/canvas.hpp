@@ -20,8 +20,8 @@ class Canvas {
   /// `width` and `height` are those of the final picture, in pixels. Throws: stream::Stopped.
   Canvas(std::uint32_t width, std::uint32_t height);
 
-  [[nodiscard]] std::uint32_t width() const { return width_; }    ///< in samples
-  [[nodiscard]] std::uint32_t height() const { return height_; }  ///< in samples
+  [[nodiscard]] std::uint32_t width() const { return width_; }    ///< number of samples
+  [[nodiscard]] std::uint32_t height() const { return height_; }  ///< number of samples
 
   /// Returns the colour of a sample: red, green and blue from 0 to 1.
   [[nodiscard]] std::array<float, 3>& colour(std::uint32_t x, std::uint32_t y) {

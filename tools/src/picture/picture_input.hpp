@@ -29,7 +29,7 @@ struct PictureSelection {
 /// The objects to draw, in ground coordinates.
 struct PictureInput {
   terrain::TriangleMesh mesh;                 ///< positions in metres from the centre
-  std::vector<double> heights;                ///< of the vertices, in the source's unit
+  std::vector<double> heights;                ///< heights of the vertices, in the source's unit
   std::vector<terrain::LineSet::Line> lines;  ///< between vertices, instead of triangles
   bool height_field = false;                  ///< the input is one; otherwise the mesh decides
   std::string guess;                          ///< a guess that the picture depends on

@@ -66,8 +66,8 @@ class LiveSite {
   std::vector<std::string> paths_;
   std::function<stream::Store(const std::string& path)> open_;
   std::vector<std::filesystem::path> manifests_, files_;  ///< files_: all except the manifests
-  std::vector<Stamp> manifest_stamps_, file_stamps_;      ///< of the files in site_
-  std::vector<Stamp> attempted_stamps_;                   ///< of the manifests, at the last attempt
+  std::vector<Stamp> manifest_stamps_, file_stamps_;      ///< stamps of the files in site_
+  std::vector<Stamp> attempted_stamps_;  ///< stamps of the manifests at the last attempt
   bool last_attempt_failed_ = false;
   Clock::time_point next_check_{};
   Site site_;

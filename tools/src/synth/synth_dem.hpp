@@ -30,7 +30,7 @@ struct SynthDemOptions {
 struct SynthDemResult {
   std::uint64_t bytes = 0;
   double base = 0.0;                                    ///< mean height of the infinite plane
-  double minimum = 0.0, maximum = 0.0, rms_step = 0.0;  ///< as written
+  double minimum = 0.0, maximum = 0.0, rms_step = 0.0;  ///< values of the written samples
 };
 
 /// Writes a fractal DEM (see Fractal) as a tiled GeoTIFF, one row of tiles at a time. The mean

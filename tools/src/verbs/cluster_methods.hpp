@@ -30,15 +30,15 @@ struct ClusterRequest {
   ClusterMethod method = ClusterMethod::facility;
   cluster::LinkageMethod linkage = cluster::LinkageMethod::single;
   std::string linkage_name;  ///< as the user wrote it
-  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< for facility
-  std::string iterations;  ///< for facility: tenth, log10, log2 or a number; empty: by effort
+  cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;  ///< of facility
+  std::string iterations;  ///< of facility: tenth, log10, log2 or a number; empty: by effort
   cluster::Effort effort = cluster::Effort::standard;
   std::size_t batch = 1;         ///< candidates evaluated at once
   std::size_t k = 0;             ///< requested number of clusters; 0: not requested
-  std::optional<double> height;  ///< for linkage: where to cut the tree
+  std::optional<double> height;  ///< height at which linkage cuts the tree
   std::optional<std::uint32_t> bound_iterations;  ///< steps for the lower bound; 0: no bound
   std::size_t restarts = 1;                       ///< runs of k-means and k-median
-  bool single_precision = false;                  ///< for the linkage matrix
+  bool single_precision = false;                  ///< holds the linkage matrix as floats
   bool cuda = false;
   std::uint64_t seed = 1;
   unsigned threads = 1;
@@ -51,7 +51,7 @@ struct ClusterOutcome {
   /// Set if the method minimises a cost. For k-means the connection cost is the sum of squares.
   std::optional<double> opening_cost, connection_cost, outlier_cost, lower_bound;
   std::optional<cluster::Dendrogram> dendrogram;
-  std::vector<std::string> notes;  ///< for the user
+  std::vector<std::string> notes;  ///< shown to the user
 };
 
 /// Called from time to time with the completed share of the work; may throw to stop.

@@ -177,7 +177,7 @@ class CompensatedSum {
 /// Counts and extent of all points of a source.
 struct SourceScan {
   std::uint64_t points = 0, nodata = 0, empty_values = 0, withheld = 0;
-  stream::Box3 stored, world;  ///< in stored coordinates, and in the CRS
+  stream::Box3 stored, world;  ///< bounding boxes, in stored coordinates and in the CRS
   double mean_height = 0;      ///< mean height, stored
   std::string note;            ///< about heights, or empty
 };

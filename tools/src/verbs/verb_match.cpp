@@ -53,8 +53,8 @@ using MatchProgress = std::function<bool(std::uint64_t done, std::uint64_t total
 struct MatchRequest {
   MatchMethod method = MatchMethod::automatic;
   std::span<const std::uint32_t> labels{};  ///< cluster of each point; empty if not given
-  std::uint64_t iterations = 0;             ///< for halving; 0: the number of points
-  double seconds = 0.0;                     ///< for halving; 0: no limit
+  std::uint64_t iterations = 0;             ///< iterations of halving; 0: as many as points
+  double seconds = 0.0;                     ///< time limit of halving; 0: no limit
   std::uint64_t seed = 1;
   unsigned threads = 1;
   std::uint64_t memory_bytes = 0;  ///< limit for the whole process; 0: no limit

@@ -21,8 +21,8 @@ struct GeoTiffLayout {
   std::uint32_t blocks_across = 0, blocks_down = 0;
   std::uint16_t compression = 1;
   std::uint16_t sample_format = 1;
-  unsigned bits = 8;                 ///< of a stored sample
-  ScalarType type = ScalarType::u8;  ///< of a sample in memory
+  unsigned bits = 8;                 ///< bits of a stored sample
+  ScalarType type = ScalarType::u8;  ///< type of a sample in memory
   bool plain = false;                ///< uncompressed whole bytes: readable without libtiff
   bool swapped = false;              ///< the byte order is not native
 

@@ -61,7 +61,7 @@ class Overviews {
   GeoTiffOptions options_;
   std::vector<GeoTiffLevel> levels_;
   Write write_;
-  std::vector<std::map<Place, Tile>> open_;  ///< of each level
+  std::vector<std::map<Place, Tile>> open_;  ///< open tiles of each level
 };
 
 }  // namespace terrace::stream

@@ -21,7 +21,7 @@ inline constexpr char kAdjustedGpsTime[] = "GPS second less 1e9";
 /// The position of an attribute in a point record.
 struct LasField {
   Channel channel;
-  std::size_t offset = 0;        ///< of its first byte in the record
+  std::size_t offset = 0;        ///< offset of its first byte in the record
   unsigned shift = 0, bits = 0;  ///< of a part of a byte; bits 0: a complete value
 
   friend bool operator==(const LasField&, const LasField&) = default;

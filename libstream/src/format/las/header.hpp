@@ -40,7 +40,7 @@ inline constexpr std::size_t kLasFirstBytes = 227;  ///< header of LAS 1.0 to 1.
 
 /// The fields of a header that readers use, and the records around the points.
 struct LasHeader {
-  unsigned minor = 0;          ///< of the version 1.minor
+  unsigned minor = 0;          ///< minor version: 1.minor
   unsigned point_format = 0;   ///< 0 to 10
   bool compressed = false;     ///< LAZ
   bool wkt = false;            ///< WKT applies, not GeoKeys

@@ -17,9 +17,9 @@ enum class PlyEncoding { ascii, little_endian, big_endian };
 /// A property of an element: a value or a list of values.
 struct PlyProperty {
   std::string name;
-  ScalarType type = ScalarType::f32;  ///< of the value, or of a list's items
+  ScalarType type = ScalarType::f32;  ///< type of the value, or of a list's items
   bool list = false;
-  ScalarType count_type = ScalarType::u8;  ///< of a list's length
+  ScalarType count_type = ScalarType::u8;  ///< type of a list's length
 };
 
 /// An element, such as "vertex": items with the same properties.
@@ -38,7 +38,7 @@ struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::ascii;
   std::vector<PlyElement> elements;
   std::vector<std::string> comments;
-  std::uint64_t lines = 0;  ///< of the header
+  std::uint64_t lines = 0;  ///< number of lines of the header
 };
 
 /// Reads the header and leaves `input` at the first byte after it. Throws: Error with the line if

@@ -20,9 +20,9 @@ struct TextLayout {
   std::size_t columns = 0;
   std::array<std::size_t, 3> xyz{0, 1, 2};  ///< columns of the coordinates
   std::vector<std::size_t> attributes;      ///< the other columns, in order
-  std::vector<std::string> names;           ///< of the attributes
+  std::vector<std::string> names;           ///< names of the attributes
   bool geographic = false;                  ///< the header names longitude and latitude
-  std::array<std::string, 3> units;         ///< of the coordinates: see axis_unit()
+  std::array<std::string, 3> units;         ///< units of the coordinates, see axis_unit()
   std::vector<std::string> comments;        ///< before the first point
 };
 

@@ -23,7 +23,7 @@ struct VrtSource {
   /// The source's nodata value, which overrides that of its file. Without it the source replaces
   /// the cells below it, whether it has data or not.
   std::optional<std::string> nodata{};
-  std::uint64_t source_column = 0, source_row = 0;  ///< of the source
+  std::uint64_t source_column = 0, source_row = 0;  ///< first cell of the part of the source
   std::uint64_t column = 0, row = 0, columns = 0, rows = 0;
 };
 
@@ -31,7 +31,7 @@ struct VrtSource {
 struct VrtDocument {
   RasterInfo info{};
   std::vector<VrtSource> sources{};  ///< in order of precedence, topmost last
-  NodataRule nodata{};               ///< of the mosaic
+  NodataRule nodata{};               ///< nodata value of the mosaic
 };
 
 /// The CRS of an SRS element: a code ("EPSG:n", "EPSG:n+m"), or else the text as WKT.

@@ -33,7 +33,7 @@ struct Layout {
   bool grid = false;
   unsigned level = 0;
   std::vector<ScalarType> attributes;
-  std::vector<std::size_t> offsets;  ///< of the attributes in the payload of a point
+  std::vector<std::size_t> offsets;  ///< offsets of the attributes in the payload of a point
   std::size_t payload_size = 0;
 
   Layout(const Schema& schema, unsigned number)
@@ -94,11 +94,11 @@ struct Entry {
   std::uint32_t bytes = 0;
   std::uint32_t points = 0;  ///< including the representative
   std::array<NumberForm, 3> forms{};
-  std::array<std::int64_t, 3> low{};           ///< of the box, in the form of each axis
-  std::array<std::uint64_t, 3> size{1, 1, 1};  ///< of the box: integers per axis
+  std::array<std::int64_t, 3> low{};  ///< lower corner of the box, in the form of each axis
+  std::array<std::uint64_t, 3> size{1, 1, 1};  ///< size of the box: integers per axis
   std::uint16_t error = 0;                     ///< see error_code
   std::uint64_t descendants = 0;               ///< 0 on level 0
-  std::uint16_t checksum = 0;                  ///< of the bytes
+  std::uint16_t checksum = 0;                  ///< checksum of the bytes
   std::int64_t jump = 0;  ///< from the end of the previous cluster's bytes to these
 };
 

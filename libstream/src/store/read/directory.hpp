@@ -104,7 +104,7 @@ class Directory {
 
  private:
   struct Contents {
-    std::vector<std::uint64_t> offsets;  ///< of the pages, and of the end of the last
+    std::vector<std::uint64_t> offsets;  ///< offsets of the pages, and of the end of the last
     std::vector<PageBox> boxes;
   };
   struct Chapter {

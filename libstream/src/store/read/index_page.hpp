@@ -78,7 +78,7 @@ struct RangeColumns : NumberColumns {
 
 /// The contents of a page.
 struct PageContent {
-  std::uint64_t offset = 0;  ///< of the first cluster in the level's data file
+  std::uint64_t offset = 0;  ///< offset of the first cluster in the level's data file
   PageColumns entries;
   RangeColumns ranges;
 
@@ -129,7 +129,7 @@ class IndexPage {
   /// Values above a base, in as few bytes as the largest needs.
   struct Column {
     std::uint64_t base = 0, mask = 0;  ///< mask: the bits stored in bytes_
-    std::uint32_t start = 0;           ///< of the first value, in bytes_
+    std::uint32_t start = 0;           ///< position of the first value in bytes_
     std::uint8_t shift = 0, width = 0;
   };
 

@@ -165,11 +165,11 @@ class LevelReader {
 
   Layout layout_;
   std::uint64_t clusters_;
-  std::uint64_t max_points_;  ///< of a cluster
+  std::uint64_t max_points_;  ///< maximum number of points of a cluster
   bool top_;
   std::uint64_t store_points_;
-  Box3 bounds_;                                ///< of the store
-  std::vector<std::uint64_t> clusters_below_;  ///< of each level below
+  Box3 bounds_;                                ///< bounds of the store
+  std::vector<std::uint64_t> clusters_below_;  ///< number of clusters of each level below
   std::unique_ptr<ByteSource> data_, index_;
   std::unique_ptr<const Directory> directory_;
   mutable SlotCache<IndexPage> page_cache_;

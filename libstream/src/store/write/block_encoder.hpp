@@ -86,7 +86,7 @@ class BlockEncoder {
   std::array<NumberForm, 3> forms_{};
   std::array<unsigned, 3> shifts_{};
   std::array<std::vector<std::int64_t>, 3> axes_;  ///< in the order of the block, by cluster
-  std::array<std::vector<Extent>, 3> extents_;     ///< of the clusters
+  std::array<std::vector<Extent>, 3> extents_;     ///< extents of the clusters
   std::vector<Attribute> attributes_;
   std::vector<std::byte> differing_;
   // The current cluster.
@@ -94,7 +94,7 @@ class BlockEncoder {
   std::span<const std::uint32_t> members_;
   IntegerBox coded_box_;  ///< inside the entry's box
   IntegerBox entry_box_;
-  std::array<std::uint64_t, 3> origin_{};  ///< of coded_box_
+  std::array<std::uint64_t, 3> origin_{};  ///< origin of coded_box_
   bool own_box_ = false;
   std::array<std::vector<std::uint64_t>, 3> relative_;  ///< relative to origin_
   std::vector<std::uint32_t> order_;                    ///< order of coding, as indices of members_

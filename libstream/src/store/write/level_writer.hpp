@@ -163,8 +163,8 @@ class LevelWriter {
     Box3 box;
   };
   std::vector<PageAt> pages_;
-  std::uint64_t page_offset_ = 0;  ///< of the page's first cluster, in the data
-  std::uint64_t last_end_ = 0;     ///< of the last cluster, in the data
+  std::uint64_t page_offset_ = 0;  ///< offset of the page's first cluster in the data
+  std::uint64_t last_end_ = 0;     ///< end of the last cluster in the data
   /// Offsets in the data of the segment's blocks of few bytes. Blocks of still water, for example,
   /// are equal.
   std::map<std::string, std::uint64_t> small_blocks_;
@@ -172,7 +172,7 @@ class LevelWriter {
     std::uint64_t first = 0;  ///< ordinal of the first cluster that uses it
     Bytes bytes;
   };
-  std::vector<Set> sets_;  ///< of tables
+  std::vector<Set> sets_;  ///< sets of tables
 };
 
 }  // namespace terrace::stream::store
