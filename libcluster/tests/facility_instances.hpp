@@ -82,13 +82,13 @@ class Words {
   std::size_t at_ = 0;
 };
 
-inline constexpr std::size_t kMostPlaces = 10000;
+inline constexpr std::size_t kMaxPlaces = 10000;
 
 /// Reads "m n", m times "capacity opening-cost", then per client its demand and m costs, each for
 /// the whole demand. A capacity may be the word `capacity`; capacities are not used.
 inline void read_orlib(Words& words, Instance& instance) {
-  instance.facilities = words.count(1, kMostPlaces);
-  instance.clients = words.count(1, kMostPlaces);
+  instance.facilities = words.count(1, kMaxPlaces);
+  instance.clients = words.count(1, kMaxPlaces);
   for (std::size_t j = 0; j < instance.facilities; ++j) {
     words.word();
     instance.opening.push_back(words.number());
@@ -107,8 +107,8 @@ inline void read_orlib(Words& words, Instance& instance) {
 inline void read_simple(Words& words, Instance& instance) {
   if (words.word() != "FILE:") words.fail("does not begin with FILE:");
   words.word();
-  instance.facilities = words.count(1, kMostPlaces);
-  instance.clients = words.count(1, kMostPlaces);
+  instance.facilities = words.count(1, kMaxPlaces);
+  instance.clients = words.count(1, kMaxPlaces);
   words.count(0, 0);
   for (std::size_t j = 0; j < instance.facilities; ++j) {
     words.count(j + 1, j + 1);
@@ -123,7 +123,7 @@ inline void read_simple(Words& words, Instance& instance) {
 /// Reads "n edges k", then "from to length" per edge. Of repeated edges the last one counts. Costs
 /// are the lengths of shortest paths.
 inline void read_pmed(Words& words, Instance& instance) {
-  const std::size_t n = words.count(1, kMostPlaces);
+  const std::size_t n = words.count(1, kMaxPlaces);
   const std::size_t edges = words.count(0, n * n);
   instance.medians = words.count(1, n);
   instance.facilities = instance.clients = n;
@@ -195,8 +195,8 @@ inline std::vector<Instance> listed(const std::filesystem::path& folder) {
     Instance instance;
     instance.file = field[0];
     instance.format = field[3].substr(0, field[3].find(' '));
-    instance.facilities = numbers.count(1, kMostPlaces);
-    instance.clients = numbers.count(1, kMostPlaces);
+    instance.facilities = numbers.count(1, kMaxPlaces);
+    instance.clients = numbers.count(1, kMaxPlaces);
     instance.optimum = numbers.number();
     instance.proved = field[5].find("not proved") == std::string::npos;
     all.push_back(std::move(instance));

@@ -499,8 +499,8 @@ class SlowStartSink : public RecordingSink {
     if (block.level == 0) {
       if (block.block == 0) wait_until_others_wait();
       const int waiting = ++waiting_;
-      int most = most_waiting;
-      while (most < waiting && !most_waiting.compare_exchange_weak(most, waiting)) {
+      int most = max_waiting;
+      while (most < waiting && !max_waiting.compare_exchange_weak(most, waiting)) {
       }
     }
     return RecordingSink::prepare(block);
@@ -509,7 +509,7 @@ class SlowStartSink : public RecordingSink {
     if (level == 0) --waiting_;
     RecordingSink::commit(level, std::move(prepared));
   }
-  std::atomic<int> most_waiting = 0;
+  std::atomic<int> max_waiting = 0;
 
  private:
   std::atomic<int> waiting_ = 0;
@@ -522,7 +522,7 @@ TEST(HierarchyEngine, FewBlocksPerThreadAreInProgress) {
     const std::vector<Point3> points = line(20000);
     push_all(engine, points, 50);
     laws::check_hierarchy(sink, engine.finish(), points, 100);
-    EXPECT_LE(sink.most_waiting, static_cast<int>(4 * threads + 1));
+    EXPECT_LE(sink.max_waiting, static_cast<int>(4 * threads + 1));
   }
 }
 

@@ -33,13 +33,13 @@ struct MatrixProblem {
 /// Makes a random problem. Seeds select in turn: uniform costs, integers with many ties, points in
 /// a square, points on a small grid with duplicates, sparse problems where most connections are
 /// prohibitively expensive, and free facilities.
-inline MatrixProblem random_problem(std::uint64_t seed, std::size_t most_facilities,
-                                    std::size_t most_clients) {
+inline MatrixProblem random_problem(std::uint64_t seed, std::size_t max_facilities,
+                                    std::size_t max_clients) {
   std::mt19937_64 random(seed);
   const auto uniform = [&random] { return inputs::uniform(random); };
   MatrixProblem p;
-  p.facilities = 1 + random() % most_facilities;
-  p.clients = 1 + random() % most_clients;
+  p.facilities = 1 + random() % max_facilities;
+  p.clients = 1 + random() % max_clients;
   p.connection.resize(p.facilities * p.clients);
   const double level = 0.02 + 2.0 * uniform();
   for (std::size_t j = 0; j < p.facilities; ++j) p.opening.push_back(level * (0.5 + uniform()));

@@ -44,9 +44,9 @@ std::vector<Metric> metrics() {
 
 // Makes a problem. Some have weights, some a price of leaving points out, some duplicates.
 // Euclidean ones have channels.
-void make(Case& c, std::uint64_t seed, std::size_t most_points) {
+void make(Case& c, std::uint64_t seed, std::size_t max_points) {
   std::mt19937_64 random(seed);
-  c.points = inputs::cube(2 + random() % (most_points - 1), random);
+  c.points = inputs::cube(2 + random() % (max_points - 1), random);
   if (seed % 4 == 0) {
     for (Point3& p : c.points) {
       for (double& x : p) x = std::floor(3 * x);

@@ -39,8 +39,8 @@ double sum_of(const std::vector<double>& values) {
   return sum;
 }
 
-double most_paid_share(const FacilityMatrix& matrix, const std::vector<double>& duals,
-                       double divisor) {
+double max_paid_share(const FacilityMatrix& matrix, const std::vector<double>& duals,
+                      double divisor) {
   double most = 0.0;
   for (std::size_t j = 0; j < matrix.facilities; ++j) {
     double paid = 0.0;
@@ -70,8 +70,8 @@ TEST(PrimalDual, CostsAndBoundsAreWithinTheProvenFactors) {
       EXPECT_NEAR(result->solution.lower_bound, bound, 1e-8 * bound);
     }
     EXPECT_EQ(growth.divisor, 1.0);
-    EXPECT_LE(most_paid_share(matrix, growth.duals, 1.0), 1.0 + 1e-9);
-    EXPECT_LE(most_paid_share(matrix, stars.duals, stars.divisor), 1.0 + 1e-8);
+    EXPECT_LE(max_paid_share(matrix, growth.duals, 1.0), 1.0 + 1e-9);
+    EXPECT_LE(max_paid_share(matrix, stars.duals, stars.divisor), 1.0 + 1e-8);
     // Duals pay for the stars, and clients then only change to cheaper facilities.
     EXPECT_LE(stars.solution.cost(), sum_of(stars.duals) * (1.0 + 1e-12));
     if (!problem.metric) continue;

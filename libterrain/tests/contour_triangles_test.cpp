@@ -106,7 +106,7 @@ std::multiset<Segment> segments_of(const std::vector<Triangle>& triangles, doubl
 
 struct DrawnParts {
   std::vector<ContourLine> lines;
-  std::uint64_t most_open = 0, left_open = 0;
+  std::uint64_t max_open = 0, left_open = 0;
 };
 
 /// Divides the plane around the points into equal squares, numbered row by row.
@@ -144,7 +144,7 @@ DrawnParts draw(std::vector<Triangle> triangles, const Parts& parts, double inte
   for (std::vector<Triangle>& part : by_part) {
     ContourTriangles::sort(part);
     contours.add(part);
-    drawn.most_open = std::max(drawn.most_open, contours.open_points());
+    drawn.max_open = std::max(drawn.max_open, contours.open_points());
   }
   drawn.left_open = contours.open_points();
   contours.finish();
@@ -291,7 +291,7 @@ TEST(ContourTriangles, EmitLinesAsSoonAsComplete) {
   const DrawnParts drawn = draw(surface.triangles, Parts(surface.points, 8), 1);
   std::uint64_t points = 0;
   for (const ContourLine& line : drawn.lines) points += line.points.size();
-  EXPECT_LT(drawn.most_open, points / 2);
+  EXPECT_LT(drawn.max_open, points / 2);
 }
 
 TEST(ContourTriangles, OrderDependsOnlyOnPlaces) {

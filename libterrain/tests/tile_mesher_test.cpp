@@ -280,7 +280,7 @@ TEST(TileMesher, SharedSidesChangeNothing) {
     SCOPED_TRACE(zoom);
     const ZoomPlan plan = plan_of(zoom, 10, surface);
     const TileRange range = tiles_in(surface.bounds(), zoom);
-    SharedSides shared{kMostSharedVertices};
+    SharedSides shared{kMaxSharedVertices};
     for (std::uint32_t y = range.y0; y <= std::min(range.y1, range.y0 + 2); ++y) {
       for (std::uint32_t x = range.x0; x <= std::min(range.x1, range.x0 + 2); ++x) {
         const BuiltTile alone = make_tile({zoom, x, y}, plan, surface, {});

@@ -128,19 +128,19 @@ struct NearestOfStale {
 /// a part. Adjacent indices read adjacent columns of one row.
 template <class Entry>
 struct NearestOfRows {
-  /// A thread reads the rows of its part one after another, so parts should be short. kMostParts
-  /// limits their memory, and kLeastRows, the least number of rows in a part, limits the pass over
+  /// A thread reads the rows of its part one after another, so parts should be short. kMaxParts
+  /// limits their memory, and kMinRows, the least number of rows in a part, limits the pass over
   /// the results.
-  static constexpr std::uint32_t kMostParts = 128;
-  static constexpr std::uint32_t kLeastRows = 16;
+  static constexpr std::uint32_t kMaxParts = 128;
+  static constexpr std::uint32_t kMinRows = 16;
   static std::uint32_t rows_of(std::uint32_t slots) {
-    const std::uint32_t rows = (slots + kMostParts - 1) / kMostParts;
-    return rows < kLeastRows ? kLeastRows : rows;
+    const std::uint32_t rows = (slots + kMaxParts - 1) / kMaxParts;
+    return rows < kMinRows ? kMinRows : rows;
   }
   /// Returns an upper bound of the number of parts for `slots` or fewer slots.
-  static std::uint32_t most_parts(std::uint32_t slots) {
-    const std::uint32_t parts = (slots + kLeastRows - 1) / kLeastRows;
-    return parts < kMostParts ? parts : kMostParts;
+  static std::uint32_t max_parts(std::uint32_t slots) {
+    const std::uint32_t parts = (slots + kMinRows - 1) / kMinRows;
+    return parts < kMaxParts ? parts : kMaxParts;
   }
 
   Slots<Entry> s;

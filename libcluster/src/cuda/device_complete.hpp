@@ -28,7 +28,7 @@ template <class Entry>
 [[nodiscard]] std::uint64_t complete_rounds_bytes(std::uint64_t points) {
   const std::uint64_t slots = points | 1;
   const std::uint64_t band = slots * (slots / 2) * sizeof(Entry);
-  const std::uint64_t parts = NearestOfRows<Entry>::most_parts(static_cast<std::uint32_t>(slots));
+  const std::uint64_t parts = NearestOfRows<Entry>::max_parts(static_cast<std::uint32_t>(slots));
   const std::uint64_t per_slot = parts * (4 + sizeof(Entry)) + 80 + 4 * sizeof(Entry);
   return band + band / 25 * 16 + slots * per_slot + kSmallMemory;
 }
@@ -50,7 +50,7 @@ class CompleteRounds {
         link_round_(device.template allocate<std::uint32_t>(points_)),
         link_square_(device.template allocate<Entry>(points_)) {
     const std::uint32_t slots = points_ | 1;
-    const std::size_t parts = std::size_t{NearestOfRows<Entry>::most_parts(slots)} * slots;
+    const std::size_t parts = std::size_t{NearestOfRows<Entry>::max_parts(slots)} * slots;
     part_value_ = device.template allocate<Entry>(parts);
     part_index_ = device.template allocate<std::uint32_t>(parts);
     band_ = device.template allocate<Entry>(band_size(slots));

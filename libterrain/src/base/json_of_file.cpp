@@ -59,7 +59,7 @@ std::string place_of(std::string_view text, std::size_t byte) {
 
 }  // namespace
 
-std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t most_bytes,
+std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_t max_bytes,
                                            const stream::Message& remedy,
                                            const std::stop_token& stop) {
   // An ifstream opens a folder, then throws at the first read.
@@ -76,9 +76,9 @@ std::optional<nlohmann::json> json_of_file(const std::string& name, std::uint64_
     if (stop.stop_requested()) throw stream::Stopped();
     file.read(piece.data(), static_cast<std::streamsize>(piece.size()));
     text.append(piece.data(), static_cast<std::size_t>(file.gcount()));
-    if (text.size() > most_bytes) {
+    if (text.size() > max_bytes) {
       throw fault(fmt::format("is larger than the {} that such a file may have",
-                              readable_bytes(most_bytes)));
+                              readable_bytes(max_bytes)));
     }
     // Recognises binary files early, before reading them to the end.
     const std::size_t first = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");

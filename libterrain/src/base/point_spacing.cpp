@@ -18,7 +18,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::size_t kLeaf = 8;
-constexpr unsigned kMostRank = 32;
+constexpr unsigned kMaxRank = 32;
 
 /// Halves the points across their longest side until at most kLeaf are left. The halves of [first,
 /// last) meet at its middle.
@@ -44,7 +44,7 @@ class Tree {
     stream::Point3 place;
     unsigned rank;
     unsigned count = 0;
-    std::array<double, kMostRank> squares{};  // ascending
+    std::array<double, kMaxRank> squares{};  // ascending
 
     [[nodiscard]] double worst() const {
       return count < rank ? std::numeric_limits<double>::infinity() : squares[count - 1];
@@ -122,7 +122,7 @@ class Tree {
 
 std::vector<float> neighbour_distances(std::span<const stream::Point3> points, unsigned rank,
                                        unsigned threads, const std::stop_token& stop) {
-  assert(rank >= 1 && rank <= kMostRank);
+  assert(rank >= 1 && rank <= kMaxRank);
   const auto check_stop = [&stop] {
     if (stop.stop_requested()) throw stream::Stopped();
   };

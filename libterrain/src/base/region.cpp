@@ -91,7 +91,7 @@ void collect_polygons(const nlohmann::json& json, const std::string& file, int d
 }
 
 Region read_geojson(const std::string& name, const std::stop_token& stop) {
-  const auto json = json_of_file(name, kMostGeoJsonBytes, convert_to_geojson(name), stop);
+  const auto json = json_of_file(name, kMaxGeoJsonBytes, convert_to_geojson(name), stop);
   if (!json) throw fault(name, "neither a box nor a file that can be read");
   std::vector<Polygon> polygons;
   collect_polygons(*json, name, 0, polygons);

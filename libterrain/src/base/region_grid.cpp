@@ -7,9 +7,9 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kLeastGridSide = 16, kMostGridSide = 1024, kCellsPerCorner = 10;
+constexpr std::size_t kMinGridSide = 16, kMaxGridSide = 1024, kCellsPerCorner = 10;
 /// Limit on the cells to mark. A cell counts once for each edge that marks it.
-constexpr double kMostMarks = 0x1p25;
+constexpr double kMaxMarks = 0x1p25;
 constexpr auto kOutside = static_cast<std::uint8_t>(Overlap::none);
 constexpr auto kRing = static_cast<std::uint8_t>(Overlap::part);
 constexpr auto kInside = static_cast<std::uint8_t>(Overlap::whole);
@@ -49,11 +49,10 @@ RegionGrid::RegionGrid(const std::vector<Polygon>& polygons,
       }
     }
   }
-  while (side_ < kMostGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
+  while (side_ < kMaxGridSide && side_ * side_ < kCellsPerCorner * corners) side_ *= 2;
   // Many edges across the whole box would mark the same cells again and again, so use larger cells.
   const Point2 extent = edge_extent(polygons, low_, high_);
-  while (side_ > kLeastGridSide &&
-         (extent[0] + extent[1]) * static_cast<double>(side_) > kMostMarks) {
+  while (side_ > kMinGridSide && (extent[0] + extent[1]) * static_cast<double>(side_) > kMaxMarks) {
     side_ /= 2;
   }
   for (std::size_t axis = 0; axis < 2; ++axis) {

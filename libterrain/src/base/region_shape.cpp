@@ -18,7 +18,7 @@ namespace {
 
 /// A copy takes 20 MB for 100,000 corners. The grid answers 99 of 100 queries, so a few copies
 /// serve many threads.
-constexpr unsigned kMostPrepared = 4;
+constexpr unsigned kMaxPrepared = 4;
 
 /// GEOS's functions, with its last error message.
 class Geos {
@@ -244,7 +244,7 @@ bool RegionShape::ask(const Ask& question) const {
   std::unique_ptr<Prepared> shape;
   {
     std::unique_lock lock(mutex_);
-    idle_changed_.wait(lock, [this] { return !idle_.empty() || count_ < kMostPrepared; });
+    idle_changed_.wait(lock, [this] { return !idle_.empty() || count_ < kMaxPrepared; });
     if (idle_.empty()) {
       ++count_;
     } else {

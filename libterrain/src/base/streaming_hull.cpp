@@ -10,7 +10,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kLeastWaiting = 4096;
+constexpr std::size_t kMinWaiting = 4096;
 
 /// Returns the other coordinate at which a side from `from` to `to` (counter-clockwise, so that the
 /// inside is on its left) has the coordinate c along `axis`; on the side or to its right.
@@ -100,7 +100,7 @@ bool StreamingHull::inside(const Point2& point) const {
 
 void StreamingHull::keep(const Point2& point) {
   waiting_.push_back(point);
-  if (waiting_.size() < std::max(kLeastWaiting, hull_.size())) return;
+  if (waiting_.size() < std::max(kMinWaiting, hull_.size())) return;
   hull_ = corners();
   waiting_.clear();
   if (hull_.size() < 3) return;

@@ -115,7 +115,7 @@ constexpr std::size_t kBlocksAhead = 4;
 /// Memory limit of a build, unless its context sets another.
 constexpr std::uint64_t kMemory = std::uint64_t{256} << 20;
 /// Number of parts of points that are sorted ahead. Each uses about 20 MiB.
-constexpr unsigned kMostPartsAhead = 4;
+constexpr unsigned kMaxPartsAhead = 4;
 
 /// Estimates peak memory with this many threads, excluding the source's. The estimate is generous:
 /// a benchmark prints the true peak.
@@ -358,7 +358,7 @@ std::unique_ptr<stream::PointSource> Build::in_order(std::unique_ptr<stream::Poi
        .unit_lengths = on_the_ground,
        .folder = folder(),
        .threads = std::max(1U, context_.threads),
-       .parts_ahead = memory_bytes_ < kMemory ? 0 : std::min(context_.threads / 4, kMostPartsAhead),
+       .parts_ahead = memory_bytes_ < kMemory ? 0 : std::min(context_.threads / 4, kMaxPartsAhead),
        .stop = reading_.get_token(),
        .reading = report});
   ordered_ = ordered.get();

@@ -37,7 +37,7 @@ class DamageReport {
       // Each of several files is opened twice, first to check that they agree and then to read it.
       if (std::find(lines_.begin(), lines_.end(), line) != lines_.end()) return;
       ++parts_;
-      if (lines_.size() < kMostLines) lines_.push_back(std::move(line));
+      if (lines_.size() < kMaxLines) lines_.push_back(std::move(line));
     };
   }
 
@@ -50,7 +50,7 @@ class DamageReport {
   }
 
  private:
-  static constexpr std::size_t kMostLines = 10;
+  static constexpr std::size_t kMaxLines = 10;
 
   mutable std::mutex mutex_;
   std::size_t parts_ = 0;

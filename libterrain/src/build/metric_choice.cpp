@@ -114,11 +114,11 @@ MetricChoice::Region region_of(const nlohmann::json& json, const Place& place) {
 }
 
 std::vector<MetricChoice::Region> read_regions(const std::string& file) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{16} << 20;
+  constexpr std::uint64_t kMaxBytes = std::uint64_t{16} << 20;
   const std::string shape =
       "write {\"regions\": [{\"box\": [minx, miny, maxx, maxy], \"semi_axes\": [a, b], \"angle\": "
       "degrees}]}";
-  const std::optional<nlohmann::json> found = json_of_file(file, kMostBytes, shape);
+  const std::optional<nlohmann::json> found = json_of_file(file, kMaxBytes, shape);
   if (!found) {
     throw stream::Error(file, "cannot be read")
         .remedy(stream::message("{metric} elliptical:FILE names a JSON file of regions"));

@@ -23,9 +23,9 @@ namespace {
 
 /// Memory in bytes per point of an unfinished line (the vector doubles as it grows).
 constexpr std::uint64_t kContourBytesPerPoint = 48;
-constexpr double kMostLevels = 1e15;
+constexpr double kMaxLevels = 1e15;
 /// Drawing more levels than this would practically never end.
-constexpr double kMostLevelsDrawn = 1e7;
+constexpr double kMaxLevelsDrawn = 1e7;
 
 stream::Error fault(const stream::Store& store, stream::Message cause) {
   return {store.path().string(), std::move(cause)};
@@ -36,7 +36,7 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
   const stream::Channel& z = store.schema().coordinates[2];
   const auto level = [&](double raw) { return (raw * z.scale + z.offset) / request.interval; };
   const stream::Box3& bounds = store.bounds();
-  if (std::max(std::abs(level(bounds.min[2])), std::abs(level(bounds.max[2]))) > kMostLevels) {
+  if (std::max(std::abs(level(bounds.min[2])), std::abs(level(bounds.max[2]))) > kMaxLevels) {
     throw fault(store,
                 fmt::format("heights have too many levels of {}", plain_number(request.interval)))
         .remedy(stream::message("give a larger {interval}"));
@@ -51,13 +51,13 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
     high = heights->high;
   }
   const double levels = std::abs(level(high) - level(low));
-  if (levels <= kMostLevelsDrawn) return;
+  if (levels <= kMaxLevelsDrawn) return;
   throw fault(
       store,
       fmt::format("between the lowest and the highest point there are {} of {}, more than {}",
                   counted(static_cast<std::uint64_t>(levels), "level"),
                   plain_number(request.interval),
-                  with_commas(static_cast<std::uint64_t>(kMostLevelsDrawn))))
+                  with_commas(static_cast<std::uint64_t>(kMaxLevelsDrawn))))
       .remedy(stream::message("give a larger {interval}"));
 }
 

@@ -52,7 +52,7 @@ void draw_lattice_contours(const ContourParts& parts) {
   const LatticeWindow lattice = lattice_of(store, ground, request.region);
   const std::int64_t fits =
       static_cast<std::int64_t>(parts.memory_bytes / 4 / kContourBytesPerSample) / lattice.columns;
-  std::int64_t band = ContourLines::kMostBandRows;
+  std::int64_t band = ContourLines::kMaxBandRows;
   while (band > 2 && band > fits) band /= 2;
   const auto stored = [&](const Point2& p) {
     return Point2{p[0] + static_cast<double>(lattice.column),

@@ -113,7 +113,7 @@ void ContourLines::add(std::span<const double> heights, std::int64_t rows,
   }
   row_ += rows - 1;
   // Not after every band, because the order of lines must not depend on available memory.
-  if (row_ % kMostBandRows == 0) emit_complete(row_, false);
+  if (row_ % kMaxBandRows == 0) emit_complete(row_, false);
 }
 
 void ContourLines::finish() {

@@ -21,7 +21,7 @@ namespace terrace::terrain {
 class ContourLines {
  public:
   /// Bands give the lines in the same order if their rows, except the first, are a divisor of this.
-  static constexpr std::int64_t kMostBandRows = 256;
+  static constexpr std::int64_t kMaxBandRows = 256;
 
   /// columns: of the lattice. emit: receives every line when it is complete, in an order that
   /// depends only on the lattice. Lines that shrink to a point are left out.

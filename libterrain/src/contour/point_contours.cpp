@@ -29,7 +29,7 @@ namespace {
 constexpr std::uint64_t kBytesPerWindow = std::uint64_t{40} << 20;
 /// Several parts are triangulated together, which costs less per point. A point's memory is its
 /// share of the triangulation and of the triangles that wait to be drawn.
-constexpr double kMostPointsAtOnce = 1U << 16;
+constexpr double kMaxPointsAtOnce = 1U << 16;
 /// Peak memory in bytes per point if all points are one part.
 constexpr std::uint64_t kBytesPerPointAlone = 1200;
 constexpr double kPartsPerThread = 4;
@@ -104,12 +104,12 @@ class PointContours {
     }
     const auto threads = static_cast<unsigned>(
         std::clamp<std::uint64_t>(memory / kBytesPerWindow, 1, parts_.threads));
-    most_segments_ = memory / threads / kShareOfLines / kBytesPerSegment;
-    const double most_points =
-        std::min({static_cast<double>(memory / threads) / kBytesPerExpected, kMostPointsAtOnce,
+    max_segments_ = memory / threads / kShareOfLines / kBytesPerSegment;
+    const double max_points =
+        std::min({static_cast<double>(memory / threads) / kBytesPerExpected, kMaxPointsAtOnce,
                   tree_.part(0).points / (kPartsPerThread * threads)});
     std::vector<const WindowTree::Part*> loads;
-    tree_.for_each_part([&](const WindowTree::Part& part) { return part.points <= most_points; },
+    tree_.for_each_part([&](const WindowTree::Part& part) { return part.points <= max_points; },
                         [&](const WindowTree::Part& part) {
                           if (first_at_work(part) < part.end) loads.push_back(&part);
                         });
@@ -217,7 +217,7 @@ class PointContours {
         result.strange.push_back(triangle_of(id));
       }
     }
-    if (segments <= most_segments_) {
+    if (segments <= max_segments_) {
       PartTracer tracer(levels_, delaunay, window.heights(), level_of, part_of);
       for (const auto& ids : by_part) result.by_part.emplace_back(tracer.trace(ids));
     } else {
@@ -238,8 +238,8 @@ class PointContours {
   StoredBox bounds_;
   std::vector<std::uint32_t> rank_;  ///< by part: its number among the parts that meet the region
   std::uint32_t parts_at_work_ = 0;
-  bool is_selective_;                ///< whether some triangles are not wanted
-  std::uint64_t most_segments_ = 0;  ///< limit of segments waiting in parts triangulated together
+  bool is_selective_;               ///< whether some triangles are not wanted
+  std::uint64_t max_segments_ = 0;  ///< limit of segments waiting in parts triangulated together
 };
 
 }  // namespace

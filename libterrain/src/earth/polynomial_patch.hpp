@@ -212,13 +212,13 @@ class PatchGrid {
   template <class Fit>
   PatchGrid(const Point2& low, const Point2& high, const Point2& longest, const Fit& fit)
       : low_(low) {
-    constexpr double kMostPatches = 64;
+    constexpr double kMaxPatches = 64;
     Point2 size{};
     std::array<std::size_t, 2> count{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double extent = high[axis] - low[axis];
       if (!(extent > 0) || !std::isfinite(extent / longest[axis])) return;
-      const double patches = std::clamp(std::ceil(extent / longest[axis]), 1.0, kMostPatches);
+      const double patches = std::clamp(std::ceil(extent / longest[axis]), 1.0, kMaxPatches);
       size[axis] = extent / patches;
       per_unit_[axis] = patches / extent;
       count[axis] = static_cast<std::size_t>(patches);

@@ -65,9 +65,9 @@ class Outline {
   /// b.
   Point2 add_from(const Point2& a, const Point2& b, const Point2& start, int depth,
                   std::vector<Point2>& result) const {
-    constexpr int kLeast = 4, kMost = 14;
+    constexpr int kMin = 4, kMost = 14;
     const Point2 middle{0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])};
-    if (depth < kLeast) {
+    if (depth < kMin) {
       const Point2 place = add_from(a, middle, start, depth + 1, result);
       result.push_back(place);
       return add_from(middle, b, place, depth + 1, result);

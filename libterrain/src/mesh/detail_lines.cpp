@@ -28,8 +28,8 @@ struct Piece {
 };
 
 /// A piece, its place in order, and its vertices twice while they are joined.
-constexpr std::size_t bytes_per_piece(std::size_t most_vertices) {
-  return sizeof(Piece) + sizeof(LineSet::Line) + 2 * most_vertices * sizeof(stream::Point3);
+constexpr std::size_t bytes_per_piece(std::size_t max_vertices) {
+  return sizeof(Piece) + sizeof(LineSet::Line) + 2 * max_vertices * sizeof(stream::Point3);
 }
 
 /// The offsets of the columns that every line has.

@@ -127,10 +127,10 @@ constexpr std::uint64_t kBytesToFlip = 120;
 void check_memory(const stream::Store& store, const Detail& detail, std::uint64_t memory_bytes,
                   std::uint64_t more_per_vertex) {
   const std::uint64_t points = wanted_points(store, detail);
-  constexpr std::uint64_t kMostVertices = (std::uint64_t{1} << 29) - 2;
+  constexpr std::uint64_t kMaxVertices = (std::uint64_t{1} << 29) - 2;
   const std::uint64_t needed =
       points * (kBytesPerVertex + more_per_vertex) + (std::uint64_t{32} << 20);
-  if (needed <= memory_bytes && points <= kMostVertices) return;
+  if (needed <= memory_bytes && points <= kMaxVertices) return;
   throw stream::Error(
       store.path().string(),
       stream::message("a mesh of {} needs {}M of memory, {memory_bytes} allows {}M",
@@ -446,16 +446,16 @@ TriangleMesh detail_points(const stream::Store& store, const Detail& detail) {
   return cloud;
 }
 
-unsigned level_within(const stream::Store& store, std::uint64_t most_points) {
+unsigned level_within(const stream::Store& store, std::uint64_t max_points) {
   if (store.condition() != nullptr) {
     stream::StoreQuery query(store);
     const stream::Box3 all = store.whole().bounds();
     unsigned level = store.top();
-    while (level > 0 && query.count(all, level - 1) <= most_points) --level;
+    while (level > 0 && query.count(all, level - 1) <= max_points) --level;
     return level;
   }
   for (const stream::LevelInfo& level : store.levels()) {
-    if (level.points <= most_points) return level.level;
+    if (level.points <= max_points) return level.level;
   }
   return store.top();
 }

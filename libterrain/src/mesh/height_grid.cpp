@@ -17,9 +17,9 @@ std::uint64_t reduced(std::uint64_t size, std::uint64_t reduction) {
   return (size + reduction - 1) / reduction;
 }
 
-std::uint64_t reduction_for(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells) {
+std::uint64_t reduction_for(std::uint64_t columns, std::uint64_t rows, std::uint64_t max_cells) {
   std::uint64_t by = 1;
-  while (reduced(columns, by) * reduced(rows, by) > most_cells && by < std::max(columns, rows)) {
+  while (reduced(columns, by) * reduced(rows, by) > max_cells && by < std::max(columns, rows)) {
     ++by;
   }
   return by;
@@ -28,15 +28,15 @@ std::uint64_t reduction_for(std::uint64_t columns, std::uint64_t rows, std::uint
 }  // namespace
 
 std::uint64_t HeightGrid::cells(std::uint64_t columns, std::uint64_t rows,
-                                std::uint64_t most_cells) {
-  const std::uint64_t by = reduction_for(columns, rows, most_cells);
+                                std::uint64_t max_cells) {
+  const std::uint64_t by = reduction_for(columns, rows, max_cells);
   return reduced(columns, by) * reduced(rows, by);
 }
 
-HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells,
+HeightGrid::HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t max_cells,
                        base::StopCheck check_stop)
     : check_stop_(std::move(check_stop)),
-      reduction_(reduction_for(columns, rows, most_cells)),
+      reduction_(reduction_for(columns, rows, max_cells)),
       columns_(reduced(columns, reduction_)),
       rows_(reduced(rows, reduction_)),
       full_columns_(columns),
@@ -99,9 +99,9 @@ TriangleMesh HeightGrid::mesh() const {
   return mesh;
 }
 
-TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
+TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t max_cells,
                             const Context& context) {
-  HeightGrid grid(store.schema().columns, store.schema().rows, most_cells,
+  HeightGrid grid(store.schema().columns, store.schema().rows, max_cells,
                   [&context] { context.check_stop(); });
   const ProgressReport progress(context, "points");
   std::uint64_t points = 0;

@@ -17,8 +17,8 @@ namespace terrace::terrain {
 /// memory, for pictures.
 class HeightGrid {
  public:
-  /// Chooses the smallest squares that leave at most `most_cells` cells of columns x rows.
-  HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells,
+  /// Chooses the smallest squares that leave at most `max_cells` cells of columns x rows.
+  HeightGrid(std::uint64_t columns, std::uint64_t rows, std::uint64_t max_cells,
              base::StopCheck check_stop = {});
 
   /// Adds a cell in stored coordinates (column, row, raw sample), in any order. Ignores cells
@@ -26,7 +26,7 @@ class HeightGrid {
   void add(const stream::Point3& cell);
 
   /// Returns the number of cells after the reduction.
-  static std::uint64_t cells(std::uint64_t columns, std::uint64_t rows, std::uint64_t most_cells);
+  static std::uint64_t cells(std::uint64_t columns, std::uint64_t rows, std::uint64_t max_cells);
 
   [[nodiscard]] std::uint64_t reduction() const { return reduction_; }
 
@@ -45,7 +45,7 @@ class HeightGrid {
 
 /// Returns mesh() of all cells of a raster store. Throws: stream::Error, stream::Stopped, what
 /// context.progress throws.
-TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t most_cells,
+TriangleMesh reduced_raster(const stream::Store& store, std::uint64_t max_cells,
                             const Context& context);
 
 }  // namespace terrace::terrain

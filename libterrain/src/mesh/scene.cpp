@@ -100,13 +100,13 @@ std::vector<double> heights_by_area(const TriangleMesh& mesh, const std::vector<
 std::vector<double> heights_by_cells(const TriangleMesh& cloud, const std::vector<double>& heights,
                                      const base::StopCheck& check_stop) {
   base::StopTicks ticks(check_stop);
-  constexpr double kMostCells = 64;  // along a side
+  constexpr double kMaxCells = 64;  // along a side
   std::array<std::size_t, 256> groups{};
   for (const std::uint8_t left_out : cloud.left_out) ++groups[left_out];
   const std::size_t coarsest =
       *std::find_if(groups.rbegin(), groups.rend(), [](std::size_t count) { return count > 0; });
   const double cells =
-      std::clamp(std::floor(std::sqrt(static_cast<double>(coarsest) / 4)), 1.0, kMostCells);
+      std::clamp(std::floor(std::sqrt(static_cast<double>(coarsest) / 4)), 1.0, kMaxCells);
   stream::Box3 box;
   for (const stream::Point3& p : cloud.positions) {
     ticks(4);

@@ -166,14 +166,14 @@ PlaceFile::PlaceFile(const std::string& path, std::stop_token stop)
   }
 }
 
-bool PlaceFile::next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines) {
-  const std::size_t limit = std::max(most_bytes, kLongestPlaceLine);
+bool PlaceFile::next(PlaceBatch& batch, std::size_t max_bytes, std::size_t max_lines) {
+  const std::size_t limit = std::max(max_bytes, kLongestPlaceLine);
   const std::string_view window = input_.fill(limit);
   const bool ended = window.size() < limit;
   batch.begins.clear();
   batch.first_line = line_;
   std::size_t end = 0;
-  while (end < window.size() && batch.begins.size() < most_lines) {
+  while (end < window.size() && batch.begins.size() < max_lines) {
     const std::size_t found = window.find('\n', end);
     if (found == std::string_view::npos && !ended) break;
     batch.begins.push_back(end);

@@ -48,9 +48,9 @@ class PlaceFile {
   /// file cannot be read.
   explicit PlaceFile(const std::string& path, std::stop_token stop = {});
 
-  /// Reads the next complete lines, at most `most_lines` and about `most_bytes` of them. Returns
+  /// Reads the next complete lines, at most `max_lines` and about `max_bytes` of them. Returns
   /// false at the end. Throws: stream::Error on a line longer than a mebibyte, stream::Stopped.
-  bool next(PlaceBatch& batch, std::size_t most_bytes, std::size_t most_lines);
+  bool next(PlaceBatch& batch, std::size_t max_bytes, std::size_t max_lines);
   /// The name for messages.
   [[nodiscard]] const std::string& name() const { return input_.name(); }
 

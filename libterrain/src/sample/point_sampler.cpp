@@ -21,7 +21,7 @@ namespace terrace::terrain {
 namespace {
 
 /// With more points, threads would wait for the last one.
-constexpr double kMostPointsAtOnce = 1U << 21;
+constexpr double kMaxPointsAtOnce = 1U << 21;
 constexpr double kPartsPerThread = 4;
 /// A single place costs as much as loading this many points. In addition it reads all clusters
 /// whose boxes contain it, which costs half as much per point.
@@ -34,7 +34,7 @@ constexpr double kParts = 8;
 constexpr double kSampleMargin = 8;
 /// Limit of the margin as a share of the longer side; otherwise a window in a void would load the
 /// points of many windows around it.
-constexpr double kMostSampleMargin = 0.125;
+constexpr double kMaxSampleMargin = 0.125;
 /// Memory that a thread may need: a window of usual size where points are crowded.
 constexpr std::uint64_t kThreadBytes = std::uint64_t{32} << 20;
 /// Memory for reading, in addition to the points.
@@ -90,11 +90,11 @@ struct CloudWorker {
 
   /// Loads the points in a box and `margin` around it, unless they are loaded. Returns false if
   /// they do not fit.
-  bool load(const StoredBox& inner, double margin, std::size_t most_points, bool may_crowd) {
+  bool load(const StoredBox& inner, double margin, std::size_t max_points, bool may_crowd) {
     const StoredBox box = inner.widened(margin);
     if (loaded && loaded->min == box.min && loaded->max == box.max) return true;
     loaded.reset();
-    if (!surface.load(box, most_points, may_crowd)) return false;
+    if (!surface.load(box, max_points, may_crowd)) return false;
     loaded = box;
     return true;
   }
@@ -118,7 +118,7 @@ class PointSampler final : public HeightSampler {
     room_ = static_cast<std::size_t>(bytes / PointCells::kBytesPerPoint);
     const double total = tree_.part(0).points;
     most_points_ =
-        std::min({static_cast<double>(bytes) / kBytesPerExpected, kMostPointsAtOnce,
+        std::min({static_cast<double>(bytes) / kBytesPerExpected, kMaxPointsAtOnce,
                   std::max(65536.0, total / (kPartsPerThread * static_cast<double>(threads)))});
     const double met = points_met_by_a_place(store, options.level);
     points_per_place_ = kPointsPerPlace + kReadShare * met;
@@ -219,7 +219,7 @@ class PointSampler final : public HeightSampler {
     const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
     const double margin =
         std::min(kSampleMargin * std::sqrt(width * height / std::max(part.points, 1.0)),
-                 kMostSampleMargin * std::max(width, height));
+                 kMaxSampleMargin * std::max(width, height));
     if (is_dense(part, numbers.size())) {
       if (worker.load(box, margin, room_, part.is_window())) {
         return answer_along(worker, box, numbers, places, out);

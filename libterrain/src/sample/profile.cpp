@@ -34,7 +34,7 @@ namespace {
 
 constexpr std::size_t kRowsAtOnce = 65536;
 /// Longer profiles are refused, because writing them would practically never end.
-constexpr double kMostRows = 1e9;
+constexpr double kMaxRows = 1e9;
 
 Point2 between(const Point2& a, const Point2& b, double t) {
   return {a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])};
@@ -213,11 +213,11 @@ class ProfileRun {
         rows += 2 * (std::abs(to[0] - from[0]) + std::abs(to[1] - from[1]));
       }
     }
-    if (!(rows > kMostRows)) return;
+    if (!(rows > kMaxRows)) return;
     throw UsageError(stream::message(
         "{}: the profile would have more than {}",
         request_.step ? stream::message("{step} is too small") : "the line is too long",
-        counted(static_cast<std::uint64_t>(kMostRows), "row")));
+        counted(static_cast<std::uint64_t>(kMaxRows), "row")));
   }
 
   /// Adds a point every `step` metres of the leg.

@@ -94,7 +94,7 @@ constexpr std::int64_t kRunTile = 256;
 constexpr std::uint64_t kBytesPerCell = 130;
 
 /// The most tiles along a side of the square that is sampled at once.
-constexpr std::int64_t kMostSide = 8;
+constexpr std::int64_t kMaxSide = 8;
 
 constexpr std::uint64_t bytes_of(std::int64_t side) {
   return static_cast<std::uint64_t>(side * side * kRunTile * kRunTile) * kBytesPerCell;
@@ -178,7 +178,7 @@ class RasterRun {
     const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
     const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
     std::int64_t side = 1;
-    while (side < kMostSide && bytes_of(2 * side) <= memory / 2) side *= 2;
+    while (side < kMaxSide && bytes_of(2 * side) <= memory / 2) side *= 2;
     std::vector<TilePlace> block;
     double done = 0;
     for_each_square({0, 0}, power_of_two(std::max(across, down)), side, {across, down},

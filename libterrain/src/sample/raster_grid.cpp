@@ -28,7 +28,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr double kMostGridCells = 2147483647.0;
+constexpr double kMaxGridCells = 2147483647.0;
 
 /// Returns the area of a store's points in its CRS; for a raster, half a cell beyond the samples.
 stream::Box3 area_of(const stream::Store& store) {
@@ -97,7 +97,7 @@ double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned
 }
 
 std::uint32_t count_of(double cells) {
-  if (!(cells <= kMostGridCells)) {
+  if (!(cells <= kMaxGridCells)) {
     throw UsageError(
         stream::message("{cell} is too small: a side of the raster would have {} cells",
                         plain_number(std::ceil(cells))));

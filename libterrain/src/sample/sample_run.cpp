@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t kLines = 8192;
 /// Peak memory in bytes per line, excluding its text: places, sorting, surface, answer.
 constexpr std::uint64_t kBytesPerLine = 266;
-constexpr std::size_t kMostLines = std::size_t{1} << 21, kMostBytes = std::size_t{128} << 20;
+constexpr std::size_t kMaxLines = std::size_t{1} << 21, kMaxBytes = std::size_t{128} << 20;
 
 /// The numbers to append to a line.
 class AnswerText {
@@ -206,9 +206,9 @@ SampleCounts answer_places(const stream::Store& store, const SamplerOptions& opt
   Answers answers(store, options, places, context);
   const std::uint64_t memory = working_memory(context);
   const auto lines = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(memory / 4 / kBytesPerLine, 1000, kMostLines));
+      std::clamp<std::uint64_t>(memory / 4 / kBytesPerLine, 1000, kMaxLines));
   const auto bytes = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(memory / 16, std::uint64_t{1} << 20, kMostBytes));
+      std::clamp<std::uint64_t>(memory / 16, std::uint64_t{1} << 20, kMaxBytes));
   const ProgressReport report(context, "points");
   PlaceBatch batch;
   SampleCounts sum;

@@ -242,7 +242,7 @@ std::optional<StoreProbe::Found> StoreProbe::nearest(const Point3& place, double
   Point3 stored{};
   std::vector<std::byte> record;
   const unsigned level = descend(
-      kMostRead,
+      kMaxRead,
       [&](const Box3& box) {
         return around[0].meets(box) && around[1].meets(box) && around[2].meets(box);
       },
@@ -273,7 +273,7 @@ StoreProbe::Profile StoreProbe::of_raster(const Point3& from, const Point3& to) 
   profile.metres = std::sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]));
   // Crossings with columns and rows, and with as many diagonals at most.
   const double cells = std::abs(to[0] - from[0]) + std::abs(to[1] - from[1]);
-  profile.sampled = 2 * cells > kMostCrossings;
+  profile.sampled = 2 * cells > kMaxCrossings;
   std::vector<Point2> places{way.from};
   profile.points.push_back({0, 0});
   if (profile.sampled) {
@@ -334,7 +334,7 @@ StoreProbe::Profile StoreProbe::of_points(const Point3& from, const Point3& to, 
     return p[2] * schema.coordinates[2].scale + schema.coordinates[2].offset;
   };
   profile.level = descend(
-      kMostRead, [&](const Box3& box) { return along.meets(box) && aside.meets(box); },
+      kMaxRead, [&](const Box3& box) { return along.meets(box) && aside.meets(box); },
       [&](const stream::ClusterPoints& points) {
         for (const Point3& p : points.positions) {
           if (!along.holds(p) || !aside.holds(p)) continue;

@@ -37,7 +37,7 @@ class StoreProbe {
   /// attributes of the sample whose cell contains it; nullopt where there is no surface.
   std::optional<Found> on_raster(double column, double row);
   /// Returns the point within `reach` metres that is nearest to a stored place, on ties the one
-  /// with smaller coordinates. Reads at most about kMostRead points. If there are more, it reads
+  /// with smaller coordinates. Reads at most about kMaxRead points. If there are more, it reads
   /// those of a coarser level.
   std::optional<Found> nearest(const stream::Point3& place, double reach);
 
@@ -52,13 +52,13 @@ class StoreProbe {
         false;  ///< a raster sampled at equal distances, because the line crosses too many cells
   };
   /// Returns the profile between two stored places. For a raster it has the places where the line
-  /// crosses a column, a row or a diagonal, at most kMostCrossings. For other stores it has the
+  /// crosses a column, a row or a diagonal, at most kMaxCrossings. For other stores it has the
   /// points in a strip whose width is kStrip times its length. axis: the upward coordinate, 1 or 2;
   /// 2 for rasters.
   Profile profile(const stream::Point3& from, const stream::Point3& to, std::size_t axis);
 
-  static constexpr std::uint64_t kMostRead = 1u << 18;
-  static constexpr double kMostCrossings = 8192, kSamples = 1024, kStrip = 0.02;
+  static constexpr std::uint64_t kMaxRead = 1u << 18;
+  static constexpr double kMaxCrossings = 8192, kSamples = 1024, kStrip = 0.02;
 
  private:
   class SomeSamples;

@@ -37,7 +37,7 @@ void PointCells::clear() {
 }
 
 bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
-                      std::size_t most_points, bool may_crowd) {
+                      std::size_t max_points, bool may_crowd) {
   clear();
   const stream::Store& store = query.store();
   const stream::Channel& channel = store.schema().coordinates[2];
@@ -55,7 +55,7 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
           places.push_back({p[0], p[1]});
           heights.push_back(p[2] * channel.scale + channel.offset);
         }
-        too_many = places.size() > most_points;
+        too_many = places.size() > max_points;
       });
   return !too_many && (sort(store, box, places, heights, may_crowd, 1) || may_crowd);
 }

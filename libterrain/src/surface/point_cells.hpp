@@ -28,11 +28,11 @@ class PointCells {
   static constexpr std::uint64_t kBytesPerPoint = 58;
 
   /// Loads the points of `level` and above in the box, replacing the contents. Returns false, with
-  /// no contents, if there are more than most_points, or if they are crowded into few cells and
+  /// no contents, if there are more than max_points, or if they are crowded into few cells and
   /// `may_crowd` is not set. 60 ns per point. Throws: stream::Error on a damaged store,
   /// stream::Stopped.
-  bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
-            std::size_t most_points, bool may_crowd);
+  bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box, std::size_t max_points,
+            bool may_crowd);
   /// Loads all points of a store with several threads. Each thread decodes consecutive clusters,
   /// then sorts a band of rows. Returns false if the points are crowded, but keeps them. Throws: as
   /// above.

@@ -24,10 +24,10 @@ constexpr std::uint64_t kShareOfMemory = 4;
 }  // namespace
 
 PointVoids::PointVoids(const stream::Store& store, unsigned level)
-    : store_(store), level_(level), most_looks_(kLooksPerPoint * store.levels()[level].points) {}
+    : store_(store), level_(level), max_looks_(kLooksPerPoint * store.levels()[level].points) {}
 
 bool PointVoids::count_looks(std::uint64_t boxes) {
-  return (looks_ += boxes) > most_looks_ && state_ != State::none;
+  return (looks_ += boxes) > max_looks_ && state_ != State::none;
 }
 
 bool PointVoids::find(PointWindow& window) {

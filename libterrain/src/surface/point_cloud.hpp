@@ -73,7 +73,7 @@ class PointVoids {
 
   const stream::Store& store_;
   unsigned level_;
-  std::uint64_t most_looks_;
+  std::uint64_t max_looks_;
   std::atomic<std::uint64_t> looks_ = 0;
   std::atomic<State> state_ = State::unknown;
 

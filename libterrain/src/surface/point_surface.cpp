@@ -74,9 +74,9 @@ PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t me
   loaded_.clear();
 }
 
-bool PointSurface::load(const StoredBox& box, std::size_t most_points, bool may_crowd) {
+bool PointSurface::load(const StoredBox& box, std::size_t max_points, bool may_crowd) {
   cells_ = &loaded_;
-  return loaded_.load(query_, cloud_.level, box, most_points, may_crowd);
+  return loaded_.load(query_, cloud_.level, box, max_points, may_crowd);
 }
 
 int PointSurface::side_of(const Point2& a, const Point2& b, const Target& target) {

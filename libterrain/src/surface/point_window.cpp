@@ -19,10 +19,10 @@ namespace {
 /// Width of the margin in mean distances of points around the box.
 constexpr double kMargin = 3;
 /// Limit of the margin as a share of the longer side.
-constexpr double kMostMargin = 0.05;
+constexpr double kMaxMargin = 0.05;
 /// Circles border voids if they are wider than this many medians, or than this share of the longer
 /// side.
-constexpr double kWidest = 4, kMostWide = 1.0 / 16;
+constexpr double kWidest = 4, kMaxWidth = 1.0 / 16;
 /// Peak memory in bytes per point that was read but is outside. An inserted point has its place,
 /// height and origin twice during insertion, 20 bytes for sorting and then 68 in the triangulation,
 /// states, a hint and a share of a suspect.
@@ -179,7 +179,7 @@ double PointWindow::margin() const {
   const double width = box_.max[0] - box_.min[0], height = box_.max[1] - box_.min[1];
   const auto inside = static_cast<double>(std::max<std::size_t>(places_.size(), 1));
   return std::min(kMargin * std::sqrt(width * height / inside),
-                  kMostMargin * std::max(width, height));
+                  kMaxMargin * std::max(width, height));
 }
 
 void PointWindow::begin(const StoredBox& box) {
@@ -252,7 +252,7 @@ double PointWindow::find_border(const StoredBox& box, std::vector<SurfaceCorner>
     const auto middle = radii.begin() + static_cast<std::ptrdiff_t>(radii.size() / 2);
     std::nth_element(radii.begin(), middle, radii.end());
     const double side = std::max(box.max[0] - box.min[0], box.max[1] - box.min[1]);
-    radius = std::min(kWidest * *middle, kMostWide * side);
+    radius = std::min(kWidest * *middle, kMaxWidth * side);
   }
   // Slightly more, for rounding.
   const double reach = 2 * radius * (1 + 1e-6);

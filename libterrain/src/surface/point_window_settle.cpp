@@ -19,11 +19,11 @@ constexpr std::size_t kPointsPerGroup = 16;
 /// Share of the circles crossing the border that a wider border should contain.
 constexpr double kWidened = 0.95;
 /// Limit of each widening as a share of the window's longer side.
-constexpr double kMostWidened = 0.03;
-constexpr unsigned kMostTimesWidened = 3;
+constexpr double kMaxWidened = 0.03;
+constexpr unsigned kMaxTimesWidened = 3;
 /// The number of clusters read together for a suspect doubles after this many rounds, at most this
 /// often.
-constexpr unsigned kRoundsToDouble = 8, kMostDoublings = 8;
+constexpr unsigned kRoundsToDouble = 8, kMaxDoublings = 8;
 /// With fewer suspects, a wider border does not pay off.
 constexpr std::size_t kFewSuspects = 12;
 /// Tested boxes are added to the count of all windows in batches of this size.
@@ -62,7 +62,7 @@ void PointWindow::settle() {
   clusters_at_once_ = 1;
   triangulation_.start_journal();
   examine_all();
-  for (unsigned i = 0; i < kMostTimesWidened && widen(); ++i) cloud_.store.check_stop();
+  for (unsigned i = 0; i < kMaxTimesWidened && widen(); ++i) cloud_.store.check_stop();
   // With these corners, the hull is that of all points, so only circles can lack points. The
   // corners get their heights when their clusters are read.
   for (const Point2& corner : cloud_.hull.corners()) take_distant({corner, kUnknownHeight});
@@ -70,7 +70,7 @@ void PointWindow::settle() {
   examine_changes();
   for (unsigned round = 1; add_missing(); ++round) {
     // Where clusters have no missing points, more of them are read together.
-    clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMostDoublings);
+    clusters_at_once_ = std::size_t{1} << std::min(round / kRoundsToDouble, kMaxDoublings);
     cloud_.store.check_stop();
     insert_new_points();
     examine_changes();
@@ -157,8 +157,7 @@ bool PointWindow::widen() {
   const auto at = reaches_.begin() +
                   static_cast<std::ptrdiff_t>(kWidened * static_cast<double>(reaches_.size() - 1));
   std::nth_element(reaches_.begin(), at, reaches_.end());
-  const double limit =
-      kMostWidened * std::max(box_.max[0] - box_.min[0], box_.max[1] - box_.min[1]);
+  const double limit = kMaxWidened * std::max(box_.max[0] - box_.min[0], box_.max[1] - box_.min[1]);
   // Slightly more, for rounding.
   const double more = std::min(*at * (1 + 1e-6), limit);
   if (!(more > 0)) return false;

@@ -54,8 +54,8 @@ double between(const std::vector<float>& heights, std::size_t columns, std::size
          fy * ((1.0 - fx) * at(c0, r1) + fx * at(c1, r1));
 }
 
-constexpr std::uint64_t kMostCells = std::uint64_t{1} << 20;
-constexpr std::uint64_t kMostPoints = std::uint64_t{1} << 23;
+constexpr std::uint64_t kMaxCells = std::uint64_t{1} << 20;
+constexpr std::uint64_t kMaxPoints = std::uint64_t{1} << 23;
 
 /// The level to read, and the grid of means.
 struct Layout {
@@ -71,7 +71,7 @@ Layout of_raster(const stream::Store& store) {
   const auto reduced = [&](std::size_t axis) {
     return (samples[axis] + reduction - 1) / reduction;
   };
-  while (reduced(0) * reduced(1) > kMostCells) ++reduction;
+  while (reduced(0) * reduced(1) > kMaxCells) ++reduction;
   Layout layout;
   layout.detail.level = std::min(1U, store.top());
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -87,9 +87,9 @@ Layout of_raster(const stream::Store& store) {
 Layout of_points(const stream::Store& store) {
   Layout layout;
   unsigned& level = layout.detail.level;
-  while (level < store.top() && store.levels()[level].points > kMostPoints) ++level;
+  while (level < store.top() && store.levels()[level].points > kMaxPoints) ++level;
   const std::uint64_t points = store.levels()[level].points;
-  const auto cells = static_cast<double>(std::clamp<std::uint64_t>(points, 1, kMostCells));
+  const auto cells = static_cast<double>(std::clamp<std::uint64_t>(points, 1, kMaxCells));
   const stream::Box3& box = store.bounds();
   const double width = box.max[0] - box.min[0], height = box.max[1] - box.min[1];
   std::array<std::size_t, 2>& size = layout.size;

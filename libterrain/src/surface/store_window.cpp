@@ -9,7 +9,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::size_t kMostSome = 12;
+constexpr std::size_t kMaxExamples = 12;
 
 /// Visits the clusters with points of `level` and above in the box.
 template <class Visit>
@@ -32,7 +32,7 @@ std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const S
       [&](const stream::Point3* head, const stream::StoreQuery::Branch& cluster) {
         found.low = std::min(found.low, cluster.box.min[2]);
         found.high = std::max(found.high, cluster.box.max[2]);
-        if (head != nullptr && found.examples.size() < kMostSome && box.contains(flat(*head))) {
+        if (head != nullptr && found.examples.size() < kMaxExamples && box.contains(flat(*head))) {
           found.examples.push_back(*head);
         }
         return true;
@@ -40,7 +40,7 @@ std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const S
       [&](const stream::StoreQuery::Branch& cluster) {
         // The clusters below cannot widen the range.
         const bool known = found.low <= cluster.box.min[2] && found.high >= cluster.box.max[2];
-        return !(known && found.examples.size() == kMostSome);
+        return !(known && found.examples.size() == kMaxExamples);
       });
   if (found.low > found.high) return std::nullopt;
   return found;

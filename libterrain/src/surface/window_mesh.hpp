@@ -76,15 +76,15 @@ class WindowJoiner {
 
   /// Drops vertices that no window after this one has, whenever they may be half of all.
   void forget_until(std::size_t window) {
-    if (open_.size() < most_open_) return;
+    if (open_.size() < max_open_) return;
     std::erase_if(open_, [&](const auto& vertex) { return vertex.second.last <= window; });
-    most_open_ = std::max(kFewOpen, 2 * open_.size());
+    max_open_ = std::max(kFewOpen, 2 * open_.size());
   }
 
   static constexpr std::size_t kFewOpen = 4096;
   std::uint64_t vertices_ = 0;
   std::unordered_map<std::uint64_t, Open> open_;  ///< by place
-  std::size_t most_open_ = kFewOpen;
+  std::size_t max_open_ = kFewOpen;
 };
 
 /// Meshes windows with several threads and joins them in order. make(worker, i) returns the mesh of

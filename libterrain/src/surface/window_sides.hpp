@@ -24,9 +24,9 @@ using SideVertices = std::vector<SideVertex>;
 template <class Key>
 class WindowSides {
  public:
-  /// With a limit, at most twice `most_vertices` and two sides are kept; the oldest are dropped.
-  explicit WindowSides(std::size_t most_vertices = std::numeric_limits<std::size_t>::max())
-      : most_vertices_(most_vertices) {}
+  /// With a limit, at most twice `max_vertices` and two sides are kept; the oldest are dropped.
+  explicit WindowSides(std::size_t max_vertices = std::numeric_limits<std::size_t>::max())
+      : max_vertices_(max_vertices) {}
 
   /// Returns the vertices of a side. If they are unknown, settle() returns them. It must depend
   /// only on the side, because several threads may call it at once.
@@ -35,7 +35,7 @@ class WindowSides {
     if (auto known = find(side)) return known;
     auto settled = std::make_shared<const SideVertices>(settle());
     const std::lock_guard lock(mutex_);
-    if (vertices_ > most_vertices_) {
+    if (vertices_ > max_vertices_) {
       older_ = std::exchange(recent_, {});
       vertices_ = 0;
     }
@@ -69,7 +69,7 @@ class WindowSides {
 
  private:
   using Sides = std::map<Key, std::shared_ptr<const SideVertices>>;
-  std::size_t most_vertices_;
+  std::size_t max_vertices_;
   mutable std::mutex mutex_;
   Sides recent_, older_;
   std::size_t vertices_ = 0;  ///< in recent_

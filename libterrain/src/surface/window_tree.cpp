@@ -7,7 +7,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::uint64_t kMostCounted = std::uint64_t{1} << 18;
+constexpr std::uint64_t kMaxCounted = std::uint64_t{1} << 18;
 /// A view's share of a level is unknown, so it reads finer levels until it has this many points.
 constexpr std::size_t kFewestCounted = std::size_t{1} << 14;
 /// Limit on halvings of the store's area; only coincident points need more.
@@ -17,7 +17,7 @@ constexpr unsigned kDeepestTree = 48;
 
 WindowTree::WindowTree(const stream::Store& store, unsigned level, std::size_t points) {
   unsigned counted = level;
-  while (counted < store.top() && store.levels()[counted].points > kMostCounted) ++counted;
+  while (counted < store.top() && store.levels()[counted].points > kMaxCounted) ++counted;
   constexpr double kAll = std::numeric_limits<double>::infinity();
   std::vector<Point2> sample;
   {

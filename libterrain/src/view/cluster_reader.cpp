@@ -13,7 +13,7 @@ namespace {
 /// Share of a frame's time that the calling thread may spend looking for missing bytes.
 constexpr double kMissingShare = 0.25;
 /// A frame stops looking after this many missing ranges; requesting them takes longer than a frame.
-constexpr std::size_t kMostMissing = 512;
+constexpr std::size_t kMaxMissing = 512;
 
 class FrameReader final : public ClusterReader {
  public:
@@ -24,20 +24,20 @@ class FrameReader final : public ClusterReader {
     const tri::StepBudget budget{.seconds = kReadingShare * seconds, .clock = steady_seconds};
     meter_.start(budget);
     missing_.clear();
-    if (!has_arrived_ || lacking_.size() > 8 * kMostMissing) lacking_.clear();
-    if (!has_arrived_ || lacking_pages_.size() > 8 * kMostMissing) lacking_pages_.clear();
+    if (!has_arrived_ || lacking_.size() > 8 * kMaxMissing) lacking_.clear();
+    if (!has_arrived_ || lacking_pages_.size() > 8 * kMaxMissing) lacking_pages_.clear();
     ++number_;
     const double end = steady_seconds() + kMissingShare * seconds;
     for (const tri::ViewRequest& request : wanted_) {
       if (request.members == tri::ClusterRecord::kUnread) {
-        if (missing_.size() >= kMostMissing || !bring_record(request.cluster, end, give_record))
+        if (missing_.size() >= kMaxMissing || !bring_record(request.cluster, end, give_record))
           break;
         continue;
       }
       const auto members = static_cast<std::size_t>(request.members);
       // Above level 0, reading includes the records of the clusters below, which takes far longer.
       const std::size_t kind = tri::level_of(request.cluster) > 0 ? 1 : 0;
-      if (!meter_.has_time(members, kind) || missing_.size() >= kMostMissing) break;
+      if (!meter_.has_time(members, kind) || missing_.size() >= kMaxMissing) break;
       auto lacking = lacking_.find(request.cluster);
       if (lacking == lacking_.end() || has_come(lacking->second.front())) {
         try {

@@ -26,7 +26,7 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
   std::size_t spare_count = kSpares;
   spare[0] = spare_first;
   spare[1] = spare_second;
-  std::size_t most_removed = mesh.sides.size() - kSpares;
+  std::size_t max_removed = mesh.sides.size() - kSpares;
   // The pools do not grow from here on.
   Triangle* const triangle = mesh.triangle.data();
   const auto* const point = mesh.point.data();
@@ -37,12 +37,12 @@ void insert_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex, std::uint32_t confl
   const auto remove = [&](std::uint32_t t) {
     if (recording) [[unlikely]]
       mesh.record(t);
-    if (++removed > most_removed) [[unlikely]] {
+    if (++removed > max_removed) [[unlikely]] {
       mesh.sides.resize(2 * mesh.sides.size());
       mesh.spare.resize(mesh.sides.size());
       pending = mesh.sides.data();
       spare = mesh.spare.data();
-      most_removed = mesh.sides.size() - kSpares;
+      max_removed = mesh.sides.size() - kSpares;
     }
     spare[spare_count++] = t;
   };

@@ -60,7 +60,7 @@ bool barycentric(const Query& p, const std::array<Query, 3>& corner,
   }
   if constexpr (std::is_same_v<Number, double>) {
     const bool accurate = size * (4 * 0x1p-53 / kTolerance) < total;
-    if (!accurate || !(total > kLeastSquare) || !(size < kGreatestSquare)) return false;
+    if (!accurate || !(total > kMinSquare) || !(size < kGreatestSquare)) return false;
   }
   for (std::size_t i = 0; i < 3; ++i) weights[i] = Rounded<Number>::of(Number(area[i] / total));
   return true;
@@ -282,7 +282,7 @@ Gradient Sampler<Kernel>::gradient_of_triangles(const Heights& heights) {
   };
   if (!add_all(sum)) return {};
   const bool accurate = sum.size * (4 * 0x1p-53 / kTolerance) < sum.area;
-  if (accurate && sum.area > kLeastSquare && sum.size < kGreatestSquare) return sum.gradient();
+  if (accurate && sum.area > kMinSquare && sum.size < kGreatestSquare) return sum.gradient();
   GradientSum<Rational> exact_sum;
   add_all(exact_sum);
   return exact_sum.gradient();

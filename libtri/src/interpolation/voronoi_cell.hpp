@@ -26,7 +26,7 @@ inline constexpr double kTolerance = 1e-11;
 /// Number of roundings that add up in a weight, besides those counted by VoronoiCell::error.
 inline constexpr double kRoundings = 4;
 /// Limits of squared sizes, so that products of four lengths neither overflow nor lose bits.
-inline constexpr double kLeastSquare = 1e-130;
+inline constexpr double kMinSquare = 1e-130;
 inline constexpr double kGreatestSquare = 1e130;
 
 /// Rounds to a double (NaN: the number is not known precisely enough) or, if it kShortens, to a
@@ -177,7 +177,7 @@ bool VoronoiCell<Number>::accurate() const {
   // If a centre has an error of e, the border of an area moves by e along a length of at most the
   // cell's extent.
   constexpr double kFactor = kRoundings * 0x1p-53 / kTolerance;
-  return total > kLeastSquare && total < kGreatestSquare &&
+  return total > kMinSquare && total < kGreatestSquare &&
          error * extent * (kFactor * kFactor) < total * total;
 }
 

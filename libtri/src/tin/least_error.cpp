@@ -9,7 +9,7 @@
 namespace terrace::tri {
 namespace {
 
-constexpr double kLeastStep = 1.002;  // ratio below which two bounds count as equal
+constexpr double kMinStep = 1.002;  // ratio below which two bounds count as equal
 
 /// A bound that was tried and its number of vertices.
 struct Trial {
@@ -31,7 +31,7 @@ class Bracket {
 
   [[nodiscard]] const Trial& below() const { return below_; }
   [[nodiscard]] bool is_narrow() const {
-    return below_.is_set && above_.is_set && below_.bound <= above_.bound * kLeastStep;
+    return below_.is_set && above_.is_set && below_.bound <= above_.bound * kMinStep;
   }
 
   /// The next bound to try. Numbers of vertices fall about as a power of the bound between 1 and 2,
@@ -55,8 +55,8 @@ class Bracket {
 
   /// The nearest bound strictly between the known ones.
   [[nodiscard]] double inside(double bound) const {
-    if (below_.is_set) bound = std::min(bound, below_.bound / kLeastStep);
-    if (above_.is_set) bound = std::max(bound, above_.bound * kLeastStep);
+    if (below_.is_set) bound = std::min(bound, below_.bound / kMinStep);
+    if (above_.is_set) bound = std::max(bound, above_.bound * kMinStep);
     if (below_.is_set && above_.is_set && bound >= below_.bound)
       bound = std::sqrt(below_.bound * above_.bound);
     return std::clamp(bound, least_, range_);

@@ -71,11 +71,11 @@ class ViewFront {
   [[nodiscard]] std::size_t candidates() const { return candidates_.size(); }
   /// At most a thousand clusters that may be wanted soon, the greatest demand first. Call it after
   /// next().
-  [[nodiscard]] std::span<const Candidate> upcoming() { return first_of(soon_, kMostSoon); }
+  [[nodiscard]] std::span<const Candidate> upcoming() { return first_of(soon_, kMaxUpcoming); }
   /// At most a few thousand clusters whose record must be read to decide whether they are wanted,
   /// now or soon. Their `keep` is an estimate. The greatest comes first. Call it after next().
   [[nodiscard]] std::span<const Candidate> unread_records() {
-    return first_of(unread_, kMostUnread);
+    return first_of(unread_, kMaxUnread);
   }
   /// Points of expanded clusters whose demand is less than `below`.
   [[nodiscard]] std::size_t points_below(double below);
@@ -92,7 +92,7 @@ class ViewFront {
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFu;
   /// Upper limits of requests ahead of time in a step. More would take too much of its time.
-  static constexpr std::size_t kMostSoon = 1024, kMostUnread = 4096;
+  static constexpr std::size_t kMaxUpcoming = 1024, kMaxUnread = 4096;
   // The children of one expanded cluster.
   struct Group {
     Slot parent = ClusterTree::kNoSlot;

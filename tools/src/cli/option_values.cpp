@@ -200,7 +200,7 @@ Line parse_line(const std::string& text) {
     }
     return line;
   }
-  const auto json = json_of_file(text, kMostGeoJsonBytes, convert_to_geojson(text), stop_token());
+  const auto json = json_of_file(text, kMaxGeoJsonBytes, convert_to_geojson(text), stop_token());
   if (!json) throw line_error("is neither a list of places nor a readable file");
   std::vector<std::vector<Point2>> lines;
   try {

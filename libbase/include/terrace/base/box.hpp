@@ -23,7 +23,7 @@ struct Box {
   using Point = std::array<T, D>;
 
   Point min = filled(kGreatest);
-  Point max = filled(kLeast);
+  Point max = filled(kMin);
 
   /// Returns whether the box contains no point: on some axis min > max, or a bound is NaN.
   [[nodiscard]] constexpr bool empty() const {
@@ -102,7 +102,7 @@ struct Box {
  private:
   using Limits = std::numeric_limits<T>;
   static constexpr T kGreatest = Limits::has_infinity ? Limits::infinity() : Limits::max();
-  static constexpr T kLeast = Limits::has_infinity ? -Limits::infinity() : Limits::lowest();
+  static constexpr T kMin = Limits::has_infinity ? -Limits::infinity() : Limits::lowest();
 
   static constexpr Point filled(T value) {
     Point point{};

@@ -10,7 +10,7 @@
 namespace terrace::cluster {
 
 // Gains below this fraction of the cost are rounding. Without this limit a search might cycle.
-constexpr double kLeastGain = 1e-12;
+constexpr double kMinGain = 1e-12;
 
 MatrixSearch::MatrixSearch(const CostRows& costs, std::span<const double> opening,
                            std::span<const std::uint32_t> candidates)
@@ -87,7 +87,7 @@ bool MatrixSearch::drop() {
     for (std::size_t i = 0, n = costs_->clients(); i < n; ++i) {
       closing_[state_.first()[i]][0] += state_.second_cost()[i] - state_.first_cost()[i];
     }
-    double best = kLeastGain * cost_;
+    double best = kMinGain * cost_;
     std::uint32_t worst = NearestOpen::kNone;
     for (const std::uint32_t j : state_.facilities()) {
       const double spare = opening_[j] - closing_[j][0];
@@ -112,7 +112,7 @@ void MatrixSearch::descend(std::mt19937_64& random) {
   for (std::size_t k = 0; refused < order_.size(); k = (k + 1) % order_.size()) {
     const std::uint32_t candidate = order_[k];
     ++refused;
-    if (state_.is_open(candidate) || !(gain(candidate) > kLeastGain * cost_)) continue;
+    if (state_.is_open(candidate) || !(gain(candidate) > kMinGain * cost_)) continue;
     open(candidate);
     drop();
     refused = 0;

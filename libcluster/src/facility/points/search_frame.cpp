@@ -55,22 +55,22 @@ struct Channel {
   double range = 0.0;  // largest value()
 
   Channel(const Channels& channels, std::size_t c, std::size_t count) {
-    double least_half = 0.0, most_half = 0.0;
+    double min_half = 0.0, max_half = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
       const double half = 0.5 * channels.values[i * channels.size() + c];
-      least_half = i == 0 ? half : std::min(least_half, half);
-      most_half = i == 0 ? half : std::max(most_half, half);
+      min_half = i == 0 ? half : std::min(min_half, half);
+      max_half = i == 0 ? half : std::max(max_half, half);
     }
-    least = least_half;
+    least = min_half;
     int weight_exponent = 0;
     weight = std::frexp(channels.weights[c], &weight_exponent);
-    if (weight == 0.0 || most_half == least_half) {
+    if (weight == 0.0 || max_half == min_half) {
       weight = 0.0;
       return;
     }
-    shift = exponent_of(most_half - least_half);
+    shift = exponent_of(max_half - min_half);
     exponent = shift + 1 + weight_exponent;
-    range = value(2.0 * most_half);
+    range = value(2.0 * max_half);
   }
   [[nodiscard]] double value(double original) const {
     return weight * std::ldexp(0.5 * original - least, -shift);

@@ -23,7 +23,7 @@ namespace terrace::terrain {
 namespace {
 
 /// The longest definition that is read, in bytes.
-constexpr std::size_t kMostCrsText = std::size_t{64} << 10;
+constexpr std::size_t kMaxCrsText = std::size_t{64} << 10;
 
 /// Common codes that are not in the EPSG dataset.
 int alias_of(int code) {
@@ -36,9 +36,9 @@ int alias_of(int code) {
 /// definition. PROJ looks up many parts in its database, and its time and memory grow with the
 /// square of the depth.
 void check_extent(std::string_view text) {
-  constexpr int kDeepest = 32, kMostParts = 512;
+  constexpr int kDeepest = 32, kMaxParts = 512;
   const stream::Message remedy = remedy_by_code();
-  if (text.size() > kMostCrsText) {
+  if (text.size() > kMaxCrsText) {
     throw CrsError("the definition is longer than 64 KiB", remedy);
   }
   const bool json = text.starts_with('{');
@@ -52,7 +52,7 @@ void check_extent(std::string_view text) {
       if (json && c == '\\') ++i;
     } else if (c == '[' || c == '(' || c == '{') {
       if (++depth > kDeepest) throw CrsError("the definition is nested too deeply", remedy);
-      if (++parts > kMostParts) throw CrsError("the definition has too many parts", remedy);
+      if (++parts > kMaxParts) throw CrsError("the definition has too many parts", remedy);
     } else if (c == ']' || c == ')' || c == '}') {
       --depth;
     }
@@ -295,7 +295,7 @@ AnyCrs crs_of_epsg(int code) {
 
 std::string contents_of_file(const std::string& name) {
   std::ifstream file(name, std::ios::binary);
-  std::string text(kMostCrsText + 1, '\0');
+  std::string text(kMaxCrsText + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(file.gcount()));
   return without_padding(text);

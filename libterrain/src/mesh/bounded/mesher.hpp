@@ -52,10 +52,9 @@ class BoundedMesher {
   BoundedMesher(const BoundedMesher&) = delete;
   BoundedMesher& operator=(const BoundedMesher&) = delete;
 
-  /// Meshes into the spool. Stops early with more than `most_vertices` vertices, and then estimates
+  /// Meshes into the spool. Stops early with more than `max_vertices` vertices, and then estimates
   /// their final number. Throws: as write_bounded_mesh().
-  virtual BoundedMeshResult run(double max_error, MeshSpool& spool,
-                                std::uint64_t most_vertices) = 0;
+  virtual BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t max_vertices) = 0;
   /// Estimates the number of vertices for a bound quickly, from some windows. Requires
   /// can_estimate().
   [[nodiscard]] virtual double estimate(double max_error) const = 0;
@@ -84,7 +83,7 @@ class BoundedMesher {
   /// may correct the measures. total_work: of all windows.
   template <class Make, class Joined>
   BoundedMeshResult run_windows(std::size_t windows, unsigned threads, std::uint64_t total_work,
-                                MeshSpool& spool, std::uint64_t most_vertices, const Make& make,
+                                MeshSpool& spool, std::uint64_t max_vertices, const Make& make,
                                 const Joined& joined) const {
     BoundedMeshResult result;
     ProgressReport report(context_, "samples");
@@ -100,7 +99,7 @@ class BoundedMesher {
             spool.add_triangles(mesh.triangles);
             const WindowMeasures& window = mesh.measures;
             work += window.work;
-            if (spool.vertices() > most_vertices) throw Enough{};
+            if (spool.vertices() > max_vertices) throw Enough{};
             result.max_error = std::max(result.max_error, window.max_error);
             const auto count = static_cast<double>(window.covered);
             squares += window.rms_error * window.rms_error * count;
@@ -117,7 +116,7 @@ class BoundedMesher {
           std::clamp(static_cast<double>(work) / static_cast<double>(total_work), 1e-9, 1.0);
       result.vertices =
           std::max(static_cast<std::uint64_t>(static_cast<double>(spool.vertices()) / part),
-                   most_vertices + 1);
+                   max_vertices + 1);
       return result;
     }
     result.vertices = spool.vertices();

@@ -171,14 +171,14 @@ std::uint32_t Cutter::add_cell(const Part& part) {
 }
 
 constexpr std::size_t kBufferBytes = std::size_t{16} << 20;
-constexpr std::size_t kLeastChunk = 40, kMostChunk = 4096;  // in points
+constexpr std::size_t kMinChunk = 40, kMaxChunk = 4096;  // in points
 
 std::filesystem::path place_for(const std::string& path) {
   if (path != "-") return path + ".samples";
   return std::filesystem::temp_directory_path() / "terrace.samples";
 }
 
-constexpr std::size_t kMostPlaces = std::size_t{1} << 20;
+constexpr std::size_t kMaxPlaces = std::size_t{1} << 20;
 /// The limit of tri::point_tin(); products of two such numbers are finite.
 constexpr double kLargest = 1e100;
 
@@ -266,8 +266,8 @@ PointMeshSamples::PointMeshSamples(const stream::Store& store, const Detail& det
     : store_(store),
       cuts_(cuts),
       file_(place_for(path), true),
-      chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(),
-                               kLeastChunk, kMostChunk)),
+      chunk_points_(std::clamp(kBufferBytes / sizeof(stream::Point3) / cuts.cells.size(), kMinChunk,
+                               kMaxChunk)),
       counts_(cuts.cells.size(), 0),
       waiting_(cuts.cells.size()),
       chunks_(cuts.cells.size()) {
@@ -339,7 +339,7 @@ PointMeshScan scan_point_mesh(const stream::Store& store, const Detail& detail, 
           .remedy(stream::message("leave it out of the store, or of the {region}"));
     }
     if (scan.samples % scan.period == 0) {
-      if (scan.sample.size() == kMostPlaces) {
+      if (scan.sample.size() == kMaxPlaces) {
         thin_out(scan.sample);
         scan.period *= 2;
       }

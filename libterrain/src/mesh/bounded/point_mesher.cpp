@@ -32,7 +32,7 @@ constexpr std::uint64_t kBytesPerSample = 80;
 /// Cells are joined into windows of at most this many vertices, so that few of them are on sides,
 /// where they cannot be removed; and of at most this many cells.
 constexpr double kPointsPerMeshWindow = 10000.0;
-constexpr double kMostMeshCells = 4.0;
+constexpr double kMaxMeshCells = 4.0;
 /// Memory for reading per thread, and for everything else.
 constexpr std::uint64_t kBytesPerReader = std::uint64_t{12} << 20;
 constexpr std::uint64_t kFixedBytes = std::uint64_t{48} << 20;
@@ -105,7 +105,7 @@ class PointMesher final : public BoundedMesher {
   PointMesher(const stream::Store& store, const BoundedMeshOptions& options,
               const Context& context);
 
-  BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices) override;
+  BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t max_vertices) override;
   [[nodiscard]] double estimate(double max_error) const override;
   [[nodiscard]] bool can_estimate() const override { return samples_.has_value(); }
 
@@ -117,7 +117,7 @@ class PointMesher final : public BoundedMesher {
   [[nodiscard]] stream::Error shared_places_error() const;
   BoundedMeshResult run_single(const PointMeshOptions& options, MeshSpool& spool) const;
   BoundedMeshResult run_plan(const PointMeshOptions& options, MeshSpool& spool,
-                             std::uint64_t most_vertices) const;
+                             std::uint64_t max_vertices) const;
   [[nodiscard]] PointMeshPlan plan_for(double max_error) const;
   /// The number of threads for windows that need `each` bytes.
   [[nodiscard]] unsigned threads_for(std::uint64_t each, std::uint64_t points) const;
@@ -200,13 +200,13 @@ PointMeshPlan PointMesher::plan_for(double max_error) const {
   return plan_point_mesh(cuts_, scan_.hull, [&](std::uint32_t first, std::uint32_t cells) {
     const auto from = vertices.begin() + first;
     return static_cast<double>(samples_->count(first, cells)) <=
-               kMostMeshCells * static_cast<double>(options_.window_points) &&
+               kMaxMeshCells * static_cast<double>(options_.window_points) &&
            std::accumulate(from, from + cells, 0.0) <= kPointsPerMeshWindow;
   });
 }
 
 BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpool& spool,
-                                        std::uint64_t most_vertices) const {
+                                        std::uint64_t max_vertices) const {
   if (!samples_) {  // collinear samples have no surface
     BoundedMeshResult result;
     result.samples = result.uncovered = scan_.samples;
@@ -222,7 +222,7 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
   PointMeshSides sides(plan, *samples_, options.tin.duplicates, options.tin.max_error);
   const PointWindowMesher mesher(plan, *samples_, sides, options, rounding_, store_);
   return run_windows(
-      plan.windows.size(), threads_for(each, max_points), scan_.samples, spool, most_vertices,
+      plan.windows.size(), threads_for(each, max_points), scan_.samples, spool, max_vertices,
       [&](unsigned, std::size_t i) { return mesher.mesh(i); },
       [&](std::size_t i, const BoundedWindow&) {
         for (const std::uint32_t side : plan.windows[i].sides) {
@@ -263,12 +263,11 @@ stream::Error PointMesher::shared_places_error() const {
                   : stream::message("choose one with {duplicates}"));
 }
 
-BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool,
-                                   std::uint64_t most_vertices) {
+BoundedMeshResult PointMesher::run(double max_error, MeshSpool& spool, std::uint64_t max_vertices) {
   BoundedMeshResult result;
   try {
     const PointMeshOptions options = mesh_options(max_error);
-    result = single() ? run_single(options, spool) : run_plan(options, spool, most_vertices);
+    result = single() ? run_single(options, spool) : run_plan(options, spool, max_vertices);
   } catch (const SamplesShareAPlace&) {
     throw shared_places_error();
   }

@@ -42,7 +42,7 @@ constexpr std::uint64_t kRasterFixedBytes = std::uint64_t{48} << 20;
 constexpr std::uint64_t kFillBytes = std::uint64_t{32} << 20;
 /// Limit, in cells, for the distance of an edge that is straight in the file from the samples along
 /// it: less than half, so that no sample next to a window's side moves to the other side of it.
-constexpr double kMostBend = 0.125;
+constexpr double kMaxBend = 0.125;
 
 /// Returns the size of windows, from the vertices per sample of greedy insertion.
 std::int64_t window_cells(double per_sample) {
@@ -117,7 +117,7 @@ class RasterMesher final : public BoundedMesher {
   RasterMesher(const stream::Store& store, const BoundedMeshOptions& options,
                const Context& context);
 
-  BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t most_vertices) override;
+  BoundedMeshResult run(double max_error, MeshSpool& spool, std::uint64_t max_vertices) override;
   [[nodiscard]] double estimate(double max_error) const override;
   /// Whether the sampled windows are a small part of all.
   [[nodiscard]] bool can_estimate() const override;
@@ -134,12 +134,12 @@ class RasterMesher final : public BoundedMesher {
                               std::size_t down) const;
 
   /// Returns the largest size of a window along each axis, in cells, at which a straight edge in
-  /// the file is within kMostBend of the samples along it. Requires a conversion.
+  /// the file is within kMaxBend of the samples along it. Requires a conversion.
   [[nodiscard]] std::int64_t straight_cells() const;
 
   LatticeWindow lattice_;
-  std::int64_t most_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, along each
-                                                                        ///< axis
+  std::int64_t max_cells_ = std::numeric_limits<std::int64_t>::max();  ///< of a window, along each
+                                                                       ///< axis
   unsigned threads_ = 1;
   std::shared_ptr<const StoreFill> fill_;
 };
@@ -162,7 +162,7 @@ RasterMesher::RasterMesher(const stream::Store& store, const BoundedMeshOptions&
                                                      static_cast<std::uint64_t>(lattice_.columns) +
                                                  (interpolates ? kFillBytes : 0));
   if (interpolates) fill_ = std::make_shared<StoreFill>(store);
-  if (options.places.has_effect()) most_cells_ = straight_cells();
+  if (options.places.has_effect()) max_cells_ = straight_cells();
 }
 
 std::int64_t RasterMesher::straight_cells() const {
@@ -200,7 +200,7 @@ std::int64_t RasterMesher::straight_cells() const {
   }
   // Bends grow as the square of the length; the longest edge is the diagonal of the largest window.
   constexpr double kLongest = 1.5 * 1.4143;
-  const double cells = 2.0 * half * std::sqrt(kMostBend / std::max(bend, 1e-9)) / kLongest;
+  const double cells = 2.0 * half * std::sqrt(kMaxBend / std::max(bend, 1e-9)) / kLongest;
   return static_cast<std::int64_t>(std::clamp(cells, 1.0, static_cast<double>(kWidestCells)));
 }
 
@@ -280,18 +280,18 @@ RasterMesher::Sample RasterMesher::sample(double max_error, tri::TinQuality qual
 }
 
 BoundedMeshResult RasterMesher::run(double max_error, MeshSpool& spool,
-                                    std::uint64_t most_vertices) {
+                                    std::uint64_t max_vertices) {
   std::int64_t cells = kWindowCells;
   Sample sample;
   if (LatticePlan(lattice_, cells).size() > 1) {
     sample = this->sample(max_error, tri::TinQuality::greedy, 2, 2);
     cells = window_cells(sample.vertices_per_sample);
   }
-  const LatticePlan plan(lattice_, std::min(cells, most_cells_));
+  const LatticePlan plan(lattice_, std::min(cells, max_cells_));
   const auto meshers = this->meshers(max_error);
   SideSamples side_samples;
   BoundedMeshResult result = run_windows(
-      plan.size(), threads_, lattice_.size(), spool, most_vertices,
+      plan.size(), threads_, lattice_.size(), spool, max_vertices,
       [&](unsigned worker, std::size_t i) { return meshers[worker]->mesh(plan, i); },
       [&](std::size_t, RasterWindow& window) {
         window.measures.uncovered += side_samples.add(window.uncovered);

@@ -29,8 +29,8 @@ double twice_area(std::span<const tri::Point3> points, const std::array<std::uin
 /// are.
 bool turn_back(std::span<const tri::Point3> points,
                std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  constexpr int kMostRounds = 16;
-  for (int round = 0; round < kMostRounds; ++round) {
+  constexpr int kMaxRounds = 16;
+  for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<std::uint32_t> turned;
     for (std::uint32_t i = 0; i < triangles.size(); ++i) {
       if (!(twice_area(points, triangles[i]) > 0.0)) turned.push_back(i);

@@ -143,8 +143,8 @@ std::string layer_json(const TileLayer& layer) {
 }
 
 TileLayer read_layer(const std::string& path) {
-  constexpr std::uint64_t kMostBytes = std::uint64_t{256} << 20;  // for a fragmented coverage
-  const auto json = json_of_file(path, kMostBytes, "make the tiles again");
+  constexpr std::uint64_t kMaxBytes = std::uint64_t{256} << 20;  // for a fragmented coverage
+  const auto json = json_of_file(path, kMaxBytes, "make the tiles again");
   if (!json) {
     throw stream::Error(path, "cannot be read").remedy("name the folder of a finished tile set");
   }

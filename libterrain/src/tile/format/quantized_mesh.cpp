@@ -128,7 +128,7 @@ std::vector<std::byte> encode_tile(const TileMesh& mesh, const TileHeader& heade
   put_column(out, mesh.height);
 
   const TileEdges edges = edges_of(mesh);
-  if (mesh.size() > kMostShortVertices) {
+  if (mesh.size() > kMaxShortVertices) {
     out.align(sizeof(std::uint32_t));
     put_indices<std::uint32_t>(out, mesh, edges);
   } else {

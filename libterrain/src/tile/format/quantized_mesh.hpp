@@ -19,7 +19,7 @@ namespace terrace::terrain {
 enum class TileExtension : std::uint8_t { oct_normals = 1, water_mask = 2, metadata = 4 };
 
 /// With more vertices than this, indices have 32 bits.
-inline constexpr std::size_t kMostShortVertices = 65536;
+inline constexpr std::size_t kMaxShortVertices = 65536;
 /// Number of cells in a water mask that is not uniform.
 inline constexpr std::size_t kWaterCells = std::size_t{256} * 256;
 

@@ -172,7 +172,7 @@ DecodedTile decode_tile(std::span<const std::byte> bytes, const std::string& nam
   mesh.u = read_column(in, vertices, "u");
   mesh.v = read_column(in, vertices, "v");
   mesh.height = read_column(in, vertices, "height");
-  if (vertices > kMostShortVertices) {
+  if (vertices > kMaxShortVertices) {
     in.align(sizeof(std::uint32_t));
     read_indices<std::uint32_t>(in, tile);
   } else {

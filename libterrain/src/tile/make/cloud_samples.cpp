@@ -17,7 +17,7 @@ namespace terrace::terrain {
 namespace {
 
 constexpr std::uint64_t kSeeds = 32;
-constexpr double kMostPointsAround = 3000;
+constexpr double kMaxPointsAround = 3000;
 constexpr unsigned kRank = 8;
 /// In a view, boxes grow until they contain this many points.
 constexpr std::size_t kFewestPointsAround = 200;
@@ -89,7 +89,7 @@ StoredBox box_of(const Seed& seed, stream::StoreQuery& query) {
   constexpr unsigned kHalvings = 60;
   StoredBox box = seed.box;
   for (unsigned i = 0;
-       i < kHalvings && query.estimate(tall(grown(box)), kMostPointsAround) > kMostPointsAround;
+       i < kHalvings && query.estimate(tall(grown(box)), kMaxPointsAround) > kMaxPointsAround;
        ++i) {
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double quarter = 0.25 * (box.max[axis] - box.min[axis]);
@@ -172,7 +172,7 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
   std::vector<Point2> stored;
   for (const Seed& seed : some_seeds(store, places)) {
     StoredBox box = box_of(seed, reader.query()), around = grown(box);
-    if (reader.query().estimate(tall(around), kMostPointsAround) > kMostPointsAround) continue;
+    if (reader.query().estimate(tall(around), kMaxPointsAround) > kMaxPointsAround) continue;
     reader.points(around, points);
     // A view may have few points where the store has many.
     while (store.condition() != nullptr && points.positions.size() < kFewestPointsAround &&

@@ -16,7 +16,7 @@
 namespace terrace::terrain {
 namespace {
 
-constexpr std::int64_t kMostBlocks = std::int64_t{1} << 20;
+constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 20;
 /// The number of clusters that a thread reads at a time.
 constexpr std::uint64_t kClustersAtOnce = 64;
 constexpr std::size_t kMutexes = 64;
@@ -45,7 +45,7 @@ HeightBlocks::HeightBlocks(const stream::Store& store, unsigned threads)
     : columns_(static_cast<std::int64_t>(store.schema().columns)),
       rows_(static_cast<std::int64_t>(store.schema().rows)) {
   const auto count = [this](std::int64_t samples) { return (samples + side_ - 1) / side_; };
-  while (count(columns_) * count(rows_) > kMostBlocks) side_ *= 2;
+  while (count(columns_) * count(rows_) > kMaxBlocks) side_ *= 2;
   across_ = count(columns_);
   down_ = count(rows_);
   const auto blocks = static_cast<std::size_t>(across_ * down_);

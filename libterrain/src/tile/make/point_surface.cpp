@@ -15,15 +15,15 @@ namespace terrace::terrain {
 namespace {
 
 /// The most samples to return at once.
-constexpr double kMostSamples = 1U << 18;
+constexpr double kMaxSamples = 1U << 18;
 /// Margin to load around a part, in mean distances of points.
 constexpr double kMargin = 8;
 /// In degrees: a box this narrow is practically one place, so dividing it does not help.
 constexpr double kNarrowest = 1e-9;
 /// The most points to load at once if places need them.
-constexpr double kMostTogether = 1U << 15;
+constexpr double kMaxTogether = 1U << 15;
 /// The number of boxes to remember as crowded or not.
-constexpr std::size_t kMostRemembered = 1U << 14;
+constexpr std::size_t kMaxRemembered = 1U << 14;
 
 }  // namespace
 
@@ -65,7 +65,7 @@ void PointTileSurface::expect(const GeographicBox& box) {
 bool PointTileSurface::crowded(const GeographicBox& box) {
   if (box.east - box.west < kNarrowest || box.north - box.south < kNarrowest) return false;
   // Adjacent leaves ask for the same sides.
-  if (crowded_.size() > kMostRemembered) crowded_.clear();
+  if (crowded_.size() > kMaxRemembered) crowded_.clear();
   const std::array<double, 4> key{box.west, box.south, box.east, box.north};
   if (const auto known = crowded_.find(key); known != crowded_.end()) return known->second;
   const bool is_crowded = counts_as_crowded(box);
@@ -76,8 +76,8 @@ bool PointTileSurface::crowded(const GeographicBox& box) {
 bool PointTileSurface::counts_as_crowded(const GeographicBox& box) {
   double count = 0.0;
   for (const StoredBox& window : windows(box)) {
-    count += estimate(window, kMostSamples);
-    if (count > kMostSamples) return true;
+    count += estimate(window, kMaxSamples);
+    if (count > kMaxSamples) return true;
   }
   return false;
 }
@@ -182,9 +182,9 @@ void PointTileSurface::part_heights(std::span<const Point2> stored, std::span<st
   if (!holds(box)) {
     const auto within = [&](const StoredBox& all) { return all.covers(box); };
     std::optional<StoredBox> needed;
-    if (expected_ && within(*expected_) && estimate(*expected_, kMostTogether) <= kMostTogether) {
+    if (expected_ && within(*expected_) && estimate(*expected_, kMaxTogether) <= kMaxTogether) {
       needed = expected_;
-    } else if (box.min == box.max || estimate(box, kMostTogether) <= kMostTogether) {
+    } else if (box.min == box.max || estimate(box, kMaxTogether) <= kMaxTogether) {
       needed = box;
     }
     if (!needed) {

@@ -145,9 +145,9 @@ std::optional<HeightRange> RasterTileSurface::surface_range(const GeographicBox&
 template <class Visit>
 void RasterTileSurface::visit_places(std::span<const double> longitude,
                                      std::span<const double> latitude, const Visit& visit) {
-  constexpr std::int64_t kBlock = 128;           // places are handled block by block of the lattice
-  constexpr std::int64_t kMostInWindow = 32768;  // limit of a window for a run of places,
-  constexpr std::int64_t kMostForEach = 64;      // and per place in the run
+  constexpr std::int64_t kBlock = 128;          // places are handled block by block of the lattice
+  constexpr std::int64_t kMaxInWindow = 32768;  // limit of a window for a run of places,
+  constexpr std::int64_t kMaxPerPlace = 64;     // and per place in the run
   std::vector<Point2> places(longitude.size());
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = {longitude[i], latitude[i]};
   raster_.places.to_stored(places);
@@ -185,7 +185,7 @@ void RasterTileSurface::visit_places(std::span<const double> longitude,
       const std::int64_t nc1 = first ? column + 1 : std::max(c1, column + 1);
       const std::int64_t nr1 = first ? row + 1 : std::max(r1, row + 1);
       const std::int64_t max_samples =
-          std::min(kMostInWindow, kMostForEach * static_cast<std::int64_t>(to + 1 - from));
+          std::min(kMaxInWindow, kMaxPerPlace * static_cast<std::int64_t>(to + 1 - from));
       if (!first && (nc1 - nc0 + 1) * (nr1 - nr0 + 1) > max_samples) break;
       c0 = nc0;
       r0 = nr0;

@@ -20,7 +20,7 @@ constexpr double kTolerance = 0.005;
 /// Larger parts are divided unless they are uniform.
 constexpr std::size_t kSmallestHeight = 8, kLargestHeight = 64;
 /// The most samples to read at once, unless a single cell needs more.
-constexpr std::size_t kMostWaterSamples = 65536;
+constexpr std::size_t kMaxWaterSamples = 65536;
 
 using WaterPatch = PolynomialPatch<2, 2>;
 
@@ -123,7 +123,7 @@ void WaterMask<View>::read(const LatticePart& part, std::span<const Point2> plac
   }
   window.columns = right - window.column + 1;
   window.rows = bottom - window.row + 1;
-  if (window.size() > kMostWaterSamples && (part.columns > 1 || part.rows > 1)) {
+  if (window.size() > kMaxWaterSamples && (part.columns > 1 || part.rows > 1)) {
     if (part.rows > 1) {
       const std::size_t upper = part.rows / 2;
       read({part.column, part.row, part.columns, upper}, places, stride);

@@ -17,7 +17,7 @@ namespace {
 /// A leaf has at least this many units along each axis.
 constexpr unsigned kDeepestLeaf = 8;
 /// The most places at which a side of a leaf is sampled.
-constexpr double kMostSidePlaces = 4096.0;
+constexpr double kMaxSidePlaces = 4096.0;
 /// Share of the bound for sides. Samples so close to a side that no vertex fits in between have the
 /// error of the side.
 constexpr double kSideShare = 0.75;
@@ -199,7 +199,7 @@ SideVertices TileSides::settle(const Side& side) {
   const bool looked_at =
       is_near_data(side, 2.0 * (unit + surface_.spacing())) && !is_flat(band_around(side));
   const double count =
-      looked_at ? std::min(2.0 * length / surface_.spacing(), kMostSidePlaces) : 1.0;
+      looked_at ? std::min(2.0 * length / surface_.spacing(), kMaxSidePlaces) : 1.0;
   const auto parts =
       static_cast<std::size_t>(std::clamp(std::ceil(count), 1.0, static_cast<double>(to - from)));
   std::vector<double> t, longitude, latitude, height;

@@ -71,7 +71,7 @@ struct TileSideKey {
 /// of a tile, heights in metres.
 using SharedSides = WindowSides<TileSideKey>;
 /// Limit for SharedSides, at 16 bytes each.
-inline constexpr std::size_t kMostSharedVertices = std::size_t{1} << 16;
+inline constexpr std::size_t kMaxSharedVertices = std::size_t{1} << 16;
 
 /// Computes the vertices on the sides of a tile's leaves. They depend only on the zoom's plan and
 /// on the surface along the side, not on the tile or leaf that requests them. So shared sides are

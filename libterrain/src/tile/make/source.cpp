@@ -25,7 +25,7 @@ constexpr std::uint64_t kBytesPerThread = std::uint64_t{96} << 20;
 /// Memory of the store's fill and blocks, and of the lists of tiles.
 constexpr std::uint64_t kTilingFixedBytes = std::uint64_t{80} << 20;
 /// The least memory for the triangles of a part.
-constexpr std::uint64_t kLeastWindowBytes = std::uint64_t{64} << 20;
+constexpr std::uint64_t kMinWindowBytes = std::uint64_t{64} << 20;
 
 /// The largest height that is accepted, in metres above or below the ellipsoid.
 constexpr double kFarthest = 1e7;
@@ -120,7 +120,7 @@ std::unique_ptr<TileSource> open_tile_source(const stream::Store& input,
                                                                       resources.threads);
   }
   const std::uint64_t window =
-      std::max(kLeastWindowBytes, resources.memory_bytes / resources.threads / 2);
+      std::max(kMinWindowBytes, resources.memory_bytes / resources.threads / 2);
   auto cloud = std::make_unique<TiledCloud>(store, system, std::move(heights), window,
                                             resources.memory_bytes / 2, resources.threads);
   with_options(*cloud);

@@ -259,10 +259,10 @@ std::vector<StoredBox> StoredPlaces::windows(const GeographicBox& box) const {
   if (crs_.is_geographic()) {
     // Only turns that may reach the store matter. If it goes around several times, the first turns
     // suffice.
-    constexpr int kMostTurns = 5;
+    constexpr int kMaxTurns = 5;
     const double first = std::floor(first_longitude_ / turn_ - 0.5),
                  last = std::ceil(last_longitude_ / turn_ + 0.5);
-    for (int i = 0; i < kMostTurns && first + i <= last; ++i) {
+    for (int i = 0; i < kMaxTurns && first + i <= last; ++i) {
       const double turn = first + i;
       std::array<Point2, 4> places;
       for (unsigned k = 0; k < 4; ++k) {

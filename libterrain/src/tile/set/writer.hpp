@@ -71,7 +71,7 @@ class TileSetWriter {
     std::vector<TileAddress> tiles;  ///< those that may have data, sorted by row, then column
     double range = 0.0;              ///< of heights that a tile's steps must cover
     ZoomPlan plan;
-    SharedSides sides{kMostSharedVertices};
+    SharedSides sides{kMaxSharedVertices};
     bool open = true;                   ///< its tiles remain to be written
     std::atomic<bool> too_far = false;  ///< the range was not sufficient
     std::vector<Written> written;       ///< by tile

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// The most missing tiles of a zoom that are reported one by one.
-constexpr std::uint64_t kMostNamed = 1000;
+constexpr std::uint64_t kMaxNamed = 1000;
 
 class Inventory {
  public:
@@ -110,17 +110,17 @@ void Inventory::zoom(unsigned zoom) {
         if (at != existing.end() && *at == tile) {
           ++named[static_cast<std::size_t>(at - existing.begin())];
           ++at;
-        } else if (missing++ < kMostNamed) {
+        } else if (missing++ < kMaxNamed) {
           problem(folder_ + "/" + tile_path(tile),
                   "layer.json lists this tile, but it does not exist");
         }
       }
     }
   }
-  if (missing > kMostNamed) {
-    problem(layer_path_, label + ": " +
-                             counted(missing - kMostNamed, "more listed tile", "does not exist",
-                                     "do not exist"));
+  if (missing > kMaxNamed) {
+    problem(layer_path_,
+            label + ": " +
+                counted(missing - kMaxNamed, "more listed tile", "does not exist", "do not exist"));
   }
   for (std::size_t i = 0; i < existing.size(); ++i) {
     if (named[i] == 1) continue;

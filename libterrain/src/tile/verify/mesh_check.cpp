@@ -101,7 +101,7 @@ class MeshCheck {
   MeshCheck(const TileAddress& address, const DecodedTile& tile)
       : address_(address), tile_(tile), mesh_(tile.mesh) {
     const std::size_t n = mesh_.size();
-    index_size_ = n > kMostShortVertices ? 4 : 2;
+    index_size_ = n > kMaxShortVertices ? 4 : 2;
     triangles_at_ = kVerticesAt + 4 + 6 * n;
     if (index_size_ == 4) triangles_at_ = (triangles_at_ + 3) / 4 * 4;
     edges_at_ = triangles_at_ + 4 + 3 * index_size_ * mesh_.triangles.size();

@@ -34,7 +34,7 @@ namespace {
 constexpr double kHeightSlack = 1e-4;
 
 /// Limit on the size of an uncompressed tile.
-constexpr std::uint64_t kMostBorderBytes = std::uint64_t{1} << 28;
+constexpr std::uint64_t kMaxBorderBytes = std::uint64_t{1} << 28;
 /// Tolerance in metres for the heights of neighbours, in addition to the rounding of each.
 constexpr double kBorderSlack = 1e-3;
 
@@ -85,7 +85,7 @@ std::string misfit(const BorderSide& one, const BorderSide& other) {
 DecodedTile unpack_tile(const std::vector<std::byte>& bytes, const std::string& name) {
   if (!stream::is_gzip(bytes)) return decode_tile(bytes, name);
   try {
-    return decode_tile(stream::gunzip(bytes, kMostBorderBytes, name), name);
+    return decode_tile(stream::gunzip(bytes, kMaxBorderBytes, name), name);
   } catch (const stream::Error& packed) {
     // One in 65536 uncompressed tiles begins like gzip.
     try {
