@@ -9,6 +9,7 @@ import array
 import csv
 import filecmp
 import io
+import itertools
 import json
 import math
 import os
@@ -352,6 +353,26 @@ class RasterTest(QueryTest):
         self.run_ok('raster', self.store, '--align', theirs, '-o', out, '--force')
         self.assertEqual(self.grid(theirs), self.grid(out))
         self.assertEqual(self.samples(theirs), self.samples(out))
+
+    def test_align_says_which_crs_is_unknown(self):
+        grid, cloud, store, out = map(self.path, ('no-crs.asc', 'no-crs.csv', 'no-crs.terrace', 'no-crs.tif'))
+        with open(grid, 'w', encoding='ascii') as file:
+            file.write(f'ncols 3\nnrows 2\nxllcorner {self.low[0]}\nyllcorner {self.low[1]}\ncellsize {CELL}\n1 2 3\n4 5 6\n')
+        result = terrace('raster', self.store, '--align', grid, '-o', out, '--force')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("no-crs.asc: assuming that its grid is in the store's CRS, because the CRS of the file is unknown",
+                      result.stderr)
+        error = self.expect_error(2, 'raster', self.store, '--align', grid, '--to-crs', 'EPSG:4326', '-o', out, '--force')
+        self.assertIn("no-crs.asc is unknown, so --align uses the store's: leave --to-crs out", error)
+        with open(cloud, 'w', encoding='ascii') as file:
+            file.write('x,y,z\n')
+            for x, y in itertools.product((self.low[0], self.high[0]), (self.low[1], self.high[1])):
+                file.write(f'{x},{y},1\n')
+        self.run_ok('build', cloud, '-o', store, '--force')
+        result = terrace('raster', store, '--align', self.dem, '-o', out, '--force')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("dem.tif: assuming that its grid is in the store's CRS, because the CRS of the store is unknown",
+                      result.stderr)
 
     @needs('gdalinfo')
     def test_a_raster_in_another_crs(self):

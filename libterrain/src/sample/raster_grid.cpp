@@ -30,7 +30,8 @@ namespace {
 
 constexpr double kMaxGridCells = 2147483647.0;
 
-/// Returns the area of a store's points in its CRS; for a raster, half a cell beyond the samples.
+/// Returns the bounds of a store in its CRS. Those of a raster include half a cell around the outer
+/// samples.
 stream::Box3 area_of(const stream::Store& store) {
   stream::Box3 stored = store.bounds();
   if (store.schema().grid) {
@@ -42,10 +43,10 @@ stream::Box3 area_of(const stream::Store& store) {
   return world_box(store.schema(), stored);
 }
 
-/// Returns the box in the output's CRS around a box in the store's CRS.
-stream::Box3 converted(const stream::Box3& box, const Transformation& change,
-                       const stream::Store& store) {
-  // Sides may bend, so convert this many points of each.
+/// Returns the bounding box, in the output's CRS, of a box in the store's CRS.
+stream::Box3 converted_box(const stream::Box3& box, const Transformation& to_output,
+                           const stream::Store& store) {
+  // Straight sides may become curves, so convert this many points of each.
   constexpr int kPoints = 256;
   std::vector<Point2> outline;
   for (int i = 0; i <= kPoints; ++i) {
@@ -57,8 +58,8 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
       outline.push_back(p);
     }
   }
-  change.forward(outline);
-  const WholeTurns turns(middle_in(change, box)[0], change.to().turn());
+  to_output.forward(outline);
+  const WholeTurns turns(middle_in(to_output, box)[0], to_output.to().turn());
   for (Point2& p : outline) p = turns(p);
   stream::Box3 result;
   for (const Point2& p : outline) {
@@ -66,19 +67,18 @@ stream::Box3 converted(const stream::Box3& box, const Transformation& change,
   }
   if (result.empty()) {
     throw stream::Error(store.path().string(),
-                        fmt::format("the region has no image in {}", change.to().title()))
+                        fmt::format("the region is outside the area of {}", to_output.to().title()))
         .remedy(stream::message("choose another {to_crs} or a smaller {region}"));
   }
   return result;
 }
 
-std::uint64_t points_of(const stream::Store& store, unsigned level) {
+std::uint64_t point_count(const stream::Store& store, unsigned level) {
   if (store.condition() == nullptr) return store.levels()[level].points;
   return stream::StoreQuery(store).count(store.bounds(), level);
 }
 
-/// Rounds to two digits.
-double rounded_cell(double value) {
+double rounded_to_two_digits(double value) {
   std::array<char, 32> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value,
                                  std::chars_format::scientific, 1);
@@ -89,14 +89,15 @@ double rounded_cell(double value) {
 
 /// Returns the spacing of points in units of the store's CRS.
 double spacing_of(const stream::Store& store, const stream::Box3& area, unsigned level) {
-  const std::array<double, 6>& m = store.schema().world.xy;
-  if (store.schema().grid && level == 0) return std::sqrt(std::abs(m[0] * m[4] - m[1] * m[3]));
+  const std::array<double, 6>& world = store.schema().world.xy;
+  if (store.schema().grid && level == 0)
+    return std::sqrt(std::abs(world[0] * world[4] - world[1] * world[3]));
   const double size = (area.max[0] - area.min[0]) * (area.max[1] - area.min[1]);
-  const std::uint64_t points = std::max<std::uint64_t>(points_of(store, level), 1);
-  return rounded_cell(std::sqrt(size / static_cast<double>(points)));
+  const std::uint64_t points = std::max<std::uint64_t>(point_count(store, level), 1);
+  return rounded_to_two_digits(std::sqrt(size / static_cast<double>(points)));
 }
 
-std::uint32_t count_of(double cells) {
+std::uint32_t cell_count(double cells) {
   if (!(cells <= kMaxGridCells)) {
     throw UsageError(
         stream::message("{cell} is too small: a side of the raster would have {} cells",
@@ -105,12 +106,12 @@ std::uint32_t count_of(double cells) {
   return static_cast<std::uint32_t>(std::max(1.0, cells));
 }
 
-/// The cells, with borders at multiples of their size, that contain a range.
+/// The cells that cover a range; their borders are multiples of the cell size.
 struct CellRange {
   CellRange(double low, double high, double cell)
       : first(std::floor(low / cell + kRounding)), last(std::ceil(high / cell - kRounding)) {}
 
-  [[nodiscard]] std::uint32_t count() const { return count_of(last - first); }
+  [[nodiscard]] std::uint32_t count() const { return cell_count(last - first); }
 
   /// Tolerance, as a share of a cell, for a range to end at a multiple.
   static constexpr double kRounding = 1e-6;
@@ -122,19 +123,19 @@ struct CellRange {
 RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
                         const Context& context) {
   if (request.cell)
-    throw UsageError(stream::message("{align} also sets the size of cells: leave {cell} out"));
+    throw UsageError(stream::message("{align} sets the cell size: leave {cell} out"));
   need_level(store, request.sampler.level);
   stream::SourceOptions options;
   options.stop = context.stop;
   const stream::SourceInfo info =
       stream::open_source(std::span(&request.align, 1), options)->info();
 
-  const std::array<double, 6>& m = info.world.xy;
+  const std::array<double, 6>& world = info.world.xy;
   if (!info.grid) {
-    throw stream::Error(request.align, "is not a raster, and has no grid to align with")
-        .remedy("name a raster");
+    throw stream::Error(request.align, "is not a raster, so there is no grid to align with")
+        .remedy(stream::message("pass a raster to {align}"));
   }
-  if (m[1] != 0 || m[3] != 0) {
+  if (world[1] != 0 || world[3] != 0) {
     throw stream::Error(request.align, "is rotated, which the output does not support")
         .remedy("align with a raster that is north up");
   }
@@ -143,7 +144,7 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
       CoordinateSystem::of(store.schema().crs, store.path().string());
   if (grid_crs && store_crs && !grid_crs->same_places(*store_crs)) {
     if (request.to && !request.to->to().same_places(*grid_crs)) {
-      throw UsageError(stream::message("{align} uses the CRS of {}, {}: leave {to_crs} out",
+      throw UsageError(stream::message("{align} sets the CRS to that of {}, {}: leave {to_crs} out",
                                        request.align, grid_crs->title()));
     }
     if (!request.to) {
@@ -152,17 +153,22 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
     }
   } else if (request.to) {
     throw UsageError(
-        stream::message("{align} uses the CRS of {}: leave {to_crs} out", request.align));
+        grid_crs ? stream::message("{align} sets the CRS to that of {}: leave {to_crs} out",
+                                   request.align)
+                 : stream::message("the CRS of {} is unknown, so {align} uses the store's: leave "
+                                   "{to_crs} out",
+                                   request.align));
   } else if (grid_crs.has_value() != store_crs.has_value()) {
-    context.say(fmt::format("{}: its grid is read in the CRS of the store, because {} is not known",
-                            request.align, grid_crs ? "that of the store" : "its own"));
+    context.say(fmt::format(
+        "{}: assuming that its grid is in the store's CRS, because the CRS of the {} is unknown",
+        request.align, grid_crs ? "store" : "file"));
   }
-  return {.x = m[2],
-          .y = m[5],
-          .step_x = m[0],
-          .step_y = m[4],
-          .columns = count_of(static_cast<double>(info.columns)),
-          .rows = count_of(static_cast<double>(info.rows))};
+  return {.x = world[2],
+          .y = world[5],
+          .step_x = world[0],
+          .step_y = world[4],
+          .columns = cell_count(static_cast<double>(info.columns)),
+          .rows = cell_count(static_cast<double>(info.rows))};
 }
 
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request) {
@@ -179,34 +185,35 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
     return box;
   };
   const stream::Box3 selected = area_of(store);
-  const stream::Box3 met = within_region(selected);
-  if (store.points() == 0 || !(met.min[0] <= met.max[0] && met.min[1] <= met.max[1])) {
+  const stream::Box3 overlap = within_region(selected);
+  if (store.points() == 0 ||
+      !(overlap.min[0] <= overlap.max[0] && overlap.min[1] <= overlap.max[1])) {
     throw_none_inside(store);
   }
   // With a given cell size, a condition does not change the grid.
-  stream::Box3 box = request.cell ? within_region(area_of(store.whole())) : met;
-  const std::array<double, 6>& m = store.schema().world.xy;
-  const bool straight = m[1] == 0 && m[3] == 0;
+  stream::Box3 box = request.cell ? within_region(area_of(store.whole())) : overlap;
+  const std::array<double, 6>& world = store.schema().world.xy;
+  const bool straight = world[1] == 0 && world[3] == 0;
   RasterGrid grid;
   if (!request.cell && !request.to && store.schema().grid && straight && level == 0) {
     // Use the lattice itself: the samples within the box.
     std::array<double, 2> first{}, last{};
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      const double step = m[4 * axis], origin = axis == 0 ? m[2] : m[5];
+      const double step = world[4 * axis], origin = axis == 0 ? world[2] : world[5];
       const double size =
           static_cast<double>(axis == 0 ? store.schema().columns : store.schema().rows);
       double a = (box.min[axis] - origin) / step, b = (box.max[axis] - origin) / step;
       if (a > b) std::swap(a, b);
-      first[axis] = std::max(0.0, std::ceil(a - 1e-6));
-      last[axis] = std::min(size - 1, std::floor(b + 1e-6));
+      first[axis] = std::max(0.0, std::ceil(a - CellRange::kRounding));
+      last[axis] = std::min(size - 1, std::floor(b + CellRange::kRounding));
       if (first[axis] > last[axis]) throw_none_inside(store);
     }
-    grid.step_x = m[0];
-    grid.step_y = m[4];
-    grid.x = m[2] + m[0] * first[0];
-    grid.y = m[5] + m[4] * first[1];
-    grid.columns = count_of(last[0] - first[0] + 1);
-    grid.rows = count_of(last[1] - first[1] + 1);
+    grid.step_x = world[0];
+    grid.step_y = world[4];
+    grid.x = world[2] + world[0] * first[0];
+    grid.y = world[5] + world[4] * first[1];
+    grid.columns = cell_count(last[0] - first[0] + 1);
+    grid.rows = cell_count(last[1] - first[1] + 1);
     return grid;
   }
   double cell = request.cell.value_or(spacing_of(store, selected, level));
@@ -218,39 +225,42 @@ RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request)
                               {centre[0], centre[1] + cell},
                               {centre[0] - cell, centre[1]},
                               {centre[0], centre[1] - cell}};
-    box = converted(box, *request.to, store);
+    box = converted_box(box, *request.to, store);
     if (!request.cell) {
       request.to->forward(steps);
-      const auto one_way = [&](std::size_t i) {
+      const auto distance_to = [&](std::size_t i) {
         return base::hypot(steps[i][0] - steps[0][0], steps[i][1] - steps[0][1]);
       };
-      const auto length = [&](std::size_t i) {
-        const double forward = one_way(i), backward = one_way(i + 2);
+      // A much larger distance crosses a discontinuity.
+      const auto cell_length = [&](std::size_t i) {
+        const double forward = distance_to(i), backward = distance_to(i + 2);
         return backward < 0.5 * forward ? backward : forward;
       };
-      cell = std::sqrt(length(1) * length(2));
+      cell = std::sqrt(cell_length(1) * cell_length(2));
     }
   }
   if (!(cell > 0) || !std::isfinite(cell)) {
-    throw stream::Error(store.path().string(),
-                        "all points are at one place or on one line, so no cell size follows")
-        .remedy(stream::message("give {cell}"));
+    throw stream::Error(
+        store.path().string(),
+        "the points are all at one position or on one line, so a cell size cannot be "
+        "derived")
+        .remedy(stream::message("pass {cell}"));
   }
   grid.step_x = cell;
   grid.step_y = -cell;
   if (!request.cell) {
     grid.x = box.min[0] + 0.5 * cell;
     grid.y = box.max[1] - 0.5 * cell;
-    grid.columns = count_of(std::ceil((box.max[0] - box.min[0]) / cell - CellRange::kRounding));
-    grid.rows = count_of(std::ceil((box.max[1] - box.min[1]) / cell - CellRange::kRounding));
+    grid.columns = cell_count(std::ceil((box.max[0] - box.min[0]) / cell - CellRange::kRounding));
+    grid.rows = cell_count(std::ceil((box.max[1] - box.min[1]) / cell - CellRange::kRounding));
     return grid;
   }
-  const CellRange across(box.min[0], box.max[0], cell), down(box.min[1], box.max[1], cell);
+  const CellRange columns(box.min[0], box.max[0], cell), rows(box.min[1], box.max[1], cell);
   const DecimalMultiples multiple(cell);
-  grid.x = multiple(across.first + 0.5);
-  grid.y = multiple(down.last - 0.5);
-  grid.columns = across.count();
-  grid.rows = down.count();
+  grid.x = multiple(columns.first + 0.5);
+  grid.y = multiple(rows.last - 0.5);
+  grid.columns = columns.count();
+  grid.rows = rows.count();
   return grid;
 }
 
