@@ -90,11 +90,11 @@ struct CloudWorker {
 
   /// Loads the points in a box and `margin` around it, unless they are loaded. Returns false if
   /// they do not fit.
-  bool load(const StoredBox& inner, double margin, std::size_t max_points, bool may_crowd) {
+  bool load(const StoredBox& inner, double margin, std::size_t max_points, bool allow_crowding) {
     const StoredBox box = inner.widened(margin);
     if (loaded && loaded->min == box.min && loaded->max == box.max) return true;
     loaded.reset();
-    if (!surface.load(box, max_points, may_crowd)) return false;
+    if (!surface.load(box, max_points, allow_crowding)) return false;
     loaded = box;
     return true;
   }

@@ -16,32 +16,32 @@ namespace {
 constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr double kPointsPerCell = 2;
 /// Points are crowded if a point shares its cell with this many on average.
-constexpr double kCrowd = 48;
-/// Up to this many are sorted without extra memory.
+constexpr double kCrowdedNeighbours = 48;
+/// Up to this many points of a cell are sorted without extra memory.
 constexpr std::size_t kFewInCells = 16;
-/// The number of clusters that a thread decodes at a time.
+/// Clusters that a thread decodes at a time.
 constexpr std::uint64_t kClustersAtOnce = 256;
-/// Number of points sorted between two checks for a stop.
-constexpr std::size_t kBetweenChecks = std::size_t{1} << 20;
+/// Points sorted between two checks for a stop.
+constexpr std::size_t kPointsPerCheck = std::size_t{1} << 20;
 
 }  // namespace
 
 void PointCells::clear() {
-  known_ = {{kFar, kFar}, {-kFar, -kFar}};
+  loaded_box_ = {{kFar, kFar}, {-kFar, -kFar}};
   columns_ = rows_ = 1;
-  per_unit_ = {};
-  places_.reset();
+  cells_per_unit_ = {};
+  positions_.reset();
   heights_.reset();
-  begin_.assign(2, 0);
-  sums_.assign(4, 0);
+  cell_begin_.assign(2, 0);
+  prefix_sums_.assign(4, 0);
 }
 
 bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
-                      std::size_t max_points, bool may_crowd) {
+                      std::size_t max_points, bool allow_crowding) {
   clear();
   const stream::Store& store = query.store();
   const stream::Channel& channel = store.schema().coordinates[2];
-  std::vector<Point2> places;
+  std::vector<Point2> positions;
   std::vector<double> heights;
   bool too_many = false;
   query.descend(
@@ -52,12 +52,12 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
       [&](const stream::StoreQuery::Node& node) {
         for (const stream::Point3& p : node.positions) {
           if (!box.contains(flat(p))) continue;
-          places.push_back({p[0], p[1]});
+          positions.push_back({p[0], p[1]});
           heights.push_back(p[2] * channel.scale + channel.offset);
         }
-        too_many = places.size() > max_points;
+        too_many = positions.size() > max_points;
       });
-  return !too_many && (sort(store, box, places, heights, may_crowd, 1) || may_crowd);
+  return !too_many && (sort(store, box, positions, heights, allow_crowding, 1) || allow_crowding);
 }
 
 bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned threads) {
@@ -88,7 +88,7 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
     count += piece.points;
   }
   need_all_points(store, level, count);
-  const auto places = large_array<Point2>(count);
+  const auto positions = large_array<Point2>(count);
   const auto heights = large_array<double>(count);
   parallel_for(pieces.size(), threads, [&](std::size_t i) {
     Piece& piece = pieces[i];
@@ -101,34 +101,34 @@ bool PointCells::load_all(const stream::Store& store, unsigned level, unsigned t
       for (std::size_t m = 0; m < cluster.size(); ++m) {
         if (!cluster.match(m)) continue;
         const stream::Point3& p = cluster.positions[m];
-        places[at] = {p[0], p[1]};
+        positions[at] = {p[0], p[1]};
         heights[at++] = p[2] * channel.scale + channel.offset;
       }
     }
     piece.points = at - piece.begin;
   });
-  // Close the gaps left by points that do not meet a view's condition.
+  // Close the gaps left by points that do not match a view's condition.
   count = 0;
   for (const Piece& piece : pieces) {
     if (count < piece.begin) {
-      std::copy_n(places.get() + piece.begin, piece.points, places.get() + count);
+      std::copy_n(positions.get() + piece.begin, piece.points, positions.get() + count);
       std::copy_n(heights.get() + piece.begin, piece.points, heights.get() + count);
     }
     count += piece.points;
   }
-  return sort(store, flat(store.bounds()), {places.get(), count}, {heights.get(), count}, true,
+  return sort(store, flat(store.bounds()), {positions.get(), count}, {heights.get(), count}, true,
               threads);
 }
 
 bool PointCells::sort(const stream::Store& store, const StoredBox& box,
-                      std::span<const Point2> places, std::span<const double> heights,
-                      bool may_crowd, unsigned threads) {
+                      std::span<const Point2> positions, std::span<const double> heights,
+                      bool allow_crowding, unsigned threads) {
   for (std::size_t k = 0; k < 2; ++k) {
     box_.min[k] = std::max(box.min[k], store.bounds().min[k]);
     box_.max[k] = std::min(box.max[k], store.bounds().max[k]);
   }
   const double width = box_.max[0] - box_.min[0], height = box_.max[1] - box_.min[1];
-  const double cells = std::max(1.0, static_cast<double>(places.size()) / kPointsPerCell);
+  const double cells = std::max(1.0, static_cast<double>(positions.size()) / kPointsPerCell);
   // Choose the number of columns that makes the cells square.
   if (width > 0) {
     const double columns = height > 0 ? std::sqrt(cells) * std::sqrt(width / height) : cells;
@@ -137,71 +137,71 @@ bool PointCells::sort(const stream::Store& store, const StoredBox& box,
   if (height > 0) rows_ = std::max(static_cast<std::uint32_t>(cells) / columns_, 1U);
   for (std::size_t k = 0; k < 2; ++k) {
     const double size = box_.max[k] - box_.min[k], count = k == 0 ? columns_ : rows_;
-    per_unit_[k] = size > 0 ? count / size : 0.0;
+    cells_per_unit_[k] = size > 0 ? count / size : 0.0;
     // A box too small to distinguish its cells gets one cell.
-    if (!(per_unit_[k] < kFar)) per_unit_[k] = 0.0;
+    if (!(cells_per_unit_[k] < kFar)) cells_per_unit_[k] = 0.0;
     cell_size_[k] = size / count;
   }
 
-  begin_.assign(std::size_t{columns_} * rows_ + 1, 0);
-  // Each thread scans all places and handles those in its band, in order.
-  const auto in_bands = [&](const auto& take) {
+  cell_begin_.assign(std::size_t{columns_} * rows_ + 1, 0);
+  // Each thread scans all positions and handles those in its band, in order.
+  const auto in_bands = [&](const auto& handle) {
     const std::uint32_t bands = std::clamp(threads, 1U, rows_);
     parallel_for(bands, threads, [&](std::size_t band) {
       const auto from = static_cast<std::uint32_t>(std::uint64_t{rows_} * band / bands);
       const auto to = static_cast<std::uint32_t>(std::uint64_t{rows_} * (band + 1) / bands);
-      for (std::size_t i = 0; i < places.size(); ++i) {
-        if (i % kBetweenChecks == 0) store.check_stop();
-        const std::uint32_t row = index(1, places[i][1], rows_);
-        if (row >= from && row < to) take(cell(places[i]), i);
+      for (std::size_t i = 0; i < positions.size(); ++i) {
+        if (i % kPointsPerCheck == 0) store.check_stop();
+        const std::uint32_t row = index(1, positions[i][1], rows_);
+        if (row >= from && row < to) handle(cell(positions[i]), i);
       }
     });
   };
-  in_bands([&](std::size_t at, std::size_t) { ++begin_[at + 1]; });
+  in_bands([&](std::size_t at, std::size_t) { ++cell_begin_[at + 1]; });
   double shared = 0;
-  for (const std::uint32_t count : begin_) shared += static_cast<double>(count) * count;
-  const bool crowds = shared > kCrowd * static_cast<double>(places.size());
-  if (crowds && !may_crowd) {
+  for (const std::uint32_t count : cell_begin_) shared += static_cast<double>(count) * count;
+  const bool is_crowded = shared > kCrowdedNeighbours * static_cast<double>(positions.size());
+  if (is_crowded && !allow_crowding) {
     clear();
     return false;
   }
-  std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
-  places_ = large_array<Point2>(places.size());
-  heights_ = large_array<double>(places.size());
-  // Advances begin_[c] from the cell's begin to its end, which is where the next one begins.
+  std::partial_sum(cell_begin_.begin(), cell_begin_.end(), cell_begin_.begin());
+  positions_ = large_array<Point2>(positions.size());
+  heights_ = large_array<double>(positions.size());
+  // Advances cell_begin_[c] from the cell's begin to its end, which is where the next one begins.
   in_bands([&](std::size_t at, std::size_t i) {
-    places_[begin_[at]] = places[i];
-    heights_[begin_[at]++] = heights[i];
+    positions_[cell_begin_[at]] = positions[i];
+    heights_[cell_begin_[at]++] = heights[i];
   });
-  std::copy_backward(begin_.begin(), begin_.end() - 2, begin_.end() - 1);
-  begin_.front() = 0;
+  std::copy_backward(cell_begin_.begin(), cell_begin_.end() - 2, cell_begin_.end() - 1);
+  cell_begin_.front() = 0;
   drop_duplicates();
   const std::size_t side = std::size_t{columns_} + 1;
-  sums_.assign(side * (std::size_t{rows_} + 1), 0);
+  prefix_sums_.assign(side * (std::size_t{rows_} + 1), 0);
   for (std::size_t row = 0; row < rows_; ++row) {
     const std::size_t first = row * columns_;
     for (std::size_t column = 1; column < side; ++column) {
-      sums_[(row + 1) * side + column] =
-          sums_[row * side + column] + begin_[first + column] - begin_[first];
+      prefix_sums_[(row + 1) * side + column] =
+          prefix_sums_[row * side + column] + cell_begin_[first + column] - cell_begin_[first];
     }
   }
 
   for (std::size_t k = 0; k < 2; ++k) {
-    known_.min[k] = box.min[k] <= store.bounds().min[k] ? -kFar : box.min[k];
-    known_.max[k] = box.max[k] >= store.bounds().max[k] ? kFar : box.max[k];
+    loaded_box_.min[k] = box.min[k] <= store.bounds().min[k] ? -kFar : box.min[k];
+    loaded_box_.max[k] = box.max[k] >= store.bounds().max[k] ? kFar : box.max[k];
   }
-  return !crowds;
+  return !is_crowded;
 }
 
 void PointCells::drop_duplicates() {
   std::vector<std::pair<Point2, double>> sorted;
   std::uint32_t kept = 0, first = 0;
-  for (std::size_t c = 0; c + 1 < begin_.size(); ++c) {
-    const std::uint32_t end = begin_[c + 1];
-    begin_[c] = kept;
+  for (std::size_t c = 0; c + 1 < cell_begin_.size(); ++c) {
+    const std::uint32_t end = cell_begin_[c + 1];
+    cell_begin_[c] = kept;
     if (end - first > 1) {
       sorted.clear();
-      for (std::uint32_t i = first; i < end; ++i) sorted.emplace_back(places_[i], heights_[i]);
+      for (std::uint32_t i = first; i < end; ++i) sorted.emplace_back(positions_[i], heights_[i]);
       // A stable sort keeps the first of equal points first.
       const auto less = [](const auto& a, const auto& b) { return a.first < b.first; };
       if (sorted.size() > kFewInCells) {
@@ -213,16 +213,16 @@ void PointCells::drop_duplicates() {
       }
       for (std::size_t i = 0; i < sorted.size(); ++i) {
         if (i > 0 && sorted[i].first == sorted[i - 1].first) continue;
-        places_[kept] = sorted[i].first;
+        positions_[kept] = sorted[i].first;
         heights_[kept++] = sorted[i].second;
       }
     } else if (end > first) {
-      places_[kept] = places_[first];
+      positions_[kept] = positions_[first];
       heights_[kept++] = heights_[first];
     }
     first = end;
   }
-  begin_.back() = kept;
+  cell_begin_.back() = kept;
 }
 
 StoredBox PointCells::box_of(const Range& range) const {
@@ -243,8 +243,8 @@ StoredBox PointCells::box_of(const Range& range) const {
 
 double PointCells::height(const Point2& point) const {
   const std::size_t c = cell(point);
-  for (std::uint32_t i = begin_[c]; i < begin_[c + 1]; ++i) {
-    if (places_[i] == point) return heights_[i];
+  for (std::uint32_t i = cell_begin_[c]; i < cell_begin_[c + 1]; ++i) {
+    if (positions_[i] == point) return heights_[i];
   }
   return std::numeric_limits<double>::quiet_NaN();
 }

@@ -20,8 +20,8 @@
 
 namespace terrace::terrain {
 
-/// The points in a box of a store, sorted into the cells of a grid. Of points at one x and y, keeps
-/// the first in the order of StoreWindow::points().
+/// The points in a box of a store, sorted into the cells of a grid. Of points with the same x and
+/// y, keeps the first of StoreWindow::points().
 class PointCells {
  public:
   /// Peak memory in bytes per point.
@@ -29,27 +29,29 @@ class PointCells {
 
   /// Loads the points of `level` and above in the box, replacing the contents. Returns false, with
   /// no contents, if there are more than max_points, or if they are crowded into few cells and
-  /// `may_crowd` is not set. 60 ns per point. Throws: stream::Error on a damaged store,
-  /// stream::Stopped.
+  /// `allow_crowding` is not set. Takes about 60 ns per point. Throws: stream::Error on a damaged
+  /// store, stream::Stopped.
   bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box, std::size_t max_points,
-            bool may_crowd);
+            bool allow_crowding);
   /// Loads all points of a store with several threads. Each thread decodes consecutive clusters,
   /// then sorts a band of rows. Returns false if the points are crowded, but keeps them. Throws: as
   /// above.
   bool load_all(const stream::Store& store, unsigned level, unsigned threads);
   void clear();
 
-  /// The box in which all points are known; infinite in directions where the store has no more
-  /// points.
-  [[nodiscard]] const StoredBox& known() const { return known_; }
-  [[nodiscard]] bool knows(const Point2& place) const { return known_.contains(place); }
-  /// Whether all points in a box are known.
-  [[nodiscard]] bool knows(const StoredBox& box) const { return known_.covers(box); }
-  /// Returns the height of a known point, in the store's vertical unit.
+  /// Whether all points at a position are loaded.
+  [[nodiscard]] bool covers(const Point2& position) const { return loaded_box_.contains(position); }
+  /// Whether all points in a box are loaded.
+  [[nodiscard]] bool covers(const StoredBox& box) const { return loaded_box_.covers(box); }
+  /// Returns the height of a loaded point, in the store's vertical unit.
   [[nodiscard]] double height(const Point2& point) const;
-  /// All points ordered by cells, and their heights.
-  [[nodiscard]] std::span<const Point2> places() const { return {places_.get(), begin_.back()}; }
-  [[nodiscard]] std::span<const double> heights() const { return {heights_.get(), begin_.back()}; }
+  /// The points, sorted by cell, and their heights.
+  [[nodiscard]] std::span<const Point2> positions() const {
+    return {positions_.get(), cell_begin_.back()};
+  }
+  [[nodiscard]] std::span<const double> heights() const {
+    return {heights_.get(), cell_begin_.back()};
+  }
 
   /// A rectangle of cells of the grid.
   struct Range {
@@ -62,61 +64,63 @@ class PointCells {
              other.end_row <= end_row;
     }
   };
-  /// Returns the cells that contain all points in a box, since index() is ascending.
+  /// Returns the cells that contain all points in a box (index() is monotonic).
   [[nodiscard]] Range cells_of(const StoredBox& box) const {
     return {index(0, box.min[0], columns_), index(1, box.min[1], rows_),
             index(0, box.max[0], columns_) + 1, index(1, box.max[1], rows_) + 1};
   }
-  /// Returns the cell of a place and the cells up to `reach` around it.
-  [[nodiscard]] Range near(const Point2& place, std::uint32_t reach) const {
-    const Range at = cells_of({place, place});
-    return {at.column - std::min(at.column, reach), at.row - std::min(at.row, reach),
-            std::min(at.end_column + reach, columns_), std::min(at.end_row + reach, rows_)};
+  /// Returns the cell of a position and all cells up to `radius` columns and rows away.
+  [[nodiscard]] Range neighbourhood(const Point2& position, std::uint32_t radius) const {
+    const Range centre = cells_of({position, position});
+    return {
+        centre.column - std::min(centre.column, radius), centre.row - std::min(centre.row, radius),
+        std::min(centre.end_column + radius, columns_), std::min(centre.end_row + radius, rows_)};
   }
-  /// True if the box covers few more cells than near(), or near() covers them all.
-  [[nodiscard]] bool is_near(const StoredBox& box, std::uint32_t reach) const {
-    const std::size_t side = 2 * std::size_t{reach} + 1;
-    return cells_of(box).count() <= 2 * side * side || (reach >= columns_ && reach >= rows_);
+  /// Whether a box covers few more cells than a neighbourhood of this radius, or any such
+  /// neighbourhood has all cells.
+  [[nodiscard]] bool is_small_or_all(const StoredBox& box, std::uint32_t radius) const {
+    const std::size_t side = 2 * std::size_t{radius} + 1;
+    return cells_of(box).count() <= 2 * side * side || (radius >= columns_ && radius >= rows_);
   }
-  /// Calls visit(i) for each places()[i] in these cells.
+  /// Calls visit(i) for each positions()[i] in these cells.
   template <class Visit>
   void visit_indices(const Range& range, const Visit& visit) const {
     for (std::uint32_t row = range.row; row < range.end_row; ++row) {
       const std::size_t first = std::size_t{row} * columns_;
-      const std::uint32_t end = begin_[first + range.end_column];
-      for (std::uint32_t i = begin_[first + range.column]; i < end; ++i) visit(i);
+      const std::uint32_t end = cell_begin_[first + range.end_column];
+      for (std::uint32_t i = cell_begin_[first + range.column]; i < end; ++i) visit(i);
     }
   }
+  /// Calls visit(point) for each point in these cells.
   template <class Visit>
-  void visit_cells(const Range& range, const Visit& visit) const {
-    visit_indices(range, [&](std::uint32_t i) { visit(places_[i]); });
+  void visit_points(const Range& range, const Visit& visit) const {
+    visit_indices(range, [&](std::uint32_t i) { visit(positions_[i]); });
   }
-  /// As above, except for cells in `without`.
+  /// Calls visit(point) for each point in these cells, except for cells in `excluded`.
   template <class Visit>
-  void visit_cells(const Range& range, const Range& without, const Visit& visit) const {
+  void visit_points(const Range& range, const Range& excluded, const Visit& visit) const {
     for (std::uint32_t row = range.row; row < range.end_row; ++row) {
       const auto visit_part = [&](std::uint32_t column, std::uint32_t end_column) {
-        if (column < end_column) visit_cells({column, row, end_column, row + 1}, visit);
+        if (column < end_column) visit_points({column, row, end_column, row + 1}, visit);
       };
-      if (row < without.row || row >= without.end_row) {
+      if (row < excluded.row || row >= excluded.end_row) {
         visit_part(range.column, range.end_column);
       } else {
-        visit_part(range.column, std::min(range.end_column, without.column));
-        visit_part(std::max(range.column, without.end_column), range.end_column);
+        visit_part(range.column, std::min(range.end_column, excluded.column));
+        visit_part(std::max(range.column, excluded.end_column), range.end_column);
       }
     }
   }
-  /// Calls visit(point) for all points in the cover, which may shrink meanwhile, and for some
-  /// others, roughly in order of distance from a place. Empty cells cost nothing, however many.
+  /// Calls visit(point) for all points in the cover and for some others, roughly by distance from
+  /// `near`. The visitor may shrink the cover. Skips empty cells quickly.
   template <class Visit>
-  void in(const CircleCover& cover, const Point2& from, const Visit& visit) const {
+  void visit_cover(const CircleCover& cover, const Point2& near, const Visit& visit) const {
     const Range range = cells_of(cover.bounds());
-    // Visit a small number of cells without testing them.
-    constexpr std::size_t kFewCells = 36;
-    if (range.count() <= kFewCells) {
-      visit_cells(range, visit);
+    constexpr std::size_t kMaxUntestedCells = 36;
+    if (range.count() <= kMaxUntestedCells) {
+      visit_points(range, visit);
     } else {
-      visit_meeting(range, cover, cells_of({from, from}), visit);
+      visit_halves(range, cover, cells_of({near, near}), visit);
     }
   }
   /// The width and height of a cell.
@@ -124,60 +128,65 @@ class PointCells {
 
  private:
   [[nodiscard]] std::uint32_t index(std::size_t axis, double stored, std::uint32_t count) const {
-    const double at = (stored - box_.min[axis]) * per_unit_[axis];
-    // `!(at > 0)` is also true for NaN.
-    if (!(at > 0)) return 0;
-    return at < count ? static_cast<std::uint32_t>(at) : count - 1;
+    const double cells = (stored - box_.min[axis]) * cells_per_unit_[axis];
+    // `!(cells > 0)` is also true for NaN.
+    if (!(cells > 0)) return 0;
+    return cells < count ? static_cast<std::uint32_t>(cells) : count - 1;
   }
-  [[nodiscard]] std::size_t cell(const Point2& place) const {
-    return std::size_t{index(1, place[1], rows_)} * columns_ + index(0, place[0], columns_);
+  [[nodiscard]] std::size_t cell(const Point2& position) const {
+    return std::size_t{index(1, position[1], rows_)} * columns_ + index(0, position[0], columns_);
   }
-  /// Returns a box around the points in a range of cells.
+  /// Returns a box that contains the points in a range of cells.
   [[nodiscard]] StoredBox box_of(const Range& range) const;
-  /// Sorts points of the box, given in the order of StoreWindow::points(). Returns false if they
-  /// are crowded; then they are kept only if `may_crowd` is set.
-  bool sort(const stream::Store& store, const StoredBox& box, std::span<const Point2> places,
-            std::span<const double> heights, bool may_crowd, unsigned threads);
+  /// Sorts points of the box, in the order of StoreWindow::points(), into the cells. Returns false
+  /// if they are crowded. Keeps crowded points only if `allow_crowding` is set.
+  bool sort(const stream::Store& store, const StoredBox& box, std::span<const Point2> positions,
+            std::span<const double> heights, bool allow_crowding, unsigned threads);
   void drop_duplicates();
 
   /// Whether a range of cells contains a point.
   [[nodiscard]] bool has_points(const Range& range) const {
     const std::size_t side = std::size_t{columns_} + 1;
     const auto sum = [&](std::uint32_t column, std::uint32_t row) {
-      return sums_[row * side + column];
+      return prefix_sums_[row * side + column];
     };
     return sum(range.end_column, range.end_row) - sum(range.column, range.end_row) -
                sum(range.end_column, range.row) + sum(range.column, range.row) !=
            0;
   }
+  /// Visits the points of a range that overlaps the cover, the half closer to the cell `near`
+  /// first.
   template <class Visit>
-  void visit_meeting(const Range& range, const CircleCover& cover, const Range& from,
-                     const Visit& visit) const {
+  void visit_halves(const Range& range, const CircleCover& cover, const Range& near,
+                    const Visit& visit) const {
     if (!has_points(range) || !cover.meets(box_of(range))) return;
-    constexpr std::size_t kFewCells = 4;
-    if (range.count() <= kFewCells) return visit_cells(range, visit);
-    Range near = range, far = range;
-    bool is_first_near;
+    constexpr std::size_t kLeafCells = 4;
+    if (range.count() <= kLeafCells) return visit_points(range, visit);
+    Range first = range, second = range;
+    bool is_first_closer;
     if (range.end_column - range.column >= range.end_row - range.row) {
-      near.end_column = far.column = range.column + (range.end_column - range.column) / 2;
-      is_first_near = from.column < far.column;
+      first.end_column = second.column = range.column + (range.end_column - range.column) / 2;
+      is_first_closer = near.column < second.column;
     } else {
-      near.end_row = far.row = range.row + (range.end_row - range.row) / 2;
-      is_first_near = from.row < far.row;
+      first.end_row = second.row = range.row + (range.end_row - range.row) / 2;
+      is_first_closer = near.row < second.row;
     }
-    if (!is_first_near) std::swap(near, far);
-    visit_meeting(near, cover, from, visit);
-    visit_meeting(far, cover, from, visit);
+    if (!is_first_closer) std::swap(first, second);
+    visit_halves(first, cover, near, visit);
+    visit_halves(second, cover, near, visit);
   }
 
-  StoredBox box_{}, known_{};
-  std::array<double, 2> per_unit_{}, cell_size_{};
+  StoredBox box_{};
+  /// The box whose points are all loaded. It is infinite where the store has no further points.
+  StoredBox loaded_box_{};
+  std::array<double, 2> cells_per_unit_{}, cell_size_{};
   std::uint32_t columns_ = 1, rows_ = 1;
-  LargeArray<Point2> places_;         ///< by cells, row by row
-  LargeArray<double> heights_;        ///< of places_
-  std::vector<std::uint32_t> begin_;  ///< indices in places_ by cell; last, the number of places
+  LargeArray<Point2> positions_;  ///< by cell, row by row
+  LargeArray<double> heights_;    ///< of positions_
+  /// Index in positions_ of the first point of each cell, then the number of points.
+  std::vector<std::uint32_t> cell_begin_;
   /// Number of points in the cells left of and above each corner of the grid, row by row.
-  std::vector<std::uint32_t> sums_;
+  std::vector<std::uint32_t> prefix_sums_;
 };
 
 }  // namespace terrace::terrain

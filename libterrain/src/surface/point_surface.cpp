@@ -74,9 +74,9 @@ PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t me
   loaded_.clear();
 }
 
-bool PointSurface::load(const StoredBox& box, std::size_t max_points, bool may_crowd) {
+bool PointSurface::load(const StoredBox& box, std::size_t max_points, bool allow_crowding) {
   cells_ = &loaded_;
-  return loaded_.load(query_, cloud_.level, box, max_points, may_crowd);
+  return loaded_.load(query_, cloud_.level, box, max_points, allow_crowding);
 }
 
 int PointSurface::side_of(const Point2& a, const Point2& b, const Target& target) {
@@ -117,7 +117,7 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
         ++looks;
         const StoredBox box = flat(whole);
         // A box that is a single place adds nothing, because its head is known.
-        if (box.min == box.max || cells_->knows(box)) return kFarAway;
+        if (box.min == box.max || cells_->covers(box)) return kFarAway;
         const auto meets = [&](const CircleCover& cover) { return cover.meets(box); };
         return std::any_of(covers.begin(), covers.end(), meets) ? least_square(box, from)
                                                                 : kFarAway;
@@ -126,7 +126,7 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
         looks += node.positions.size();
         for (const stream::Point3& p : node.positions) {
           const Point2 place{p[0], p[1]};
-          if (!cells_->knows(place)) visit(place);
+          if (!cells_->covers(place)) visit(place);
         }
         return greatest_square(bounds_of(covers), from);
       });
@@ -174,26 +174,26 @@ void PointSurface::find_triangle(const Target& target) {
   for (std::uint32_t reach = 1;; reach *= 2) {
     do {
       changed = false;
-      cells_->visit_cells(cells_->near(target.place, reach), offer);
+      cells_->visit_points(cells_->neighbourhood(target.place, reach), offer);
     } while (changed);
-    if (reach >= kFarthest || cells_->is_near(cover.bounds(), reach)) break;
+    if (reach >= kFarthest || cells_->is_small_or_all(cover.bounds(), reach)) break;
   }
-  if (!cells_->knows(cover.bounds()) && knows_border()) {
+  if (!cells_->covers(cover.bounds()) && knows_border()) {
     const double reach = cloud_.voids.reach({target.place, target.place});
     const CircleCover near = disk(target.place, reach * reach);
     do {
       changed = false;
       cloud_.voids.for_each_around(target.place, offer);
-      cells_->in(near, target.place, offer);
-      if (!cells_->knows(near.bounds())) read_in({&near, 1}, target.place, offer);
+      cells_->visit_cover(near, target.place, offer);
+      if (!cells_->covers(near.bounds())) read_in({&near, 1}, target.place, offer);
     } while (changed);
     triangle_ = t;
     return;
   }
   do {
     changed = false;
-    cells_->in(cover, target.place, offer);
-    if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, target.place, offer);
+    cells_->visit_cover(cover, target.place, offer);
+    if (!cells_->covers(cover.bounds())) read_in({&cover, 1}, target.place, offer);
   } while (changed);
   triangle_ = t;
 }
@@ -207,7 +207,7 @@ void PointSurface::narrow_first(const Point2& centre) {
   const Point2 neighbour = star_.neighbour(first);
   Point2 next = star_.next_neighbour(first);
   CircleCover cover = star_.circle(first);
-  cells_->in(cover, centre, [&](const Point2& p) {
+  cells_->visit_cover(cover, centre, [&](const Point2& p) {
     if (!cover.meets(StoredBox{p, p}) || p == centre || p == neighbour || p == next) return;
     if (!(tri::orientation(centre, neighbour, p) > 0)) return;
     if (!tri::inside_circle(centre, neighbour, next, p)) return;
@@ -248,8 +248,8 @@ void PointSurface::find_star(const Point2& centre) {
     limit = greatest_square(bounds_of(covers_), centre);
   };
   for (std::uint32_t reach = 1;; reach *= 2) {
-    range_needed = cells_->near(centre, reach);
-    cells_->visit_cells(range_needed, visited, offer);
+    range_needed = cells_->neighbourhood(centre, reach);
+    cells_->visit_points(range_needed, visited, offer);
     visited = range_needed;
     if (reach >= kFarthest) break;
     if (!star_.is_closed()) continue;
@@ -270,17 +270,17 @@ void PointSurface::find_star(const Point2& centre) {
       }
       // The circles of new triangles are inside those of the old ones.
       if (range_needed.count() <= cells) {
-        cells_->visit_cells(range_needed, visited, offer);
+        cells_->visit_points(range_needed, visited, offer);
         visited = range_needed;
       } else {
-        for (const CircleCover& cover : covers_) cells_->in(cover, centre, offer);
+        for (const CircleCover& cover : covers_) cells_->visit_cover(cover, centre, offer);
       }
     }
     for (std::size_t i = 0; i < star_.triangles(); ++i) {
       if (star_.mark(i) == kAll) continue;
       star_.set_mark(i, kAll);
       const CircleCover cover = star_.circle(i);
-      if (!cells_->knows(cover.bounds())) covers_.push_back(cover);
+      if (!cells_->covers(cover.bounds())) covers_.push_back(cover);
     }
     if (covers_.empty()) return;
     if (knows_border()) {
@@ -288,8 +288,8 @@ void PointSurface::find_star(const Point2& centre) {
       const CircleCover near = disk(centre, reach * reach);
       limit = kFarAway;
       cloud_.voids.for_each_around(centre, offer);
-      cells_->in(near, centre, offer);
-      if (!cells_->knows(near.bounds())) read_in({&near, 1}, centre, offer);
+      cells_->visit_cover(near, centre, offer);
+      if (!cells_->covers(near.bounds())) read_in({&near, 1}, centre, offer);
       return;
     }
     limit = greatest_square(bounds_of(covers_), centre);
@@ -301,7 +301,7 @@ double PointSurface::height(const Point2& point) {
   const std::hash<double> hash;
   SurfaceCorner& kept = corners_[(31 * hash(point[0]) + hash(point[1])) % corners_.size()];
   if (kept.place == point && !std::isnan(kept.height)) return kept.height;
-  kept = {point, cells_->knows(point) ? cells_->height(point) : read_height(point)};
+  kept = {point, cells_->covers(point) ? cells_->height(point) : read_height(point)};
   return kept.height;
 }
 
@@ -361,8 +361,8 @@ void PointSurface::find_on_line(const Point2& place) {
     if (place <= p && p < after) after = p;
     cover = cover_now();
   };
-  cells_->in(cover, place, offer);
-  if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, place, offer);
+  cells_->visit_cover(cover, place, offer);
+  if (!cells_->covers(cover.bounds())) read_in({&cover, 1}, place, offer);
   points_.push_back(before);
   if (after != before) points_.push_back(after);
 }
@@ -459,14 +459,14 @@ Point2 PointSurface::nearest(const Point2& place) {
     bound = square * (1 + kDoubt);
   };
   for (std::uint32_t reach = 1;; reach *= 2) {
-    cells_->visit_cells(cells_->near(place, reach), offer);
-    if (found && cells_->is_near(disk(place, bound).bounds(), reach)) break;
+    cells_->visit_points(cells_->neighbourhood(place, reach), offer);
+    if (found && cells_->is_small_or_all(disk(place, bound).bounds(), reach)) break;
     if (found || reach < kFarthest) continue;
     for (const Point2& corner : cloud_.hull.corners()) offer(corner);
   }
   const CircleCover cover = disk(place, bound);
-  cells_->in(cover, place, offer);
-  if (!cells_->knows(cover.bounds())) read_in({&cover, 1}, place, offer);
+  cells_->visit_cover(cover, place, offer);
+  if (!cells_->covers(cover.bounds())) read_in({&cover, 1}, place, offer);
   return best;
 }
 

@@ -50,7 +50,7 @@ class PointSurface {
   PointSurface& operator=(const PointSurface&) = delete;
 
   /// See PointCells::load().
-  bool load(const StoredBox& box, std::size_t max_points, bool may_crowd);
+  bool load(const StoredBox& box, std::size_t max_points, bool allow_crowding);
   /// Uses the points of these cells from now on; they must outlive this object.
   void share(const PointCells& cells) { cells_ = &cells; }
 

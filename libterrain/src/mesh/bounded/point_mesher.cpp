@@ -226,7 +226,7 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
       [&](unsigned, std::size_t i) { return mesher.mesh(i); },
       [&](std::size_t i, const BoundedWindow&) {
         for (const std::uint32_t side : plan.windows[i].sides) {
-          if (plan.sides[side].last() == i) sides.drop(side);
+          if (plan.sides[side].last_window() == i) sides.drop(side);
         }
       });
 }

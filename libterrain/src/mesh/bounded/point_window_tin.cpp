@@ -289,17 +289,19 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
     const PointMeshPlan::Side& side = plan.sides[window.sides[i]];
     for (std::uint32_t k = 0; k < sides[i]->size(); ++k) {
       const SideVertex& v = (*sides[i])[k];
-      const bool is_knot = k == 0 || k + 1 == sides[i]->size();
-      const std::uint32_t knot = side.knots[k == 0 ? 0 : 1];
-      // Knots are numbered first, then the vertices of one side after another.
+      const bool is_junction = k == 0 || k + 1 == sides[i]->size();
+      const std::uint32_t junction = side.junctions[k == 0 ? 0 : 1];
+      // Junctions are numbered first, then the vertices of one side after another.
       const SharedVertex shared =
-          is_knot ? SharedVertex{0, knot, plan.knots[knot].last}
-                  : SharedVertex{0, std::uint64_t{window.sides[i] + 1} << 32 | k, side.last()};
-      const Point2 place = side.axis == 0 ? Point2{side.line, v.at} : Point2{v.at, side.line};
+          is_junction
+              ? SharedVertex{0, junction, plan.junctions[junction].last_window}
+              : SharedVertex{0, std::uint64_t{window.sides[i] + 1} << 32 | k, side.last_window()};
+      const Point2 place =
+          side.axis == 0 ? Point2{side.coordinate, v.at} : Point2{v.at, side.coordinate};
       vertices.try_emplace(place, Vertex{v.height, shared, {}});
     }
   }
-  for (const Point2& corner : window.corners) vertices.try_emplace(corner);
+  for (const Point2& corner : window.hull_corners) vertices.try_emplace(corner);
 
   std::vector<Point2> places;
   for (const auto& [place, vertex] : vertices) places.push_back(place);

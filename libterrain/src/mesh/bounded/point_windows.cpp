@@ -16,12 +16,12 @@
 namespace terrace::terrain {
 namespace {
 
-using Together = std::function<bool(std::uint32_t first, std::uint32_t cells)>;
+using Merge = std::function<bool(std::uint32_t first, std::uint32_t cells)>;
 
 class Planner {
  public:
-  Planner(const PointMeshCuts& cuts, std::span<const Point2> hull, const Together& together)
-      : tree_(cuts), hull_(hull), together_(together) {}
+  Planner(const PointMeshCuts& cuts, std::span<const Point2> hull, const Merge& merge)
+      : tree_(cuts), hull_(hull), merge_(merge) {}
 
   PointMeshPlan make() {
     Part root;
@@ -35,7 +35,7 @@ class Planner {
   struct Cut {
     unsigned axis = 0;
     double line = 0.0;
-    std::map<double, std::uint32_t> knots;  ///< by their position along the line
+    std::map<double, std::uint32_t> junctions;  ///< by their position along the line
   };
   /// The cuts at the lower and the upper border, per axis.
   using Borders = std::array<std::array<std::uint32_t, 2>, 2>;
@@ -52,7 +52,7 @@ class Planner {
 
   const PointMeshCuts& tree_;
   std::span<const Point2> hull_;
-  const Together& together_;
+  const Merge& merge_;
   std::vector<Cut> cuts_;
   std::vector<Borders> window_cuts_;
   PointMeshPlan plan_;
@@ -61,7 +61,7 @@ class Planner {
 void Planner::divide(std::uint32_t at, Part part) {
   if (at >= PointMeshCuts::kCell) return add_window(at - PointMeshCuts::kCell, 1, std::move(part));
   const PointMeshCuts::Node& node = tree_.nodes[at];
-  if (together_(node.first_cell, node.cells)) {
+  if (merge_(node.first_cell, node.cells)) {
     return add_window(node.first_cell, node.cells, std::move(part));
   }
   const std::uint32_t cut = add_cut(part, node.axis, node.line);
@@ -77,7 +77,7 @@ void Planner::divide(std::uint32_t at, Part part) {
 
 std::uint32_t Planner::add_cut(const Part& part, unsigned axis, double line) {
   const auto number = static_cast<std::uint32_t>(cuts_.size());
-  Cut cut{.axis = axis, .line = line, .knots = {}};
+  Cut cut{.axis = axis, .line = line, .junctions = {}};
   const unsigned along = 1 - axis;
   const auto ends = crossings(hull_, axis, line);
   for (const unsigned upper : {0U, 1U}) {
@@ -85,18 +85,18 @@ std::uint32_t Planner::add_cut(const Part& part, unsigned axis, double line) {
     const std::uint32_t ancestor = part.cuts[along][upper];
     const double crossing = (*ends)[upper];
     const auto at = [&](double t) { return along == 0 ? Point2{t, line} : Point2{line, t}; };
-    // They meet at the border if rounding does not put it beyond the crossing.
+    // The line ends at the ancestor unless rounding puts that beyond the hull.
     const bool meets =
         ancestor != kNoNumber && (upper != 0 ? border <= crossing : border >= crossing);
-    const Point2 place = at(meets ? border : crossing);
+    const Point2 position = at(meets ? border : crossing);
     if (meets) {
-      const auto [known, fresh] =
-          cuts_[ancestor].knots.try_emplace(line, static_cast<std::uint32_t>(plan_.knots.size()));
-      if (fresh) plan_.knots.push_back({place, false, 0});
-      cut.knots[border] = known->second;
+      const auto [entry, is_new] = cuts_[ancestor].junctions.try_emplace(
+          line, static_cast<std::uint32_t>(plan_.junctions.size()));
+      if (is_new) plan_.junctions.push_back({position, false, 0});
+      cut.junctions[border] = entry->second;
     } else {
-      cut.knots[crossing] = static_cast<std::uint32_t>(plan_.knots.size());
-      plan_.knots.push_back({place, true, 0});
+      cut.junctions[crossing] = static_cast<std::uint32_t>(plan_.junctions.size());
+      plan_.junctions.push_back({position, true, 0});
     }
   }
   cuts_.push_back(std::move(cut));
@@ -114,13 +114,13 @@ void Planner::add_window(std::uint32_t first, std::uint32_t cells, Part part) {
     window.spacing += cell.spacing * cell.samples;
   }
   window.spacing /= window.samples;
-  window.corners = std::move(part.corners);
+  window.hull_corners = std::move(part.corners);
   plan_.windows.push_back(std::move(window));
   window_cuts_.push_back(part.cuts);
 }
 
 void Planner::add_sides() {
-  std::map<std::array<std::uint32_t, 2>, std::uint32_t> by_knots;
+  std::map<std::array<std::uint32_t, 2>, std::uint32_t> by_junctions;
   for (std::uint32_t w = 0; w < plan_.windows.size(); ++w) {
     PointMeshPlan::Window& window = plan_.windows[w];
     for (const unsigned axis : {0U, 1U}) {
@@ -128,34 +128,37 @@ void Planner::add_sides() {
         const std::uint32_t number = window_cuts_[w][axis][upper];
         if (number == kNoNumber) continue;
         const Cut& cut = cuts_[number];
-        auto knot = cut.knots.lower_bound(window.box.min[1 - axis]);
-        for (; knot != cut.knots.end(); ++knot) {
-          const auto next = std::next(knot);
-          if (next == cut.knots.end() || next->first > window.box.max[1 - axis]) break;
-          const std::array<std::uint32_t, 2> ends{knot->second, next->second};
-          const auto [known, fresh] =
-              by_knots.try_emplace(ends, static_cast<std::uint32_t>(plan_.sides.size()));
-          if (fresh) {
-            plan_.sides.push_back(
-                {.axis = axis, .line = cut.line, .knots = ends, .windows = {kNoNumber, kNoNumber}});
+        auto junction = cut.junctions.lower_bound(window.box.min[1 - axis]);
+        for (; junction != cut.junctions.end(); ++junction) {
+          const auto next = std::next(junction);
+          if (next == cut.junctions.end() || next->first > window.box.max[1 - axis]) break;
+          const std::array<std::uint32_t, 2> ends{junction->second, next->second};
+          const auto [entry, is_new] =
+              by_junctions.try_emplace(ends, static_cast<std::uint32_t>(plan_.sides.size()));
+          if (is_new) {
+            plan_.sides.push_back({.axis = axis,
+                                   .coordinate = cut.line,
+                                   .junctions = ends,
+                                   .windows = {kNoNumber, kNoNumber}});
           }
-          plan_.sides[known->second].windows[1 - upper] = w;
-          window.sides.push_back(known->second);
+          plan_.sides[entry->second].windows[1 - upper] = w;
+          window.sides.push_back(entry->second);
         }
       }
     }
   }
-  // The height of a knot of several sides does not come from one of them.
-  std::vector<unsigned> ends(plan_.knots.size(), 0);
+  // The height at a junction of several sides does not come from one of them.
+  std::vector<unsigned> ends(plan_.junctions.size(), 0);
   for (const PointMeshPlan::Side& side : plan_.sides) {
-    for (const std::uint32_t knot : side.knots) {
-      if (++ends[knot] > 1) plan_.knots[knot].at_hull = false;
-      plan_.knots[knot].last = std::max(plan_.knots[knot].last, side.last());
+    for (const std::uint32_t junction : side.junctions) {
+      if (++ends[junction] > 1) plan_.junctions[junction].at_hull = false;
+      plan_.junctions[junction].last_window =
+          std::max(plan_.junctions[junction].last_window, side.last_window());
     }
   }
 }
 
-/// A height along a line.
+/// A position along a line, and the height there.
 struct ProfilePlace {
   double at = 0.0, height = 0.0;
   bool sample = false;  ///< whether it is a sample
@@ -164,13 +167,13 @@ struct ProfilePlace {
 /// The Delaunay triangulation of some samples as a surface.
 class LocalSurface {
  public:
-  /// duplicates: which of several samples at one place to use.
+  /// duplicates: which of several samples at one position to use.
   LocalSurface(const MeshSamples& samples, tri::PointDuplicates duplicates);
 
-  /// Returns nullopt outside the samples' hull.
+  /// Returns the height at a position, or nullopt outside the samples' hull.
   [[nodiscard]] std::optional<double> height(const Point2& place) const;
-  /// Returns where edges cross the line `axis` = c (0: x, 1: y), ascending. The surface is straight
-  /// between these places.
+  /// Returns the points where edges cross the line `axis` = c (0: x, 1: y), ascending. The surface
+  /// is straight between them.
   [[nodiscard]] std::vector<ProfilePlace> profile(unsigned axis, double c) const;
 
  private:
@@ -200,10 +203,10 @@ LocalSurface::LocalSurface(const MeshSamples& samples, tri::PointDuplicates dupl
 }
 
 std::optional<double> LocalSurface::height(const Point2& place) const {
-  const tri::Location found = delaunay_.locate(place);
-  if (found.place == tri::Place::vertex) return heights_[slot(found.vertex)];
-  if (found.place == tri::Place::outside) return std::nullopt;
-  const auto corners = delaunay_.vertices(found.triangle);
+  const tri::Location location = delaunay_.locate(place);
+  if (location.place == tri::Place::vertex) return heights_[slot(location.vertex)];
+  if (location.place == tri::Place::outside) return std::nullopt;
+  const auto corners = delaunay_.vertices(location.triangle);
   const Point2 a = delaunay_.point(corners[0]);
   const Point2 b = delaunay_.point(corners[1]);
   const Point2 c = delaunay_.point(corners[2]);
@@ -249,12 +252,12 @@ std::vector<ProfilePlace> LocalSurface::profile(unsigned axis, double c) const {
   return places;
 }
 
-/// Share of the bound for sides. The triangles at the sides use the rest.
+/// Share of the error bound for sides. The triangles at the sides use the rest.
 constexpr double kPointSideShare = 0.9;
-/// Distance from a side within which samples are used, in distances of neighbours.
-constexpr double kReach = 3.0;
-/// The search around a knot ends at this many samples.
-constexpr std::size_t kManySamples = 20000;
+/// Distance from a side within which samples are used, in spacings of the samples.
+constexpr double kStripSpacings = 3.0;
+/// The search around a junction ends at this many samples.
+constexpr std::size_t kMaxSearchedSamples = 20000;
 
 std::optional<double> nearest_height(const MeshSamples& samples, const Point2& place) {
   double best = std::numeric_limits<double>::infinity();
@@ -273,8 +276,8 @@ std::optional<double> nearest_height(const MeshSamples& samples, const Point2& p
 }  // namespace
 
 PointMeshPlan plan_point_mesh(const PointMeshCuts& cuts, std::span<const Point2> hull,
-                              const Together& together) {
-  return Planner(cuts, hull, together).make();
+                              const Merge& merge) {
+  return Planner(cuts, hull, merge).make();
 }
 
 PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
@@ -283,11 +286,11 @@ PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samp
       samples_(samples),
       duplicates_(duplicates),
       side_error_(kPointSideShare * max_error),
-      windows_at_(plan.knots.size()),
-      heights_(plan.knots.size()) {
+      windows_by_junction_(plan.junctions.size()),
+      heights_(plan.junctions.size()) {
   for (const PointMeshPlan::Side& side : plan.sides) {
-    for (const std::uint32_t knot : side.knots) {
-      std::vector<std::uint32_t>& windows = windows_at_[knot];
+    for (const std::uint32_t junction : side.junctions) {
+      std::vector<std::uint32_t>& windows = windows_by_junction_[junction];
       windows.insert(windows.end(), side.windows.begin(), side.windows.end());
       std::sort(windows.begin(), windows.end());
       windows.erase(std::unique(windows.begin(), windows.end()), windows.end());
@@ -295,21 +298,21 @@ PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samp
   }
 }
 
-double PointMeshSides::height_at(std::uint32_t knot) {
+double PointMeshSides::height_at(std::uint32_t junction) {
   {
     const std::lock_guard lock(mutex_);
-    if (heights_[knot]) return *heights_[knot];
+    if (heights_[junction]) return *heights_[junction];
   }
-  const double height = settle_knot(knot);
+  const double height = compute_height(junction);
   const std::lock_guard lock(mutex_);
-  heights_[knot] = height;
+  heights_[junction] = height;
   return height;
 }
 
-double PointMeshSides::settle_knot(std::uint32_t knot) const {
-  const Point2 place = plan_.knots[knot].place;
+double PointMeshSides::compute_height(std::uint32_t junction) const {
+  const Point2 place = plan_.junctions[junction].position;
   double distance = std::numeric_limits<double>::infinity(), limit = 0.0;
-  for (const std::uint32_t w : windows_at_[knot]) {
+  for (const std::uint32_t w : windows_by_junction_[junction]) {
     const double spacing = plan_.windows[w].spacing;
     if (spacing > 0.0) distance = std::min(distance, 2.0 * spacing);
     limit = std::max(limit, spacing * plan_.windows[w].samples);
@@ -319,13 +322,13 @@ double PointMeshSides::settle_knot(std::uint32_t knot) const {
     const PlaneBox box{{place[0] - distance, place[1] - distance},
                        {place[0] + distance, place[1] + distance}};
     around = {};
-    for (const std::uint32_t w : windows_at_[knot]) {
+    for (const std::uint32_t w : windows_by_junction_[junction]) {
       samples_.read(plan_.windows[w].first_cell, plan_.windows[w].cells, box, around);
     }
     if (around.size() >= 3) {
       if (const auto height = LocalSurface(around, duplicates_).height(place)) return *height;
     }
-    if (around.size() > kManySamples || !(distance < limit)) break;
+    if (around.size() > kMaxSearchedSamples || !(distance < limit)) break;
   }
   return nearest_height(around, place).value_or(0.0);
 }
@@ -334,33 +337,36 @@ MeshSamples PointMeshSides::near_side(const PointMeshPlan::Side& side) const {
   MeshSamples near;
   for (const std::size_t upper : {0U, 1U}) {
     const PointMeshPlan::Window& window = plan_.windows[side.windows[upper]];
-    const double distance = kReach * window.spacing;
+    const double distance = kStripSpacings * window.spacing;
     PlaneBox strip;
-    strip.min[side.axis] = side.line - distance;
-    strip.max[side.axis] = side.line + distance;
-    strip.min[1 - side.axis] = plan_.knots[side.knots[0]].place[1 - side.axis] - distance;
-    strip.max[1 - side.axis] = plan_.knots[side.knots[1]].place[1 - side.axis] + distance;
+    strip.min[side.axis] = side.coordinate - distance;
+    strip.max[side.axis] = side.coordinate + distance;
+    strip.min[1 - side.axis] =
+        plan_.junctions[side.junctions[0]].position[1 - side.axis] - distance;
+    strip.max[1 - side.axis] =
+        plan_.junctions[side.junctions[1]].position[1 - side.axis] + distance;
     samples_.read(window.first_cell, window.cells, strip, near);
   }
   return near;
 }
 
-SideVertices PointMeshSides::settle(const PointMeshPlan::Side& side) {
+SideVertices PointMeshSides::compute_vertices(const PointMeshPlan::Side& side) {
   const MeshSamples near = near_side(side);
-  const double from = plan_.knots[side.knots[0]].place[1 - side.axis];
-  const double to = plan_.knots[side.knots[1]].place[1 - side.axis];
+  const double from = plan_.junctions[side.junctions[0]].position[1 - side.axis];
+  const double to = plan_.junctions[side.junctions[1]].position[1 - side.axis];
   std::vector<ProfilePlace> profile;
-  if (near.size() >= 3) profile = LocalSurface(near, duplicates_).profile(side.axis, side.line);
+  if (near.size() >= 3)
+    profile = LocalSurface(near, duplicates_).profile(side.axis, side.coordinate);
 
   const auto end_height = [&](std::size_t end) {
-    const std::uint32_t knot = side.knots[end];
-    if (plan_.knots[knot].at_hull) {
+    const std::uint32_t junction = side.junctions[end];
+    if (plan_.junctions[junction].at_hull) {
       // Beyond the last samples: use their height.
       if (!profile.empty()) return (end == 0 ? profile.front() : profile.back()).height;
-      const auto height = nearest_height(near, plan_.knots[knot].place);
+      const auto height = nearest_height(near, plan_.junctions[junction].position);
       if (height) return *height;
     }
-    return height_at(knot);
+    return height_at(junction);
   };
   std::vector<double> at{from}, height{end_height(0)};
   std::vector<char> sample{1};

@@ -129,7 +129,7 @@ CloudSamples::CloudSamples(const stream::Store& store, const StoredPlaces& place
                            const EllipsoidalHeights& vertical, unsigned threads) {
   constexpr std::size_t kConvertedAtOnce = std::size_t{1} << 16;
   crowd_ = !cells_.load_all(store, 0, threads);
-  const std::span<const Point2> stored = cells_.places();
+  const std::span<const Point2> stored = cells_.positions();
   samples_ = large_array<Sample>(stored.size());
   const std::size_t pieces = (stored.size() + kConvertedAtOnce - 1) / kConvertedAtOnce;
   parallel_for(pieces, threads, [&](std::size_t piece) {

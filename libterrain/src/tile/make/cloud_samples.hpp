@@ -39,7 +39,7 @@ class CloudSamples {
 
   PointCells cells_;
   bool crowd_;
-  LargeArray<Sample> samples_;  ///< of cells_.places()
+  LargeArray<Sample> samples_;  ///< of cells_.positions()
 };
 
 /// Returns the typical spacing of a store's points in degrees of latitude: the spacing of a square
