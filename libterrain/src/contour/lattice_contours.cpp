@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -10,16 +13,19 @@
 #include "base/store_checks.hpp"
 #include "contour/lines.hpp"
 #include "contour/parts.hpp"
+#include "surface/ground_slope.hpp"
+#include "surface/store_window.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
 namespace {
 
-constexpr std::int64_t kWindow = 512;
-/// Memory in bytes per sample of a band: its height and its level.
+/// Columns that one task reads.
+constexpr std::int64_t kWindowColumns = 512;
+/// Bytes per sample of a band: a height and a level.
 constexpr std::uint64_t kContourBytesPerSample = 16;
 
-/// Returns the window of samples around the region.
+/// Returns the smallest window of samples that contains the region, or the whole raster.
 LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
                          const std::optional<Region>& region) {
   StoredBox box{{0, 0},
@@ -33,9 +39,9 @@ LatticeWindow lattice_of(const stream::Store& store, const GroundSlope& ground,
     }
   }
   if (!(box.min[0] <= box.max[0] && box.min[1] <= box.max[1])) throw_none_inside(store);
-  const auto integer = [](double value) { return static_cast<std::int64_t>(value); };
-  return {integer(box.min[0]), integer(box.min[1]), integer(box.max[0] - box.min[0]) + 1,
-          integer(box.max[1] - box.min[1]) + 1};
+  const auto to_integer = [](double value) { return static_cast<std::int64_t>(value); };
+  return {to_integer(box.min[0]), to_integer(box.min[1]), to_integer(box.max[0] - box.min[0]) + 1,
+          to_integer(box.max[1] - box.min[1]) + 1};
 }
 
 }  // namespace
@@ -45,35 +51,37 @@ void draw_lattice_contours(const ContourParts& parts) {
   const ContourRequest& request = parts.request;
   if (request.max_edge) {
     throw UsageError(stream::message(
-        "{max_edge} is for irregular points and coarser levels: rasters mark missing data "
-        "explicitly"));
+        "{max_edge} does not apply to level 0 of a raster, which marks missing data explicitly"));
   }
   const GroundSlope ground(store);
   const LatticeWindow lattice = lattice_of(store, ground, request.region);
-  const std::int64_t fits =
+  // Bands may use a quarter of the memory; the rest is for open lines and blocks of the store.
+  const std::int64_t max_band_rows =
       static_cast<std::int64_t>(parts.memory_bytes / 4 / kContourBytesPerSample) / lattice.columns;
   std::int64_t band = ContourLines::kMaxBandRows;
-  while (band > 2 && band > fits) band /= 2;
-  const auto stored = [&](const Point2& p) {
+  // Halves, so that the order of lines stays the same (see kMaxBandRows).
+  while (band > 2 && band > max_band_rows) band /= 2;
+  const auto to_stored = [&](const Point2& p) {
     return Point2{p[0] + static_cast<double>(lattice.column),
                   p[1] + static_cast<double>(lattice.row)};
   };
-  ContourLines lines(
+  ContourLines contours(
       lattice.columns, request.interval,
       [&](ContourLine&& line) {
-        for (Point2& p : line.points) p = stored(p);
+        for (Point2& p : line.points) p = to_stored(p);
         parts.emit(std::move(line));
       },
       parts.limit, parts.threads);
-  std::function<bool(std::int64_t, std::int64_t)> is_wanted;
+  std::function<bool(std::int64_t, std::int64_t)> in_region;
   if (request.region) {
-    is_wanted = [&](std::int64_t column, std::int64_t row) {
+    in_region = [&](std::int64_t column, std::int64_t row) {
       return request.region->covers(ground.world(
-          stored({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5})));
+          to_stored({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5})));
     };
   }
 
-  const auto windows = static_cast<std::size_t>((lattice.columns + kWindow - 1) / kWindow);
+  const auto windows =
+      static_cast<std::size_t>((lattice.columns + kWindowColumns - 1) / kWindowColumns);
   std::vector<std::unique_ptr<StoreWindow>> readers(parts.threads);
   std::vector<double> heights;
   for (std::int64_t row = 0; row + 1 < lattice.rows; row += band) {
@@ -85,28 +93,28 @@ void draw_lattice_contours(const ContourParts& parts) {
           if (readers[thread] == nullptr) {
             readers[thread] = std::make_unique<StoreWindow>(store);
           }
-          const std::int64_t column = static_cast<std::int64_t>(i) * kWindow;
+          const std::int64_t column = static_cast<std::int64_t>(i) * kWindowColumns;
           const LatticeWindow window{lattice.column + column, lattice.row + row,
-                                     std::min(kWindow, lattice.columns - column), rows};
-          std::vector<double> part(window.size(), NAN);
-          // The squares of the samples at the window's sides extend half a cell beyond it.
+                                     std::min(kWindowColumns, lattice.columns - column), rows};
+          std::vector<double> window_heights(window.size(), NAN);
+          // The squares that use the outer samples of the window reach one cell beyond it.
           const StoredBox around{
               {static_cast<double>(window.column - 1), static_cast<double>(window.row - 1)},
               {static_cast<double>(window.column + window.columns),
                static_cast<double>(window.row + window.rows)}};
           if (!request.region || reaches_into(around, *request.region, ground)) {
-            readers[thread]->heights(window, std::span(part));
+            readers[thread]->heights(window, std::span(window_heights));
           }
           for (std::int64_t r = 0; r < rows; ++r) {
-            std::copy_n(part.begin() + r * window.columns, window.columns,
+            std::copy_n(window_heights.begin() + r * window.columns, window.columns,
                         heights.begin() + r * lattice.columns + column);
           }
         },
         parts.limit.stop);
-    lines.add(heights, rows, is_wanted);
+    contours.add(heights, rows, in_region);
     parts.progress(static_cast<double>(row) / static_cast<double>(lattice.rows));
   }
-  lines.finish();
+  contours.finish();
 }
 
 }  // namespace terrace::terrain

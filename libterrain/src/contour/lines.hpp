@@ -23,8 +23,8 @@ class ContourLines {
   /// Bands give the lines in the same order if their rows, except the first, are a divisor of this.
   static constexpr std::int64_t kMaxBandRows = 256;
 
-  /// columns: of the lattice. emit: receives every line when it is complete, in an order that
-  /// depends only on the lattice. Lines that shrink to a point are left out.
+  /// columns: number of columns of the lattice. emit: receives every line when it is complete, in
+  /// an order that depends only on the lattice. Lines that shrink to a point are left out.
   ContourLines(std::int64_t columns, double interval, std::function<void(ContourLine&&)> emit,
                OpenLineLimit limit = {}, unsigned threads = 1);
 

@@ -29,8 +29,7 @@ std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
   }
   if (options.max_edge) {
     throw UsageError(stream::message(
-        "{max_edge} is for irregular points and coarser levels: rasters mark missing data "
-        "explicitly"));
+        "{max_edge} does not apply to level 0 of a raster, which marks missing data explicitly"));
   }
   return make_lattice_sampler(store.with_stop(context.stop), options, context);
 }

@@ -12,18 +12,19 @@
 namespace terrace::terrain {
 namespace {
 
-stream::Point3 scaled(const stream::Point3& p) {
+/// Returns the coordinates in units of the ellipsoid's radii.
+stream::Point3 in_radii(const stream::Point3& p) {
   return {p[0] / kEquatorialRadius, p[1] / kEquatorialRadius, p[2] / kPolarRadius};
 }
 
-// Distance in radii of the point that is returned if no point on the line qualifies.
+/// Distance, in radii, of a point that is practically never hidden.
 constexpr double kNeverHidden = 1e6;
 
-// Returns the distance along `direction` of the occlusion point of one point, in radii.
-double magnitude(const stream::Point3& direction, const stream::Point3& point) {
-  const stream::Point3 p = scaled(point);
+/// Returns the distance along `direction`, in radii, of the horizon occlusion point for one point.
+double occlusion_distance(const stream::Point3& direction, const stream::Point3& point) {
+  const stream::Point3 p = in_radii(point);
   const double square = dot(p, p);
-  // A point below the ellipsoid is moved onto it, where it is hidden earlier.
+  // A point below the ellipsoid counts as on it.
   const double length = std::sqrt(std::max(1.0, square));
   const double cos_alpha = std::min(1.0, dot(direction, p) / std::sqrt(square));
   const double sin_alpha = std::sqrt(std::max(0.0, 1.0 - cos_alpha * cos_alpha));
@@ -36,13 +37,14 @@ double magnitude(const stream::Point3& direction, const stream::Point3& point) {
 }  // namespace
 
 stream::Point3 geocentric(double longitude, double latitude, double height) {
-  constexpr double kSquareRatio =
+  constexpr double kAxisRatioSquared =
       (kPolarRadius * kPolarRadius) / (kEquatorialRadius * kEquatorialRadius);
   const double sine = base::sin_degrees(latitude), cosine = base::cos_degrees(latitude);
-  const double n = kEquatorialRadius / std::sqrt(1.0 - (1.0 - kSquareRatio) * sine * sine);
-  const double from_axis = (n + height) * cosine;
+  const double prime_vertical_radius =
+      kEquatorialRadius / std::sqrt(1.0 - (1.0 - kAxisRatioSquared) * sine * sine);
+  const double from_axis = (prime_vertical_radius + height) * cosine;
   return {from_axis * base::cos_degrees(longitude), from_axis * base::sin_degrees(longitude),
-          (kSquareRatio * n + height) * sine};
+          (kAxisRatioSquared * prime_vertical_radius + height) * sine};
 }
 
 LocalFrame local_frame(double longitude, double latitude) {
@@ -74,9 +76,10 @@ Sphere bounding_sphere(std::span<const stream::Point3> points) {
 
 stream::Point3 horizon_occlusion_point(const stream::Point3& towards,
                                        std::span<const stream::Point3> points) {
-  const stream::Point3 direction = unit(scaled(towards));
+  const stream::Point3 direction = unit(in_radii(towards));
   double farthest = 1.0;
-  for (const stream::Point3& p : points) farthest = std::max(farthest, magnitude(direction, p));
+  for (const stream::Point3& p : points)
+    farthest = std::max(farthest, occlusion_distance(direction, p));
   return {direction[0] * farthest, direction[1] * farthest, direction[2] * farthest};
 }
 

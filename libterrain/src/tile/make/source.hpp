@@ -14,14 +14,14 @@
 
 namespace terrace::terrain {
 
-/// The threads and memory of a job over tiles.
+/// Threads and memory for making or checking tiles.
 struct TileResources {
   std::uint64_t memory_bytes = 0;
   unsigned threads = 1;
 };
 
-/// Returns the resources that the context allows. path: named in errors. Throws: stream::Error if
-/// not even one thread has enough memory.
+/// Returns the resources that the context allows. Throws: stream::Error, naming `path`, if the
+/// memory does not suffice for one thread.
 TileResources tile_resources(const Context& context, const std::string& path);
 
 /// The surfaces of a store, one per thread, and the data that they share.
@@ -36,10 +36,10 @@ class TileSource {
   std::vector<std::unique_ptr<TileSurface>> surfaces_;
 };
 
-/// Opens the source for a raster or for irregular points. Reads the store once or twice. Throws:
+/// Opens the surfaces of a raster or of irregular points. Reads the store once or twice. Throws:
 /// UsageError for invalid options, or options that do not apply to this kind of store;
-/// stream::Error if no place of the store has a longitude and latitude, or if it is damaged;
-/// stream::Stopped.
+/// stream::Error if the store's positions cannot be converted to longitude and latitude, or if it
+/// is damaged; stream::Stopped.
 std::unique_ptr<TileSource> open_tile_source(const stream::Store& store,
                                              const TilesRequest& request,
                                              const TileResources& resources,
