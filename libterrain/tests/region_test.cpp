@@ -79,15 +79,15 @@ TEST(Region, ReadsAllKindsOfGeoJson) {
 }
 
 TEST(Region, SkipsFeaturesWithoutGeometry) {
-  const std::string nowhere = R"({"type":"Feature","properties":{},"geometry":null})";
+  const std::string empty = R"({"type":"Feature","properties":{},"geometry":null})";
   const std::string square =
       R"({"type":"Feature","properties":null,"geometry":)"
       R"({"type":"Polygon","coordinates":[[[0,0],[4,0],[4,4],[0,4],[0,0]]]}})";
-  const Region region = region_of(R"({"type":"FeatureCollection","features":[)" + nowhere + "," +
-                                  square + "," + nowhere + "]}");
+  const Region region = region_of(R"({"type":"FeatureCollection","features":[)" + empty + "," +
+                                  square + "," + empty + "]}");
   EXPECT_EQ(region.polygons().size(), 1u);
   EXPECT_TRUE(region.contains({2, 2, 0}));
-  EXPECT_THROW(region_of(nowhere), stream::Error);
+  EXPECT_THROW(region_of(empty), stream::Error);
 }
 
 TEST(Region, RestrictsSource) {
@@ -147,35 +147,36 @@ TEST(Orientation, IsExactForNearlyCollinearPoints) {
 
 // Polygons compared with their definition in integer arithmetic.
 
-/// Coordinates on a lattice with steps of one half.
-struct Step {
+/// A point on a lattice, with integer coordinates.
+struct LatticePoint {
   std::int64_t x = 0, y = 0;
-  friend bool operator==(const Step&, const Step&) = default;
+  friend bool operator==(const LatticePoint&, const LatticePoint&) = default;
 };
-using Ring = std::vector<Step>;
+using Ring = std::vector<LatticePoint>;
 
-int side(const Step& a, const Step& b, const Step& c) {
+int side(const LatticePoint& a, const LatticePoint& b, const LatticePoint& c) {
   const std::int64_t twice = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
   return twice > 0 ? 1 : twice < 0 ? -1 : 0;
 }
 
-bool on_segment(const Step& p, const Step& a, const Step& b) {
+bool on_segment(const LatticePoint& p, const LatticePoint& a, const LatticePoint& b) {
   return side(a, b, p) == 0 && std::min(a.x, b.x) <= p.x && p.x <= std::max(a.x, b.x) &&
          std::min(a.y, b.y) <= p.y && p.y <= std::max(a.y, b.y);
 }
 
-bool segments_meet(const Step& a, const Step& b, const Step& c, const Step& d) {
+bool segments_intersect(const LatticePoint& a, const LatticePoint& b, const LatticePoint& c,
+                        const LatticePoint& d) {
   if (side(a, b, c) * side(a, b, d) < 0 && side(c, d, a) * side(c, d, b) < 0) return true;
   return on_segment(c, a, b) || on_segment(d, a, b) || on_segment(a, c, d) || on_segment(b, c, d);
 }
 
-const Step& next(const Ring& ring, std::size_t i) { return ring[(i + 1) % ring.size()]; }
+const LatticePoint& next(const Ring& ring, std::size_t i) { return ring[(i + 1) % ring.size()]; }
 
 /// Whether the ring is simple, ignoring repeated consecutive corners.
-bool is_simple(const Ring& given) {
+bool is_simple(const Ring& corners) {
   Ring ring;
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    if (!(given[i] == next(given, i))) ring.push_back(given[i]);
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    if (!(corners[i] == next(corners, i))) ring.push_back(corners[i]);
   }
   if (ring.size() < 3) return false;
   for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -185,13 +186,13 @@ bool is_simple(const Ring& given) {
     }
     for (std::size_t k = i + 2; k < ring.size(); ++k) {
       if ((k + 1) % ring.size() == i) continue;
-      if (segments_meet(ring[i], next(ring, i), ring[k], next(ring, k))) return false;
+      if (segments_intersect(ring[i], next(ring, i), ring[k], next(ring, k))) return false;
     }
   }
   return true;
 }
 
-bool on_ring(const std::vector<Ring>& rings, const Step& p) {
+bool on_ring(const std::vector<Ring>& rings, const LatticePoint& p) {
   for (const Ring& ring : rings) {
     for (std::size_t i = 0; i < ring.size(); ++i) {
       if (on_segment(p, ring[i], next(ring, i))) return true;
@@ -201,12 +202,12 @@ bool on_ring(const std::vector<Ring>& rings, const Step& p) {
 }
 
 /// Whether p is on a ring, or inside by the even-odd rule.
-bool holds(const std::vector<Ring>& rings, const Step& p) {
+bool contains(const std::vector<Ring>& rings, const LatticePoint& p) {
   bool inside = on_ring(rings, p);
   if (inside) return true;
   for (const Ring& ring : rings) {
     for (std::size_t i = 0; i < ring.size(); ++i) {
-      const Step &a = ring[i], &b = next(ring, i);
+      const LatticePoint &a = ring[i], &b = next(ring, i);
       if ((a.y <= p.y) != (b.y <= p.y) && (side(a, b, p) > 0) == (a.y <= p.y)) inside = !inside;
     }
   }
@@ -215,46 +216,51 @@ bool holds(const std::vector<Ring>& rings, const Step& p) {
 
 /// Returns how a convex figure, given by its corners, overlaps the polygon.
 Overlap overlap_of(const std::vector<Ring>& rings, const Ring& figure) {
-  bool meets = holds(rings, figure[0]), borders = false;
+  bool intersects = contains(rings, figure[0]), crosses_border = false;
   for (const Ring& ring : rings) {
     for (std::size_t i = 0; i < ring.size(); ++i) {
       for (std::size_t k = 0; k < figure.size(); ++k) {
-        borders = borders || segments_meet(ring[i], next(ring, i), figure[k], next(figure, k));
+        crosses_border = crosses_border ||
+                         segments_intersect(ring[i], next(ring, i), figure[k], next(figure, k));
       }
     }
     bool within = true;  // the ring is in the figure or, by the above, entirely outside
     for (std::size_t k = 0; k < figure.size(); ++k) {
       within = within && side(figure[k], next(figure, k), ring[0]) > 0;
     }
-    borders = borders || within;
+    crosses_border = crosses_border || within;
   }
-  meets = meets || borders;
-  return !meets ? Overlap::none : borders ? Overlap::part : Overlap::whole;
+  intersects = intersects || crosses_border;
+  return !intersects ? Overlap::none : crosses_border ? Overlap::part : Overlap::whole;
 }
 
-/// The position of the lattice among the doubles; in the last, steps are as small as doubles allow.
-struct StepsAt {
+/// Maps lattice points to doubles.
+struct LatticeFrame {
   double origin, step;
-  [[nodiscard]] Point2 operator()(const Step& p) const {
+  [[nodiscard]] Point2 operator()(const LatticePoint& p) const {
     return {origin + step * static_cast<double>(p.x), origin + step * static_cast<double>(p.y)};
   }
-  [[nodiscard]] stream::Point3 at(const Step& p) const { return {(*this)(p)[0], (*this)(p)[1], 0}; }
+  [[nodiscard]] stream::Point3 at(const LatticePoint& p) const {
+    return {(*this)(p)[0], (*this)(p)[1], 0};
+  }
 };
-constexpr StepsAt kFrames[] = {{0, 0.5}, {-7340032.25, 0.0625}, {0x1p52, 1}, {0, 0x1p-60}};
-constexpr int kShare = TERRACE_TEST_SHARE;
+/// Steps of one half, coordinates of a projected CRS, steps as small as doubles allow at their
+/// origin, and tiny steps.
+constexpr LatticeFrame kFrames[] = {{0, 0.5}, {-7340032.25, 0.0625}, {0x1p52, 1}, {0, 0x1p-60}};
+constexpr int kTestShare = TERRACE_TEST_SHARE;
 constexpr double kAnyHeight = std::numeric_limits<double>::infinity();
 
-class RandomPlaces {
+class RandomLattice {
  public:
-  explicit RandomPlaces(std::uint64_t seed) : random_(seed) {}
+  explicit RandomLattice(std::uint64_t seed) : random_(seed) {}
   std::int64_t below(std::int64_t end) {
     return static_cast<std::int64_t>(random_() % static_cast<std::uint64_t>(end));
   }
-  /// Places that often coincide with corners.
-  Step place() { return {2 * below(10), 2 * below(10)}; }
-  Ring ring(std::int64_t most) {
-    Ring ring(static_cast<std::size_t>(3 + below(most - 2)));
-    for (Step& p : ring) p = place();
+  /// Few distinct points, so that they often coincide.
+  LatticePoint point() { return {2 * below(10), 2 * below(10)}; }
+  Ring ring(std::int64_t max_corners) {
+    Ring ring(static_cast<std::size_t>(3 + below(max_corners - 2)));
+    for (LatticePoint& p : ring) p = point();
     return ring;
   }
 
@@ -262,22 +268,22 @@ class RandomPlaces {
   std::mt19937_64 random_;
 };
 
-Polygon polygon_of(const std::vector<Ring>& rings, const StepsAt& frame) {
+Polygon polygon_of(const std::vector<Ring>& rings, const LatticeFrame& frame) {
   Polygon polygon;
   for (const Ring& ring : rings) {
     polygon.emplace_back();
-    for (const Step& p : ring) polygon.back().push_back(frame(p));
+    for (const LatticePoint& p : ring) polygon.back().push_back(frame(p));
   }
   return polygon;
 }
 
-void expect_all_places(const Region& region, const std::vector<std::vector<Ring>>& polygons,
-                       const StepsAt& frame) {
+void expect_all_points(const Region& region, const std::vector<std::vector<Ring>>& polygons,
+                       const LatticeFrame& frame) {
   for (std::int64_t y = -1; y < 21; ++y) {
     for (std::int64_t x = -1; x < 21; ++x) {
-      const Step p{x, y};
+      const LatticePoint p{x, y};
       const bool expected = std::any_of(polygons.begin(), polygons.end(),
-                                        [&](const auto& rings) { return holds(rings, p); });
+                                        [&](const auto& rings) { return contains(rings, p); });
       ASSERT_EQ(region.contains(frame.at(p)), expected) << x << ',' << y;
       ASSERT_EQ(region.covers(frame(p)), expected) << x << ',' << y;
     }
@@ -285,21 +291,21 @@ void expect_all_places(const Region& region, const std::vector<std::vector<Ring>
 }
 
 void expect_boxes_and_triangles(const Region& region, const std::vector<Ring>& rings,
-                                const StepsAt& frame, RandomPlaces& random,
+                                const LatticeFrame& frame, RandomLattice& random,
                                 std::array<int, 3>& seen) {
   for (int i = 0; i < 20; ++i) {
-    const Step a{random.below(22) - 1, random.below(22) - 1};
-    const Step b{a.x + 1 + random.below(6), a.y + 1 + random.below(6)};
+    const LatticePoint a{random.below(22) - 1, random.below(22) - 1};
+    const LatticePoint b{a.x + 1 + random.below(6), a.y + 1 + random.below(6)};
     const Point2 low = frame(a), high = frame(b);
     const Overlap box = overlap_of(rings, {a, {b.x, a.y}, b, {a.x, b.y}});
     ASSERT_EQ(region.overlap({{low[0], low[1], 0}, {high[0], high[1], 1}}), box);
     ++seen[static_cast<std::size_t>(box)];
-    // A box without size: a place on a ring is not wholly inside, one next to it is.
-    const Overlap place = !holds(rings, a)    ? Overlap::none
+    // An empty box: on a ring it is partly inside, elsewhere wholly inside or outside.
+    const Overlap point = !contains(rings, a) ? Overlap::none
                           : on_ring(rings, a) ? Overlap::part
                                               : Overlap::whole;
-    ASSERT_EQ(region.overlap({{low[0], low[1], 0}, {low[0], low[1], 0}}), place);
-    const Step c{random.below(22) - 1, random.below(22) - 1};
+    ASSERT_EQ(region.overlap({{low[0], low[1], 0}, {low[0], low[1], 0}}), point);
+    const LatticePoint c{random.below(22) - 1, random.below(22) - 1};
     const int turn = side(a, b, c);
     if (turn == 0) continue;
     const Overlap triangle = overlap_of(rings, turn > 0 ? Ring{a, b, c} : Ring{a, c, b});
@@ -309,38 +315,39 @@ void expect_boxes_and_triangles(const Region& region, const std::vector<Ring>& r
 
 // Law: a ring is accepted if it is simple; then all answers equal those in integer arithmetic.
 TEST(Region, SingleRingMatchesIntegerArithmetic) {
-  int taken = 0, refused = 0;
+  int accepted = 0, rejected = 0;
   std::array<int, 3> seen{};
-  for (std::uint64_t seed = 1; seed <= 600 / kShare; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 600 / kTestShare; ++seed) {
     SCOPED_TRACE(seed);
-    RandomPlaces random(seed);
-    const StepsAt& frame = kFrames[seed % std::size(kFrames)];
+    RandomLattice random(seed);
+    const LatticeFrame& frame = kFrames[seed % std::size(kFrames)];
     const std::vector<Ring> rings{random.ring(7)};
     if (!is_simple(rings[0])) {
-      ++refused;
+      ++rejected;
       EXPECT_THROW(Region::of_polygons({polygon_of(rings, frame)}, -kAnyHeight, kAnyHeight),
                    stream::Error);
       continue;
     }
-    ++taken;
+    ++accepted;
     const Region region = Region::of_polygons({polygon_of(rings, frame)}, -kAnyHeight, kAnyHeight);
-    expect_all_places(region, {rings}, frame);
+    expect_all_points(region, {rings}, frame);
     expect_boxes_and_triangles(region, rings, frame, random, seen);
     if (HasFatalFailure()) return;
   }
-  EXPECT_GT(taken, 100 / kShare);
-  EXPECT_GT(refused, 100 / kShare);
-  for (const int count : seen) EXPECT_GT(count, 30 / kShare);
+  EXPECT_GT(accepted, 100 / kTestShare);
+  EXPECT_GT(rejected, 100 / kTestShare);
+  for (const int count : seen) EXPECT_GT(count, 30 / kTestShare);
 }
 
-// Polygons with holes, and several that overlap; GEOS decides which are valid.
+// Law: polygons with holes, and several that overlap, match integer arithmetic. GEOS decides which
+// are valid.
 TEST(Region, HolesAndOverlapsMatchIntegerArithmetic) {
   int holes = 0, pairs = 0;
   std::array<int, 3> seen{};
-  for (std::uint64_t seed = 1; seed <= 500 / kShare; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 500 / kTestShare; ++seed) {
     SCOPED_TRACE(seed);
-    RandomPlaces random(seed);
-    const StepsAt& frame = kFrames[seed % std::size(kFrames)];
+    RandomLattice random(seed);
+    const LatticeFrame& frame = kFrames[seed % std::size(kFrames)];
     const std::int64_t x = 2 * random.below(4), y = 2 * random.below(4);
     const std::vector<Ring> large{{{0, 0}, {18, 2}, {18, 18}, {2, 16}}, random.ring(4)};
     const std::vector<Ring> other{{{x, y}, {x + 4, y}, {x + 6, y + 8}, {x, y + 6}}};
@@ -348,24 +355,23 @@ TEST(Region, HolesAndOverlapsMatchIntegerArithmetic) {
       const Region region =
           Region::of_polygons({polygon_of(large, frame)}, -kAnyHeight, kAnyHeight);
       ++holes;
-      expect_all_places(region, {large}, frame);
+      expect_all_points(region, {large}, frame);
       expect_boxes_and_triangles(region, large, frame, random, seen);
       const Region both = Region::of_polygons({polygon_of(large, frame), polygon_of(other, frame)},
                                               -kAnyHeight, kAnyHeight);
       ++pairs;
-      expect_all_places(both, {large, other}, frame);
+      expect_all_points(both, {large, other}, frame);
     } catch (const stream::Error& error) {
       EXPECT_FALSE(error.parts().where.empty());
     }
     if (HasFatalFailure()) return;
   }
-  EXPECT_GT(holes, 30 / kShare);
+  EXPECT_GT(holes, 30 / kTestShare);
   EXPECT_EQ(holes, pairs);
-  for (const int count : seen) EXPECT_GT(count, 30 / kShare);
+  for (const int count : seen) EXPECT_GT(count, 30 / kTestShare);
 }
 
-/// Makes a closed outline with corners alternating between inside and outside, each at another
-/// angle.
+/// Returns a closed outline around `middle`, with corners at random distances.
 std::vector<Point2> jagged_ring(std::size_t corners, const Point2& middle, double radius) {
   std::mt19937_64 random(corners);
   std::vector<Point2> ring;
@@ -392,10 +398,10 @@ bool even_odd(const std::vector<Point2>& ring, const Point2& p) {
   return inside;
 }
 
-// With this many corners the grid gives most answers. Oracle: exact even-odd rule. Several threads
-// query one object at once, more than it prepares for.
+// With this many corners the grid gives most answers. Oracle: exact even-odd rule.
+// More threads query one object at once than it prepares for.
 TEST(Region, LargeRegionIsThreadSafe) {
-  constexpr std::size_t kThreads = 8, kQuestions = 3000;
+  constexpr std::size_t kThreads = 8, kQueries = 3000;
   const std::vector<Point2> ring = jagged_ring(5000, {4e6, 7e6}, 1e5);
   const Region region = Region::of_polygons({{ring}}, -kAnyHeight, kAnyHeight);
   std::array<std::size_t, kThreads> wrong{}, inside{};
@@ -404,7 +410,7 @@ TEST(Region, LargeRegionIsThreadSafe) {
     threads.emplace_back([&, t] {
       std::mt19937_64 random(t);
       const auto near = [&] { return 2.2e5 * (base::unit_interval(random()) - 0.5); };
-      for (std::size_t i = 0; i < kQuestions; ++i) {
+      for (std::size_t i = 0; i < kQueries; ++i) {
         // Every other one is the rounded middle of two corners, as near to a ring as possible.
         const Point2 &a = ring[random() % ring.size()], &b = ring[random() % ring.size()];
         const Point2 p = i % 2 == 0 ? Point2{4e6 + near(), 7e6 + near()}
@@ -426,8 +432,8 @@ TEST(Region, LargeRegionIsThreadSafe) {
   for (std::thread& thread : threads) thread.join();
   for (std::size_t t = 0; t < kThreads; ++t) {
     EXPECT_EQ(wrong[t], 0U) << t;
-    EXPECT_GT(inside[t], kQuestions / 5);
-    EXPECT_LT(inside[t], kQuestions);
+    EXPECT_GT(inside[t], kQueries / 5);
+    EXPECT_LT(inside[t], kQueries);
   }
 }
 
@@ -449,23 +455,23 @@ TEST(Region, OverlapsInHeight) {
 
 // Oracle: the same box as a polygon.
 TEST(Region, BoxesTouchSameTrianglesAsPolygons) {
-  RandomPlaces random(5);
-  const StepsAt& frame = kFrames[0];
+  RandomLattice random(5);
+  const LatticeFrame& frame = kFrames[0];
   int touching = 0;
-  for (int i = 0; i < 5000 / kShare; ++i) {
+  for (int i = 0; i < 5000 / kTestShare; ++i) {
     SCOPED_TRACE(i);
-    const Step low{6 + random.below(4), 6 + random.below(4)};
-    const Step high{low.x + 1 + random.below(5), low.y + 1 + random.below(5)};
+    const LatticePoint low{6 + random.below(4), 6 + random.below(4)};
+    const LatticePoint high{low.x + 1 + random.below(5), low.y + 1 + random.below(5)};
     const Region box = Region::of_box({frame.at(low), frame.at(high)});
     const Region polygon = Region::of_polygons(
         {polygon_of({{low, {high.x, low.y}, high, {low.x, high.y}}}, frame)}, 0, 0);
-    const std::array<stream::Point3, 3> triangle{frame.at(random.place()), frame.at(random.place()),
-                                                 frame.at(random.place())};
+    const std::array<stream::Point3, 3> triangle{frame.at(random.point()), frame.at(random.point()),
+                                                 frame.at(random.point())};
     EXPECT_EQ(box.touches(triangle), polygon.touches(triangle));
     touching += box.touches(triangle) ? 1 : 0;
   }
-  EXPECT_GT(touching, 1000 / kShare);
-  EXPECT_LT(touching, 4000 / kShare);
+  EXPECT_GT(touching, 1000 / kTestShare);
+  EXPECT_LT(touching, 4000 / kTestShare);
 }
 
 TEST(Region, AcceptsRingsInAnyForm) {
@@ -531,7 +537,7 @@ TEST(Region, AcceptsRingsThatTouchOnlyAtPoints) {
   const std::vector<Point2> left{{0, 4}, {2, 3}, {4, 4}, {2, 5}}, right{{4, 4}, {6, 3}, {6, 5}};
   const std::vector<Point2> corner{{0, 0}, {2, 1}, {1, 2}};
   EXPECT_NO_THROW(Region::of_polygons({{square, left, right, corner}}, 0, 1));
-  const auto refused = [](const Polygon& polygon) -> std::string {
+  const auto error_of = [](const Polygon& polygon) -> std::string {
     try {
       Region::of_polygons({polygon}, 0, 1);
     } catch (const stream::Error& error) {
@@ -540,42 +546,42 @@ TEST(Region, AcceptsRingsThatTouchOnlyAtPoints) {
     return "accepted";
   };
   // A hole from side to side, and a closed chain of holes, cut the interior in two.
-  EXPECT_NE(refused({square, {{0, 4}, {4, 3}, {8, 4}, {4, 5}}}).find("disconnected at 8, 4"),
+  EXPECT_NE(error_of({square, {{0, 4}, {4, 3}, {8, 4}, {4, 5}}}).find("disconnected at 8, 4"),
             std::string::npos);
-  EXPECT_NE(refused({square, left, {{4, 4}, {8, 4}, {6, 5}}}).find("disconnected"),
+  EXPECT_NE(error_of({square, left, {{4, 4}, {8, 4}, {6, 5}}}).find("disconnected"),
             std::string::npos);
   // A hole that crosses the shell.
-  EXPECT_NE(refused({square, {{4, 4}, {10, 3}, {8, 5}}}).find("Self-intersection"),
+  EXPECT_NE(error_of({square, {{4, 4}, {10, 3}, {8, 5}}}).find("Self-intersection"),
             std::string::npos);
   // A hole inside another hole.
-  EXPECT_NE(refused({square, left, {{1, 4}, {2, 3.75}, {3, 4}}}).find("Nested holes at 1, 4"),
+  EXPECT_NE(error_of({square, left, {{1, 4}, {2, 3.75}, {3, 4}}}).find("Nested holes at 1, 4"),
             std::string::npos);
   // Two rings that share a side, and a hole that repeats the shell.
-  EXPECT_NE(refused({square, {{0, 2}, {2, 3}, {0, 4}}}).find("Self-intersection"),
+  EXPECT_NE(error_of({square, {{0, 2}, {2, 3}, {0, 4}}}).find("Self-intersection"),
             std::string::npos);
-  EXPECT_NE(refused({square, square}).find("Self-intersection"), std::string::npos);
+  EXPECT_NE(error_of({square, square}).find("Self-intersection"), std::string::npos);
   // A ring that touches itself.
-  EXPECT_NE(refused({{{0, 0}, {4, 2}, {8, 0}, {8, 4}, {4, 2}, {0, 4}}})
+  EXPECT_NE(error_of({{{0, 0}, {4, 2}, {8, 0}, {8, 4}, {4, 2}, {0, 4}}})
                 .find("Ring Self-intersection at 4, 2"),
             std::string::npos);
 }
 
-/// Bounding boxes alone would exclude almost no pair of edges of these shapes.
+// Bounding boxes alone would exclude almost no pair of edges of these shapes.
 TEST(Region, ChecksStarsAndSpiralsInNearlyLinearTime) {
-  constexpr int kCorners = 200'000 / kShare;
-  constexpr double kTurn = 6.283185307179586;
+  constexpr int kCorners = 200'000 / kTestShare;
+  constexpr double kFullCircle = 6.283185307179586;
   std::vector<Point2> star, spiral;
   for (int i = 0; i < kCorners; ++i) {
-    const double angle = kTurn * i / kCorners, reach = i % 2 == 0 ? 1.0 : 1e-6;
-    star.push_back({reach * std::cos(angle), reach * std::sin(angle)});
+    const double angle = kFullCircle * i / kCorners, radius = i % 2 == 0 ? 1.0 : 1e-6;
+    star.push_back({radius * std::cos(angle), radius * std::sin(angle)});
   }
-  constexpr int kTurns = 200;
+  constexpr int kWindings = 200;
   for (int i = 0; i < kCorners; ++i) {
-    const bool out = 2 * i < kCorners;
-    const double along = (out ? i : kCorners - 1 - i) * 2.0 / kCorners;
-    const double angle = kTurn * kTurns * along;
-    const double reach = 1 + kTurns * along + (out ? 0.5 : 0.0);
-    spiral.push_back({reach * std::cos(angle), reach * std::sin(angle)});
+    const bool is_outer = 2 * i < kCorners;
+    const double share = (is_outer ? i : kCorners - 1 - i) * 2.0 / kCorners;
+    const double angle = kFullCircle * kWindings * share;
+    const double radius = 1 + kWindings * share + (is_outer ? 0.5 : 0.0);
+    spiral.push_back({radius * std::cos(angle), radius * std::sin(angle)});
   }
   for (const std::vector<Point2>& ring : {star, spiral}) {
     const Region region = Region::of_polygons({{ring}}, 0, 1);
@@ -590,7 +596,7 @@ TEST(Region, ChecksStarsAndSpiralsInNearlyLinearTime) {
   EXPECT_THROW(Region::of_polygons({{star}}, 0, 1, {}, stop.get_token()), stream::Stopped);
 }
 
-/// Spikes across the whole box, all of them crossed by each row or by each column.
+// Spikes across the whole box, all of them crossed by each row or by each column.
 TEST(Region, AnswersSpikesAlongBothAxes) {
   constexpr std::size_t kSpikes = 20000;
   constexpr double kWidth = 1000.0 / kSpikes;
@@ -602,19 +608,19 @@ TEST(Region, AnswersSpikesAlongBothAxes) {
   comb.push_back({1000, 0});
   comb.push_back({1000, -1});
   comb.push_back({0, -1});
-  std::vector<Point2> turned = comb;
-  for (Point2& p : turned) std::swap(p[0], p[1]);
-  const Region upright = Region::of_polygons({Polygon{comb}}, 0, 1),
-               lying = Region::of_polygons({Polygon{turned}}, 0, 1);
+  std::vector<Point2> transposed = comb;
+  for (Point2& p : transposed) std::swap(p[0], p[1]);
+  const Region vertical = Region::of_polygons({Polygon{comb}}, 0, 1),
+               horizontal = Region::of_polygons({Polygon{transposed}}, 0, 1);
   std::mt19937_64 random(3);
-  std::uniform_real_distribution<double> place(0, 1000);
+  std::uniform_real_distribution<double> coordinate(0, 1000);
   for (int i = 0; i < 5000; ++i) {
-    const double x = place(random), y = place(random);
-    const double within = x / kWidth - std::floor(x / kWidth);
-    const double top = 1000 * (1 - std::abs(2 * within - 1));
+    const double x = coordinate(random), y = coordinate(random);
+    const double phase = x / kWidth - std::floor(x / kWidth);
+    const double top = 1000 * (1 - std::abs(2 * phase - 1));
     if (std::abs(y - top) < 1e-3) continue;
-    EXPECT_EQ(upright.covers({x, y}), y < top) << x << ' ' << y;
-    EXPECT_EQ(lying.covers({y, x}), y < top) << x << ' ' << y;
+    EXPECT_EQ(vertical.covers({x, y}), y < top) << x << ' ' << y;
+    EXPECT_EQ(horizontal.covers({y, x}), y < top) << x << ' ' << y;
   }
 }
 
