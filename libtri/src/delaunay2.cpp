@@ -115,13 +115,13 @@ void Delaunay2<Coord, Metric>::remove(VertexId vertex) {
 
 template <class Coord, class Metric>
 void Delaunay2<Coord, Metric>::remove(std::span<const VertexId> vertices) {
-  impl_->set.clear();
+  impl_->to_remove.clear();
   for (const VertexId vertex : vertices) {
     assert(alive(vertex));
-    impl_->set.push_back(slot(vertex));
+    impl_->to_remove.push_back(slot(vertex));
   }
   [[maybe_unused]] const auto scope = impl_->scope();
-  planar::remove_set(impl_->mesh, std::span<const std::uint32_t>(impl_->set));
+  planar::remove_set(impl_->mesh, std::span<const std::uint32_t>(impl_->to_remove));
 }
 
 template <class Coord, class Metric>
@@ -242,7 +242,7 @@ std::uint64_t Delaunay2<Coord, Metric>::hash() const {
 
 template <class Coord, class Metric>
 std::size_t Delaunay2<Coord, Metric>::memory_bytes() const {
-  return impl_->mesh.bytes() + impl_->set.capacity() * sizeof(std::uint32_t);
+  return impl_->mesh.bytes() + impl_->to_remove.capacity() * sizeof(std::uint32_t);
 }
 
 template <class Coord, class Metric>

@@ -10,8 +10,8 @@
 #include <utility>
 
 /// Growing arrays of plain data for the triangulation. Unlike std::vector they leave new elements
-/// uninitialised. Large arrays grow by an eighth, without a second copy if the system can move
-/// pages, and use huge pages, which is a sixth faster because accesses are scattered.
+/// uninitialised. Large arrays grow by an eighth, moving pages instead of copying them where the
+/// system can. They use huge pages, which are a sixth faster because accesses are scattered.
 
 namespace terrace::tri {
 
@@ -22,6 +22,7 @@ void* allocate_pages(std::size_t bytes);
 /// Moves `old_bytes` bytes of contents to `new_bytes` bytes of memory. Throws std::bad_alloc, which
 /// leaves the old memory valid.
 void* resize_pages(void* memory, std::size_t old_bytes, std::size_t new_bytes);
+/// Frees memory of allocate_pages() or resize_pages().
 void free_pages(void* memory, std::size_t bytes) noexcept;
 
 template <class T>
@@ -59,7 +60,7 @@ class Pool {
   void reserve(std::size_t count) {
     if (count > capacity_) set_capacity(count);
   }
-  /// New elements are not initialised.
+  /// Changes the size. New elements are not initialised.
   void resize(std::uint32_t count) {
     if (count > capacity_) set_capacity(std::max<std::size_t>(count, next_capacity()));
     size_ = count;
@@ -77,12 +78,13 @@ class Pool {
 
  private:
   [[nodiscard]] std::size_t next_capacity() const {
-    // An array smaller than a huge page is copied when it grows, and its pages are new each time.
+    // Growing below a huge page copies the array, so double it.
     const std::size_t doubled = 2 * capacity_ + 16;
     if (doubled * sizeof(T) < kHugePage) return doubled;
-    // Grows by whole huge pages: memory first used as small pages stays in them.
-    const std::size_t eighth = capacity_ + capacity_ / 8;
-    const std::size_t whole_pages = eighth * sizeof(T) / kHugePage * kHugePage / sizeof(T);
+    // Grow by whole huge pages, because memory that was touched as small pages never becomes a huge
+    // page.
+    const std::size_t grown = capacity_ + capacity_ / 8;
+    const std::size_t whole_pages = grown * sizeof(T) / kHugePage * kHugePage / sizeof(T);
     return whole_pages > capacity_ ? whole_pages : whole_pages + kHugePage / sizeof(T);
   }
   void set_capacity(std::size_t count) {

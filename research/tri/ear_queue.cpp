@@ -154,7 +154,7 @@ class EarQueue {
 template <class Kernel>
 const typename Kernel::Point& removed_point(const Mesh<Kernel>& mesh) {
   for (const std::uint32_t v : mesh.tetrahedron[mesh.hole.slots.front()].corner) {
-    if (v != kGhost && mesh.vertex[v].incident == kRemoving) return mesh.vertex[v].point;
+    if (v != kGhost && mesh.vertex[v].incident == kInHole) return mesh.vertex[v].point;
   }
   assert(false);
   return mesh.hole.point.front();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -15,13 +16,13 @@
 namespace terrace::tri {
 namespace planar {
 
-/// Types for computing in a metric: the kernel, the form of the metric that its predicates take,
-/// and the scope that passes this form to them for the duration of a call.
+/// The types that belong to a metric: its kernel, the form in which predicates receive it, and the
+/// scope that hands the form to the predicates during a call.
 template <class Coord, class Metric>
-struct InMetric;
+struct MetricTraits;
 
 template <class Coord>
-struct InMetric<Coord, Euclidean> {
+struct MetricTraits<Coord, Euclidean> {
   using Kernel = std::conditional_t<std::is_same_v<Coord, double>, DoubleKernel, IntKernel>;
   using Form = Euclidean;
   struct Scope {
@@ -30,7 +31,7 @@ struct InMetric<Coord, Euclidean> {
 };
 
 template <>
-struct InMetric<double, EllipticalMetric2> {
+struct MetricTraits<double, EllipticalMetric2> {
   using Kernel = EllipticalKernel;
   using Form = QuadraticForm;
   using Scope = EllipticalKernel::Scope;
@@ -39,31 +40,31 @@ struct InMetric<double, EllipticalMetric2> {
 }  // namespace planar
 
 template <class Coord, class Metric>
-struct Delaunay2<Coord, Metric>::Impl : planar::InMetric<Coord, Metric> {
-  using Base = planar::InMetric<Coord, Metric>;
+struct Delaunay2<Coord, Metric>::Impl : planar::MetricTraits<Coord, Metric> {
+  using Base = planar::MetricTraits<Coord, Metric>;
   explicit Impl(const Metric& value) : metric(value), form(value) {}
   [[nodiscard]] typename Base::Scope scope() const { return typename Base::Scope(form); }
 
   Metric metric;
   typename Base::Form form;
   planar::Mesh<typename Base::Kernel> mesh;
-  std::vector<std::uint32_t> set;  ///< scratch of remove()
+  std::vector<std::uint32_t> to_remove;  ///< scratch of remove()
 };
 
-/// For the library's own parts, tests and benchmarks.
+/// Gives the library's own sources, tests and benchmarks access to the mesh.
 struct Delaunay2Access {
   template <class Coord, class Metric>
   static const auto& mesh(const Delaunay2<Coord, Metric>& triangulation) {
     return triangulation.impl_->mesh;
   }
-  /// Predicates on the mesh need this scope, which must not outlive the triangulation.
+  /// Returns the scope that predicates on the mesh need. It must not outlive the triangulation.
   template <class Coord, class Metric>
   static auto scope(const Delaunay2<Coord, Metric>& triangulation) {
     return triangulation.impl_->scope();
   }
 };
 
-/// Checks a triangulation completely: counts, free lists, links, orientation, the perturbed empty
+/// Checks all invariants: counts, free lists, links, orientation, the perturbed empty
 /// circle across every edge, the hull, and the sorted line while there are no triangles. Returns a
 /// description of the first fault, or an empty string. O(n).
 template <class Coord, class Metric>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -15,13 +16,13 @@
 namespace terrace::tri {
 namespace spatial {
 
-/// Types for computing in a metric: the kernel, the form of the metric that its predicates take,
-/// and the scope that passes this form to them for the duration of a call.
+/// The types that belong to a metric: its kernel, the form in which predicates receive it, and the
+/// scope that hands the form to the predicates during a call.
 template <class Coord, class Metric>
-struct InMetric;
+struct MetricTraits;
 
 template <class Coord>
-struct InMetric<Coord, Euclidean> {
+struct MetricTraits<Coord, Euclidean> {
   using Kernel = std::conditional_t<std::is_same_v<Coord, double>, DoubleKernel, IntKernel>;
   using Form = Euclidean;
   struct Scope {
@@ -30,7 +31,7 @@ struct InMetric<Coord, Euclidean> {
 };
 
 template <>
-struct InMetric<double, EllipticalMetric3> {
+struct MetricTraits<double, EllipticalMetric3> {
   using Kernel = EllipticalKernel;
   using Form = QuadraticForm;
   using Scope = EllipticalKernel::Scope;
@@ -39,18 +40,18 @@ struct InMetric<double, EllipticalMetric3> {
 }  // namespace spatial
 
 template <class Coord, class Metric>
-struct Delaunay3<Coord, Metric>::Impl : spatial::InMetric<Coord, Metric> {
-  using Base = spatial::InMetric<Coord, Metric>;
+struct Delaunay3<Coord, Metric>::Impl : spatial::MetricTraits<Coord, Metric> {
+  using Base = spatial::MetricTraits<Coord, Metric>;
   explicit Impl(const Metric& value) : metric(value), form(value) {}
   [[nodiscard]] typename Base::Scope scope() const { return typename Base::Scope(form); }
 
   Metric metric;
   typename Base::Form form;
   spatial::Mesh<typename Base::Kernel> mesh;
-  std::vector<std::uint32_t> set;  ///< scratch of remove()
+  std::vector<std::uint32_t> to_remove;  ///< scratch of remove()
 };
 
-/// For the library's own parts, tests and benchmarks.
+/// Gives the library's own sources, tests and benchmarks access to the mesh.
 struct Delaunay3Access {
   template <class Coord, class Metric>
   static const auto& mesh(const Delaunay3<Coord, Metric>& triangulation) {
@@ -60,14 +61,14 @@ struct Delaunay3Access {
   static auto& mesh(Delaunay3<Coord, Metric>& triangulation) {
     return triangulation.impl_->mesh;
   }
-  /// Predicates on the mesh need this scope, which must not outlive the triangulation.
+  /// Returns the scope that predicates on the mesh need. It must not outlive the triangulation.
   template <class Coord, class Metric>
   static auto scope(const Delaunay3<Coord, Metric>& triangulation) {
     return triangulation.impl_->scope();
   }
 };
 
-/// Checks a triangulation completely: counts, free lists, links, orientation, the perturbed empty
+/// Checks all invariants: counts, free lists, links, orientation, the perturbed empty
 /// sphere across every facet, the hull, and the sorted list while there are no tetrahedra. Returns
 /// a description of the first fault, or an empty string. O(n).
 template <class Coord, class Metric>

@@ -77,9 +77,9 @@ inline constexpr std::uint32_t kMaxTetrahedra = (std::uint32_t{1} << 30) - 2;
 // Vertex::incident holds a tetrahedron at the vertex (below 2^30), or one of these values. Within
 // one operation: the vertex's number in a cavity or hole, with this bit.
 inline constexpr std::uint32_t kLocalBit = 0x40000000u;
-/// During a removal: a vertex that will be removed but has not been met yet, and one that has.
-inline constexpr std::uint32_t kToRemove = 0x7FFFFFF0u;
-inline constexpr std::uint32_t kRemoving = 0x7FFFFFF1u;
+/// During a removal: a vertex that will be removed, and one that is already part of a hole.
+inline constexpr std::uint32_t kPendingRemoval = 0x7FFFFFF0u;
+inline constexpr std::uint32_t kInHole = 0x7FFFFFF1u;
 /// An existing vertex without tetrahedra (all points are coplanar).
 inline constexpr std::uint32_t kNoIncident = 0x7FFFFFFFu;
 /// The slot is free. The other bits are the next free slot.

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Removes vertices, one or a set: takes out all tetrahedra at them and fills the hole as a whole,
-// whatever its shape. It may contain vertices that stay (islands), have handles and pinches, or be
-// at the hull. A hole ends at facets beyond which a tetrahedron stays. Holes that touch only in
-// edges or vertices are filled one after the other.
+// Removes one or many vertices: deletes all their tetrahedra and fills the hole in one pass,
+// whatever its shape. The hole may contain surviving vertices (islands), have handles and pinches,
+// or touch the hull. It ends at the facets of surviving tetrahedra. Holes that touch only in edges
+// or vertices are filled one after the other.
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
 #include "curve_sort.hpp"
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
@@ -14,7 +20,7 @@ namespace terrace::tri::spatial {
 namespace {
 
 /// Filling a hole tests each of its vertices for each facet, so larger sets are divided.
-constexpr std::size_t kMaxSet = 512;
+constexpr std::size_t kMaxVerticesPerHole = 512;
 /// Replacing this many tetrahedra takes about as long as an insertion.
 constexpr std::size_t kSlotsPerInsertion = 24;
 
@@ -25,14 +31,14 @@ class Removal {
       : mesh_(mesh), hole_(mesh.hole), vertices_(vertices), fill_(fill) {}
 
   void run() {
-    starts_.clear();
+    first_tetrahedra_.clear();
     for (const std::uint32_t v : vertices_) {
-      starts_.push_back(mesh_.vertex[v].incident);
-      mesh_.vertex[v].incident = kToRemove;
+      first_tetrahedra_.push_back(mesh_.vertex[v].incident);
+      mesh_.vertex[v].incident = kPendingRemoval;
     }
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      if (mesh_.vertex[vertices_[i]].incident != kToRemove) continue;
-      gather(starts_[i]);
+      if (mesh_.vertex[vertices_[i]].incident != kPendingRemoval) continue;
+      gather_hole(first_tetrahedra_[i]);
       if (must_restart()) {
         for (const std::uint32_t v : vertices_) mesh_.free_vertex_slot(v);
         std::vector<std::uint32_t> survivors;
@@ -52,11 +58,11 @@ class Removal {
  private:
   [[nodiscard]] bool is_removed(std::uint32_t v) const {
     const std::uint32_t incident = mesh_.vertex[v].incident;
-    return incident == kToRemove || incident == kRemoving;
+    return incident == kPendingRemoval || incident == kInHole;
   }
 
-  /// Returns the local number of a corner that stays.
-  std::uint32_t number(std::uint32_t v) {
+  /// Returns the local number of a surviving vertex, and assigns one if it has none.
+  std::uint32_t local_number(std::uint32_t v) {
     if (v == kGhost) return 0;
     std::uint32_t& incident = mesh_.vertex[v].incident;
     if ((incident & kLocalBit) == 0) {
@@ -67,13 +73,13 @@ class Removal {
     return incident & ~kLocalBit;
   }
 
-  /// Lists the tetrahedra of a hole, the facets around it, and the vertices on it that stay.
-  void gather(std::uint32_t start) {
+  /// Lists the tetrahedra of a hole, the facets around it, and the surviving vertices on it.
+  void gather_hole(std::uint32_t start) {
     hole_.vertex.assign(1, kGhost);
     hole_.point.assign(1, {});
     hole_.facets.clear();
     hole_.slots.clear();
-    collect(start);
+    take_tetrahedron(start);
     for (std::size_t k = 0; k < hole_.slots.size(); ++k) {
       const Tetrahedron& t = mesh_.tetrahedron[hole_.slots[k]];
       std::array<std::uint32_t, 4> local;
@@ -81,18 +87,20 @@ class Removal {
       for (std::size_t i = 0; i < 4; ++i) {
         const std::uint32_t v = t.corner[i];
         if (is_removed(v)) {
-          mesh_.vertex[v].incident = kRemoving;
+          mesh_.vertex[v].incident = kInHole;
           removed_corners |= 1u << i;
         } else {
-          local[i] = number(v);
+          local[i] = local_number(v);
         }
       }
       for (std::uint32_t i = 0; i < 4; ++i) {
         const std::uint32_t other = tetrahedron_of(t.mate[i]);
         if (mesh_.mark[other] == kCollected) continue;
+        // The neighbour belongs to the hole if it has a removed corner: on the shared facet, or
+        // opposite to it.
         if ((removed_corners & ~(1u << i)) != 0 ||
             is_removed(mesh_.tetrahedron[other].corner[index_of(t.mate[i])])) {
-          collect(other);
+          take_tetrahedron(other);
         } else {
           const auto& f = kFacet[i];
           hole_.facets.push_back({{local[f[0]], local[f[1]], local[f[2]]}, t.mate[i]});
@@ -100,7 +108,7 @@ class Removal {
       }
     }
   }
-  void collect(std::uint32_t t) {
+  void take_tetrahedron(std::uint32_t t) {
     mesh_.mark[t] = kCollected;
     mesh_.record(t);
     hole_.slots.push_back(t);
@@ -127,7 +135,7 @@ class Removal {
   Hole<typename Kernel::Point>& hole_;
   std::span<const std::uint32_t> vertices_;
   FillHole<Kernel> fill_;
-  std::vector<std::uint32_t> starts_;
+  std::vector<std::uint32_t> first_tetrahedra_;
 };
 
 }  // namespace
@@ -140,7 +148,7 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices,
     remove_flat(mesh, vertices);
     return;
   }
-  if (vertices.size() <= kMaxSet) {
+  if (vertices.size() <= kMaxVerticesPerHole) {
     Removal<Kernel>(mesh, vertices, fill).run();
     return;
   }
@@ -151,7 +159,7 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices,
   std::vector<std::uint32_t> part;
   for (std::uint32_t begin = 0; begin < order.size();) {
     part.clear();
-    for (; begin < order.size() && part.size() < kMaxSet; ++begin)
+    for (; begin < order.size() && part.size() < kMaxVerticesPerHole; ++begin)
       part.push_back(vertices[order[begin]]);
     remove_set<Kernel>(mesh, part, fill);
   }

@@ -20,7 +20,7 @@ namespace terrace::tri::shape {
 /// Weight of the angle at a vertex relative to the angle across a facet.
 inline constexpr double kPoleWeight = 2.0;
 
-/// Known facts, by slot, if the tetrahedra are only a part of all.
+/// The known labels and vertices, by slot, if the tetrahedra are only a part of all.
 struct Part {
   std::span<const std::uint8_t> label;     ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
   std::size_t unlabelled = 0;              ///< the number of unknown ones, which come first
@@ -28,11 +28,11 @@ struct Part {
 };
 
 /// The first step: returns labels by tetrahedron slot, 1 inside, 0 outside or not finite. The nodes
-/// are the finite tetrahedra, and one for all space beyond the hull. A facet states that both of
-/// its sides are alike, the more credibly the smaller its defect. A vertex states that its two
-/// poles (the largest circumspheres on either side, N. Amenta, M. Bern, doi:10.1007/PL00009475) are
-/// on different sides. A spanning forest of these statements with the least defect is believed.
-/// Boruvka's algorithm finds it.
+/// are the finite tetrahedra, and one for all space beyond the hull. The edges are signed: a facet
+/// says that its two sides have the same label, a vertex that its two poles (the largest
+/// circumspheres on either side, N. Amenta, M. Bern, doi:10.1007/PL00009475) have different labels.
+/// The smaller its defect, the more credible is an edge. The labels are those of a minimum spanning
+/// forest, which Boruvka's algorithm finds.
 ///
 /// In a part, the vertices of unknown tetrahedra are complete. If the known labels are those of the
 /// whole forest, so are the others: joining tetrahedra by their right labels in advance does not
