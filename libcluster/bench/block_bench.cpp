@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Block clustering: measures points per second for each effort and instruction set, and the cost Q
-// relative to the reference search. Blocks have 10 000 points (TERRACE_BENCH_SMALL: 576) of
+// relative to the reference search. Blocks have 10,000 points (TERRACE_BENCH_SMALL: 576) of
 //   dem   square tiles of a fractal elevation model, cells of 30 m, neighbours differ by 2.65 m
 //   scan  patches 500 points wide of a bumpy closed surface
 //   shuf  the scan shuffled: each block is a coarse copy of the whole surface

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Linkage on a GPU: wall time from points to dendrogram, including copies and memory, after the
-// device is awake, for 5 000 to 40 000 points uniform in a cube (TERRACE_BENCH_SMALL: 500). The
+// device is awake, for 5,000 to 40,000 points uniform in a cube (TERRACE_BENCH_SMALL: 500). The
 // counters are the seconds that one core of this machine takes for the same task, and the speed-up
 // of the GPU. Checks that the heights are equal. With floats, ties occur and heights may differ, so
 // there it checks that the smallest set is clustered by a valid run of complete linkage. Without a

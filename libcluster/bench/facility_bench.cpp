@@ -140,7 +140,7 @@ void print_points() {
        kSmall ? std::vector<std::size_t>{40} : std::vector<std::size_t>{100, 300, 1000}) {
     std::mt19937_64 random(20);
     const std::vector<Point3> points = inputs::dem_tiles(side, side, 30.0, 2.65, random);
-    // A facility costs as much on the larger models as on the model of 10 000 points.
+    // A facility costs as much on the larger models as on the model of 10,000 points.
     const double facility_cost = 100.0 / static_cast<double>(side);
     BlockClusterer clusterer;
     BlockClustering clustering;

@@ -2,7 +2,7 @@
 // k-means: measures seconds for seeds and iterations separately, on synthetic inputs:
 //   grid   n points around the k knots of a square grid in the plane, as in the set birch1
 //   cube   uniform in a cube
-// They start at n = 100 000 and k = 100 (TERRACE_BENCH_SMALL: n = 2 000, k = 20). The counters are
+// They start at n = 100,000 and k = 100 (TERRACE_BENCH_SMALL: n = 2,000, k = 20). The counters are
 // the iterations until no assignment changes (at most 300), the time per iteration, and the ratio
 // of the SSE to that of the k-means++ seeds.
 //

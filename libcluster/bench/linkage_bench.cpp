@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures the wall time of linkage of points uniform in a cube: single linkage of 10 000, 100 000
-// and 1 000 000 points (TERRACE_BENCH_SMALL: 500), on one thread and two. Also runs on inputs with
+// Measures the wall time of linkage of points uniform in a cube: single linkage of 10,000, 100,000
+// and 1,000,000 points (TERRACE_BENCH_SMALL: 500), on one thread and two. Also runs on inputs with
 // ties and duplicates. linkage_peers.py compares it with fastcluster.
 #include <cmath>
 #include <cstdlib>

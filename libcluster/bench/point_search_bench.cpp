@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs the strategies of the local search on blocks of 10 000 points, with a facility cost of 1
+// Runs the strategies of the local search on blocks of 10,000 points, with a facility cost of 1
 // diagonal and Meyerson's start:
 //   <input>/<strategy>/<metric>          0.1 m candidates, one thread
 //   <input>/<strategy>/threads:T         one gain by T threads

@@ -38,7 +38,7 @@ TEST(KMedian, FindsTheOptimumOfSmallProblems) {
   EXPECT_GT(share / count, 0.99);  // measured: 0.9963
 }
 
-TEST(KMedian, EndsWhereNoExchangeHelps) {
+TEST(KMedian, EndsWhereNoSwapHelps) {
   for (std::uint64_t seed = 1; seed <= 30; ++seed) {
     const laws::MatrixProblem problem = laws::random_problem(seed, 60, 90);
     if (problem.facilities < 4) continue;

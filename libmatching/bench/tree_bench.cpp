@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Compares the matching tree as a bounding volume hierarchy, with and without rotations
-// (rotate_tree), with a kD-tree split at medians and a binned build by the surface area heuristic,
+// (rotate_tree), with a kd-tree split at medians and a binned build by the surface area heuristic,
 // over the same points and triangles. All trees go down to single primitives. Leaves of at most 8
 // are then made by cost, with the same constants, layout and queries, so that only the tree
 // differs. The inputs are points, synthetic meshes and, if TERRACE_DATA names the data folder,

@@ -84,7 +84,7 @@ inline std::size_t halve(Boxes boxes, std::span<std::uint32_t> range) {
   return middle;
 }
 
-/// Builds a kD-tree that splits at the median along the longest side of the box around the centres.
+/// Builds a kd-tree that splits at the median along the longest side of the box around the centres.
 inline std::vector<TreeChildren> median_split(Boxes boxes) {
   return divide(boxes.size(), [&](std::span<std::uint32_t> range) { return halve(boxes, range); });
 }

@@ -8,15 +8,16 @@
 
 namespace terrace::cluster {
 
-/// A step of the local search: computes the gain of a candidate and opens it.
+/// One step of the local search: evaluate() computes the gain of a candidate, open() opens it. See
+/// BlockState for the layout.
 template <class V>
-class Gain {
+class CandidateStep {
  public:
-  explicit Gain(BlockState& state) : s_(state), facilities_(state) {}
+  explicit CandidateStep(BlockState& state) : s_(state), facilities_(state) {}
 
-  /// Returns the saving from opening a facility at (x, y, z). Fills `nearby` and
-  /// `close_flag`.
-  float gain(float x, float y, float z) {
+  /// Returns the saving from opening a facility at (x, y, z). Sets nearby, nearby_count and
+  /// close_flag for open().
+  float evaluate(float x, float y, float z) {
     const V cx = V::broadcast(x);
     const V cy = V::broadcast(y);
     const V cz = V::broadcast(z);
@@ -32,21 +33,24 @@ class Gain {
       }
     }
     s_.nearby_count = count;
-    float gain = -s_.facility_cost;
+    float total = -s_.facility_cost;
     V savings = zero;
     for (std::uint32_t k = 0; k < count; ++k) {
       const std::uint32_t j = s_.nearby[k];
       const std::uint32_t first = s_.begin[j];
       const std::uint32_t end = first + round_to_lanes(s_.size[j]);
       // Distance is convex, so closing j loses at least
-      // weight_sum * |candidate - mean| - connection_cost.
-      const float mx = s_.mean_x[j] - x;
-      const float my = s_.mean_y[j] - y;
-      const float mz = s_.mean_z[j] - z;
+      // weight_sum * |candidate - mean| - connection_cost. Skip the sum of losses if this bound
+      // already exceeds the facility cost.
+      const float to_mean_x = s_.mean_x[j] - x;
+      const float to_mean_y = s_.mean_y[j] - y;
+      const float to_mean_z = s_.mean_z[j] - z;
       const float loss_limit = s_.facility_cost + s_.connection_cost[j];
       const float weight = s_.weight_sum[j];
       s_.close_flag[k] = 0;
-      if (weight * weight * (mx * mx + my * my + mz * mz) < loss_limit * loss_limit) {
+      if (weight * weight *
+              (to_mean_x * to_mean_x + to_mean_y * to_mean_y + to_mean_z * to_mean_z) <
+          loss_limit * loss_limit) {
         V losses = zero;
         for (std::uint32_t i = first; i < end; i += kLanes) {
           const V d =
@@ -59,7 +63,7 @@ class Gain {
         const float loss = sum(losses);
         if (loss < s_.facility_cost) {
           s_.close_flag[k] = 1;
-          gain += s_.facility_cost - loss;
+          total += s_.facility_cost - loss;
         }
       } else {
         for (std::uint32_t i = first; i < end; i += kLanes) {
@@ -70,10 +74,10 @@ class Gain {
         }
       }
     }
-    return gain + sum(savings);
+    return total + sum(savings);
   }
 
-  /// Opens a facility at the point. Requires that the last call was gain() for the same point.
+  /// Opens a facility at the point. Requires a preceding evaluate() at this point's position.
   void open(std::uint32_t point) {
     std::uint32_t capacity = kLanes;
     for (std::uint32_t k = 0; k < s_.nearby_count; ++k)
@@ -137,7 +141,7 @@ class Gain {
     facilities_.recentre(j);
   }
 
-  /// Zeroes the lanes from `end` to the next multiple of sixteen, so that they do not count.
+  /// Zeroes the lanes from `end` to the next multiple of kLanes, so that they do not count.
   void clear_surplus(std::uint32_t end) {
     for (std::uint32_t i = end; i < round_to_lanes(end); ++i) {
       s_.px[i] = s_.py[i] = s_.pz[i] = s_.pw[i] = s_.pd[i] = 0;

@@ -22,7 +22,7 @@ template <class V>
 class Engine {
  public:
   explicit Engine(BlockState& state)
-      : s_(state), assigner_(state), facilities_(state), gain_(state) {}
+      : s_(state), assigner_(state), facilities_(state), step_(state) {}
 
   void run(const SearchPlan& plan) {
     assigner_.measure_groups();
@@ -58,7 +58,7 @@ class Engine {
   /// Opens a facility at the point if that lowers the cost.
   void consider(std::uint32_t point) {
     s_.tick(s_.facility_count / kLanes + 64);
-    if (gain_.gain(s_.x[point], s_.y[point], s_.z[point]) > 0) gain_.open(point);
+    if (step_.evaluate(s_.x[point], s_.y[point], s_.z[point]) > 0) step_.open(point);
   }
 
   /// Tries points at equal distances along the curve.
@@ -124,7 +124,7 @@ class Engine {
   BlockState& s_;
   Assigner<V> assigner_;
   Facilities<V> facilities_;
-  Gain<V> gain_;
+  CandidateStep<V> step_;
 };
 
 }  // namespace terrace::cluster

@@ -19,7 +19,7 @@ template <class Rounds>
 Dendrogram dendrogram_of(const LinkagePoints& points, const Rounds& rounds) {
   const std::size_t count = points.scaled().size();
   if (count < 2) return make_dendrogram(count, {});
-  // In the order of a kD-tree, most clusters that merge have nearby rows in the matrix.
+  // In the order of a kd-tree, most clusters that merge have nearby rows in the matrix.
   std::vector<std::uint32_t> all(count);
   std::iota(all.begin(), all.end(), 0u);
   const LinkageTree tree(points.scaled(), all, 1);

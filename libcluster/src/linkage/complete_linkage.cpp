@@ -22,7 +22,7 @@ Dendrogram cluster_points(std::span<const Point3> points, const LinkageOptions& 
   const LinkagePoints linkage_points(points);
   BandMatrix<T> matrix(points.size(), options.memory_limit);
   if (points.size() < 2) return make_dendrogram(points.size(), {});
-  // In the order of a kD-tree, most clusters that merge have nearby rows in the matrix.
+  // In the order of a kd-tree, most clusters that merge have nearby rows in the matrix.
   std::vector<std::uint32_t> all(points.size());
   std::iota(all.begin(), all.end(), 0u);
   const LinkageTree tree(linkage_points.scaled(), all, options.threads, options.check_stop);

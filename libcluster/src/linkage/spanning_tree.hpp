@@ -17,7 +17,7 @@
 
 namespace terrace::cluster {
 
-/// The Euclidean minimum spanning tree of the points of a kD-tree, all of them different.
+/// The Euclidean minimum spanning tree of the points of a kd-tree, all of them different.
 ///
 /// Uses Borůvka's method: in each round every component takes its shortest edge to another one. The
 /// largest component is skipped, because it would take longest and the others find its edges.

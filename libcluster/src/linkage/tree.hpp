@@ -14,7 +14,7 @@
 
 namespace terrace::cluster {
 
-/// A kD-tree over points in its own order, in which the points of a node are consecutive. Nodes are
+/// A kd-tree over points in its own order, in which the points of a node are consecutive. Nodes are
 /// numbered as in a heap (root 1, children 2v and 2v + 1). All leaves are on one level, and node q
 /// of a level with 2^t nodes has the points from floor(q n / 2^t) on.
 class LinkageTree {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 
+/// Marks functions that also compile as CUDA device code. Used by the CUDA sources too.
 #ifdef __CUDACC__
 #define TERRACE_CLUSTER_HOST_DEVICE __host__ __device__
 #else
@@ -15,14 +16,14 @@
 /// The band-shaped half of a symmetric n x n matrix without its diagonal. Row i holds the n / 2
 /// entries (rounded down) (i, i+1), (i, i+2), ... with columns modulo n. All rows have the same
 /// length, so equal shares of rows are equal shares of work. For odd n each pair occurs once. For
-/// even n the n / 2 pairs {i, i + n/2} occur twice, in row i and in row i + n/2. The functions on
-/// places compile as CUDA code for host and device.
+/// even n the n / 2 pairs {i, i + n/2} occur twice, in row i and in row i + n/2. The free
+/// functions also compile as CUDA device code.
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 7.6.2. Equation 7.10 as
 /// printed does not invert 7.9, so band_place() corrects it.
 
 namespace terrace::cluster {
 
-/// A place in the band: row < n, column < floor(n / 2).
+/// A position in the band: row < n, column < floor(n / 2).
 struct BandPlace {
   std::uint64_t row, column;
 };
@@ -40,7 +41,7 @@ TERRACE_CLUSTER_HOST_DEVICE inline constexpr std::uint64_t band_partner(std::uin
   return j < n ? j : j - n;
 }
 
-/// Returns the place of the pair {i, j}. If it occurs twice, returns the place in row i. Requires
+/// Returns the position of the pair {i, j}. If it occurs twice, returns that in row i. Requires
 /// i != j, i < n and j < n.
 TERRACE_CLUSTER_HOST_DEVICE inline constexpr BandPlace band_place(std::uint64_t n, std::uint64_t i,
                                                                   std::uint64_t j) {

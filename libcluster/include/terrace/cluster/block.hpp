@@ -75,7 +75,7 @@ class BlockClusterer {
   /// Blocks of fewer than 2500 points always get Effort::full, because a reduced search is up to
   /// 30 % worse there (thesis table 7.5). Costs that overflow a double are infinite, but the
   /// clustering is correct even then.
-  /// Cost: 0.05 to 0.1 us per point for blocks of 10 000 points at standard effort with AVX-512,
+  /// Cost: 0.05 to 0.1 us per point for blocks of 10,000 points at standard effort with AVX-512,
   /// and O(n k) for large n. Needs about 140 bytes of memory per point, which it keeps for the next
   /// block.
   void run(std::span<const Point3> points, std::span<const double> weights,

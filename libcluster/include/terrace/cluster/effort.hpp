@@ -9,7 +9,7 @@ namespace terrace::cluster {
 /// facility_location.hpp.
 ///
 /// The percentages for blocks say how much the cost exceeds that of the thesis's full search, on
-/// average over blocks of 10 000 points. The first is for surfaces, the second for volumes. For
+/// average over blocks of 10,000 points. The first is for surfaces, the second for volumes. For
 /// local search over n points or entities, the effort is a number of random candidates. For
 /// interchange on a matrix, it is a number of restarts and of perturbations per restart.
 /// Source: J. Skála, Algorithms for manipulating large geometric data, 7.3.1, whose full search is

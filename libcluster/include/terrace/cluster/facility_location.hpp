@@ -22,7 +22,7 @@
 /// is minimised. A problem consists of points under a metric, of entities with a distance function,
 /// or of a matrix of costs. solve() accepts each of them, and lower_bound() bounds how far a result
 /// is from the optimum. Source: J. Skála, Algorithms for manipulating large geometric data, 4.2.3,
-/// 7.1 and 7.3. Each strategy lists its own sources.
+/// 7.1 and 7.3, called the thesis below. Each strategy lists its own sources.
 
 namespace terrace::cluster {
 
@@ -37,12 +37,12 @@ struct FacilityPoints {
   /// further axes.
   double facility_cost = 1.0;
   /// The cost of leaving out a client of weight 1, as a multiple of the same diagonal. If infinite,
-  /// every client is connected. (7.1.3, figure 7.3)
+  /// every client is connected (thesis 7.1.3, figure 7.3).
   double outlier_price = std::numeric_limits<double>::infinity();
 };
 
 /// Anything with distances (triangles, segments, words), numbered from 0. Every entity is a client
-/// and a possible facility. (chapter 9)
+/// and a possible facility (thesis, chapter 9).
 struct FacilityEntities {
   std::size_t count = 0;
   /// Distance from a facility to a client: finite, not negative, and 0 from an entity to itself.
@@ -68,15 +68,18 @@ struct FacilityMatrix {
   }
 };
 
-/// Checks a problem. Throws: std::invalid_argument for sizes that do not match, no facilities or
-/// clients, more than 2^32 - 2 of either, coordinates, weights or channels that are not finite,
-/// weights or costs out of range, or a missing function. The message names the index.
+/// Checks a problem. Throws std::invalid_argument, with the index in the message, for
+/// - sizes that do not match;
+/// - no facilities or clients, or more than 2^32 - 2 of either;
+/// - coordinates, weights or channels that are not finite;
+/// - weights or costs out of range;
+/// - a missing function.
 /// Also throws whatever check_stop throws.
 void check(const FacilityPoints& problem);
 void check(const FacilityEntities& problem);
 void check(const FacilityMatrix& problem, const base::StopCheck& check_stop = {});
 
-/// Assignment of a client that is connected to no facility, because leaving it out was cheaper.
+/// Assignment of a client that is left out.
 inline constexpr std::uint32_t kOutlier = 0xffffffff;
 
 /// A solution. Clusters are numbered by ascending facility.
@@ -97,15 +100,15 @@ struct FacilitySolution {
   }
 };
 
-/// There are three kinds of strategies.
+/// Strategies of solve(), of three kinds.
 ///
-/// Local search over points and entities: Meyerson's start, then random candidates, each of which
-/// is opened if its gain (the cost that this saves) is positive. The strategies from full_scan to
-/// facilities differ in how they compute a gain (7.3.2; n clients). They give the same gains to the
-/// last bit, hence the same solution. One facility stays open, even if leaving all clients out
-/// would be cheaper. Sources: M. Charikar, S. Guha, Improved combinatorial algorithms for the
-/// facility location and k-median problems, FOCS 1999; A. Meyerson, Online facility location, FOCS
-/// 2001.
+/// Local search over points and entities: starts with Meyerson's online algorithm and continues
+/// with random candidates. Each is opened if its gain (the cost that this saves) is positive. The
+/// strategies from full_scan to facilities differ in how they compute a gain (thesis 7.3.2; n
+/// clients). They give the same gains to the last bit, hence the same solution. One facility stays
+/// open, even if leaving all clients out would be cheaper. Sources: M. Charikar, S. Guha, Improved
+/// combinatorial algorithms for the facility location and k-median problems, FOCS 1999; A.
+/// Meyerson, Online facility location, FOCS 2001.
 ///
 /// There are three differences from the thesis. Longest connections are unweighted distances,
 /// because weighted ones prune too much if weights are below 1. A bound keeps facilities from
@@ -113,11 +116,12 @@ struct FacilitySolution {
 ///
 /// Block clustering: `fast`.
 ///
-/// Strategies on a matrix. For points and entities the matrix of 8 n^2 bytes is built first. A
-/// client whose connection would cost more than its outlier price is left out at the end.
+/// Strategies on a matrix: interchange, jain_vazirani, greedy_stars. For points and entities the
+/// matrix of 8 n^2 bytes is built first. A client whose connection would cost more than its outlier
+/// price is left out at the end.
 enum class FacilityStrategy : std::uint8_t {
-  /// For points and entities, the first of facilities, kd_tree and full_scan that the distances
-  /// admit. For a matrix, interchange.
+  /// For points and entities `facilities`, else `kd_tree`, else `full_scan`: the first that
+  /// supports the distances. For a matrix, `interchange`.
   automatic,
   full_scan,  ///< examines all clients: n distances
   quadtree,  ///< cells of a quadtree over x and y, with their longest connections; no custom metric
@@ -130,7 +134,7 @@ enum class FacilityStrategy : std::uint8_t {
   /// that is uniform there), no channels, outliers or start, and fewer than 2^24 points.
   fast,
   /// Local search with restarts. The solution is a local optimum: it is not improved (by more than
-  /// rounding) by opening one facility, closing one, exchanging one for another, or opening one and
+  /// rounding) by opening one facility, closing one, swapping one for another, or opening one and
   /// closing those whose clients are better off there. Takes O(facilities * clients) per round
   /// through the candidates and some rounds per perturbation. Memory is O(facilities + clients) per
   /// thread, plus a copy of the matrix if its costs exceed 2^900. Sources: R. Whitaker, A fast
@@ -172,7 +176,7 @@ using FacilityProgress = std::function<bool(std::size_t done, std::size_t total)
 struct FacilityOptions {
   FacilityStrategy strategy = FacilityStrategy::automatic;
   Effort effort = Effort::standard;
-  /// Number of independent searches by interchange, at least 1. Overrides `effort`.
+  /// Number of independent searches of `interchange`, at least 1. Overrides `effort`.
   std::optional<std::uint32_t> restarts = {};
   /// Exact length of the search: candidates for local search, perturbations per restart for
   /// interchange. Overrides `effort`. Other strategies ignore it.
@@ -182,12 +186,12 @@ struct FacilityOptions {
   double seconds = std::numeric_limits<double>::infinity();
   std::uint64_t seed = 1;
   /// Number of threads, including the caller's; 0: one per core. Does not change the result.
-  /// Growth and `fast` use one thread.
+  /// `jain_vazirani`, `greedy_stars` and `fast` use one thread.
   unsigned threads = 1;
-  /// Number of candidates that a local search evaluates at once, on the same solution (7.3.3). The
-  /// one with the greatest positive gain is opened, those without gain count as tried, and the
-  /// others are discarded and do not count. Different batch sizes make different searches; 1 is the
-  /// plain one.
+  /// Number of candidates that a local search evaluates at once, on the same solution
+  /// (thesis 7.3.3). The one with the greatest positive gain is opened, those without gain count as
+  /// tried, and the others are discarded and do not count. Different batch sizes make different
+  /// searches; 1 is the sequential algorithm.
   std::size_t batch = 1;
   /// Whether a local search finally moves each client to its nearest open facility.
   bool assign_nearest = false;
@@ -201,13 +205,13 @@ struct FacilityOptions {
   base::StopCheck check_stop = {};
 };
 
-/// Statistics of a local search, for figures 7.12 to 7.14.
+/// Statistics of a local search, for figures 7.12 to 7.14 of the thesis.
 struct SearchStatistics {
   std::size_t candidates = 0;        ///< gains computed, including discarded ones
   std::size_t positive = 0;          ///< candidates with a positive gain
   std::size_t opened = 0;            ///< candidates that were opened
   std::uint64_t inspected = 0;       ///< distances from a candidate to a client or facility
-  std::uint64_t vertices = 0;        ///< clients and open facilities, summed over the candidates
+  std::uint64_t vertices = 0;        ///< clients and open facilities, over all candidates
   std::size_t wrongly_assigned = 0;  ///< clients with a nearer open facility, before assign_nearest
 
   [[nodiscard]] double positive_share() const {
@@ -223,10 +227,11 @@ struct SearchStatistics {
 struct FacilityReport {
   FacilityStrategy strategy = FacilityStrategy::automatic;  ///< the one that was used
   SearchStatistics search;
-  /// Duals per client: for growth, the time at which the client was connected.
+  /// Duals per client: for jain_vazirani and greedy_stars, the time at which the client was
+  /// connected.
   std::vector<double> duals;
-  /// The lower bound is that of the duals divided by this number, the least divisor (to 1e-9) for
-  /// which no facility is paid more than it costs. 1 except for greedy_stars.
+  /// Divisor that makes the duals feasible: the least number (to 1e-9) for which no facility
+  /// receives more than it costs. 1 except for greedy_stars.
   double divisor = 1.0;
 };
 
@@ -274,7 +279,7 @@ struct LowerBoundOptions {
 /// subtracted: (terms + 8) epsilon times the sum of the absolute values. Sources: D. Erlenkotter, A
 /// dual-based procedure for uncapacitated facility location, Operations Research 1978; G.
 /// Cornuejols, M. Fisher, G. Nemhauser, Location of bank accounts to optimize float, Management
-/// Science 1977; the thesis's dual program 4.17 to 4.21.
+/// Science 1977; dual program 4.17 to 4.21 of the thesis.
 ///
 /// For a matrix: dual ascent with dual adjustment, then subgradient steps. `start` is a solution
 /// whose cost is the target of the steps. The better it is, the sooner the bound is good. If it has

@@ -62,7 +62,7 @@ struct KMeansResult {
 /// Throws: std::invalid_argument if a point or weight is out of range (the message gives its
 /// index), k is 0 or above n, restarts is 0, or tolerance is negative or NaN.
 /// Cost: O(n log n) for the tree, then O(n) per iteration in the worst case. Only points near the
-/// borders of clusters are examined singly. 100 000 points in the plane with k = 100 take less than
+/// borders of clusters are examined singly. 100,000 points in the plane with k = 100 take less than
 /// a millisecond per iteration. Needs about 80 bytes of memory per point.
 [[nodiscard]] KMeansResult k_means(std::span<const Point3> points, std::span<const double> weights,
                                    const KMeansOptions& options);

@@ -24,6 +24,7 @@
 ///
 /// If distances are equal there are several valid dendrograms. Which one is returned depends only
 /// on the input and its order, not on threads or instruction set.
+///
 /// Sources: J. Skála, Algorithms for manipulating large geometric data, 4.2.1, 7.6; D. Müllner,
 /// Modern hierarchical, agglomerative clustering algorithms, 2011.
 
@@ -42,8 +43,8 @@ enum class MatrixEntry {
 
 struct LinkageOptions {
   unsigned threads = 1;  ///< does not change the result
-  /// Applies where there is a matrix: complete, average and weighted linkage, and all linkage of
-  /// distances.
+  /// Applies where there is a matrix: complete, average and weighted linkage, and every method on
+  /// given distances.
   MatrixEntry entry = MatrixEntry::float64;
   /// Limit in bytes for the matrix, or for the means of ward, centroid and median linkage; 0: no
   /// limit.
@@ -57,7 +58,7 @@ struct LinkageOptions {
 /// for non-adversarial points, including many duplicates and regular grids, and about 170 bytes of
 /// memory per point. Heights are exact to the last bits of a double. Distances below 1e-150 of the
 /// largest coordinate may count as zero.
-/// Source: O. Borůvka, O jistém problému minimálním, 1926, over a kD-tree.
+/// Source: O. Borůvka, O jistém problému minimálním, 1926, over a kd-tree.
 /// Throws: std::invalid_argument if a coordinate is not finite or exceeds 1e307 in magnitude. The
 /// message names the point.
 [[nodiscard]] Dendrogram single_linkage(std::span<const Point3> points,
@@ -80,11 +81,11 @@ using PointPair = std::array<std::uint32_t, 2>;
                                               const LinkageOptions& options = {});
 
 /// Complete linkage: the distance of two clusters is the distance of their farthest points. Uses
-/// half the matrix of distances, n * floor(n / 2) entries, and O(n^2) time. Clusters that are each
-/// other's nearest will merge whatever happens elsewhere. So in each round all such pairs merge in
-/// one pass over the matrix, which shrinks with the clusters. If a round finds few pairs, a
-/// nearest-neighbour chain takes over until a quarter of the clusters is gone. Needs about 200
-/// bytes per point in addition to the matrix.
+/// half the matrix of distances, n * floor(n / 2) entries, and O(n^2) time. Two clusters that are
+/// each other's nearest always merge, so each round merges all such pairs in one pass over the
+/// matrix, which shrinks with the clusters. If a round finds few pairs, a nearest-neighbour chain
+/// takes over until a quarter of the clusters is gone. Needs about 200 bytes per point in addition
+/// to the matrix.
 /// Source: F. Murtagh, A survey of recent advances in hierarchical clustering algorithms, 1983.
 /// Throws: std::invalid_argument if a coordinate is not finite or exceeds 1e307 in magnitude (the
 /// message names the point), and if the matrix exceeds the limit (the message gives the bytes
@@ -94,7 +95,7 @@ using PointPair = std::array<std::uint32_t, 2>;
 
 /// The distance of two items given by index, i < j. Called once for each pair, and before that
 /// about 3 n log n times to find a good order. Called concurrently if there are several threads.
-/// Its exceptions are thrown by complete_linkage().
+/// Exceptions are passed on to the caller.
 using PairDistance = std::function<double(std::uint32_t i, std::uint32_t j)>;
 
 /// Complete linkage of `count` items of any kind.
@@ -103,8 +104,8 @@ using PairDistance = std::function<double(std::uint32_t i, std::uint32_t j)>;
 [[nodiscard]] Dendrogram complete_linkage(std::size_t count, const PairDistance& distance,
                                           const LinkageOptions& options = {});
 
-/// Complete linkage of a filled matrix of distances (band_matrix.hpp). Faster if items close to
-/// each other have close indices. Consumes the matrix and ignores options.entry and memory_limit.
+/// Complete linkage of a filled matrix of distances (band_matrix.hpp). Faster if near items have
+/// near indices. Consumes the matrix and ignores options.entry and memory_limit.
 /// Throws: std::invalid_argument if an entry is negative or not finite, or the two copies of a
 /// duplicated pair differ. The message names the pair.
 template <class T>
@@ -134,9 +135,7 @@ enum class LinkageMethod : std::uint8_t {
 /// - ward: a nearest-neighbour chain over means, without a matrix; 120 bytes per point.
 /// - average, weighted: a chain over a matrix of n (n - 1) / 2 entries, and about 50 bytes per
 ///   point. With float entries each merge rounds its distances to float. Equals SciPy's result in
-///   every bit, ties included. For that, a chain begins at the first cluster and prefers the
-///   previous cluster of the chain, then the first one, and a new cluster takes the place of its
-///   later part.
+///   every bit, ties included.
 /// - centroid, median: repeatedly merges the nearest two clusters, on ties the first pair, without
 ///   a matrix; 120 bytes per point. A merge may be lower than the merges of its parts. Rows are in
 ///   the order of the merges.
@@ -164,10 +163,10 @@ struct CudaStatus {
 /// current one, which is the first unless the caller or CUDA_VISIBLE_DEVICES chose another.
 [[nodiscard]] CudaStatus cuda_available();
 
-/// Complete linkage entirely on the GPU. Two counters come back per round, and the list of merges
-/// at the end. Heights equal those of complete_linkage() with the same entries, and so does the
+/// Complete linkage entirely on the GPU. Only two counters per round and the final merges are
+/// copied back. Heights equal those of complete_linkage() with the same entries, and so does the
 /// dendrogram unless distances are equal. Device memory: n * n / 2 entries, and up to 0.64 times
-/// that again when the matrix is rebuilt for the clusters of a round, so 1.3 GB for 20 000 points
+/// that again when the matrix is rebuilt for the clusters of a round, so 1.3 GB for 20,000 points
 /// in float. Takes O(n^2) work per halving of the clusters if rounds find many pairs, and O(n)
 /// rounds in the worst case (points in geometric progression). Differences from the thesis: all
 /// reciprocal nearest neighbours merge at once, and the matrix shrinks with the clusters.
@@ -179,7 +178,7 @@ struct CudaStatus {
 
 /// Single linkage on the GPU, without a matrix, with the heights of single_linkage(). Takes O(n^2
 /// log n) work in at most log2 n rounds, in double precision, and up to 850 bytes of device memory
-/// per point. On the CPU single_linkage() is not quadratic. Throws: as cuda_complete_linkage().
+/// per point. single_linkage() on the CPU is subquadratic. Throws: as cuda_complete_linkage().
 [[nodiscard]] Dendrogram cuda_single_linkage(std::span<const Point3> points);
 
 }  // namespace terrace::cluster

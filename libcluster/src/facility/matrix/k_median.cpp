@@ -26,22 +26,22 @@
 namespace terrace::cluster {
 namespace {
 
-constexpr double kMinExchangeGain = 1e-12;  // fraction of the cost; smaller gains are rounding
-constexpr std::size_t kBatch = 32;          // number of exchanges evaluated on the same solution
+constexpr double kMinSwapGain = 1e-12;  // fraction of the cost; smaller gains are rounding
+constexpr std::size_t kBatch = 32;      // number of swaps evaluated on the same solution
 // A batch with at least this many costs is worth a thread.
 constexpr std::size_t kWorthThreads = 200000;
 
-/// A solution of k facilities that is improved by exchanges.
+/// A solution of k facilities that is improved by swaps.
 class MedianSearch {
  public:
-  /// threads: number of threads that evaluate exchanges concurrently.
+  /// threads: number of threads that evaluate swaps concurrently.
   MedianSearch(const CostRows& costs, unsigned threads);
 
   void reset(std::span<const std::uint32_t> open);
   /// Opens those of `candidates` that save most, or closes those that cost least to close, until k
   /// are open. Requires: enough candidates.
   void open_exactly(std::size_t k, std::span<const std::uint32_t> candidates);
-  /// Exchanges facilities until none helps.
+  /// Swaps facilities until none helps.
   void descend(std::mt19937_64& random);
   /// Replaces `count` random facilities by random others.
   void replace(std::size_t count, std::mt19937_64& random);
@@ -51,14 +51,14 @@ class MedianSearch {
   [[nodiscard]] std::vector<std::uint32_t> open() const;
 
  private:
-  struct Exchange {
+  struct Swap {
     double gain = 0.0;
     std::uint32_t leaving = NearestOpen::kNone;
   };
   struct Work {
     std::vector<double> closing, scratch;
   };
-  [[nodiscard]] Exchange judge(std::uint32_t candidate, Work& work) const;
+  [[nodiscard]] Swap judge(std::uint32_t candidate, Work& work) const;
   [[nodiscard]] double opening_gain(std::uint32_t candidate);
   void close_least();
 
@@ -138,7 +138,7 @@ void MedianSearch::open_exactly(std::size_t k, std::span<const std::uint32_t> ca
   }
 }
 
-MedianSearch::Exchange MedianSearch::judge(std::uint32_t candidate, Work& work) const {
+MedianSearch::Swap MedianSearch::judge(std::uint32_t candidate, Work& work) const {
   work.closing.resize(costs_->facilities());
   for (const std::uint32_t j : state_.facilities()) work.closing[j] = 0.0;
   const double* const costs = costs_->row(candidate, work.scratch);
@@ -151,7 +151,7 @@ MedianSearch::Exchange MedianSearch::judge(std::uint32_t candidate, Work& work) 
     gain += first[i] - now;
     work.closing[facility[i]] += std::min(costs[i], second[i]) - now;
   }
-  Exchange best{-1.0, NearestOpen::kNone};
+  Swap best{-1.0, NearestOpen::kNone};
   for (const std::uint32_t j : state_.facilities()) {
     const double saving = gain - work.closing[j];
     if (best.leaving == NearestOpen::kNone || saving > best.gain) best = {saving, j};
@@ -161,9 +161,9 @@ MedianSearch::Exchange MedianSearch::judge(std::uint32_t candidate, Work& work) 
 
 void MedianSearch::descend(std::mt19937_64& random) {
   base::shuffle(order_, random);
-  std::vector<Exchange> exchanges(kBatch);
+  std::vector<Swap> swaps(kBatch);
   std::vector<std::uint32_t> batch;
-  // Ends when every candidate has been rejected since the last exchange.
+  // Ends when every candidate has been rejected since the last swap.
   std::size_t refused = 0;
   for (std::size_t at = 0; refused < order_.size();) {
     batch.clear();
@@ -173,14 +173,14 @@ void MedianSearch::descend(std::mt19937_64& random) {
       if (!state_.is_open(candidate)) batch.push_back(candidate);
     }
     base::parallel_for(batch.size(), threads_,
-                       [&](std::size_t b) { exchanges[b] = judge(batch[b], work_[b]); });
+                       [&](std::size_t b) { swaps[b] = judge(batch[b], work_[b]); });
     std::size_t best = 0;
     for (std::size_t b = 1; b < batch.size(); ++b) {
-      if (exchanges[b].gain > exchanges[best].gain) best = b;
+      if (swaps[b].gain > swaps[best].gain) best = b;
     }
-    if (!batch.empty() && exchanges[best].gain > kMinExchangeGain * cost()) {
+    if (!batch.empty() && swaps[best].gain > kMinSwapGain * cost()) {
       state_.open(batch[best]);
-      state_.close(exchanges[best].leaving);
+      state_.close(swaps[best].leaving);
       refused = 0;  // the batch is repeated, because others in it may still be good
     } else {
       refused += looked;
