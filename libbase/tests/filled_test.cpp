@@ -2,6 +2,8 @@
 #include "terrace/base/filled.hpp"
 
 #include <array>
+#include <cstddef>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -10,22 +12,32 @@ namespace {
 
 struct Stop {};
 
-TEST(Filled, HasTheRequestedLengthAndStopsAtACheck) {
-  constexpr std::size_t kCount = 3'000'000;
-  std::size_t calls = 0;
-  const auto values = filled(kCount, std::array<float, 3>{1, 2, 3}, [&] { ++calls; });
-  EXPECT_EQ(values, std::vector(kCount, std::array<float, 3>{1, 2, 3}));
-  EXPECT_GE(calls, 9U);
-  const std::size_t all = calls;
-  calls = 0;
-  EXPECT_THROW(filled(kCount, std::array<float, 3>{},
-                      [&] {
-                        if (++calls == all) throw Stop();
-                      }),
-               Stop);
-  EXPECT_EQ(calls, all);
+using Item = std::array<float, 3>;
+// 36 MB, so the check is called nine times.
+constexpr std::size_t kCount = 3'000'000;
+
+TEST(Filled, ReturnsCopiesOfTheValue) {
+  EXPECT_EQ(filled(kCount, Item{1, 2, 3}, {}), std::vector(kCount, Item{1, 2, 3}));
   EXPECT_TRUE(filled(0, 1, {}).empty());
   EXPECT_EQ(filled(3, 7, {}), (std::vector{7, 7, 7}));
+}
+
+TEST(Filled, ChecksEvery4MiB) {
+  std::size_t calls = 0;
+  const auto items = filled(kCount, Item{}, [&] { ++calls; });
+  EXPECT_EQ(items.size(), kCount);
+  EXPECT_EQ(calls, 9U);
+}
+
+TEST(Filled, StopsWhenTheCheckThrows) {
+  constexpr std::size_t kLastCall = 9;
+  std::size_t calls = 0;
+  EXPECT_THROW(filled(kCount, Item{},
+                      [&] {
+                        if (++calls == kLastCall) throw Stop();
+                      }),
+               Stop);
+  EXPECT_EQ(calls, kLastCall);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ TEST(ThreadTeam, CallsEachTaskOnceInAscendingOrder) {
   }
 }
 
-TEST(ThreadTeam, WakesThreadsThatSleep) {
+TEST(ThreadTeam, WakesSleepingThreads) {
   ThreadTeam team(4);
   for (int round = 0; round < 3; ++round) {
     // Two tasks that wait for each other need two threads.
@@ -47,7 +47,7 @@ TEST(ThreadTeam, WakesThreadsThatSleep) {
   }
 }
 
-TEST(ThreadTeam, RethrowsTheFailureOfTheSmallestNumber) {
+TEST(ThreadTeam, RethrowsTheExceptionOfTheLowestTask) {
   for (const unsigned threads : {1u, 2u, 5u}) {
     ThreadTeam team(threads);
     for (int round = 0; round < 50; ++round) {
@@ -73,7 +73,7 @@ TEST(ThreadTeam, RethrowsTheFailureOfTheSmallestNumber) {
   }
 }
 
-/// A caller that ends first waits for long tasks without losing the wake-up.
+// The caller finishes first and must not miss the wake-up.
 TEST(ThreadTeam, WaitsForLongTasks) {
   ThreadTeam team(3);
   for (int round = 0; round < 5; ++round) {
