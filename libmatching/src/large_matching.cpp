@@ -28,7 +28,7 @@ namespace {
 template <std::size_t D>
 struct Unit {
   std::array<double, D> centre;
-  std::uint32_t index;  ///< of the point, or of the first of the pair
+  std::uint32_t index;  ///< index of the point, or of the first of the pair
 };
 
 /// Reorders units so that consecutive ranges are compact windows of at most `max_size` units.

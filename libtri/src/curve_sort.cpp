@@ -18,7 +18,7 @@ class Cells {
  public:
   using Coord = typename Point::value_type;
   static constexpr std::size_t kAxes = std::tuple_size_v<Point>;
-  static constexpr unsigned kBits = kAxes == 2 ? 16 : 10;  ///< of a key, per axis
+  static constexpr unsigned kBits = kAxes == 2 ? 16 : 10;  ///< bits of a key, per axis
 
   Cells(std::span<const Point> points, std::span<const std::uint32_t> order) : points_(points) {
     Point high = points[order[0]];

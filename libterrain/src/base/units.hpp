@@ -47,7 +47,7 @@ std::string with_commas(std::uint64_t value);
 /// Formats a number with a noun, in the plural unless it is 1: "1 level", "12,345 tiles",
 /// "2 vertices".
 std::string counted(std::uint64_t number, std::string_view noun);
-/// As above, with a verb that agrees with the number: "1 sample is", "2 samples are".
+/// Formats a number with a noun and a verb that agrees with it: "1 sample is", "2 samples are".
 std::string counted(std::uint64_t number, std::string_view noun, std::string_view verb_of_one,
                     std::string_view verb_of_more);
 /// Formats an amount of memory: "3.2 GiB", "640 MiB", "12 bytes".

@@ -67,7 +67,7 @@ class ContourLines {
   std::int64_t columns_;
   ContourLevels contour_levels_;
   LineJoiner<Crossing, Hash> joiner_;
-  std::int64_t row_ = 0;  ///< of the next band's first row
+  std::int64_t row_ = 0;  ///< number of the next band's first row
   std::vector<std::int64_t> levels_;
   std::vector<std::vector<std::uint32_t>>
       crossed_;  ///< by row of the band: columns of squares that levels may cross

@@ -104,7 +104,7 @@ class PartTracer {
   std::span<const std::uint32_t> part_of_;
   std::vector<std::uint32_t> number_of_;  ///< index of the entry, by triangle slot
   std::span<const tri::TriangleId> triangles_;
-  std::vector<Entry> entries_;  ///< for triangles_
+  std::vector<Entry> entries_;  ///< one entry for each of triangles_
   std::vector<bool> done_;      ///< by segment
   std::vector<Ends> ends_;
   std::vector<Point2> forwards_, backwards_;

@@ -50,8 +50,8 @@ class ContourText {
   FixedText number_;
   ContourOutcome outcome_;
   std::vector<ContourLine> lines_;  ///< not yet written
-  std::size_t points_ = 0;          ///< of these lines
-  std::vector<std::string> texts_;  ///< of pieces; their memory is reused
+  std::size_t points_ = 0;          ///< number of points of these lines
+  std::vector<std::string> texts_;  ///< texts of pieces; their memory is reused
   bool first_ = true;
 };
 

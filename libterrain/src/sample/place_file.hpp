@@ -35,7 +35,7 @@ struct PlaceLayout {
 /// Lines of text, some ended by "\n" and some by "\r\n"; line() returns them without their ends.
 struct PlaceBatch {
   std::string text;
-  std::vector<std::size_t> begins;  ///< of the lines in text, followed by the end
+  std::vector<std::size_t> begins;  ///< begin of each line in text, then the end
   std::uint64_t first_line = 1;     ///< number of the first line in the file
 
   [[nodiscard]] std::size_t size() const { return begins.empty() ? 0 : begins.size() - 1; }

@@ -316,7 +316,7 @@ class PointSampler final : public HeightSampler {
   bool may_load_all_ = false;    ///< whether to load all points if there are many places
   std::unique_ptr<const PointCells> all_cells_;
   std::vector<std::uint32_t> keys_, order_;
-  std::vector<std::size_t> begin_;  ///< in order_, by window; then its size
+  std::vector<std::size_t> begin_;  ///< index in order_, by window; then its size
 };
 
 }  // namespace

@@ -69,7 +69,8 @@ class SurfaceCrossings {
   struct Crossing {
     double t = 0;     ///< position along the line, between 0 and 1
     Point2 place{};   ///< stored
-    double height{};  ///< of the linear surface; NaN on edges longer than SamplerOptions::max_edge
+    double height{};  ///< height of the linear surface; NaN on edges longer than
+                      ///< SamplerOptions::max_edge
   };
 
   /// Uses the max_edge of the options.

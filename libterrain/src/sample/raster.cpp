@@ -334,7 +334,7 @@ class RasterRun {
   RasterOutcome outcome_;
 
   // The tiles in progress.
-  std::int64_t first_column_ = 0, first_row_ = 0;  ///< of heights_
+  std::int64_t first_column_ = 0, first_row_ = 0;  ///< first column and row of heights_
   std::size_t width_ = 0;
   std::vector<Point2> places_;
   std::vector<SurfacePoint> surface_;

@@ -15,7 +15,7 @@ struct GroundSlope::Table {
   static constexpr std::size_t kSide = 256;
 
   stream::Box3 bounds;
-  std::mutex mutex;  ///< for creating maps
+  std::mutex mutex;  ///< protects the creation of maps
   std::vector<std::atomic<const GroundMap*>> maps;
   std::deque<GroundMap> storage;
 

@@ -21,7 +21,7 @@ namespace terrace::terrain {
 template <class T>
 struct LatticeView {
   const T* heights = nullptr;
-  std::int64_t column = 0, row = 0;    ///< of the first sample
+  std::int64_t column = 0, row = 0;    ///< position of the first sample
   std::int64_t columns = 0, rows = 0;  ///< size
 
   [[nodiscard]] double at(std::int64_t c, std::int64_t r) const {

@@ -182,7 +182,7 @@ class PointCells {
   std::array<double, 2> cells_per_unit_{}, cell_size_{};
   std::uint32_t columns_ = 1, rows_ = 1;
   LargeArray<Point2> positions_;  ///< by cell, row by row
-  LargeArray<double> heights_;    ///< of positions_
+  LargeArray<double> heights_;    ///< heights of positions_
   /// Index in positions_ of the first point of each cell, then the number of points.
   std::vector<std::uint32_t> cell_begin_;
   /// Number of points in the cells left of and above each corner of the grid, row by row.

@@ -80,7 +80,7 @@ class PointVoids {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::optional<WindowTree> tree_;
-  std::vector<Part> parts_;  ///< for the windows of tree_
+  std::vector<Part> parts_;  ///< one part for each window of tree_
   std::size_t next_ = 0;     ///< the next of parts_ to search
   unsigned at_work_ = 0;     ///< number of threads
   std::size_t points_ = 0;   ///< border points until now

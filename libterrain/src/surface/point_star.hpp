@@ -50,7 +50,7 @@ class PointStar {
   struct Spoke {
     Point2 end{};
     bool is_outside = false;
-    std::uint8_t mark = 0;  ///< of the triangle between this spoke and the next
+    std::uint8_t mark = 0;  ///< mark of the triangle between this spoke and the next
   };
 
   [[nodiscard]] bool is_open() const { return !spokes_.empty() && spokes_.back().is_outside; }

@@ -164,7 +164,7 @@ class PointWindow {
 
   PointCloud& cloud_;
   std::uint64_t memory_bytes_;
-  double scale_, offset_;    ///< of heights
+  double scale_, offset_;    ///< scale and offset of heights
   std::uint64_t looks_ = 0;  ///< not yet counted in the voids
   bool takes_too_long_ = false;
   ClusterFrontier frontier_;
@@ -176,18 +176,18 @@ class PointWindow {
   std::vector<State> states_;                 ///< by triangle slot
   std::vector<stream::ClusterId> read_;       ///< in reading order
   std::vector<Triangulation::Point> places_;  ///< to be inserted
-  std::vector<NewPoint> new_points_;          ///< for places_
+  std::vector<NewPoint> new_points_;          ///< one for each of places_
   std::vector<Pending> pending_;
-  std::size_t pending_count_ = 0;  ///< of pending_, not taken
+  std::size_t pending_count_ = 0;  ///< number of pending_ that are not taken
   std::vector<Outer> outer_;
-  BoxForest groups_;  ///< of pending_
+  BoxForest groups_;  ///< groups of pending_
   std::vector<Triangulation::Insertion> inserted_;
   std::vector<Suspect> suspects_;
   std::vector<std::uint32_t> chosen_;
   BoxTree outer_tree_, open_tree_;  ///< outer_ outside inner_; frontier_.open()
   std::size_t read_in_trees_ = 0;   ///< size of read_ when the trees were made
   std::vector<std::pair<double, std::uint32_t>> by_depth_;  ///< indices in frontier_.open()
-  std::size_t clusters_at_once_ = 1;                        ///< for a suspect
+  std::size_t clusters_at_once_ = 1;  ///< number of clusters read at once for a suspect
   std::vector<double> reaches_;
   Triangulation::Changes changes_;
 };

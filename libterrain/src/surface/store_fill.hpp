@@ -58,7 +58,8 @@ class StoreFill {
     return {(place[0] - from_[0]) / cell_[0], (place[1] - from_[1]) / cell_[1]};
   }
 
-  std::array<double, 2> from_{}, cell_{1.0, 1.0};  ///< of the grid, in stored x, y
+  std::array<double, 2> from_{},
+      cell_{1.0, 1.0};  ///< origin and cell size of the grid, in stored x, y
   std::optional<FilledGrid> grid_;
 };
 

@@ -20,7 +20,7 @@ namespace terrace::terrain {
 
 /// A rectangle of a raster's lattice; may extend beyond the raster or be outside.
 struct LatticeWindow {
-  std::int64_t column = 0, row = 0;    ///< of its first sample
+  std::int64_t column = 0, row = 0;    ///< position of its first sample
   std::int64_t columns = 0, rows = 0;  ///< number of samples
 
   [[nodiscard]] std::size_t size() const {

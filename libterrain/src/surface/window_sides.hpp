@@ -72,7 +72,7 @@ class WindowSides {
   std::size_t max_vertices_;
   mutable std::mutex mutex_;
   Sides recent_, older_;
-  std::size_t vertices_ = 0;  ///< in recent_
+  std::size_t vertices_ = 0;  ///< number of vertices in recent_
 };
 
 }  // namespace terrace::terrain

@@ -100,7 +100,7 @@ class FrameReader final : public ClusterReader {
   /// The ranges that each cluster lacked in the last attempt to read it.
   std::unordered_map<tri::ClusterId, std::vector<stream::ByteRange>> lacking_;
   std::unordered_map<tri::ClusterId, LackingPage> lacking_pages_;
-  std::uint64_t number_ = 0;  ///< of the frame
+  std::uint64_t number_ = 0;  ///< number of the frame
   tri::ClusterId page_{~std::uint64_t{0}};
   tri::StepMeter meter_;
 };

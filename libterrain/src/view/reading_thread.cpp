@@ -88,7 +88,7 @@ class ReadingThread final : public ClusterReader {
   std::size_t next_ = 0;                          ///< the next of delivered_ to pass on
   std::vector<tri::ViewRequest> requested_;       ///< not yet in queue_
   std::unordered_set<tri::ClusterId> withdrawn_;  ///< may still be in queue_
-  std::mutex mutex_;                              ///< for the members below
+  std::mutex mutex_;                              ///< protects the members below
   std::condition_variable wake_;
   std::deque<tri::ViewRequest> queue_;
   std::vector<tri::LoadedCluster> ready_;

@@ -108,14 +108,14 @@ struct Inserted {
 /// A window of the integer lattice, see lattice.cpp. A node is the lower left corner of a square
 /// and has the same number. Scratch memory.
 struct Lattice {
-  std::array<std::int32_t, 2> low{};  ///< of node 0
+  std::array<std::int32_t, 2> low{};  ///< lower corner of node 0
   std::uint32_t columns = 0;
   std::vector<std::uint32_t> vertex;         ///< by node. kNone: no vertex yet
   std::vector<std::uint32_t> square_number;  ///< by square: 0, or its number in `squares` plus 1
   std::vector<std::uint32_t> squares;        ///< the squares to fill
   std::vector<std::uint32_t> inner_points, outer_points;  ///< numbers of points
-  std::vector<Inserted> inserted;                         ///< for each of `inner_points`
-  std::vector<std::uint32_t> slots;  ///< of triangles, two for each of `squares`
+  std::vector<Inserted> inserted;                         ///< one for each of `inner_points`
+  std::vector<std::uint32_t> slots;  ///< triangle slots, two for each of `squares`
   std::vector<Side> outer_sides;     ///< four for each square: the sides beyond its sides
 
   [[nodiscard]] std::size_t node(const std::array<std::int32_t, 2>& p) const {
@@ -156,7 +156,7 @@ struct Mesh {
   FreeSlots free_triangles;
 
   Journal<Point, 3> journal;
-  base::StopTicks ticks;  ///< of building, inserting and removing
+  base::StopTicks ticks;  ///< ticks of building, inserting and removing
 
   // Scratch memory, kept between calls.
   std::vector<Side> sides;

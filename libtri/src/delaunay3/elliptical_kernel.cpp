@@ -76,7 +76,7 @@ struct QuadraticForm::Exact {
   std::array<Number, 6> q;  ///< of the given map
   /// times a power of two, each with a relative error of at most 2^-52, or 0
   std::array<double, 6> near;
-  std::array<bool, 6> is_zero;  ///< of q
+  std::array<bool, 6> is_zero;  ///< by entry of q
 
   /// u^T Q v.
   [[nodiscard]] Number product(const Triple<Number>& u, const Triple<Number>& v) const {

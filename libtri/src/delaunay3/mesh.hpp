@@ -186,7 +186,7 @@ struct Mesh {
   std::uint32_t finite_count = 0;  ///< finite tetrahedra
 
   Journal<Point, 4> journal;
-  base::StopTicks ticks;  ///< of building, inserting and removing
+  base::StopTicks ticks;  ///< ticks of building, inserting and removing
 
   // Scratch memory, kept between calls.
   Cavity cavity;

@@ -127,7 +127,7 @@ struct RegionalDelaunay2<Coord>::Impl {
   std::vector<PlanePosition> position;
   std::vector<std::uint32_t> region;
   std::vector<std::uint32_t> incident;     ///< a triangle at the vertex, or kNone
-  std::vector<std::uint32_t> next_region;  ///< of vertices inserted since the last follow()
+  std::vector<std::uint32_t> next_region;  ///< regions of vertices inserted since the last follow()
 
   // Scratch memory of follow().
   struct Listed {

@@ -460,7 +460,7 @@ class Forest {
   const Part& part_;
   std::uint32_t outside_node_;
   std::vector<Poles> poles_;
-  Pool<std::uint32_t> keys_;  ///< of facets, by side
+  Pool<std::uint32_t> keys_;  ///< keys of facets, by side
   Pool<Edge> edges_;
   /// By root: the rounded defect of the best edge of the set, followed by its index in edges_. In
   /// the first round its id.

@@ -214,7 +214,7 @@ class LocalUpdate {
 
   const Mesh& mesh_;
   State& state_;
-  std::vector<std::uint32_t> slots_;              ///< of tetrahedra, by local number
+  std::vector<std::uint32_t> slots_;              ///< tetrahedron slots, by local number
   std::vector<spatial::Tetrahedron> tetrahedra_;  ///< by local number
   std::vector<std::uint32_t> examined_;           ///< see examined()
   std::size_t unlabelled_count_ = 0;              ///< number of tetrahedra to label

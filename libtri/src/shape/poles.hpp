@@ -22,9 +22,9 @@ inline constexpr double kPoleWeight = 2.0;
 
 /// The known labels and vertices, by slot, if the tetrahedra are only a part of all.
 struct Part {
-  std::span<const std::uint8_t> label;     ///< of tetrahedra: 1 outside, 2 inside, 0 unknown
+  std::span<const std::uint8_t> label;     ///< labels of tetrahedra: 1 outside, 2 inside, 0 unknown
   std::size_t unlabelled = 0;              ///< the number of unknown ones, which come first
-  std::span<const std::uint8_t> complete;  ///< of vertices: 1 if all tetrahedra at them are here
+  std::span<const std::uint8_t> complete;  ///< by vertex: 1 if all its tetrahedra are in the part
 };
 
 /// The first step: returns labels by tetrahedron slot, 1 inside, 0 outside or not finite. The nodes

@@ -130,7 +130,7 @@ void sculpt(const Spheres& spheres, Labels& labels, base::StopTicks& ticks) {
     double defect;
     std::uint32_t vertex_rank;
     Ranks facet;
-    spatial::Side side;  ///< of the tetrahedron to flip, opposite to the vertex
+    spatial::Side side;  ///< side of the tetrahedron to flip, opposite to the vertex
     bool operator<(const Candidate& other) const {
       if (defect != other.defect) return defect > other.defect;
       if (vertex_rank != other.vertex_rank) return vertex_rank > other.vertex_rank;

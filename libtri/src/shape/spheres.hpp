@@ -30,7 +30,7 @@ namespace terrace::tri::shape {
 /// In an elliptical metric it is mapped to where the metric is Euclidean.
 struct Place {
   Vector3 at;
-  std::uint32_t rank;  ///< in lexicographic order. The ghost is last
+  std::uint32_t rank;  ///< rank in lexicographic order; the ghost is last
 };
 inline constexpr Place kGhostPlace{{}, 0xFFFFFFFFu};
 
@@ -237,7 +237,7 @@ class Spheres {
   std::span<const spatial::Tetrahedron> tetrahedra_;
   std::vector<Place> places_;  ///< by vertex slot
   // By tetrahedron slot:
-  Pool<Sphere> sphere_;        ///< of finite tetrahedra
+  Pool<Sphere> sphere_;        ///< spheres of finite tetrahedra
   Pool<std::uint8_t> finite_;  ///< separate, as it is read everywhere
 };
 

@@ -32,9 +32,9 @@ struct State {
   std::vector<std::uint32_t> degree;
   std::vector<std::uint32_t> lost;     ///< existing vertices of degree 0 while there are tetrahedra
   std::vector<std::uint32_t> rescued;  ///< tetrahedra
-  std::size_t kept_count = 0;          ///< in state kKept
+  std::size_t kept_count = 0;          ///< number of tetrahedra in state kKept
   std::vector<std::uint8_t> forest;    ///< poles rule: labels of its first step, by slot
-  base::StopTicks ticks;               ///< of the rules that peel
+  base::StopTicks ticks;               ///< ticks of the rules that peel
   // Scratch memory, kept between calls.
   std::vector<std::uint32_t> queue;    ///< removed tetrahedra whose neighbours must be tested
   std::vector<std::uint32_t> pending;  ///< kept tetrahedra that must be tested on all sides

@@ -110,7 +110,7 @@ class Ground {
   }
 
   std::int64_t x_, y_;  ///< squares of the steps, up to a common factor
-  double area_;         ///< of a cell, in the unit of the squares
+  double area_;         ///< area of a cell, in the unit of the squares
   double tangent_;
   bool narrow_;  ///< true if 64 bits suffice
 };

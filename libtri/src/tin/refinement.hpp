@@ -96,7 +96,8 @@ concept VertexHole = requires(H hole, Mesh<typename S::Vertices> mesh, const Sta
 
 /// Limits that end refinement before the bound holds everywhere.
 struct RefinementLimits {
-  std::size_t vertices = std::numeric_limits<std::size_t>::max();  ///< at most this many that count
+  std::size_t vertices =
+      std::numeric_limits<std::size_t>::max();  ///< maximum number of vertices that count
   std::size_t triangles = std::numeric_limits<std::size_t>::max();  ///< stops when there are more
 };
 

@@ -23,7 +23,7 @@ struct GridFace {
   std::int32_t first_column, last_column, first_row, last_row;
   bool empty;
   bool clipped;              ///< the box does not cover the whole triangle
-  T gradient_x, gradient_y;  ///< of the plane
+  T gradient_x, gradient_y;  ///< gradient of the plane
   T slack;
 
   [[gnu::always_inline]] GridFace(const GridSamples<T>& all, const GridCorner<T>& p,

@@ -67,7 +67,7 @@ struct RowFace {
   double inverse;  ///< reciprocal of twice the area
   double slack;
   double margin;  ///< bound of the rounding error of an edge function, negated
-  double start_x[3], start_y[3], along_x[3], along_y[3];  ///< of the sides
+  double start_x[3], start_y[3], along_x[3], along_y[3];  ///< start and direction of the sides
 
   [[gnu::always_inline]] RowFace(const RowSamples& all, const RowCorner& p, const RowCorner& q,
                                  const RowCorner& r, double = 0.0)

@@ -53,7 +53,7 @@ struct ViewDemand {
 
   std::vector<double> want;      ///< by the view itself
   std::vector<double> keep;      ///< by the view widened by the guard; not less than want
-  std::vector<double> distance;  ///< of the box from the camera, or 0 without a camera
+  std::vector<double> distance;  ///< distance of the box from the camera, or 0 without a camera
 
   void resize(std::size_t size) {
     want.resize(size);

@@ -97,11 +97,11 @@ struct Geomorph<Triangulation>::Scratch {
     Point3 old_place, new_place;
     std::uint32_t lost = 0, gained = 0;  ///< number of triangles
   };
-  std::vector<std::uint32_t> number;  ///< of a site, by vertex slot. kNone between calls
+  std::vector<std::uint32_t> number;  ///< number of a site, by vertex slot. kNone between calls
   std::vector<Site> sites;
   std::size_t removed_count = 0;  ///< number of sites that were removed
   std::vector<Triangle> old_triangles, new_triangles;
-  std::vector<std::uint32_t> part;  ///< of each site
+  std::vector<std::uint32_t> part;  ///< part of each site
   Patches<kAxes> patches;
   detail::PlaceMask mask;
   struct Mover {
@@ -111,7 +111,7 @@ struct Geomorph<Triangulation>::Scratch {
   };
   std::vector<Mover> movers;
   std::vector<std::uint32_t> order;  ///< the triangles of `patches`
-  std::vector<std::uint32_t> index;  ///< in `old_triangles`, by slot. kNone between calls
+  std::vector<std::uint32_t> index;  ///< index in `old_triangles`, by slot. kNone between calls
 
   std::uint32_t site(const Model& model, VertexId vertex) {
     std::uint32_t& n = number[slot(vertex)];

@@ -43,7 +43,7 @@ inline std::string to_string(ClusterId id) {
 
 /// Summary of all points below a cluster down to level 0, including its representative.
 struct ClusterSummary {
-  Box3 box;                       ///< of the positions as stored
+  Box3 box;                       ///< box of the positions as stored
   double error = 0.0;             ///< upper bound of the ground distance from the representative
                                   ///< to a descendant, in ground units (metres)
   std::uint64_t descendants = 0;  ///< number of level-0 points

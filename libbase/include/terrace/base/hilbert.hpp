@@ -18,7 +18,7 @@ namespace hilbert {
 /// mirrors both. The curve enters each square at one corner and leaves at a neighbouring one.
 struct FourSteps {
   std::uint8_t index;        ///< eight bits of the index
-  std::uint8_t orientation;  ///< of the small square
+  std::uint8_t orientation;  ///< orientation of the small square
 };
 /// Returns the steps for each orientation of a square (4) and four bits of x and of y (16 * 16).
 constexpr std::array<FourSteps, 4 * 256> square_table() {

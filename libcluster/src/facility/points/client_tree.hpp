@@ -27,7 +27,7 @@ class ClientTree {
     double longest = 0.0;
     std::uint32_t parent = 0;
     std::uint32_t first_child = 0, child_count = 0;  ///< consecutive nodes; none for a leaf
-    std::uint32_t first = 0, count = 0;              ///< in order()
+    std::uint32_t first = 0, count = 0;              ///< range in order()
   };
 
   /// O(n log n); a quadtree or octree may take O(n) levels, as many as the binary digits of the

@@ -17,7 +17,7 @@ struct SearchFrame {
   std::size_t channel_count = 0;
   std::vector<double> weights;  ///< the greatest is in [0.5, 1)
   double facility_cost = 0.0;   ///< finite
-  double outlier_price = 0.0;   ///< for a client of weight 1; may be infinite
+  double outlier_price = 0.0;   ///< price of a client of weight 1; may be infinite
   int cost_exponent = 0;        ///< a cost times 2 to this power is in the unit of the metric
   /// In the unit of the metric; infinite beyond the range of double.
   double true_facility_cost = 0.0;

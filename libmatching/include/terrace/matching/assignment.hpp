@@ -57,7 +57,8 @@ Assignment assign(std::span<const double> costs, std::size_t rows, std::size_t c
                   const base::StopCheck& check_stop = {});
 Assignment assign(std::span<const float> costs, std::size_t rows, std::size_t columns,
                   const base::StopCheck& check_stop = {});
-/// As above for integers. Labels and cost are exact: every sum fits into 64 bits.
+/// Minimum-cost assignment of integer costs. Labels and cost are exact: every sum fits into 64
+/// bits.
 IntegerAssignment assign(std::span<const std::int32_t> costs, std::size_t rows, std::size_t columns,
                          const base::StopCheck& check_stop = {});
 
@@ -67,7 +68,7 @@ using CostRow = std::function<void(std::size_t row, std::span<double> costs)>;
 
 /// As assign(), with costs from a function. The matrix is never stored.
 ///
-/// Throws: std::invalid_argument as above, std::bad_function_call if fill_row is empty, and
+/// Throws: std::invalid_argument as assign() does, std::bad_function_call if fill_row is empty, and
 /// whatever fill_row throws.
 /// Cost: O(rows + columns) memory. fill_row is called O(rows * min(rows, columns)) times at worst.
 Assignment assign_rows(std::size_t rows, std::size_t columns, const CostRow& fill_row);

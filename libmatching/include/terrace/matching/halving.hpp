@@ -75,8 +75,8 @@ using PairDistance = std::function<double(std::uint32_t, std::uint32_t)>;
 [[nodiscard]] HalvingMatching match_by_halving(std::span<const Point3> points,
                                                const HalvingOptions& options = {});
 
-/// As above, for any distance function. Also throws std::invalid_argument for a distance that is
-/// not finite. The message names the pair.
+/// Matches points by any distance function, as match_by_halving() of points does. Also throws
+/// std::invalid_argument for a distance that is not finite. The message names the pair.
 [[nodiscard]] HalvingMatching match_by_halving(std::size_t count, const PairDistance& distance,
                                                const HalvingOptions& options = {});
 

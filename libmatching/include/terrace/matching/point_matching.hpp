@@ -42,7 +42,7 @@ struct PointMatching {
   std::uint32_t left_over = kNone;  ///< the point without a partner where n is odd
   std::size_t rounds = 0;           ///< rounds of solving and pricing
   std::size_t edges = 0;            ///< candidate edges in the last round
-  Matching proof;  ///< for the sparse graph. If n is odd, vertex n is a dummy partner.
+  Matching proof;  ///< proof for the sparse graph. If n is odd, vertex n is a dummy partner.
 };
 
 /// Minimum-weight perfect matching of points on the complete graph.

@@ -36,7 +36,7 @@ struct BuildRequest {
   /// (see cluster::triangle_distance). A triangle is located at its first corner, and detail_mesh()
   /// returns the triangles. Heights, tiles and bounded meshes need points.
   stream::Entities entities = stream::Entities::points;
-  stream::Selection selection{};  ///< of points and attributes; see Region::restrict()
+  stream::Selection selection{};  ///< points and attributes to keep; see Region::restrict()
   /// Continues where parts of laser data are damaged: see stream::SourceOptions::on_damage.
   bool skip_damaged = false;
   std::optional<stream::Crs> crs{};  ///< overrides the source's
@@ -60,7 +60,7 @@ struct BuildRequest {
   /// How to search for facilities: automatic, or a local search of the thesis (7.3.2).
   cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;
   int band = 1;
-  stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< of PNG
+  stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< encoding of PNG
   std::optional<double> cell{};  ///< cell size of rasters without georeferencing
   std::uint64_t seed = 1;
   /// How to order points that are not the cells of a raster: see stream::in_spatial_order(). The

@@ -15,7 +15,7 @@ namespace terrace::terrain {
 struct Progress {
   std::string_view what;    ///< the things counted, such as "tiles"
   std::uint64_t count = 0;  ///< done until now
-  double fraction = 0.0;    ///< of the whole task, from 0 to 1; 0 if unknown
+  double fraction = 0.0;    ///< share of the whole task, from 0 to 1; 0 if unknown
   bool ended = false;       ///< the last report of this task, completed or abandoned
 };
 

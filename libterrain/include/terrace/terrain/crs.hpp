@@ -86,9 +86,9 @@ class CoordinateSystem {
 
   /// The record of this system in stores and files: code, name, WKT, units.
   [[nodiscard]] stream::Crs crs() const;
-  /// As above, plus the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
+  /// The record of crs() with the GeoKeys that a system without an EPSG code needs in a GeoTIFF.
   [[nodiscard]] stream::Crs crs_with_keys() const;
-  /// As above, but with WKT 1 (OGC 01-009), which LAS requires, or with WKT 2 if WKT 1 cannot
+  /// The record of crs() with WKT 1 (OGC 01-009), which LAS requires, or with WKT 2 if WKT 1 cannot
   /// express the system.
   [[nodiscard]] stream::Crs crs_with_wkt1() const;
 
@@ -224,7 +224,8 @@ class RegionConversion {
 
   bool overrides_ = false;  ///< one CRS for all regions, which overrides their own
   std::optional<Transformation> to_regions_;
-  std::function<std::optional<CoordinateSystem>()> system_;  ///< of the data, computed when needed
+  /// The system of the data, computed when needed.
+  std::function<std::optional<CoordinateSystem>()> system_;
   std::function<void(const std::string&)> note_;
   stream::Box3 bounds_;
   Point2 tolerance_{};

@@ -72,14 +72,15 @@ class WantedPart {
   virtual void take() = 0;
 };
 
-/// As above with several threads, which read clusters and add them to parts concurrently.
+/// Visits the wanted clusters with several threads, which read clusters and add them to parts
+/// concurrently.
 /// make(worker) returns a new part for the thread of that number, 0 to threads - 1. The effect does
 /// not depend on the number of threads if only take() has effects. At most two parts per thread
 /// wait.
 void for_each_wanted(const stream::Store& store, const Detail& detail, unsigned threads,
                      const std::function<std::unique_ptr<WantedPart>(unsigned worker)>& make);
 
-/// As above, but visits index entries only. Clusters of level 0 are not read.
+/// Visits the index entries of the wanted clusters. Clusters of level 0 are not read.
 void for_each_wanted_record(
     const stream::Store& store, const Detail& detail,
     const std::function<void(stream::ClusterId, const stream::ClusterRecord&)>& visit);

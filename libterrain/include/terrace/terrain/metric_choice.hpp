@@ -21,8 +21,8 @@ struct MetricChoice {
 
   std::string text = "euclidean";  ///< as the user wrote it
   Kind kind = Kind::euclidean;
-  double p = 2.0;               ///< of minkowski
-  std::vector<Region> regions;  ///< of elliptical; the first that contains a point applies
+  double p = 2.0;               ///< exponent of minkowski
+  std::vector<Region> regions;  ///< regions of elliptical; the first that contains a point applies
 
   /// Parses euclidean, squared, minkowski:P (P at least 0, or inf) or elliptical:FILE. The file is
   /// JSON:

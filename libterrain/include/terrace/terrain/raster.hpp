@@ -26,7 +26,7 @@ struct RasterRequest {
   std::optional<Region> region{};      ///< in the store's CRS
   std::optional<Transformation> to{};  ///< to the output's CRS, if that is not the store's
   std::string output;                  ///< the GeoTIFF to write
-  stream::Naming replace{};            ///< of an existing file
+  stream::Naming replace{};            ///< what happens to an existing file
 };
 
 struct RasterOutcome {

@@ -118,7 +118,8 @@ class StoreView {
   /// Returns a point in stored coordinates as metres east, north and up.
   [[nodiscard]] stream::Point3 in_view_frame(const stream::Point3& stored) const;
   [[nodiscard]] stream::Point3 in_view_frame(tri::VertexId vertex) const;
-  /// As above for a place in the model's coordinates, which geomorphs use (tri::Geomorph).
+  /// Returns a position in the model's coordinates, which geomorphs use (tri::Geomorph), as metres
+  /// east, north and up.
   [[nodiscard]] stream::Point3 model_in_view_frame(const stream::Point3& place) const;
 
   /// Whether a triangle of a raster spans samples without data; false for other stores. Such a

@@ -20,7 +20,7 @@ struct TileCheckRequest {
   std::optional<double> max_error{};
   /// The store of samples to compare heights with; null: heights are not compared.
   const stream::Store* store = nullptr;
-  HeightReference vertical = HeightReference::recorded;  ///< of the store's heights
+  HeightReference vertical = HeightReference::recorded;  ///< reference of the store's heights
   std::string geoid{};                                   ///< the same as when the tiles were made
 };
 

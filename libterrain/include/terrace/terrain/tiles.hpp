@@ -31,7 +31,7 @@ struct TilesRequest {
   /// Globes have no holes, so `none` is not allowed. `interpolate` fills voids within the convex
   /// outline of the data. Beyond it the surface is 0 m above the ellipsoid.
   Fill fill = Fill::interpolate;
-  std::optional<double> flat_height{};  ///< of Fill::flat, metres above the ellipsoid
+  std::optional<double> flat_height{};  ///< height of Fill::flat, metres above the ellipsoid
   /// Adds a water mask: water is where there is no data, or where the height equals water_height
   /// (in the store's unit).
   bool water = false;

@@ -31,7 +31,7 @@ class UndeclaredVoids {
     std::uint64_t beyond = 0;  ///< impossible heights
     double value = 0;          ///< one of them, stored
     std::array<std::uint64_t, kUsual> usual{};
-    double least = 1e300;  ///< of all other heights
+    double least = 1e300;  ///< least of all other heights
   };
 
   [[nodiscard]] double height(double stored) const {

@@ -65,10 +65,10 @@ struct CrsDefinition {
   /// The horizontal system's code, such as "EPSG" and "32632"; empty if it has none.
   std::string authority, code;
   std::string name;
-  std::string wkt;  ///< of the horizontal system without heights, as WKT 2
+  std::string wkt;  ///< WKT 2 of the horizontal system without heights
   bool geographic = true;
 
-  std::string base_wkt;  ///< of the underlying geographic system, without heights
+  std::string base_wkt;  ///< WKT of the underlying geographic system, without heights
   int base_epsg = 0;     ///< 0: no code
   std::string datum;
   Ellipsoid ellipsoid;
@@ -85,7 +85,8 @@ struct CrsDefinition {
   ProjectionParameters parameters;
 
   Heights heights = Heights::unknown;
-  std::string height_wkt;  ///< of a vertical system, or of a horizontal system with a third axis
+  /// WKT of a vertical system, or of a horizontal system with a third axis.
+  std::string height_wkt;
   std::string vertical_name;
   int vertical_epsg = 0;
   double metres_per_height = 0;  ///< 0: unknown
@@ -116,7 +117,7 @@ AnyCrs crs_of_text(const std::string& text);
 /// a URN or URL of the OGC, or a name. Refuses text of more than 64 KiB, 512 parts or 32 levels.
 /// Throws: CrsError.
 AnyCrs crs_of_contents(const std::string& text);
-/// As above, for a system that must be on the earth.
+/// Reads contents as crs_of_contents() does, for a system that must be on the earth.
 inline CrsDefinition definition_of_contents(const std::string& text) {
   return on_earth(crs_of_contents(text));
 }
@@ -134,7 +135,7 @@ void forget_heights(CrsDefinition& definition);
 /// Writes a unit of heights, given in metres, into the definition's WKT. Adds a vertical system
 /// named "unknown" if none is known.
 void write_height_unit(CrsDefinition& definition, double metres);
-/// As above, for the WKT of a local system.
+/// Returns the WKT of a local system with a unit of heights, given in metres.
 std::string with_height_unit(const stream::Crs& local, double metres);
 /// Returns the system as WKT 2 (ISO 19162:2019), with a shift as a bound CRS.
 std::string wkt_of(const CrsDefinition& definition);

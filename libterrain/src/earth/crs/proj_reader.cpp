@@ -18,7 +18,7 @@ namespace {
 
 struct Axis {
   std::string direction;
-  double unit = 1;  ///< in radians or metres
+  double unit = 1;  ///< the unit in radians or metres
 };
 
 std::vector<Axis> axes_of(const PJ* crs) {

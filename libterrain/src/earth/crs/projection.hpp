@@ -37,8 +37,8 @@ enum class ProjectionMethod : std::uint8_t {
 
 /// In degrees and metres. The method determines which of them are used.
 struct ProjectionParameters {
-  double latitude = 0.0;   ///< of the (false) origin or the centre
-  double longitude = 0.0;  ///< of the same; from the system's prime meridian
+  double latitude = 0.0;   ///< latitude of the (false) origin or the centre
+  double longitude = 0.0;  ///< its longitude, from the system's prime meridian
   double scale = 1.0;
   double parallel1 = 0.0, parallel2 = 0.0;
   double false_easting = 0.0, false_northing = 0.0;

@@ -34,7 +34,7 @@ class LatticePlan {
 
  private:
   LatticeWindow lattice_;
-  std::vector<std::int64_t> columns_, rows_;  ///< of the sides
+  std::vector<std::int64_t> columns_, rows_;  ///< columns and rows of the sides
 };
 
 }  // namespace terrace::terrain

@@ -48,7 +48,7 @@ struct PointMeshCuts {
     unsigned axis = 0;  ///< 0: a line of equal x
     double line = 0.0;
     std::array<std::uint32_t, 2> next{};      ///< nodes, or kCell + a cell
-    std::uint32_t first_cell = 0, cells = 0;  ///< of both sides
+    std::uint32_t first_cell = 0, cells = 0;  ///< cells on both sides
   };
   struct Cell {
     PlaneBox box;

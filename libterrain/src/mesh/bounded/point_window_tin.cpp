@@ -32,7 +32,7 @@ struct Along {
 /// A side of the frame on the hull.
 struct OuterSide {
   Point2 from{}, to{};
-  std::vector<Along> samples;  ///< on it, excluding its ends
+  std::vector<Along> samples;  ///< samples on the side, without its ends
 
   [[nodiscard]] double least() const { return std::min(from[0], to[0]); }
   [[nodiscard]] double greatest() const { return std::max(from[0], to[0]); }
@@ -282,7 +282,7 @@ PointMeshFrame frame_of(const PointMeshPlan& plan, const PointMeshPlan::Window& 
   struct Vertex {
     double height = 0.0;
     std::optional<SharedVertex> shared;
-    std::vector<double> samples;  ///< at a corner of the hull
+    std::vector<double> samples;  ///< heights of the samples at a corner of the hull
   };
   std::map<Point2, Vertex> vertices;
   for (std::size_t i = 0; i < sides.size(); ++i) {

@@ -91,7 +91,7 @@ class PointMeshSides {
   double side_error_;
   std::vector<std::vector<std::uint32_t>> windows_by_junction_;
   WindowSides<std::uint32_t> cache_;
-  std::mutex mutex_;                            ///< for heights_
+  std::mutex mutex_;                            ///< protects heights_
   std::vector<std::optional<double>> heights_;  ///< by junction
 };
 

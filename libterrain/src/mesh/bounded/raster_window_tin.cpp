@@ -69,7 +69,7 @@ bool turn_back(std::span<const tri::Point3> points,
 struct WindowMesher::WindowTin {
   LatticeWindow window;
   std::vector<tri::GridVertex> vertices;  ///< columns and rows relative to the window
-  std::vector<stream::Point3> positions;  ///< of the vertices, in the CRS of the file
+  std::vector<stream::Point3> positions;  ///< vertex positions in the CRS of the file
   std::vector<std::array<std::uint32_t, 3>> triangles;
   /// Measured on the mesh as a reader decodes it; coverage is determined on the lattice.
   tri::GridTinCheck check;
@@ -137,8 +137,8 @@ double WindowMesher::WindowTin::rounding_of_errors() const {
 /// The samples of a window and of the lines around it, as far as the raster extends.
 template <class T>
 struct WindowMesher::Samples {
-  std::int64_t columns = 0, rows = 0;  ///< of the window
-  std::vector<T> heights;              ///< of the window
+  std::int64_t columns = 0, rows = 0;  ///< size of the window
+  std::vector<T> heights;              ///< heights of the window
   // The lines just outside; empty at the raster's borders.
   std::vector<T> above, below, left, right;
   std::uint64_t with_data = 0;

@@ -78,7 +78,7 @@ class HeightBlocks {
   std::int64_t side_ = 16;  ///< in samples
   std::int64_t columns_ = 0, rows_ = 0, across_ = 0, down_ = 0;
   std::vector<Block> blocks_;
-  std::vector<std::uint64_t> digests_;  ///< of blocks, sums over their samples
+  std::vector<std::uint64_t> digests_;  ///< digests of blocks: sums over their samples
   std::vector<std::uint32_t> samples_;  ///< number of samples with data per block
 };
 

@@ -58,7 +58,7 @@ class RasterTileSurface : public TileSurface {
   StoreWindow reader_;
   std::optional<std::pair<GeographicBox, LatticeWindow>> around_;  ///< the most recent
   LatticeWindow loaded_{};
-  std::vector<double> heights_;  ///< of the loaded window
+  std::vector<double> heights_;  ///< heights of the loaded window
   std::vector<Point2> places_;   ///< places to evaluate the geoid at
   std::vector<double> geoid_shares_;
   std::vector<std::size_t> filled_;  ///< samples of a grid that get the flat fill

@@ -26,8 +26,8 @@ struct SurfaceSamples {
 
 /// Equally spaced samples in rows along parallels and columns along meridians.
 struct SurfaceRows {
-  std::vector<double> longitude;  ///< of the columns, ascending
-  std::vector<double> latitude;   ///< of the rows, ascending
+  std::vector<double> longitude;  ///< longitudes of the columns, ascending
+  std::vector<double> latitude;   ///< latitudes of the rows, ascending
   std::vector<double> height;     ///< in metres above the ellipsoid, row by row; NaN: no sample
 };
 

@@ -18,8 +18,8 @@ struct TiledRaster : TiledStore {
   GridGeography geography;
   HeightBlocks blocks;
   mutable HeightCache height_cache;  ///< 24 MiB per thread
-  HeightBlocks::Range everywhere;    ///< of all samples
-  PointHull hull;                    ///< of the samples with data, in columns and rows
+  HeightBlocks::Range everywhere;    ///< range of all samples
+  PointHull hull;                    ///< hull of the samples with data, in columns and rows
   double rim = 0;                    ///< from rim_of_outline()
   /// Whether columns are along meridians and rows along parallels, equally spaced.
   bool upright = false;

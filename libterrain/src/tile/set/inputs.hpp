@@ -16,7 +16,7 @@ struct TileInputs {
   TileMeshOptions mesh;
   bool gzip = false;
   std::string source_options;  ///< the options that the surface depends on
-  std::string metadata;        ///< of this tile
+  std::string metadata;        ///< metadata of this tile
 };
 
 /// Returns a box with all places at which make_tile() may query a surface: the tile and a margin.

@@ -15,7 +15,7 @@ namespace terrace::terrain {
 
 /// The record of a finished tile.
 struct FinishedTile {
-  std::uint64_t bytes = 0;  ///< of its file; 0: the tile does not exist because it has no data
+  std::uint64_t bytes = 0;  ///< size of its file; 0: the tile does not exist because it has no data
   std::uint64_t checksum = 0;
   std::uint64_t inputs = 0;  ///< digest_of() everything that its bytes depend on
   double max_error = 0.0;    ///< in metres

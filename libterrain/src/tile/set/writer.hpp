@@ -69,7 +69,7 @@ class TileSetWriter {
   };
   struct Zoom {
     std::vector<TileAddress> tiles;  ///< those that may have data, sorted by row, then column
-    double range = 0.0;              ///< of heights that a tile's steps must cover
+    double range = 0.0;              ///< range of heights that a tile's steps must cover
     ZoomPlan plan;
     SharedSides sides{kMaxSharedVertices};
     bool open = true;                   ///< its tiles remain to be written

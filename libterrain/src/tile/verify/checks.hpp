@@ -46,9 +46,9 @@ std::vector<TileFault> check_tile_mesh(const TileAddress& address, const Decoded
 /// The result of comparing samples with the surface of a tile.
 struct TileHeights {
   std::uint64_t samples = 0;               ///< in the tile, its borders included
-  std::uint64_t uncovered = 0;             ///< of these, in no triangle
-  double max_error = 0.0;                  ///< of the others, in metres
-  double longitude = 0.0, latitude = 0.0;  ///< of a sample with that error
+  std::uint64_t uncovered = 0;             ///< number of these samples in no triangle
+  double max_error = 0.0;                  ///< largest error of the others, in metres
+  double longitude = 0.0, latitude = 0.0;  ///< position of a sample with that error
 
   /// Adds the result of another part of the tile.
   void add(const TileHeights& part);

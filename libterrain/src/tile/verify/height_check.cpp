@@ -40,7 +40,7 @@ class Measurement {
   TileSurface& surface_;
   GeographicBox tile_box_;
   double units_ = 0.0;
-  std::vector<std::uint32_t> number_;  ///< of vertices in a part
+  std::vector<std::uint32_t> number_;  ///< numbers of vertices in a part
   SurfaceSamples samples_;
 };
 

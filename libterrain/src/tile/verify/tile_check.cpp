@@ -42,7 +42,7 @@ constexpr double kBorderSlack = 1e-3;
 struct BorderSide {
   /// The position along it in units of the tile, and metres.
   std::vector<std::pair<std::uint16_t, double>> vertices;
-  double rounding = 0.0;  ///< of a height, in metres
+  double rounding = 0.0;  ///< rounding of a height, in metres
 };
 
 struct TileBorders {
@@ -154,7 +154,8 @@ class SetCheck {
   unsigned threads_;
   const std::vector<std::unique_ptr<TileSurface>>& surfaces_;
   const Context& context_;
-  std::vector<TileJournal::Record> records_;  ///< of the written tiles, if there is a journal
+  std::vector<TileJournal::Record>
+      records_;  ///< records of the written tiles, if there is a journal
 };
 
 double SetCheck::bound_of(unsigned zoom) const {

@@ -79,7 +79,9 @@ class PointSamples {
   /// Gives new triangles empty lists.
   void add_lists(const Triangles& triangles);
   double bound() const { return bound_; }
-  double tangent() const { return tangent_; }  ///< of the smallest angle, see PointTinOptions
+  double tangent() const {
+    return tangent_;
+  }  ///< tangent of the smallest angle, see PointTinOptions
   bool on_lattice() const { return lattice_.has_value(); }
 
   template <class At>
