@@ -34,7 +34,7 @@ void check_latitudes(std::span<const Point2> places, double max_latitude, const 
     if (!(std::abs(latitude) > 90 + beyond) || !std::isfinite(latitude)) continue;
     if (!std::isnan(latitude_on_earth(latitude))) continue;
     throw beyond_pole(file, where.empty() ? "place " + place_text(x, y) : where, latitude)
-        .remedy("places are longitude, latitude: exchange them if they are swapped");
+        .remedy("pass the longitude before the latitude");
   }
 }
 
@@ -74,9 +74,8 @@ void LatitudeCheck::operator()(std::span<const stream::Point3> stored) const {
     if (!std::isnan(latitude_on_earth(y * degrees_))) continue;
     const double x = m[0] * p[0] + m[1] * p[1] + m[2];
     throw beyond_pole(file_, "point " + place_text(x, y), y * degrees_)
-        .remedy(stream::message(
-            "x is the longitude and y the latitude: exchange them if they are swapped, or "
-            "name the right {crs}"));
+        .remedy(
+            stream::message("pass the longitude as x and the latitude as y, or the right {crs}"));
   }
 }
 
