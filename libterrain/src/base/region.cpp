@@ -22,7 +22,7 @@ namespace {
 
 stream::Error fault(const std::string& file, std::string cause) {
   return stream::Error(file, std::move(cause))
-      .remedy("give a GeoJSON file with polygons, or minx,miny,maxx,maxy");
+      .remedy("pass a GeoJSON file with polygons, or minx,miny,maxx,maxy");
 }
 
 std::vector<Point2> ring_of(const nlohmann::json& json, const std::string& file) {

@@ -262,7 +262,7 @@ std::optional<JoinedLongitudes::Joint> needed_joint(const BuildRequest& request,
     throw stream::Error(request.inputs.front(),
                         "its points " + joint->reason +
                             ", which is known only at the end, and the input can be read only once")
-        .remedy("name a file, or count longitudes from 0 to 360 or continue them beyond 180");
+        .remedy("pass a file, or count longitudes from 0 to 360 or continue them beyond 180");
   }
   return joint;
 }

@@ -39,7 +39,7 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
   if (std::max(std::abs(level(bounds.min[2])), std::abs(level(bounds.max[2]))) > kMaxLevels) {
     throw fault(store,
                 fmt::format("heights have too many levels of {}", plain_number(request.interval)))
-        .remedy(stream::message("give a larger {interval}"));
+        .remedy(stream::message("pass a larger {interval}"));
   }
   double low = bounds.min[2], high = bounds.max[2];
   if (request.region) {
@@ -58,7 +58,7 @@ void check_levels(const stream::Store& store, const ContourRequest& request) {
                   counted(static_cast<std::uint64_t>(levels), "level"),
                   plain_number(request.interval),
                   with_commas(static_cast<std::uint64_t>(kMaxLevelsDrawn))))
-      .remedy(stream::message("give a larger {interval}"));
+      .remedy(stream::message("pass a larger {interval}"));
 }
 
 /// Returns why there are no lines although the store has points.

@@ -23,7 +23,7 @@ GeoidGrid::GeoidGrid(const std::string& file, std::uint64_t memory_bytes) {
   const std::filesystem::path path(file);
   const auto fault = [&file](std::string cause) {
     return stream::Error(file, std::move(cause))
-        .remedy("give a grid of GeographicLib's, like egm2008-5.pgm");
+        .remedy("pass a grid of GeographicLib, such as egm2008-5.pgm");
   };
   if (path.extension() != ".pgm") throw fault("is not named like a geoid grid (.pgm)");
   std::error_code error;

@@ -21,7 +21,7 @@ namespace {
 stream::Error fault(const CoordinateSystem& to, const std::string& cause) {
   return stream::Error("", cause + " " + to.title())
       .at("region")
-      .remedy("give a smaller region, or one in the CRS of the data");
+      .remedy("pass a smaller region, or one in the CRS of the data");
 }
 
 class Outline {

@@ -121,7 +121,7 @@ RegionConversion::RegionConversion(const stream::SourceInfo& source, const std::
   if (!system && !named.empty()) {
     throw stream::Error(source.files.empty() ? std::string() : source.files.front(),
                         "has no known CRS, so the region cannot be converted to it")
-        .remedy(stream::message("leave {region_crs} out and give the region in its coordinates"));
+        .remedy(stream::message("leave {region_crs} out and pass the region in its coordinates"));
   }
   const bool degrees = source.crs.geographic && source.crs.horizontal_unit == "degree";
   turn_ = system ? system->turn() : degrees ? 360 : 0;
@@ -165,7 +165,7 @@ std::optional<Transformation> RegionConversion::to_places(const PlacesCrs& place
     throw stream::Error(places_crs.file,
                         fmt::format("its crs is {}, and the CRS of the data is not known",
                                     system_named_in(places_crs).title()))
-        .remedy(stream::message("name the CRS of the data with {crs} EPSG:n when they are read or "
+        .remedy(stream::message("pass the CRS of the data as {crs} EPSG:n when they are read or "
                                 "built, or leave the crs out if it is the same"));
   }
   if (places_crs.name.empty()) {

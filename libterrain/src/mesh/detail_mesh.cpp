@@ -466,7 +466,7 @@ stream::Overlay open_height_overlay(const std::string& path, const stream::Store
   if (overlay.channel() != heights) {
     throw stream::Error(
         path, "has values of '" + overlay.channel() + "', not of the heights '" + heights + "'")
-        .remedy("name an overlay written by terrace mesh");
+        .remedy("pass an overlay written by terrace mesh");
   }
   return overlay;
 }

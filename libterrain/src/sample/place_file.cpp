@@ -103,7 +103,7 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
                                    : binary ? "not text"
                                             : "XML") +
                                   ", not a table of places")
-        .remedy("give CSV; 'ogr2ogr -f CSV -lco GEOMETRY=AS_XY out.csv " + file +
+        .remedy("pass CSV; 'ogr2ogr -f CSV -lco GEOMETRY=AS_XY out.csv " + file +
                 "' converts what GDAL can read");
   }
   if (has_decimal_commas(first_line)) {
@@ -115,7 +115,7 @@ PlaceLayout PlaceLayout::of(std::string_view first_line, const std::string& file
     layout.separator = first_line[at];
   } else {
     throw stream::Error(file, "the first line has only one column")
-        .remedy("give x and y with a comma, a semicolon or a tab between them");
+        .remedy("write x and y with a comma, a semicolon or a tab between them");
   }
   const auto cells_of = [&layout](std::string_view line) {
     std::vector<std::string_view> cells;
@@ -183,7 +183,7 @@ bool PlaceFile::next(PlaceBatch& batch, std::size_t max_bytes, std::size_t max_l
     if (window.empty()) return false;
     throw stream::Error(name(), "is longer than any line of a table")
         .at_line(line_)
-        .remedy("give a text file with one place a line");
+        .remedy("pass a text file with one place per line");
   }
   batch.text.assign(window.substr(0, end));
   batch.begins.push_back(end);
@@ -223,7 +223,7 @@ Point2 place_of(std::string_view line, const PlaceLayout& layout, const std::str
   if (cells < 2) {
     throw stream::Error(file, "has fewer columns than the first line")
         .at_line(line_number)
-        .remedy("give x and y in every line");
+        .remedy("write x and y in every line");
   }
   return place;
 }

@@ -245,7 +245,7 @@ class PointSampler final : public HeightSampler {
         cloud_.store.path().string(),
         stream::message("more than {} are close together, too many for {memory_bytes}",
                         counted(room_, "point")))
-        .remedy(stream::message("give {}M of memory or more, or a coarser {level}",
+        .remedy(stream::message("pass {}M of memory or more, or a coarser {level}",
                                 (needed >> 20) + 1));
   }
 

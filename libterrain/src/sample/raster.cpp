@@ -215,7 +215,7 @@ class RasterRun {
                         with_commas(grid_.columns), with_commas(grid_.rows),
                         readable_bytes(kProcessBytes + 2 * table),
                         readable_bytes(context_.memory_or(0))))
-        .remedy(stream::message("give a larger {cell} or a smaller {region}"));
+        .remedy(stream::message("pass a larger {cell} or a smaller {region}"));
   }
 
   [[nodiscard]] bool shaded() const { return request_.value == RasterValue::hillshade; }

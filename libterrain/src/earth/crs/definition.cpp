@@ -114,7 +114,7 @@ CrsDefinition on_earth(AnyCrs system) {
   if (local.is_geocentric) {
     throw CrsError(
         fmt::format("{} is geocentric, with x, y and z from the centre of the earth", name),
-        stream::message("convert the points with cs2cs, or name the right CRS: {crs} EPSG:n"));
+        stream::message("convert the points with cs2cs, or pass the right CRS: {crs} EPSG:n"));
   }
   throw CrsError(fmt::format("{} is a local one, without a place on the earth", name),
                  "name a CRS on the earth: EPSG:n");

@@ -146,7 +146,7 @@ TileLayer read_layer(const std::string& path) {
   constexpr std::uint64_t kMaxBytes = std::uint64_t{256} << 20;  // for a fragmented coverage
   const auto json = json_of_file(path, kMaxBytes, "make the tiles again");
   if (!json) {
-    throw stream::Error(path, "cannot be read").remedy("name the folder of a finished tile set");
+    throw stream::Error(path, "cannot be read").remedy("pass the folder of a finished tile set");
   }
   try {
     return layer_from(*json);

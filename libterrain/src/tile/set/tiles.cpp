@@ -70,7 +70,7 @@ std::string fingerprint_of(const stream::Store& store, const TileSetOptions& opt
 void refuse_another(const std::string& layer_path, const std::string& fingerprint) {
   if (!fs::exists(layer_path) || read_layer(layer_path).fingerprint == fingerprint) return;
   throw stream::Error(layer_path, "is finished, and made from another store or with other options")
-      .remedy(stream::message("give {replace} to replace it: tiles that stay the same are kept"));
+      .remedy(stream::message("pass {replace} to replace it: unchanged tiles are kept"));
 }
 
 /// Whether `folder` contains files but no tile set, finished or not.
@@ -137,12 +137,12 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
     : path_(stream::follow_links(folder).string()) {
   const auto fault = [&](std::string cause) { return stream::Error(folder, std::move(cause)); };
   if (fs::exists(path_) && !fs::is_directory(path_)) {
-    throw fault("is not a folder").remedy("name another one");
+    throw fault("is not a folder").remedy("pass a folder");
   }
   // Create nothing in a folder of another program, not even the lock.
   if (holds_others(path_)) {
     throw fault("is not empty and contains no tile set")
-        .remedy("name another folder, or empty it yourself");
+        .remedy("pass another folder, or empty this one");
   }
   std::error_code error;
   created_ = fs::create_directories(path_, error);
@@ -156,7 +156,7 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
   const std::string journal_path = path_ + "/" + TileJournal::kName;
   if (fs::exists(layer_path)) {
     if (read_layer(layer_path).fingerprint.empty()) {
-      throw fault("contains a tile set that terrace did not write").remedy("name another folder");
+      throw fault("contains a tile set that terrace did not write").remedy("pass another folder");
     }
     if (!force && !resume) {
       throw fault("already contains a tile set")
@@ -165,7 +165,7 @@ TileFolder::TileFolder(const std::string& folder, bool force, bool resume)
     }
   } else if (fs::exists(journal_path) && !force && !resume) {
     throw fault("contains an unfinished tile set")
-        .remedy(stream::message("give {resume} to continue, or {replace} to replace it"));
+        .remedy(stream::message("pass {resume} to continue, or {replace} to replace it"));
   }
   stream::remove_abandoned(layer_path);
   stream::remove_abandoned(journal_path);

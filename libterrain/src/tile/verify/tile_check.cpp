@@ -366,7 +366,7 @@ bool is_tile_folder(const std::string& folder) {
 TileCheckResult check_tiles(const TileCheckRequest& request, const Context& context) {
   if (!is_tile_folder(request.folder)) {
     throw stream::Error(request.folder, "contains no tile set")
-        .remedy("name the folder that it was written to");
+        .remedy("pass the folder that it was written to");
   }
   const TileResources resources = tile_resources(context, request.folder);
   std::unique_ptr<TileSource> source;
