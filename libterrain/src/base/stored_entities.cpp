@@ -45,15 +45,15 @@ CornerReader::CornerReader(const stream::Schema& schema, stream::Entities entiti
 
 CornerReader::Column CornerReader::column(const stream::Schema& schema,
                                           const std::string& name) const {
-  const auto found =
+  const auto attribute =
       std::find_if(schema.attributes.begin(), schema.attributes.end(),
                    [&](const stream::Channel& channel) { return channel.name == name; });
-  if (found == schema.attributes.end()) {
+  if (attribute == schema.attributes.end()) {
     throw stream::Error(file_, fmt::format("the column \"{}\" of the corners is missing", name))
         .remedy(stream::message("keep all columns: leave {keep} and {drop} out"));
   }
-  return {found->type,
-          schema.attribute_offset(static_cast<std::size_t>(found - schema.attributes.begin()))};
+  return {attribute->type,
+          schema.attribute_offset(static_cast<std::size_t>(attribute - schema.attributes.begin()))};
 }
 
 std::size_t CornerReader::operator()(std::span<const std::byte> record,

@@ -118,12 +118,12 @@ std::vector<MetricChoice::Region> read_regions(const std::string& file) {
   const std::string shape =
       "write {\"regions\": [{\"box\": [minx, miny, maxx, maxy], \"semi_axes\": [a, b], \"angle\": "
       "degrees}]}";
-  const std::optional<nlohmann::json> found = json_of_file(file, kMaxBytes, shape);
-  if (!found) {
+  const std::optional<nlohmann::json> contents = json_of_file(file, kMaxBytes, shape);
+  if (!contents) {
     throw stream::Error(file, "cannot be read")
         .remedy(stream::message("{metric} elliptical:FILE names a JSON file of regions"));
   }
-  const nlohmann::json& json = *found;
+  const nlohmann::json& json = *contents;
   if (!json.is_object() || !json.contains("regions") || !json["regions"].is_array() ||
       json["regions"].empty()) {
     throw stream::Error(file, "is not a JSON object with a list \"regions\"").remedy(shape);

@@ -57,10 +57,10 @@ BoxGeography::BoxGeography(const CoordinateSystem& system, const stream::Box3& b
   patches_ = PatchGrid(
       low, high, {longest, longest},
       [this](const Point2& corner, const Point2& size) -> std::optional<PlacePatch> {
-        const auto found =
+        const auto fitted =
             fit(corner, size, [this](std::span<Point2> places) { system_.to_geographic(places); });
-        if (!found) return std::nullopt;
-        return found->patch;
+        if (!fitted) return std::nullopt;
+        return fitted->patch;
       });
 }
 
@@ -125,12 +125,12 @@ void GridGeography::exact(const LatticePart& part, const Output& output) const {
 bool GridGeography::interpolated(const LatticePart& part, const Output& output) const {
   const double width = static_cast<double>(part.columns - 1);
   const double height = static_cast<double>(part.rows - 1);
-  const auto found = fit({output.column(part.column), output.row(part.row)}, {width, height},
-                         [this](std::span<Point2> places) { exact(places); });
-  if (!found) return false;
+  const auto fitted = fit({output.column(part.column), output.row(part.row)}, {width, height},
+                          [this](std::span<Point2> places) { exact(places); });
+  if (!fitted) return false;
   const double step_across = 1.0 / width, step_down = 1.0 / height;
   for (std::size_t j = 0; j < part.rows; ++j) {
-    const PlacePatch::Row row = found->patch.row(static_cast<double>(j) * step_down);
+    const PlacePatch::Row row = fitted->patch.row(static_cast<double>(j) * step_down);
     const std::size_t start = (part.row + j) * output.columns + part.column;
     double* const x = output.longitude + start;
     double* const y = output.latitude + start;
@@ -140,7 +140,7 @@ bool GridGeography::interpolated(const LatticePart& part, const Output& output) 
       x[i] = row(0, s);
       y[i] = row(1, s);
     }
-    if (found->is_within_turn) continue;
+    if (fitted->is_within_turn) continue;
     for (std::size_t i = 0; i < part.columns; ++i) x[i] = in_turn(x[i]);
   }
   return true;

@@ -106,10 +106,11 @@ void EllipsoidalHeights::find_operation(const stream::StoreSchema& schema,
   std::string name;
   OperationChoice choice;
   try {
-    const std::optional<CrsDefinition> known = definition_of(schema.crs);
+    const std::optional<CrsDefinition> definition = definition_of(schema.crs);
     CrsDefinition heights;
-    if (known && known->heights == Heights::orthometric && !known->height_wkt.empty()) {
-      heights = *known;
+    if (definition && definition->heights == Heights::orthometric &&
+        !definition->height_wkt.empty()) {
+      heights = *definition;
     } else {
       set_vertical_epsg(heights, schema.crs.vertical_epsg != 0 ? schema.crs.vertical_epsg : kEgm96);
       if (schema.crs.vertical_epsg == 0) add_note("heights are taken as above EGM96");

@@ -53,8 +53,8 @@ double degrees_of_latitude(const stream::Crs& crs) {
   if (!crs.geographic) return 0;
   if (crs.horizontal_unit == "degree") return 1;
   try {
-    const std::optional<CrsDefinition> known = definition_of(crs);
-    if (known && known->geographic) return known->degrees_per_unit;
+    const std::optional<CrsDefinition> definition = definition_of(crs);
+    if (definition && definition->geographic) return definition->degrees_per_unit;
   } catch (const CrsError&) {
     // Callers that need places report the error.
   }

@@ -16,9 +16,10 @@ std::string unit_of_heights(const stream::Placement& placement, bool converted) 
   if (!placement.coordinates[2].unit.empty()) return placement.coordinates[2].unit;
   if (!placement.crs.vertical_unit.empty()) return placement.crs.vertical_unit;
   if (converted) return Ground(placement).height_unit();
-  const std::optional<CrsDefinition> known = definition_of(placement.crs);
-  return known && known->metres_per_height != 0 ? recorded_unit(known->metres_per_height)
-                                                : std::string();
+  const std::optional<CrsDefinition> definition = definition_of(placement.crs);
+  return definition && definition->metres_per_height != 0
+             ? recorded_unit(definition->metres_per_height)
+             : std::string();
 }
 
 /// Returns the definition to record; nullopt for a local system. Throws: CrsError.
@@ -70,9 +71,9 @@ stream::Crs crs_of_point_file(const stream::Placement& placement,
       } else if (unsaid) {
         write_height_unit(*definition, assumed ? 1 : definition->metres_per_unit);
       }
-      stream::Crs known = CoordinateSystem(*definition).crs_with_wkt1();
-      known.vertical_unit = crs.vertical_unit;
-      return known;
+      stream::Crs recorded = CoordinateSystem(*definition).crs_with_wkt1();
+      recorded.vertical_unit = crs.vertical_unit;
+      return recorded;
     }
     const std::optional<LocalCrs> local = local_crs_of(crs);
     // The WKT of a system with a third axis already has the unit.

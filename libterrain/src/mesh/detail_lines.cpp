@@ -115,8 +115,8 @@ LineSet detail_lines(const stream::Store& input, const Detail& detail, const Con
 void write_geojson(const LineSet& lines, const stream::Crs& crs,
                    const std::function<void(std::string_view)>& write) {
   constexpr std::size_t kAtOnce = std::size_t{1} << 20;
-  const bool known = crs != stream::Crs{};
-  if (known && crs.epsg == 0) {
+  const bool has_crs = crs != stream::Crs{};
+  if (has_crs && crs.epsg == 0) {
     throw UsageError(stream::message(
         "GeoJSON names its CRS by an EPSG code, which the CRS of these lines does not have; pass "
         "{to_crs} EPSG:4326, which needs none"));

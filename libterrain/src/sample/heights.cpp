@@ -43,7 +43,7 @@ std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<con
   if (options.gradients) say_unknown_height_unit(ground.ground(), context);
   std::vector<Point2> stored(places.size());
   std::vector<SurfacePoint> surface(places.size());
-  std::vector<GroundPoint> found(places.size());
+  std::vector<GroundPoint> points(places.size());
   const auto in_pieces = [&](const auto& work) {
     parallel_for((places.size() + kPlacesAtOnce - 1) / kPlacesAtOnce, std::max(1U, context.threads),
                  [&](std::size_t piece) {
@@ -58,9 +58,9 @@ std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<con
   in_pieces([&](std::size_t i) {
     if (std::isnan(surface[i].height)) return;
     const tri::Gradient gradient = ground.on_ground(stored[i], surface[i]);
-    found[i] = {.height = surface[i].height, .east = gradient.x, .north = gradient.y};
+    points[i] = {.height = surface[i].height, .east = gradient.x, .north = gradient.y};
   });
-  return found;
+  return points;
 }
 
 }  // namespace terrace::terrain

@@ -131,8 +131,8 @@ stream::Crs crs_with_keys(const stream::Store& store) {
   const stream::Crs& recorded = store.schema().crs;
   if (recorded.epsg != 0) return recorded;
   try {
-    const std::optional<CrsDefinition> known = definition_of(recorded);
-    if (known) return CoordinateSystem(*known).crs_with_keys();
+    const std::optional<CrsDefinition> definition = definition_of(recorded);
+    if (definition) return CoordinateSystem(*definition).crs_with_keys();
   } catch (const CrsError&) {
     // Only functions that need places report the error; heights do not need them.
   }

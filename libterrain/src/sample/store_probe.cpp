@@ -103,11 +103,11 @@ class StoreProbe::SomeSamples {
   [[nodiscard]] double at(std::int64_t column, std::int64_t row) const {
     const Sample target{static_cast<double>(row), static_cast<double>(column),
                         -std::numeric_limits<double>::infinity()};
-    const auto found = std::lower_bound(samples_.begin(), samples_.end(), target);
-    if (found == samples_.end() || (*found)[0] != target[0] || (*found)[1] != target[1]) {
+    const auto sample = std::lower_bound(samples_.begin(), samples_.end(), target);
+    if (sample == samples_.end() || (*sample)[0] != target[0] || (*sample)[1] != target[1]) {
       return std::numeric_limits<double>::quiet_NaN();
     }
-    return (*found)[2] * heights_.scale + heights_.offset;
+    return (*sample)[2] * heights_.scale + heights_.offset;
   }
   [[nodiscard]] double height(const Point2& place) const {
     const double left = std::floor(place[0]), top = std::floor(place[1]);

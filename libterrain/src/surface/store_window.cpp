@@ -26,24 +26,26 @@ void descend(stream::StoreQuery& query, const StoredBox& box, unsigned level, co
 
 std::optional<ClusterHeights> cluster_heights(stream::StoreQuery& query, const StoredBox& box) {
   constexpr double kFar = std::numeric_limits<double>::infinity();
-  ClusterHeights found{.low = kFar, .high = -kFar, .examples = {}};
+  ClusterHeights heights{.low = kFar, .high = -kFar, .examples = {}};
   query.cut(
       tall(box),
       [&](const stream::Point3* head, const stream::StoreQuery::Branch& cluster) {
-        found.low = std::min(found.low, cluster.box.min[2]);
-        found.high = std::max(found.high, cluster.box.max[2]);
-        if (head != nullptr && found.examples.size() < kMaxExamples && box.contains(flat(*head))) {
-          found.examples.push_back(*head);
+        heights.low = std::min(heights.low, cluster.box.min[2]);
+        heights.high = std::max(heights.high, cluster.box.max[2]);
+        if (head != nullptr && heights.examples.size() < kMaxExamples &&
+            box.contains(flat(*head))) {
+          heights.examples.push_back(*head);
         }
         return true;
       },
       [&](const stream::StoreQuery::Branch& cluster) {
         // The clusters below cannot widen the range.
-        const bool known = found.low <= cluster.box.min[2] && found.high >= cluster.box.max[2];
-        return !(known && found.examples.size() == kMaxExamples);
+        const bool has_range =
+            heights.low <= cluster.box.min[2] && heights.high >= cluster.box.max[2];
+        return !(has_range && heights.examples.size() == kMaxExamples);
       });
-  if (found.low > found.high) return std::nullopt;
-  return found;
+  if (heights.low > heights.high) return std::nullopt;
+  return heights;
 }
 
 StoreWindow::StoreWindow(const stream::Store& store, std::uint64_t cache_bytes)

@@ -51,9 +51,9 @@ class WindowJoiner {
       auto number = static_cast<std::uint32_t>(vertices_ + kept);
       bool fresh = true;
       if (shared != mesh.shared.end() && shared->vertex == i) {
-        const auto known = open_.try_emplace(shared->place, Open{shared->last, number});
-        number = known.first->second.number;
-        fresh = known.second;
+        const auto entry = open_.try_emplace(shared->place, Open{shared->last, number});
+        number = entry.first->second.number;
+        fresh = entry.second;
         ++shared;
       }
       numbers.push_back(number);

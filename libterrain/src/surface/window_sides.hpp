@@ -32,31 +32,31 @@ class WindowSides {
   /// only on the side, because several threads may call it at once.
   template <class Settle>
   std::shared_ptr<const SideVertices> vertices(const Key& side, const Settle& settle) {
-    if (auto known = find(side)) return known;
+    if (auto cached = find(side)) return cached;
     auto settled = std::make_shared<const SideVertices>(settle());
     const std::lock_guard lock(mutex_);
     if (vertices_ > max_vertices_) {
       older_ = std::exchange(recent_, {});
       vertices_ = 0;
     }
-    const auto [known, fresh] = recent_.try_emplace(side, std::move(settled));
-    if (fresh) vertices_ += known->second->size();
-    return known->second;
+    const auto [cached, fresh] = recent_.try_emplace(side, std::move(settled));
+    if (fresh) vertices_ += cached->second->size();
+    return cached->second;
   }
   /// Returns null for an unknown side.
   [[nodiscard]] std::shared_ptr<const SideVertices> find(const Key& side) const {
     const std::lock_guard lock(mutex_);
     for (const Sides* sides : {&recent_, &older_}) {
-      if (const auto known = sides->find(side); known != sides->end()) return known->second;
+      if (const auto cached = sides->find(side); cached != sides->end()) return cached->second;
     }
     return nullptr;
   }
   /// Drops a side that no window needs any more.
   void drop(const Key& side) {
     const std::lock_guard lock(mutex_);
-    if (const auto known = recent_.find(side); known != recent_.end()) {
-      vertices_ -= known->second->size();
-      recent_.erase(known);
+    if (const auto cached = recent_.find(side); cached != recent_.end()) {
+      vertices_ -= cached->second->size();
+      recent_.erase(cached);
     }
     older_.erase(side);
   }

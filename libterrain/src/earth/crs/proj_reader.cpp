@@ -57,14 +57,14 @@ int epsg_of(const PJ* object) {
 ProjObject identified(const PJ* geographic) {
   PJ_CONTEXT* const context = proj_context();
   int* confidence = nullptr;
-  const ProjOwned<PJ_OBJ_LIST> found(
+  const ProjOwned<PJ_OBJ_LIST> candidates(
       proj_identify(context, geographic, "EPSG", nullptr, &confidence));
   check_proj_database();
   constexpr int kSure = 70;
   ProjObject result;
-  if (found != nullptr && confidence != nullptr && proj_list_get_count(found.get()) > 0 &&
+  if (candidates != nullptr && confidence != nullptr && proj_list_get_count(candidates.get()) > 0 &&
       confidence[0] >= kSure) {
-    result.reset(proj_list_get(context, found.get(), 0));
+    result.reset(proj_list_get(context, candidates.get(), 0));
   }
   proj_int_list_destroy(confidence);
   return result;
@@ -112,15 +112,15 @@ void read_base(const PJ* crs, CrsDefinition& definition) {
   }
   definition.base_epsg = epsg_of(base.get());
   if (definition.base_epsg == 0) {
-    if (ProjObject known = identified(base.get())) {
+    if (ProjObject registered = identified(base.get())) {
       CrsDefinition first, second;
       read_ellipsoid(base.get(), first);
-      read_ellipsoid(known.get(), second);
+      read_ellipsoid(registered.get(), second);
       if (std::abs(first.ellipsoid.semi_major / second.ellipsoid.semi_major - 1) < 1e-9 &&
           std::abs(first.ellipsoid.flattening() - second.ellipsoid.flattening()) < 1e-9 &&
           first.prime_meridian == second.prime_meridian &&
-          axes_of(base.get()).front().unit == axes_of(known.get()).front().unit) {
-        base = std::move(known);
+          axes_of(base.get()).front().unit == axes_of(registered.get()).front().unit) {
+        base = std::move(registered);
         definition.base_epsg = epsg_of(base.get());
       }
     }
@@ -140,11 +140,11 @@ void read_projected(const PJ* crs, CrsDefinition& definition) {
   definition.metres_per_unit = metres_of(axes[0].unit);
   const ProjObject conversion(proj_crs_get_coordoperation(context, crs));
   if (conversion == nullptr) return;
-  const auto known =
+  const auto projection =
       geographiclib_projection(conversion.get(), axes[0].direction, axes[1].direction);
-  if (!known) return;
-  definition.method = known->method;
-  definition.parameters = known->parameters;
+  if (!projection) return;
+  definition.method = projection->method;
+  definition.parameters = projection->parameters;
 }
 
 /// Reads the shift of TOWGS84 or of a bound CRS.
@@ -252,36 +252,38 @@ bool same_numbers(const CrsDefinition& a, const CrsDefinition& b, const PJ* code
   return true;
 }
 
-void take(CrsDefinition&& known, CrsDefinition& definition) {
-  known.shift = definition.shift;
-  if (known.heights == Heights::unknown) {
-    known.heights = definition.heights;
-    known.height_wkt = definition.height_wkt;
-    known.vertical_name = definition.vertical_name;
-    known.vertical_epsg = definition.vertical_epsg;
-    known.metres_per_height = definition.metres_per_height;
+void take(CrsDefinition&& registered, CrsDefinition& definition) {
+  registered.shift = definition.shift;
+  if (registered.heights == Heights::unknown) {
+    registered.heights = definition.heights;
+    registered.height_wkt = definition.height_wkt;
+    registered.vertical_name = definition.vertical_name;
+    registered.vertical_epsg = definition.vertical_epsg;
+    registered.metres_per_height = definition.metres_per_height;
   }
-  definition = std::move(known);
+  definition = std::move(registered);
 }
 
 void check_code(CrsDefinition& definition) {
   const ProjObject code = proj_crs_of_code(definition.authority, definition.code);
   if (code == nullptr) return;
-  CrsDefinition known = read_definition(code.get());
+  CrsDefinition registered = read_definition(code.get());
   const auto differs = [](double a, double b) { return !(std::abs(a / b - 1) < 1e-9); };
   std::string what;
-  if (known.geographic != definition.geographic) {
+  if (registered.geographic != definition.geographic) {
     what = "the kind";
-  } else if (differs(known.ellipsoid.semi_major, definition.ellipsoid.semi_major) ||
-             std::abs(known.ellipsoid.flattening() - definition.ellipsoid.flattening()) > 1e-9) {
+  } else if (differs(registered.ellipsoid.semi_major, definition.ellipsoid.semi_major) ||
+             std::abs(registered.ellipsoid.flattening() - definition.ellipsoid.flattening()) >
+                 1e-9) {
     what = "the ellipsoid";
-  } else if (std::abs(known.prime_meridian - definition.prime_meridian) > 1e-9) {
+  } else if (std::abs(registered.prime_meridian - definition.prime_meridian) > 1e-9) {
     what = "the prime meridian";
-  } else if (known.geographic ? differs(known.degrees_per_unit, definition.degrees_per_unit)
-                              : differs(known.metres_per_unit, definition.metres_per_unit)) {
+  } else if (registered.geographic
+                 ? differs(registered.degrees_per_unit, definition.degrees_per_unit)
+                 : differs(registered.metres_per_unit, definition.metres_per_unit)) {
     what = "the unit";
-  } else if (!known.geographic && !same_places(known, definition) &&
-             !same_numbers(known, definition, code.get())) {
+  } else if (!registered.geographic && !same_places(registered, definition) &&
+             !same_numbers(registered, definition, code.get())) {
     what = "the projection";
   }
   if (!what.empty()) {
@@ -289,7 +291,7 @@ void check_code(CrsDefinition& definition) {
                                definition.authority + ":" + definition.code + " in " + what,
                            remedy_by_code());
   }
-  take(std::move(known), definition);
+  take(std::move(registered), definition);
 }
 
 }  // namespace
@@ -367,10 +369,10 @@ void settle_code(CrsDefinition& definition) {
   for (int i = 0; i < count && confidence[i] >= kSure; ++i) {
     const ProjObject candidate(proj_list_get(proj_context(), list.get(), i));
     if (proj_is_deprecated(candidate.get()) != 0) continue;
-    CrsDefinition known = read_definition(candidate.get());
-    if (known.heights != Heights::unknown || !same_places(known, definition)) continue;
+    CrsDefinition registered = read_definition(candidate.get());
+    if (registered.heights != Heights::unknown || !same_places(registered, definition)) continue;
     several = several || only.has_value();
-    only = std::move(known);
+    only = std::move(registered);
   }
   proj_int_list_destroy(confidence);
   if (only && !several) take(std::move(*only), definition);

@@ -48,8 +48,8 @@ class ProjectionBatch final : public Projection {
 
   void reverse(std::span<Point2> places) const override {
     for (Point2& place : places) {
-      const Point2 found = formula_.reverse(place[0] - east_, place[1] - north_);
-      place = {GeographicLib::Math::AngNormalize(found[0] + longitude_), found[1]};
+      const Point2 geographic = formula_.reverse(place[0] - east_, place[1] - north_);
+      place = {GeographicLib::Math::AngNormalize(geographic[0] + longitude_), geographic[1]};
       if (!std::isfinite(place[0]) || !std::isfinite(place[1])) place = {kNowhere, kNowhere};
     }
   }

@@ -177,8 +177,8 @@ std::size_t take_out_vertices(const std::vector<tri::Point3>& frame,
   std::map<Point2, std::vector<std::size_t>> at;
   for (const tri::Point3& v : frame) at.try_emplace({v[0], v[1]});
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const auto found = at.find({samples.x[i], samples.y[i]});
-    if (found != at.end()) found->second.push_back(i);
+    const auto entry = at.find({samples.x[i], samples.y[i]});
+    if (entry != at.end()) entry->second.push_back(i);
   }
   std::vector<char> out(samples.size(), 0);
   std::size_t places = 0;

@@ -97,10 +97,10 @@ class SideSamples {
   std::uint64_t add(const std::vector<RasterWindow::SideSample>& uncovered) {
     std::uint64_t by_none = 0;
     for (const RasterWindow::SideSample& sample : uncovered) {
-      const auto known = windows_.try_emplace(sample.place, 0U).first;
-      if (++known->second < sample.windows) continue;
+      const auto entry = windows_.try_emplace(sample.place, 0U).first;
+      if (++entry->second < sample.windows) continue;
       ++by_none;
-      windows_.erase(known);
+      windows_.erase(entry);
     }
     return by_none;
   }

@@ -47,9 +47,9 @@ std::vector<Seed> some_seeds(const stream::Store& store, const StoredPlaces& pla
     store.read(id, points);
     stream::Point3 at = points.representative;
     if (store.condition() != nullptr) {
-      const auto found = std::find(points.matches.begin(), points.matches.end(), 1);
-      if (found == points.matches.end()) return false;
-      at = points.positions[static_cast<std::size_t>(found - points.matches.begin())];
+      const auto match = std::find(points.matches.begin(), points.matches.end(), 1);
+      if (match == points.matches.end()) return false;
+      at = points.positions[static_cast<std::size_t>(match - points.matches.begin())];
     }
     seeds.push_back({at, flat(store.record(id).summary.box)});
     return true;
@@ -184,12 +184,12 @@ double cloud_spacing(const stream::Store& store, const StoredPlaces& places) {
     const std::vector<stream::Point3> ground = on_the_ground(points, places, stored);
     if (ground.size() < 2) continue;
     const auto rank = static_cast<unsigned>(std::min<std::size_t>(kRank, ground.size() - 1));
-    const std::vector<float> found = neighbour_distances(ground, rank, 1);
+    const std::vector<float> spacings = neighbour_distances(ground, rank, 1);
     // A circle of this radius contains `rank` points.
     const auto share = static_cast<float>(std::sqrt(std::numbers::pi / rank));
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      if (found[i] > 0.0F && box.contains(stored[i])) {
-        distances.push_back(found[i] * share);
+    for (std::size_t i = 0; i < spacings.size(); ++i) {
+      if (spacings[i] > 0.0F && box.contains(stored[i])) {
+        distances.push_back(spacings[i] * share);
       }
     }
   }

@@ -188,9 +188,9 @@ HeightCache::Squares::iterator HeightCache::use(StoreWindow& reader, std::int64_
                                                 std::int64_t down) {
   const std::int64_t number = down * across_ + across;
   std::unique_lock lock(mutex_);
-  for (auto found = by_number_.find(number); found != by_number_.end();
-       found = by_number_.find(number)) {
-    const Squares::iterator square = found->second;
+  for (auto entry = by_number_.find(number); entry != by_number_.end();
+       entry = by_number_.find(number)) {
+    const Squares::iterator square = entry->second;
     if (square->ready) {
       squares_.splice(squares_.begin(), squares_, square);
       ++square->users;

@@ -67,7 +67,7 @@ bool PointTileSurface::crowded(const GeographicBox& box) {
   // Adjacent leaves ask for the same sides.
   if (crowded_.size() > kMaxRemembered) crowded_.clear();
   const std::array<double, 4> key{box.west, box.south, box.east, box.north};
-  if (const auto known = crowded_.find(key); known != crowded_.end()) return known->second;
+  if (const auto entry = crowded_.find(key); entry != crowded_.end()) return entry->second;
   const bool is_crowded = counts_as_crowded(box);
   crowded_[key] = is_crowded;
   return is_crowded;
@@ -146,17 +146,17 @@ std::optional<HeightRange> PointTileSurface::range(const GeographicBox& box) {
   std::optional<HeightRange> range;
   const stream::Channel& channel = cloud_.store.schema().coordinates[2];
   for (const StoredBox& window : windows(box)) {
-    const auto found = cluster_heights(reader_.query(), window);
-    if (!found) continue;
+    const auto cluster_range = cluster_heights(reader_.query(), window);
+    if (!cluster_range) continue;
     const auto metres = [&](double stored) {
       return (stored * channel.scale + channel.offset) * cloud_.vertical.metres_per_unit();
     };
-    const auto [low, high] = std::minmax({metres(found->low), metres(found->high)});
+    const auto [low, high] = std::minmax({metres(cluster_range->low), metres(cluster_range->high)});
     if (!range) range = HeightRange{low, high, false};
     range->low = std::min(range->low, low);
     range->high = std::max(range->high, high);
     std::vector<Point2> places;
-    for (const stream::Point3& p : found->examples) {
+    for (const stream::Point3& p : cluster_range->examples) {
       if (std::isfinite(p[2])) places.push_back({p[0], p[1]});
     }
     cloud_.places.to_geographic(places);

@@ -246,11 +246,11 @@ std::shared_ptr<const SideVertices> TileSides::vertices(const Side& side) {
 std::vector<TileVertex> TileSides::around(const TileLeaf& leaf) {
   std::vector<TileVertex> ring;
   const auto add = [&](const Side& side, bool backward) {
-    const auto known = vertices(side);
+    const auto side_vertices = vertices(side);
     const std::uint32_t across = leaf_unit(side.line, side.depth);
     // The last vertex is the first of the next side.
-    for (std::size_t i = 0; i + 1 < known->size(); ++i) {
-      const SideVertex& vertex = (*known)[backward ? known->size() - 1 - i : i];
+    for (std::size_t i = 0; i + 1 < side_vertices->size(); ++i) {
+      const SideVertex& vertex = (*side_vertices)[backward ? side_vertices->size() - 1 - i : i];
       const auto at = static_cast<std::uint32_t>(vertex.at);
       ring.push_back({side.along_parallel ? at : across, side.along_parallel ? across : at,
                       std::llround(vertex.height / plan_.height_step)});
@@ -278,11 +278,11 @@ void TileSides::Samples::add(double height, double units) {
 TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double>& t,
                                             std::vector<double>& longitude,
                                             std::vector<double>& latitude) {
-  SamplesAt found;
+  SamplesAt samples;
   // Tiles on both sides of 180 degrees see different samples, unless both request those of both
   // sides.
   const bool on_180 = !side.along_parallel && std::abs(longitude.front()) == 180.0;
-  if (on_180 && !surface_.sides_take_samples()) return found;
+  if (on_180 && !surface_.sides_take_samples()) return samples;
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const std::size_t before = t.size();
   const double from = t.front(), to = t.back();
@@ -300,13 +300,13 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
       if (!(shifted > from && shifted < to)) continue;
       t.push_back(shifted);
       if (surface_.sides_take_samples()) {
-        found[shifted].add(near->height[i], std::abs(side.along_parallel ? north : east));
+        samples[shifted].add(near->height[i], std::abs(side.along_parallel ? north : east));
       }
     }
   }
   std::sort(t.begin(), t.end());
   t.erase(std::unique(t.begin(), t.end()), t.end());
-  if (t.size() == before) return found;
+  if (t.size() == before) return samples;
   const double across = leaf_unit(side.line, side.depth);
   longitude.clear();
   latitude.clear();
@@ -314,7 +314,7 @@ TileSides::SamplesAt TileSides::add_samples(const Side& side, std::vector<double
     longitude.push_back(longitude_at(tile_, side.along_parallel ? at : across));
     latitude.push_back(latitude_at(tile_, side.along_parallel ? across : at));
   }
-  return found;
+  return samples;
 }
 
 std::optional<SurfaceSamples> TileSides::samples_near(const GeographicBox& box) {
@@ -345,8 +345,8 @@ std::optional<SurfaceSamples> TileSides::samples_near(const GeographicBox& box) 
 
 std::optional<TileSides::Samples> TileSides::samples_at_corner(double longitude, double latitude) {
   if (!surface_.sides_take_samples()) return std::nullopt;
-  const auto [known, fresh] = corners_.try_emplace({longitude, latitude}, std::nullopt);
-  if (!fresh) return known->second;
+  const auto [entry, fresh] = corners_.try_emplace({longitude, latitude}, std::nullopt);
+  if (!fresh) return entry->second;
   const double unit = tile_width(tile_.zoom) / kTileUnits;
   const std::optional<SurfaceSamples> near =
       samples_near({longitude - unit, latitude - unit, longitude + unit, latitude + unit});
@@ -358,8 +358,8 @@ std::optional<TileSides::Samples> TileSides::samples_at_corner(double longitude,
     const double north = near->latitude[i] - latitude;
     samples.add(near->height[i], std::max(std::abs(east), std::abs(north)) / unit);
   }
-  known->second = samples;
-  return known->second;
+  entry->second = samples;
+  return entry->second;
 }
 
 }  // namespace terrace::terrain

@@ -28,9 +28,9 @@ template <class Number>
 bool take(std::string_view& line, Number& number) {
   const std::size_t end = line.find(' ');
   if (end == std::string_view::npos) return false;
-  const auto found = number_from<Number>(line.substr(0, end));
-  if (!found) return false;
-  number = *found;
+  const auto value = number_from<Number>(line.substr(0, end));
+  if (!value) return false;
+  number = *value;
   line.remove_prefix(end + 1);
   return true;
 }
@@ -121,9 +121,9 @@ TileJournal::TileJournal(const std::string& folder) : folder_(folder), path_(fol
 }
 
 const FinishedTile* TileJournal::find(const TileAddress& tile) const {
-  const auto found =
+  const auto entry =
       std::lower_bound(earlier_.begin(), earlier_.end(), Record{tile, {}}, by_address);
-  return found == earlier_.end() || found->first != tile ? nullptr : &found->second;
+  return entry == earlier_.end() || entry->first != tile ? nullptr : &entry->second;
 }
 
 void TileJournal::add(const TileAddress& tile, const FinishedTile& finished) {

@@ -60,9 +60,9 @@ double widest_range(const std::vector<TileAddress>& tiles, TileSurface& surface)
 /// Returns the index of a tile among tiles sorted by row.
 std::optional<std::size_t> number_of(const TileAddress& tile,
                                      const std::vector<TileAddress>& tiles) {
-  const auto found = std::lower_bound(tiles.begin(), tiles.end(), tile, by_row);
-  if (found == tiles.end() || *found != tile) return std::nullopt;
-  return static_cast<std::size_t>(found - tiles.begin());
+  const auto position = std::lower_bound(tiles.begin(), tiles.end(), tile, by_row);
+  if (position == tiles.end() || *position != tile) return std::nullopt;
+  return static_cast<std::size_t>(position - tiles.begin());
 }
 
 }  // namespace
@@ -105,17 +105,17 @@ void TileSetWriter::begin_change() {
 }
 
 std::string TileSetWriter::children_json(const TileAddress& tile) const {
-  std::vector<TileAddress> there;
+  std::vector<TileAddress> children;
   // Metadata begin at zoom 0, so zooms_ is indexed by zoom.
   if (tile.zoom + 1 < zooms_.size()) {
     const Zoom& below = *zooms_[tile.zoom + 1];
     for (const TileAddress& child : children_of(tile)) {
       const auto number = number_of(child, below.tiles);
-      if (number && below.written[*number].finished.bytes > 0) there.push_back(child);
+      if (number && below.written[*number].finished.bytes > 0) children.push_back(child);
     }
   }
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const TileRange& range : ranges_of(there)) {
+  for (const TileRange& range : ranges_of(children)) {
     list.push_back(
         {{"startX", range.x0}, {"startY", range.y0}, {"endX", range.x1}, {"endY", range.y1}});
   }
@@ -287,20 +287,20 @@ void TileSetWriter::take_larger_steps(Zoom& zoom) {
 }
 
 void TileSetWriter::conclude(const Zoom& zoom) {
-  std::vector<TileAddress>& there = present[zoom.plan.zoom];
+  std::vector<TileAddress>& existing = present[zoom.plan.zoom];
   TileZoom summary{.zoom = zoom.plan.zoom};
   for (std::size_t i = 0; i < zoom.tiles.size(); ++i) {
     const Written& written = zoom.written[i];
     records_.emplace_back(zoom.tiles[i], written.finished);
     if (written.finished.bytes == 0) continue;
-    there.push_back(zoom.tiles[i]);
+    existing.push_back(zoom.tiles[i]);
     result.bytes += written.finished.bytes;
     result.made += written.made ? 1 : 0;
     result.kept += written.kept ? 1 : 0;
     summary.max_error = std::max(summary.max_error, written.finished.max_error);
   }
-  summary.tiles = there.size();
-  result.tiles += there.size();
+  summary.tiles = existing.size();
+  result.tiles += existing.size();
   result.zooms.insert(result.zooms.begin(), summary);
 }
 

@@ -245,11 +245,11 @@ void MeshCheck::vertices() {
   for (unsigned corner = 0; corner < 4; ++corner) {
     const std::uint16_t u = (corner & 1) != 0 ? kTileUnits : 0;
     const std::uint16_t v = (corner & 2) != 0 ? kTileUnits : 0;
-    bool there = false;
-    for (std::size_t i = 0; i < mesh_.size() && !there; ++i) {
-      there = mesh_.u[i] == u && mesh_.v[i] == v;
+    bool has_corner = false;
+    for (std::size_t i = 0; i < mesh_.size() && !has_corner; ++i) {
+      has_corner = mesh_.u[i] == u && mesh_.v[i] == v;
     }
-    if (!there) {
+    if (!has_corner) {
       fault(kVerticesAt, std::string("no vertex in the ") + (v == 0 ? "south-" : "north-") +
                              (u == 0 ? "west" : "east") + " corner");
     }
@@ -297,13 +297,13 @@ void MeshCheck::normals() {
 }
 
 void MeshCheck::extensions(const std::vector<std::string>& promised_names) {
-  const auto compare = [&](const char* name, bool there) {
+  const auto compare = [&](const char* name, bool is_present) {
     const bool promised =
         std::find(promised_names.begin(), promised_names.end(), name) != promised_names.end();
-    if (promised == there) return;
+    if (promised == is_present) return;
     fault(extensions_at_,
           std::string("the extension ") + name +
-              (there ? " is not listed in layer.json" : " of layer.json is missing"));
+              (is_present ? " is not listed in layer.json" : " of layer.json is missing"));
   };
   compare("octvertexnormals", !mesh_.normals.empty());
   compare("watermask", !mesh_.water.empty());
