@@ -70,8 +70,8 @@ void weights_at(const Delaunay2<Coord>& triangulation, const Point2& query, Inte
   using Kernel = typename std::remove_cvref_t<decltype(mesh)>::Kernel;
   planar::Sampler<Kernel> sampler(mesh);
   sampler.start_at(slot(hint));
-  const auto found = sampler.compute_weights(query, method);
-  weights.assign(found.begin(), found.end());
+  const auto result = sampler.compute_weights(query, method);
+  weights.assign(result.begin(), result.end());
 }
 
 template <class Coord>

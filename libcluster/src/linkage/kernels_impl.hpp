@@ -47,12 +47,12 @@ std::size_t minima(const T* v, std::size_t count, LaneIndex<T> row, T* best, Lan
     place = lower ? here : place;
     here += static_cast<Index>(kLanes);
   }
-  std::size_t found = count;
+  std::size_t nearest = count;
   for (std::size_t lane = 0; lane < kLanes; ++lane) {
     const auto at = static_cast<std::size_t>(place[lane]);
-    if (low[lane] < *least || (low[lane] == *least && at < found)) {
+    if (low[lane] < *least || (low[lane] == *least && at < nearest)) {
       *least = low[lane];
-      found = at;
+      nearest = at;
     }
   }
   for (; k < count; ++k) {
@@ -62,10 +62,10 @@ std::size_t minima(const T* v, std::size_t count, LaneIndex<T> row, T* best, Lan
     }
     if (v[k] < *least) {
       *least = v[k];
-      found = k;
+      nearest = k;
     }
   }
-  return found;
+  return nearest;
 }
 
 template <class T>

@@ -74,14 +74,14 @@ class DenseSolver {
   /// row.
   std::uint32_t column_at(const Cost* costs, Number value, bool prefer_free,
                           std::uint32_t excluded) const {
-    std::uint32_t found = kUnassigned;
+    std::uint32_t first = kUnassigned;
     for (std::size_t j = 0; j < columns_; ++j) {
       if (static_cast<Number>(costs[j]) - result_.column_dual[j] != value || j == excluded)
         continue;
       if (!prefer_free || row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
-      if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
+      if (first == kUnassigned) first = static_cast<std::uint32_t>(j);
     }
-    return found;
+    return first;
   }
 
   /// Augmenting row reduction: a row takes its best column, and the column's label falls until the
@@ -135,17 +135,17 @@ class DenseSolver {
 
   /// Returns the first column at the least distance, preferably one without a row.
   std::uint32_t nearest_column(Number least) const {
-    std::uint32_t found = kUnassigned;
+    std::uint32_t first = kUnassigned;
     for (std::size_t b = 0; b < block_least_.size(); ++b) {
       if (block_least_[b] != least) continue;
       const std::size_t end = std::min(columns_, (b + 1) * kScanBlock);
       for (std::size_t j = b * kScanBlock; j < end; ++j) {
         if (distance_[j] != least) continue;
         if (row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
-        if (found == kUnassigned) found = static_cast<std::uint32_t>(j);
+        if (first == kUnassigned) first = static_cast<std::uint32_t>(j);
       }
     }
-    return found;
+    return first;
   }
 
   /// Gives row `start` a column by the shortest augmenting path, or leaves one row unassigned if

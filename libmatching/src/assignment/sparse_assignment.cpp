@@ -122,13 +122,13 @@ EdgeLists lists_of(std::span<const CostEdge> edges, std::size_t rows, std::size_
 
 /// Finds the cheapest of the row's edges to this column. Returns false if there is no such edge.
 bool chosen_cost(const EdgeLists& lists, std::size_t row, std::uint32_t column, double& cost) {
-  bool found = false;
+  bool has_cost = false;
   for (const Candidate& c : lists.candidates(row)) {
-    if (c.column != column || (found && !(c.cost < cost))) continue;
+    if (c.column != column || (has_cost && !(c.cost < cost))) continue;
     cost = c.cost;
-    found = true;
+    has_cost = true;
   }
-  return found;
+  return has_cost;
 }
 
 Assignment solve_wide(EdgeLists& lists, const char* side, const base::StopCheck& check_stop) {
@@ -172,12 +172,12 @@ double check_lists(const Assignment& assignment, const EdgeLists& lists) {
   for (std::size_t i = 0; i < lists.rows(); ++i) {
     const std::uint32_t column = assignment.column[i];
     double cost = 0;
-    const bool found = chosen_cost(lists, i, column, cost);
-    if (!found && column != kUnassigned) {
+    const bool has_cost = chosen_cost(lists, i, column, cost);
+    if (!has_cost && column != kUnassigned) {
       throw std::invalid_argument("check: row " + std::to_string(i) +
                                   " has a column that is not among its entries");
     }
-    if (found) optimality.add_entry(i, column, cost);
+    if (has_cost) optimality.add_entry(i, column, cost);
     for (const Candidate& c : lists.candidates(i)) {
       if (c.column != column) optimality.add_entry(i, c.column, c.cost);
     }

@@ -146,19 +146,19 @@ class SparseSolver {
   Offer<double> offer(std::uint32_t row) {
     for (;;) {
       ticks_(source_.candidates(row).size());
-      Offer<double> found{kUnassigned, kInfinity, source_.threshold(row)};
+      Offer<double> best{kUnassigned, kInfinity, source_.threshold(row)};
       for (const Candidate& c : source_.candidates(row)) {
         const double reduced = c.cost - result_.column_dual[c.column];
-        if (reduced < found.least) {
-          found.second = std::min(found.second, found.least);
-          found.least = reduced;
-          found.column = c.column;
+        if (reduced < best.least) {
+          best.second = std::min(best.second, best.least);
+          best.least = reduced;
+          best.column = c.column;
         } else {
-          found.second = std::min(found.second, reduced);
+          best.second = std::min(best.second, reduced);
         }
       }
-      if (found.second == kInfinity) found.second = found.least;
-      if (found.least <= found.second) return found;
+      if (best.second == kInfinity) best.second = best.least;
+      if (best.least <= best.second) return best;
       // The best column may be absent from the list.
       source_.extend(row, result_.column_dual, kInfinity);
     }

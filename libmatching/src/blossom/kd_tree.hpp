@@ -88,18 +88,18 @@ class KdTree {
     return sum;
   }
 
-  /// Stores the k points nearest to point i (excluding i) in `found`, nearest first. Stores fewer
-  /// if there are fewer. Ties are in the order in which the tree is walked.
+  /// Stores the k points nearest to point i (excluding i) in `neighbours`, nearest first. Stores
+  /// fewer if there are fewer. Ties are in the order in which the tree is walked.
   void nearest(std::uint32_t i, std::size_t k,
-               std::vector<std::pair<double, std::uint32_t>>& found) const {
-    found.clear();
+               std::vector<std::pair<double, std::uint32_t>>& neighbours) const {
+    neighbours.clear();
     const Point& p = points_[i];
     std::array<std::pair<double, std::uint32_t>, 64> open;
     std::size_t depth = 0;
     open[depth++] = {0.0, 0};
     while (depth != 0) {
       const auto [far, at] = open[--depth];
-      if (found.size() == k && far >= found.back().first) continue;
+      if (neighbours.size() == k && far >= neighbours.back().first) continue;
       const Node& node = nodes_[at];
       if (node.right != 0) {
         const double left = nodes_[at + 1].box.squared_distance(p);
@@ -111,11 +111,11 @@ class KdTree {
       }
       for (std::uint32_t j = node.begin; j < node.end; ++j) {
         const double d = distance2(points_[j], p);
-        if (j == i || (found.size() == k && d >= found.back().first)) continue;
-        if (found.size() == k) found.pop_back();
-        auto place = found.end();
-        while (place != found.begin() && (place - 1)->first > d) --place;
-        found.insert(place, {d, j});
+        if (j == i || (neighbours.size() == k && d >= neighbours.back().first)) continue;
+        if (neighbours.size() == k) neighbours.pop_back();
+        auto place = neighbours.end();
+        while (place != neighbours.begin() && (place - 1)->first > d) --place;
+        neighbours.insert(place, {d, j});
       }
     }
   }

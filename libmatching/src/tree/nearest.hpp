@@ -63,11 +63,11 @@ std::optional<Neighbour> nearest_one(const BoundingVolumeHierarchy<D>& tree,
   return Neighbour{best.second, std::sqrt(best.first) / tree.frame().scale};
 }
 
-/// Writes the k nearest primitives to `found`.
+/// Writes the k nearest primitives to `neighbours`, the nearest first.
 template <std::size_t D, class Squared>
 void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double, D>& in_frame,
-                 std::size_t k, Squared&& squared, std::vector<Neighbour>& found) {
-  found.clear();
+                 std::size_t k, Squared&& squared, std::vector<Neighbour>& neighbours) {
+  neighbours.clear();
   k = std::min(k, tree.order().size());
   if (k == 0) return;
   // A heap with the farthest primitive on top. Distances stay squared until the end.
@@ -82,19 +82,19 @@ void nearest_few(const BoundingVolumeHierarchy<D>& tree, const std::array<double
         for (std::uint32_t slot = leaf.link; slot < leaf.link + leaf.count; ++slot) {
           const Neighbour candidate{order[slot], squared(slot)};
           if (candidate.distance > bound) continue;
-          if (found.size() == k) {
-            if (!nearer(candidate, found.front())) continue;
-            std::pop_heap(found.begin(), found.end(), nearer);
-            found.back() = candidate;
+          if (neighbours.size() == k) {
+            if (!nearer(candidate, neighbours.front())) continue;
+            std::pop_heap(neighbours.begin(), neighbours.end(), nearer);
+            neighbours.back() = candidate;
           } else {
-            found.push_back(candidate);
+            neighbours.push_back(candidate);
           }
-          std::push_heap(found.begin(), found.end(), nearer);
-          if (found.size() == k) bound = found.front().distance;
+          std::push_heap(neighbours.begin(), neighbours.end(), nearer);
+          if (neighbours.size() == k) bound = neighbours.front().distance;
         }
       });
-  std::sort_heap(found.begin(), found.end(), nearer);
-  for (Neighbour& neighbour : found) {
+  std::sort_heap(neighbours.begin(), neighbours.end(), nearer);
+  for (Neighbour& neighbour : neighbours) {
     neighbour.distance = std::sqrt(neighbour.distance) / tree.frame().scale;
   }
 }

@@ -126,10 +126,10 @@ std::uint32_t nearest_vertex(const Mesh<Kernel>& mesh, const Query& p, std::uint
   };
   if (mesh.flat) {
     // Along the line the distance decreases and then increases. There is no vertex after the last.
-    const auto found =
+    const auto nearest =
         std::partition_point(mesh.line.begin(), mesh.line.end() - 1,
                              [&](const std::uint32_t& v) { return compare(v, *(&v + 1)) > 0; });
-    return *found;
+    return *nearest;
   }
   last = walk_to(mesh, p, last);
   const auto nearer = [&](std::uint32_t a, std::uint32_t b) {

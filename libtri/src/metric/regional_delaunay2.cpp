@@ -306,10 +306,10 @@ struct RegionalDelaunay2<Coord>::Impl {
     std::sort(new_triangles.begin(), new_triangles.end());
     for (const auto& corners : changes.removed_corners) {
       const Listed key{from_least(slots_of(corners)), 0};
-      const auto found = std::lower_bound(new_triangles.begin(), new_triangles.end(), key);
-      assert(found != new_triangles.end() && found->corners == key.corners);
-      marks[found->slot] |= kRemoved;
-      removed_slots.push_back(found->slot);
+      const auto entry = std::lower_bound(new_triangles.begin(), new_triangles.end(), key);
+      assert(entry != new_triangles.end() && entry->corners == key.corners);
+      marks[entry->slot] |= kRemoved;
+      removed_slots.push_back(entry->slot);
     }
     for (const TriangleId id : changes.added_triangles) {
       const Triple c = slots_of(plain.vertices(id));

@@ -102,9 +102,9 @@ struct DynamicSurface<Coord>::Impl {
     const auto& all = mesh();
     removed_facets.clear();
     added_facets.clear();
-    const std::uint32_t known = facet_at.size();
-    facet_at.resize(std::max(known, all.tetrahedron.size()));
-    for (std::uint32_t t = known; t < facet_at.size(); ++t) facet_at[t].fill(spatial::kNone);
+    const std::uint32_t old_size = facet_at.size();
+    facet_at.resize(std::max(old_size, all.tetrahedron.size()));
+    for (std::uint32_t t = old_size; t < facet_at.size(); ++t) facet_at[t].fill(spatial::kNone);
     const auto remove_facet = [&](spatial::Side s) {
       const std::uint32_t triangle = std::exchange(at(s), spatial::kNone);
       if (triangle != spatial::kNone) removed_facets.push_back({corners[triangle], triangle});

@@ -102,9 +102,9 @@ class LidFinder {
   /// fresh: by vertex slot, true for added vertices.
   void add(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& is_new) {
     for_edges(corners, [&](Spacing& at, std::uint32_t v, std::uint32_t end) {
-      const std::uint8_t known = is_new[end] ? 0 : bit(at, end);
-      at.added |= known;
-      if (known == 0 && length(v, end) < at.length) at.removed |= kShorter;
+      const std::uint8_t end_bit = is_new[end] ? 0 : bit(at, end);
+      at.added |= end_bit;
+      if (end_bit == 0 && length(v, end) < at.length) at.removed |= kShorter;
     });
   }
   /// Calls changed(v) for vertices whose spacing was known and no longer is.
@@ -133,14 +133,14 @@ class LidFinder {
       visit(t);
       for (const std::uint32_t other : mesh_.tetrahedron[t].corner) {
         if (other == v || other == spatial::kGhost) continue;
-        const double found = length(v, other);
-        if (found >= least.back() || bit(at, other) != 0) continue;
+        const double edge_length = length(v, other);
+        if (edge_length >= least.back() || bit(at, other) != 0) continue;
         std::size_t i = kSpacingRank - 1;
-        for (; i > 0 && found < least[i - 1]; --i) {
+        for (; i > 0 && edge_length < least[i - 1]; --i) {
           least[i] = least[i - 1];
           at.ends[i] = at.ends[i - 1];
         }
-        least[i] = found;
+        least[i] = edge_length;
         at.ends[i] = other;
       }
     }

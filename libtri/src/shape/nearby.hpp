@@ -30,10 +30,10 @@ class LocalUpdate {
  public:
   LocalUpdate(const Mesh& mesh, State& state) : mesh_(mesh), state_(state) {
     const auto extend_with_none = [](Pool<std::uint32_t>& numbers, std::uint32_t size) {
-      const std::uint32_t known = numbers.size();
-      if (size <= known) return;
+      const std::uint32_t old_size = numbers.size();
+      if (size <= old_size) return;
       numbers.resize(size);
-      std::fill(numbers.data() + known, numbers.data() + size, spatial::kNone);
+      std::fill(numbers.data() + old_size, numbers.data() + size, spatial::kNone);
     };
     extend_with_none(state.local_tetrahedron, mesh.tetrahedron.size());
     extend_with_none(state.local_vertex, mesh.vertex.size());
@@ -53,10 +53,10 @@ class LocalUpdate {
     number_vertices();
     number_tetrahedra();
     const Spheres spheres(tetrahedra_, local_places(), 1);
-    std::vector<std::uint8_t> known(tetrahedra_.size());
+    std::vector<std::uint8_t> labels(tetrahedra_.size());
     for (std::size_t i = unlabelled_count_; i < slots_.size(); ++i)
-      known[i] = static_cast<std::uint8_t>(1 + state_.forest[slots_[i]]);
-    const Part part{known, unlabelled_count_, is_complete_};
+      labels[i] = static_cast<std::uint8_t>(1 + state_.forest[slots_[i]]);
+    const Part part{labels, unlabelled_count_, is_complete_};
     std::vector<std::uint8_t> inside = signed_forest(spheres, 1, part);
     for (std::uint32_t i = 0; i < slots_.size(); ++i) {
       if (i < unlabelled_count_) state_.forest[slots_[i]] = inside[i];

@@ -35,7 +35,7 @@ namespace terrace::tri::tin {
 ///   the triangle that was judged, unless it separates data from missing data.
 /// - kMaxFittedTriangles: vertices with more triangles keep their height.
 template <class S>
-concept Samples = requires(S samples, const S known, Mesh<typename S::Vertices> mesh,
+concept Samples = requires(S samples, const S const_samples, Mesh<typename S::Vertices> mesh,
                            typename S::Vertex vertex, const Spot spot, std::uint32_t number,
                            std::span<const std::uint32_t> created, Interval rises) {
   requires std::same_as<decltype(S::kMovesVertices), const bool>;
@@ -45,10 +45,10 @@ concept Samples = requires(S samples, const S known, Mesh<typename S::Vertices> 
 
   // Exact predicates. turn(a, b, p): positive if p is left of ab, 0 if it is on the line.
   // in_circle(a, b, c, p): true if p is strictly inside the circle.
-  { known.turn(vertex, vertex, vertex) > 0 } -> std::same_as<bool>;
-  { known.in_circle(vertex, vertex, vertex, vertex) } -> std::same_as<bool>;
+  { const_samples.turn(vertex, vertex, vertex) > 0 } -> std::same_as<bool>;
+  { const_samples.in_circle(vertex, vertex, vertex, vertex) } -> std::same_as<bool>;
   // True if no vertex may be inserted on the border.
-  { known.border_fixed() } -> std::same_as<bool>;
+  { const_samples.border_fixed() } -> std::same_as<bool>;
 
   // set_error(mesh, t): sets `place` and `error` of triangle t to its worst sample that is beyond
   // the bound and may become a vertex. `error` is 0 if there is none. split(mesh, created,
@@ -59,21 +59,21 @@ concept Samples = requires(S samples, const S known, Mesh<typename S::Vertices> 
   // open(place): true if the sample may become a vertex. take(place): returns that vertex.
   // give_up(place): it cannot become one after all. restore(): undoes all give_up() that must
   // not outlast refinement. counts(vertex): false if it does not count towards a limit.
-  { known.open(number) } -> std::same_as<bool>;
+  { const_samples.open(number) } -> std::same_as<bool>;
   { samples.take(number) } -> std::same_as<typename S::Vertex>;
   samples.give_up(number);
   samples.restore();
-  { known.counts(vertex) } -> std::same_as<bool>;
+  { const_samples.counts(vertex) } -> std::same_as<bool>;
 
   // narrow(t, v, b, c, rises): narrows the range by which vertex v of triangle t may rise to
   // the range that the samples in the triangle allow. raise(v, rises): moves v to the middle of
   // it, or false if it stays. within(mesh, t, v, b, c): true if the triangle is within the bound.
-  known.narrow(number, vertex, vertex, vertex, rises);
-  { known.raise(vertex, rises) } -> std::same_as<bool>;
-  { known.within(mesh, number, vertex, vertex, vertex) } -> std::same_as<bool>;
+  const_samples.narrow(number, vertex, vertex, vertex, rises);
+  { const_samples.raise(vertex, rises) } -> std::same_as<bool>;
+  { const_samples.within(mesh, number, vertex, vertex, vertex) } -> std::same_as<bool>;
 
   // True if the triangle belongs to the result. (publish(vertex, tin) adds a vertex to it.)
-  { known.covers(vertex, vertex, vertex) } -> std::same_as<bool>;
+  { const_samples.covers(vertex, vertex, vertex) } -> std::same_as<bool>;
 };
 
 /// The star of a vertex, whose corners are numbered along its ring.

@@ -232,9 +232,9 @@ void ViewControl<Triangulation>::Impl::request_missing(const Candidate& candidat
   const unsigned level = level_of(candidate.id);
   // Requests only clusters that could be expanded, and kept until then.
   const std::size_t reserved = reserved_points_ + members;
-  const auto known = requested_.find(candidate.id);
+  const auto entry = requested_.find(candidate.id);
   const double bytes = cache_.bytes_of(level, members);
-  const double additional = known == requested_.end() ? bytes : 0.0;
+  const double additional = entry == requested_.end() ? bytes : 0.0;
   if (!could_fit(candidate, members) || !could_fit(candidate, reserved) ||
       reserved_bytes_ + additional > static_cast<double>(cache_.max_bytes())) {
     --result_.missing;
@@ -255,9 +255,9 @@ void ViewControl<Triangulation>::Impl::request_upcoming() {
     if (++examined % kClockInterval == 0 && meter_.is_late()) break;
     if (!faulty_.empty() && faulty_.count(candidate.id)) continue;
     const double bytes = cache_.bytes_of(level_of(candidate.id), candidate.members);
-    const bool known = requested_.count(candidate.id) != 0;
-    if (!known && reserved_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
-    if (!known) reserved_bytes_ += bytes;
+    const bool is_requested = requested_.count(candidate.id) != 0;
+    if (!is_requested && reserved_bytes_ + bytes > static_cast<double>(cache_.max_bytes())) break;
+    if (!is_requested) reserved_bytes_ += bytes;
     if (!cache_.find(candidate.id, true)) request(candidate, std::min(candidate.keep, 1.0), bytes);
   }
 }
@@ -289,9 +289,9 @@ void ViewControl<Triangulation>::Impl::request(const Candidate& candidate, doubl
   ViewRequest request{candidate.id, {}, candidate.members, importance};
   if (level_of(candidate.id) > 0) request.head_child = tree().head_child(candidate.place);
   result_.wanted.push_back(request);
-  const auto [known, is_new] = requested_.try_emplace(candidate.id, Requested{number_, bytes});
+  const auto [entry, is_new] = requested_.try_emplace(candidate.id, Requested{number_, bytes});
   if (is_new) result_.requests.push_back(request);
-  known->second.step = number_;
+  entry->second.step = number_;
 }
 
 template <class Triangulation>

@@ -218,10 +218,10 @@ struct Geomorph<Triangulation>::Scratch {
     }
     patches.build(kAxes == 2 ? 1 : part_count);
     for (Mover& mover : movers) {
-      const auto found = patches.find(kAxes == 2 ? 0 : mover.part, mover.place);
-      if (!found) continue;
-      mover.place = found->place;
-      mover.on = order[found->triangle];
+      const auto hit = patches.find(kAxes == 2 ? 0 : mover.part, mover.place);
+      if (!hit) continue;
+      mover.place = hit->place;
+      mover.on = order[hit->triangle];
     }
   }
 };

@@ -69,11 +69,11 @@ class HoleFilling {
       // Seen from the other side.
       const std::array<std::uint32_t, 3> corner = {local[f[0]], local[f[2]], local[f[1]]};
       const auto next = static_cast<std::uint32_t>(hole_.facets.size());
-      const std::uint32_t known = table_.find_or_add(corner, next);
-      if (known != next) {
-        assert(is_open(known));
-        mesh_.link(make_side(t, k), hole_.facets[known].outer);
-        hole_.facets[known].outer = hole_.kMatched;
+      const std::uint32_t facet = table_.find_or_add(corner, next);
+      if (facet != next) {
+        assert(is_open(facet));
+        mesh_.link(make_side(t, k), hole_.facets[facet].outer);
+        hole_.facets[facet].outer = hole_.kMatched;
         continue;
       }
       hole_.facets.push_back({corner, make_side(t, k)});

@@ -127,8 +127,8 @@ void RasterSamples<T>::judge_coarsely_first() {
 
 template <class T>
 WorstSample<T> RasterSamples<T>::worst(const Vertex& a, const Vertex& b, const Vertex& c) const {
-  const WorstSample<T> found = scan_.worst(samples_, a, b, c, scan_bound_);
-  if (found.error != T{kUnsure}) return found;
+  const WorstSample<T> sample = scan_.worst(samples_, a, b, c, scan_bound_);
+  if (sample.error != T{kUnsure}) return sample;
   const PreciseWorst precise = precise_worst(samples_, a, b, c);
   if (precise.missing) return {std::numeric_limits<T>::infinity(), 0};
   if (precise.error <= std::max(bound_ - precise.slack, precise.slack)) return {0, 0};
@@ -139,8 +139,8 @@ template <class T>
 WorstSample<T> RasterSamples<T>::worst_to_insert(const Vertex& a, const Vertex& b,
                                                  const Vertex& c) const {
   if (!coarse_heights_.empty() && turn(a, b, c) > 2 * kCoarseArea) {
-    const WorstSample<T> found = scan_.coarse(coarse_, a, b, c, scan_bound_);
-    if (found.error > 0 && found.error < std::numeric_limits<T>::infinity()) return found;
+    const WorstSample<T> sample = scan_.coarse(coarse_, a, b, c, scan_bound_);
+    if (sample.error > 0 && sample.error < std::numeric_limits<T>::infinity()) return sample;
   }
   return worst(a, b, c);
 }
@@ -151,15 +151,15 @@ void RasterSamples<T>::set_error(RasterMesh& mesh, std::uint32_t t) const {
   const Vertex &a = mesh.vertex(triangle, 0), &b = mesh.vertex(triangle, 1),
                &c = mesh.vertex(triangle, 2);
   if (!gaps_ || have_data(a, b, c)) {
-    const WorstSample<T> found = worst_to_insert(a, b, c);
-    if (found.error == 0) {
+    const WorstSample<T> sample = worst_to_insert(a, b, c);
+    if (sample.error == 0) {
       triangle.error = 0;
       return;
     }
-    if (found.error < std::numeric_limits<T>::infinity()) {
-      triangle.place = found.place;
+    if (sample.error < std::numeric_limits<T>::infinity()) {
+      triangle.place = sample.place;
       triangle.error = static_cast<float>(std::clamp<double>(
-          found.error, std::numeric_limits<float>::min(), std::numeric_limits<float>::max()));
+          sample.error, std::numeric_limits<float>::min(), std::numeric_limits<float>::max()));
       return;
     }
   } else if (!gaps_->mixed(a, b, c)) {
@@ -194,8 +194,8 @@ GridCorner<T> RasterSamples<T>::sample_of(const Vertex& vertex) const {
 
 template <class T>
 bool RasterSamples<T>::within(const Vertex& a, const Vertex& b, const Vertex& c) const {
-  const int found = scan_.within(samples_, a, b, c, scan_bound_);
-  if (found != kUnsure) return found != 0;
+  const int result = scan_.within(samples_, a, b, c, scan_bound_);
+  if (result != kUnsure) return result != 0;
   const PreciseWorst precise = precise_worst(samples_, a, b, c);
   return !precise.missing && precise.error <= std::max(bound_ - precise.slack, precise.slack);
 }

@@ -76,8 +76,8 @@ std::size_t Fan::sector_of(double dx, double dy) const {
   // everything, and its bit must not be mistaken for a ray's.
   left &= ~std::uint64_t{0} >> (64 - rays);
   const std::uint64_t next = left >> 1 | (open_ ? 0 : (left & 1) << (rays - 1));
-  const std::uint64_t found = left & ~next & (~std::uint64_t{0} >> (64 - sectors_.size()));
-  if (found != 0) return static_cast<std::size_t>(std::countr_zero(found));
+  const std::uint64_t matches = left & ~next & (~std::uint64_t{0} >> (64 - sectors_.size()));
+  if (matches != 0) return static_cast<std::size_t>(std::countr_zero(matches));
   return (left & 1) == 0 ? 0 : sectors_.size() - 1;
 }
 
