@@ -173,8 +173,8 @@ TEST(PointCells, AreTheSameForAnyNumberOfThreads) {
       const StoredBox all = terrain::flat(store.bounds());
       const auto visited = [&](const terrain::PointCells& cells) {
         std::vector<std::pair<Point2, double>> points;
-        cells.visit_cells(cells.cells_of(all),
-                          [&](const Point2& p) { points.emplace_back(p, cells.height(p)); });
+        cells.visit_points(cells.cells_of(all),
+                           [&](const Point2& p) { points.emplace_back(p, cells.height(p)); });
         return points;
       };
       stream::StoreQuery query(store);
