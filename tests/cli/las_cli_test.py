@@ -241,7 +241,7 @@ class LasFormatTest(LasCase):
         inches = self.put('inches.csv', b'x,y,z (in)\n1,2,3\n2,3,4\n')
         self.assertIn(b'heights are in inches', terrace('convert', inches, '-o', self.path('inches.las')).stderr)
         strange = self.put('strange.csv', b'x,y,z (NAVD88)\n1,2,3\n2,3,4\n')
-        self.assertIn(b"'NAVD88' in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
+        self.assertIn(b"unit 'NAVD88' of z in the header", terrace('convert', strange, '-o', self.path('strange.las')).stderr)
 
     def test_csv_names_the_units_of_all_coordinates(self):
         """Otherwise x and y in feet would be read as metres next to heights in feet."""
