@@ -9,8 +9,6 @@
 #include <terrace/base/random.hpp>
 
 namespace terrace::tools {
-
-using namespace terrain;
 namespace {
 
 struct ColourStop {
