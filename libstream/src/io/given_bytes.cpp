@@ -114,7 +114,7 @@ void GivenBytes::add_file(const std::string& name, std::uint64_t size) {
 void GivenBytes::give(const std::string& name, std::uint64_t offset,
                       std::span<const std::byte> bytes) {
   const auto at = impl_->files.find(name);
-  if (at == impl_->files.end()) throw fault(name, "the file has not been added");
+  if (at == impl_->files.end()) throw fault(name, "unknown file: call add() first");
   if (offset > at->second.size || bytes.size() > at->second.size - offset) {
     throw fault(name, "the given bytes extend beyond the end of the file");
   }
@@ -130,7 +130,7 @@ void GivenBytes::forget(const std::string& name) {
 OpenByName GivenBytes::open() const {
   return [impl = impl_](const std::string& name) {
     const auto at = impl->files.find(name);
-    if (at == impl->files.end()) throw fault(name, "the file has not been added");
+    if (at == impl->files.end()) throw fault(name, "unknown file: call add() first");
     Impl::File& file = at->second;
     return bytes_by_function(name, file.size,
                              [impl, name, &file](std::uint64_t offset, std::span<std::byte> out) {

@@ -31,10 +31,10 @@ struct PlaceConversions {
 };
 
 /// Writes every line of `places` with its own columns, followed by height, gradient (rise per run),
-/// slope (degrees) and aspect (degrees clockwise from north, downhill), which are empty where there
-/// is no surface. Empty lines and comments are copied unchanged. A header line gets the four names
-/// too. Places in another CRS replace the original ones in their columns, which are named x and y,
-/// or longitude and latitude. They are empty where they have no image.
+/// slope (degrees) and aspect (degrees clockwise from north, downhill). Outside the surface these
+/// are empty. Empty lines and comments are copied unchanged. The four names are appended to a
+/// header line. Places in another CRS replace the original ones in their columns, which are named x
+/// and y, or longitude and latitude. They are empty where they have no image.
 ///
 /// write: receives the lines in order, many at a time. Reports "points". Throws: stream::Error on
 /// invalid lines, latitudes beyond a pole and a damaged store; stream::Stopped; what `write`

@@ -116,10 +116,9 @@ class Removal {
       __builtin_prefetch(&mesh_.tetrahedron[tetrahedron_of(mate)]);
   }
 
-  /// True if everything must be rebuilt. That is the case if no tetrahedron is left to start from,
-  /// or if the survivors are coplanar, which requires that all of them are on this hole. It is also
-  /// the case if a hole has so many vertices that testing each of them for each facet would cost
-  /// more than a rebuild.
+  /// Returns true if everything must be rebuilt: no tetrahedron remains to start from, the
+  /// remaining vertices are coplanar (then all of them are on this hole), or the hole has so many
+  /// vertices that a rebuild costs less than testing every vertex with every facet.
   [[nodiscard]] bool must_restart() const {
     if (hole_.facets.empty()) return true;
     const std::size_t vertices = hole_.vertex.size();

@@ -119,8 +119,8 @@ using Metric =
 /// Returns the map that makes all distances between points of `box` Euclidean, or nullopt if there
 /// is none.
 [[nodiscard]] std::optional<LinearMap> linear_map(const Metric& metric, const Box3& box);
-/// Returns the points, mapped by the linear_map() of their bounding box. Returns nullopt if there
-/// is no such map.
+/// Returns the points, mapped by the linear_map() of their bounding box, or nullopt if the box has
+/// none.
 [[nodiscard]] std::optional<std::vector<Point3>> linear_points(const Metric& metric,
                                                                std::span<const Point3> points);
 

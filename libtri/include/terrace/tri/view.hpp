@@ -227,9 +227,9 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 /// Order of a step: the clusters with the greatest demand are expanded first. If there would be too
 /// many points, clusters of less than collapse_below times that demand are collapsed to make room:
 /// first those out of view, the farthest first, then those of the least demand. The remaining time
-/// goes to collapsing clusters that are no longer wanted, in the same order. Once they hold a
-/// quarter of the points, this comes before expanding. Under max_points the outcome depends on
-/// sizes, but it is also stable once reached.
+/// goes to collapsing clusters that are no longer wanted, in the same order. If these clusters have
+/// more than a quarter of the points, they are collapsed before others are expanded. Under
+/// max_points the outcome depends on sizes, but it is also stable once reached.
 ///
 /// Cost of a step without changes: O(expanded clusters + collapsed clusters next to wanted ones).
 /// Memory besides the model: 85 bytes per expanded cluster and 65 per cluster that could be
