@@ -60,12 +60,12 @@ void check_levels(const MatchingTree<Point>& tree, const std::vector<Point>& poi
 
 void check_queries(const std::vector<Point3>& points, const std::vector<TreeChildren>& rows) {
   const PointHierarchy<3> by_matching(rows, points);
-  const PointHierarchy<3> chained(oracles::chain(points.size()), points);
+  const PointHierarchy<3> chained(oracles::chain_tree(points.size()), points);
   std::vector<Triangle> triangles;
   for (std::uint32_t k = 0; k + 2 < points.size(); ++k) triangles.push_back({k, k + 1, k + 2});
   const std::vector<Point3> middles = centroids(points, triangles);
   const TriangleHierarchy surface(oracles::matching_rows(middles), points, triangles);
-  const TriangleHierarchy surface_chained(oracles::chain(triangles.size()), points, triangles);
+  const TriangleHierarchy surface_chained(oracles::chain_tree(triangles.size()), points, triangles);
   std::vector<Neighbour> found;
   for (const Point3& p : points) {
     const Point3 query{p[1], p[2] - 1.0, 0.5 * p[0]};

@@ -223,7 +223,8 @@ HalvingMatching match_by_halving(std::size_t count, const PairDistance& distance
       if (std::abs(out[k]) <= 1e300) continue;
       throw std::invalid_argument("the distance of " + std::to_string(std::min(from, to[k])) +
                                   " and " + std::to_string(std::max(from, to[k])) + " is " +
-                                  std::to_string(out[k]) + ": distances must be finite");
+                                  std::to_string(out[k]) +
+                                  ": distances must be finite and at most 1e300");
     }
   };
   return run(count, row, options);

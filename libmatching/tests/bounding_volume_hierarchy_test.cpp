@@ -133,7 +133,7 @@ void test_random(std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const std::size_t n = seed == 1 ? 0 : 1 + random() % (seed < 30 ? 9 : 300);
   const auto boxes = random_boxes<D>(n, static_cast<double>(seed % 3), random);
-  const auto rows = seed % 5 == 0 ? oracles::chain(n) : oracles::random_tree(n, random);
+  const auto rows = seed % 5 == 0 ? oracles::chain_tree(n) : oracles::random_tree(n, random);
   HierarchyOptions options;
   options.leaf_size = static_cast<std::uint32_t>(1 + random() % 5);
   options.costs = {0.5 + uniform(random), uniform(random)};
@@ -186,7 +186,7 @@ TEST(BoundingVolumeHierarchy, ComputesTheSurfaceAreaCost) {
 TEST(BoundingVolumeHierarchy, HandlesDeepTreesAndAnyScale) {
   std::mt19937_64 random(3);
   const auto plain = random_boxes<3>(20000, 0.01, random);
-  const auto rows = oracles::chain(plain.size());
+  const auto rows = oracles::chain_tree(plain.size());
   HierarchyOptions options;
   options.leaf_size = 1;
   const BoundingVolumeHierarchy<3> tree(rows, plain, options);
@@ -235,7 +235,7 @@ void test_rotation(std::uint64_t seed) {
       box.max[d] *= unit;
     }
   }
-  const auto rows = seed % 3 == 0 ? oracles::chain(n) : oracles::random_tree(n, random);
+  const auto rows = seed % 3 == 0 ? oracles::chain_tree(n) : oracles::random_tree(n, random);
   HierarchyOptions options;
   options.leaf_size = 1;
   const BoundingVolumeHierarchy<D> before(rows, boxes, options);

@@ -41,7 +41,7 @@ void test_nearest(std::uint64_t seed) {
   for (auto& p : points) p = draw<D>(kind, random);
   const std::size_t n = points.size();
   const std::vector<std::vector<TreeChildren>> trees{
-      oracles::matching_rows(points), oracles::random_tree(n, random), oracles::chain(n)};
+      oracles::matching_rows(points), oracles::random_tree(n, random), oracles::chain_tree(n)};
   std::vector<PointHierarchy<D>> hierarchies;
   for (std::uint32_t k = 0; k < trees.size(); ++k) {
     HierarchyOptions options = kPointLeaves;
@@ -99,7 +99,7 @@ TEST(PointHierarchy, HandlesAnyScaleAndDepth) {
   for (int k = 0; k < 5000; ++k) line.push_back({std::sqrt(k), 0.0});
   HierarchyOptions single = kPointLeaves;
   single.leaf_size = 1;
-  const PointHierarchy<2> deep(oracles::chain(line.size()), line, single);
+  const PointHierarchy<2> deep(oracles::chain_tree(line.size()), line, single);
   EXPECT_EQ(deep.tree().depth(), 4999u);
   EXPECT_EQ(deep.nearest({10.0, 1.0})->index, 100u);
   EXPECT_EQ(deep.nearest({60.0, 1.0})->index, 3600u);
@@ -136,8 +136,8 @@ TEST(PointHierarchy, FindsTheFirstBall) {
       RayHit sure, possible;
       sure.t = possible.t = std::numeric_limits<double>::infinity();
       for (std::uint32_t i = 0; i < points.size(); ++i) {
-        const auto in = oracles::ball(ray, points[i], radius * (1.0 - 1e-13));
-        const auto out = oracles::ball(ray, points[i], radius * (1.0 + 1e-13));
+        const auto in = oracles::ball_entry(ray, points[i], radius * (1.0 - 1e-13));
+        const auto out = oracles::ball_entry(ray, points[i], radius * (1.0 + 1e-13));
         if (in && *in < sure.t) sure = {i, *in};
         if (out && *out < possible.t) possible = {i, *out};
       }
@@ -145,7 +145,7 @@ TEST(PointHierarchy, FindsTheFirstBall) {
         ++hits;
         EXPECT_GE(hit->t, possible.t - 1e-6);
         EXPECT_LE(hit->t, sure.t + 1e-6);
-        const auto own = oracles::ball(ray, points[hit->index], radius * (1.0 + 1e-13));
+        const auto own = oracles::ball_entry(ray, points[hit->index], radius * (1.0 + 1e-13));
         ASSERT_TRUE(own);
         EXPECT_NEAR(hit->t, *own, 1e-6);
       } else {

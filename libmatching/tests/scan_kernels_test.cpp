@@ -18,7 +18,7 @@ TYPED_TEST_SUITE(ScanKernelsTyped, CostTypes);
 
 // Compares each instruction set with the definition, column by column.
 TYPED_TEST(ScanKernelsTyped, MatchTheDefinitionOnEveryInstructionSet) {
-  using Number = LabelOf<TypeParam>;
+  using Sum = CostSum<TypeParam>;
   for (const base::SimdPath path :
        {base::SimdPath::portable, base::SimdPath::avx2, base::SimdPath::avx512}) {
     if (!base::supports(path)) continue;
@@ -27,25 +27,24 @@ TYPED_TEST(ScanKernelsTyped, MatchTheDefinitionOnEveryInstructionSet) {
       SCOPED_TRACE(testing::Message() << "path " << static_cast<int>(path) << ", " << columns);
       std::mt19937_64 random(columns);
       std::vector<TypeParam> costs(columns);
-      std::vector<Number> labels(columns), distance(columns);
+      std::vector<Sum> labels(columns), distance(columns);
       for (std::size_t j = 0; j < columns; ++j) {
         costs[j] = static_cast<TypeParam>(static_cast<int>(random() % 100) - 20);
-        labels[j] = random() % 5 == 0 ? kSettled<Number> : -static_cast<Number>(random() % 50);
-        distance[j] =
-            random() % 3 == 0 ? kUnreachable<Number> : static_cast<Number>(random() % 100);
+        labels[j] = random() % 5 == 0 ? kSettled<Sum> : -static_cast<Sum>(random() % 50);
+        distance[j] = random() % 3 == 0 ? kUnreachable<Sum> : static_cast<Sum>(random() % 100);
       }
       std::vector<std::int64_t> previous(columns, 3), expected_previous = previous;
-      std::vector<Number> expected = distance;
+      std::vector<Sum> expected = distance;
       for (std::size_t j = 0; j < columns; ++j) {
-        const Number through = 7 + static_cast<Number>(costs[j]) - labels[j];
+        const Sum through = 7 + static_cast<Sum>(costs[j]) - labels[j];
         if (through < expected[j]) {
           expected[j] = through;
           expected_previous[j] = 5;
         }
       }
-      std::vector<Number> block_least((columns + kScanBlock - 1) / kScanBlock);
-      const Number least = kernels.relax(costs.data(), labels.data(), columns, 7, 5,
-                                         distance.data(), previous.data(), block_least.data());
+      std::vector<Sum> block_least((columns + kScanBlock - 1) / kScanBlock);
+      const Sum least = kernels.relax(costs.data(), labels.data(), columns, 7, 5, distance.data(),
+                                      previous.data(), block_least.data());
       EXPECT_EQ(distance, expected);
       EXPECT_EQ(previous, expected_previous);
       EXPECT_EQ(least, *std::min_element(expected.begin(), expected.end()));
@@ -54,12 +53,11 @@ TYPED_TEST(ScanKernelsTyped, MatchTheDefinitionOnEveryInstructionSet) {
         const auto end = std::min(expected.end() - begin, std::ptrdiff_t{kScanBlock});
         EXPECT_EQ(block_least[b], *std::min_element(begin, begin + end));
       }
-      for (Number& label : labels) label = std::max<Number>(label, -50);
-      std::vector<Number> reduced(columns + 1, kUnreachable<Number>);
-      for (std::size_t j = 0; j < columns; ++j)
-        reduced[j] = static_cast<Number>(costs[j]) - labels[j];
+      for (Sum& label : labels) label = std::max<Sum>(label, -50);
+      std::vector<Sum> reduced(columns + 1, kUnreachable<Sum>);
+      for (std::size_t j = 0; j < columns; ++j) reduced[j] = static_cast<Sum>(costs[j]) - labels[j];
       std::sort(reduced.begin(), reduced.end());
-      Number first, second;
+      Sum first, second;
       kernels.least_two(costs.data(), labels.data(), columns, &first, &second);
       EXPECT_EQ(first, reduced[0]);
       EXPECT_EQ(second, reduced[1]);

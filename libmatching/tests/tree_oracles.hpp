@@ -36,7 +36,7 @@ inline std::vector<TreeChildren> random_tree(std::size_t n, std::mt19937_64& ran
 }
 
 /// Returns a tree of the greatest possible depth.
-inline std::vector<TreeChildren> chain(std::size_t n) {
+inline std::vector<TreeChildren> chain_tree(std::size_t n) {
   std::vector<TreeChildren> rows;
   for (std::uint32_t i = 1; i < n; ++i) {
     rows.push_back({i == 1 ? 0 : static_cast<std::uint32_t>(n + i - 2), i});
@@ -81,28 +81,29 @@ inline Wide dot(const WidePoint& p, const WidePoint& q) {
   return p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
 }
 
-/// Returns where a ray crosses a triangle (T. Möller and B. Trumbore, 1997). Barycentric
-/// coordinates down to -margin count as inside.
+/// Returns the ray parameter t at which a ray crosses a triangle (T. Möller and B. Trumbore, 1997).
+/// Barycentric coordinates down to -margin count as inside.
 inline std::optional<double> crossing(const Ray& ray, const std::array<Point3, 3>& corners,
                                       Wide margin) {
-  const WidePoint along{ray.direction[0], ray.direction[1], ray.direction[2]};
+  const WidePoint direction{ray.direction[0], ray.direction[1], ray.direction[2]};
   const WidePoint first = wide_difference(corners[1], corners[0]);
   const WidePoint second = wide_difference(corners[2], corners[0]);
-  const WidePoint p = cross(along, second), s = wide_difference(ray.origin, corners[0]);
+  const WidePoint p = cross(direction, second), s = wide_difference(ray.origin, corners[0]);
   const WidePoint q = cross(s, first);
   const Wide det = dot(first, p);
   if (det == 0) return std::nullopt;
-  const Wide u = dot(s, p) / det, v = dot(along, q) / det, t = dot(second, q) / det;
+  const Wide u = dot(s, p) / det, v = dot(direction, q) / det, t = dot(second, q) / det;
   if (u < -margin || v < -margin || u + v > 1 + margin) return std::nullopt;
   if (t < Wide{ray.t_min} || t > Wide{ray.t_max}) return std::nullopt;
   return static_cast<double>(t);
 }
 
-/// Returns where a ray first enters a ball.
-inline std::optional<double> ball(const Ray& ray, const Point3& centre, Wide radius) {
-  const WidePoint along{ray.direction[0], ray.direction[1], ray.direction[2]};
-  const WidePoint to = wide_difference(ray.origin, centre);
-  const Wide a = dot(along, along), b = dot(along, to), c = dot(to, to) - radius * radius;
+/// Returns the ray parameter t at which a ray first enters a ball; t_min if the ray starts inside.
+inline std::optional<double> ball_entry(const Ray& ray, const Point3& centre, Wide radius) {
+  const WidePoint direction{ray.direction[0], ray.direction[1], ray.direction[2]};
+  const WidePoint from_centre = wide_difference(ray.origin, centre);
+  const Wide a = dot(direction, direction), b = dot(direction, from_centre),
+             c = dot(from_centre, from_centre) - radius * radius;
   const Wide discriminant = b * b - a * c;
   if (discriminant < 0) return std::nullopt;
   const Wide enter = (-b - std::sqrt(discriminant)) / a, leave = (-b + std::sqrt(discriminant)) / a;

@@ -28,7 +28,7 @@ namespace {
 template <class Cost, class Rows>
 class DenseSolver {
  public:
-  using Number = LabelOf<Cost>;
+  using Sum = CostSum<Cost>;
 
   /// check_stop: must outlive this object.
   DenseSolver(std::size_t rows, std::size_t columns, Rows& source,
@@ -47,7 +47,7 @@ class DenseSolver {
     result_.column_dual.assign(columns, 0);
   }
 
-  BasicAssignment<Number> solve() {
+  BasicAssignment<Sum> solve() {
     const std::size_t first = std::min(rows_, columns_);
     if (columns_ != 0) {
       for (const std::uint32_t row : reduce_rows(first)) augment(row);
@@ -59,7 +59,7 @@ class DenseSolver {
     }
     for (std::size_t i = 0; i < rows_; ++i) {
       const std::uint32_t j = result_.column[i];
-      if (j != kUnassigned) result_.cost += static_cast<Number>(source_(i)[j]);
+      if (j != kUnassigned) result_.cost += static_cast<Sum>(source_(i)[j]);
     }
     return std::move(result_);
   }
@@ -67,17 +67,16 @@ class DenseSolver {
  private:
   struct Settled {
     std::uint32_t column;
-    Number distance, label;
+    Sum distance, label;
   };
 
   /// Returns the first column of `costs` with this value of cost - label, preferably one without a
   /// row.
-  std::uint32_t column_at(const Cost* costs, Number value, bool prefer_free,
+  std::uint32_t column_at(const Cost* costs, Sum value, bool prefer_free,
                           std::uint32_t excluded) const {
     std::uint32_t first = kUnassigned;
     for (std::size_t j = 0; j < columns_; ++j) {
-      if (static_cast<Number>(costs[j]) - result_.column_dual[j] != value || j == excluded)
-        continue;
+      if (static_cast<Sum>(costs[j]) - result_.column_dual[j] != value || j == excluded) continue;
       if (!prefer_free || row_of_[j] == kUnassigned) return static_cast<std::uint32_t>(j);
       if (first == kUnassigned) first = static_cast<std::uint32_t>(j);
     }
@@ -95,7 +94,7 @@ class DenseSolver {
       while (row != kUnassigned) {
         ticks_(columns_);
         const Cost* costs = source_(row);
-        Number least, second;
+        Sum least, second;
         kernels_.least_two(costs, result_.column_dual.data(), columns_, &least, &second);
         result_.row_dual[row] = least;
         std::uint32_t column = column_at(costs, least, least == second, kUnassigned);
@@ -107,14 +106,14 @@ class DenseSolver {
         }
         if (steps != 0) --steps;
         if (columns_ > 1 && least < second) {
-          const Number label = result_.column_dual[column] - (second - least);
+          const Sum label = result_.column_dual[column] - (second - least);
           // Rounding can absorb the difference. Further steps would then make no progress.
           if (!free && !(label < result_.column_dual[column])) {
             unassigned.push_back(row);
             break;
           }
           result_.column_dual[column] = label;
-          result_.row_dual[row] = static_cast<Number>(costs[column]) - label;
+          result_.row_dual[row] = static_cast<Sum>(costs[column]) - label;
         }
         row_of_[column] = row;
         result_.column[row] = column;
@@ -127,14 +126,14 @@ class DenseSolver {
 
   /// Shifts all labels so that the labels of rows are at most 0.
   void shift_labels(std::size_t count) {
-    Number highest = result_.row_dual[0];
+    Sum highest = result_.row_dual[0];
     for (std::size_t i = 1; i < count; ++i) highest = std::max(highest, result_.row_dual[i]);
     for (std::size_t i = 0; i < count; ++i) result_.row_dual[i] -= highest;
-    for (Number& label : result_.column_dual) label += highest;
+    for (Sum& label : result_.column_dual) label += highest;
   }
 
   /// Returns the first column at the least distance, preferably one without a row.
-  std::uint32_t nearest_column(Number least) const {
+  std::uint32_t nearest_column(Sum least) const {
     std::uint32_t first = kUnassigned;
     for (std::size_t b = 0; b < block_least_.size(); ++b) {
       if (block_least_[b] != least) continue;
@@ -151,20 +150,20 @@ class DenseSolver {
   /// Gives row `start` a column by the shortest augmenting path, or leaves one row unassigned if
   /// that is cheaper and allowed.
   void augment(std::uint32_t start) {
-    std::fill(distance_.begin(), distance_.end(), kUnreachable<Number>);
+    std::fill(distance_.begin(), distance_.end(), kUnreachable<Sum>);
     settled_.clear();
     auto& labels = result_.column_dual;
     std::uint32_t row = start, sink = kUnassigned, released_row = kUnassigned;
-    Number path_length = 0, release_distance = kUnreachable<Number>;
+    Sum path_length = 0, release_distance = kUnreachable<Sum>;
     if (may_unassign_) {
       released_row = start;
       release_distance = -result_.row_dual[start];
     }
     for (;;) {
       ticks_(columns_);
-      const Number base = path_length - result_.row_dual[row];
-      const Number least = kernels_.relax(source_(row), labels.data(), columns_, base, row,
-                                          distance_.data(), previous_.data(), block_least_.data());
+      const Sum base = path_length - result_.row_dual[row];
+      const Sum least = kernels_.relax(source_(row), labels.data(), columns_, base, row,
+                                       distance_.data(), previous_.data(), block_least_.data());
       if (may_unassign_ && base < release_distance) {
         release_distance = base;
         released_row = row;
@@ -180,15 +179,15 @@ class DenseSolver {
         break;
       }
       settled_.push_back({j, least, labels[j]});
-      labels[j] = kSettled<Number>;
-      distance_[j] = kUnreachable<Number>;
+      labels[j] = kSettled<Sum>;
+      distance_[j] = kUnreachable<Sum>;
       row = row_of_[j];
     }
     // Labels of the tree's rows rise and labels of its columns fall, which makes the path's edges
     // tight.
     result_.row_dual[start] += path_length;
     for (const Settled& s : settled_) {
-      const Number decrease = path_length - s.distance;
+      const Sum decrease = path_length - s.distance;
       result_.row_dual[row_of_[s.column]] += decrease;
       labels[s.column] = s.label - decrease;
     }
@@ -213,16 +212,16 @@ class DenseSolver {
   base::StopTicks ticks_;
   const ScanKernels<Cost>& kernels_;
   bool may_unassign_ = false;
-  BasicAssignment<Number> result_;
+  BasicAssignment<Sum> result_;
   std::vector<std::uint32_t> row_of_;
-  std::vector<Number> distance_;
+  std::vector<Sum> distance_;
   std::vector<std::int64_t> previous_;
-  std::vector<Number> block_least_;
+  std::vector<Sum> block_least_;
   std::vector<Settled> settled_;
 };
 
 template <class Cost>
-BasicAssignment<LabelOf<Cost>> assign_matrix(std::span<const Cost> costs, std::size_t rows,
+BasicAssignment<CostSum<Cost>> assign_matrix(std::span<const Cost> costs, std::size_t rows,
                                              std::size_t columns,
                                              const base::StopCheck& check_stop) {
   check_matrix(costs, rows, columns);

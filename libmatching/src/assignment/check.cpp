@@ -10,10 +10,10 @@ namespace terrace::matching {
 namespace {
 
 template <class Cost>
-LabelOf<Cost> check_all(const BasicAssignment<LabelOf<Cost>>& assignment,
+CostSum<Cost> check_all(const BasicAssignment<CostSum<Cost>>& assignment,
                         std::span<const Cost> costs, std::size_t rows, std::size_t columns) {
   check_matrix(costs, rows, columns);
-  OptimalityCheck<LabelOf<Cost>> optimality(assignment, rows, columns);
+  OptimalityCheck<CostSum<Cost>> optimality(assignment, rows, columns);
   for (std::size_t i = 0; i < rows; ++i) {
     for (std::size_t j = 0; j < columns; ++j) optimality.add_entry(i, j, costs[i * columns + j]);
   }

@@ -13,16 +13,17 @@ namespace terrace::matching {
 /// The type in which costs are added: double for double and float, 64-bit integers for 32-bit
 /// integers.
 template <class Cost>
-using LabelOf = std::conditional_t<std::is_integral_v<Cost>, std::int64_t, double>;
+using CostSum = std::conditional_t<std::is_integral_v<Cost>, std::int64_t, double>;
 
-/// kUnreachable is larger than every distance. kSettled is the label that keeps a settled column
-/// settled: base + c - kSettled is at least kUnreachable for any cost c.
-template <class Number>
-inline constexpr Number kUnreachable = std::numeric_limits<Number>::infinity();
+/// Larger than every distance, and used where there is none.
+template <class Sum>
+inline constexpr Sum kUnreachable = std::numeric_limits<Sum>::infinity();
 template <>
 inline constexpr std::int64_t kUnreachable<std::int64_t> = std::int64_t{1} << 61;
-template <class Number>
-inline constexpr Number kSettled = -std::numeric_limits<Number>::infinity();
+/// The label that keeps a settled column settled: base + c - kSettled is at least kUnreachable for
+/// any cost c.
+template <class Sum>
+inline constexpr Sum kSettled = -std::numeric_limits<Sum>::infinity();
 template <>
 inline constexpr std::int64_t kSettled<std::int64_t> = -(std::int64_t{1} << 62);
 
@@ -33,16 +34,16 @@ inline constexpr std::size_t kScanBlock = 128;
 /// the same numbers.
 template <class Cost>
 struct ScanKernels {
-  using Number = LabelOf<Cost>;
+  using Sum = CostSum<Cost>;
   /// For each column j computes through = (base + costs[j]) - labels[j]. Where that is below
   /// distance[j], stores it in distance[j] and `row` in previous[j]. Writes the least distance of
   /// each block of columns to block_least, and returns the least of all.
-  Number (*relax)(const Cost* costs, const Number* labels, std::size_t columns, Number base,
-                  std::int64_t row, Number* distance, std::int64_t* previous, Number* block_least);
+  Sum (*relax)(const Cost* costs, const Sum* labels, std::size_t columns, Sum base,
+               std::int64_t row, Sum* distance, std::int64_t* previous, Sum* block_least);
   /// Computes the two least values of costs[j] - labels[j]. They are equal if two columns tie. A
   /// missing value is kUnreachable.
-  void (*least_two)(const Cost* costs, const Number* labels, std::size_t columns, Number* first,
-                    Number* second);
+  void (*least_two)(const Cost* costs, const Sum* labels, std::size_t columns, Sum* first,
+                    Sum* second);
 };
 
 /// Returns the kernels for the best instruction set of this processor.

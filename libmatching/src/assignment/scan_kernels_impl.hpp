@@ -47,20 +47,20 @@ typename Vector<Number>::Type all(Number value) {
 }
 
 template <class Cost>
-LabelOf<Cost> relax(const Cost* costs, const LabelOf<Cost>* labels, std::size_t columns,
-                    LabelOf<Cost> base, std::int64_t row, LabelOf<Cost>* distance,
-                    std::int64_t* previous, LabelOf<Cost>* block_least) {
-  using Number = LabelOf<Cost>;
-  using V = typename Vector<Number>::Type;
+CostSum<Cost> relax(const Cost* costs, const CostSum<Cost>* labels, std::size_t columns,
+                    CostSum<Cost> base, std::int64_t row, CostSum<Cost>* distance,
+                    std::int64_t* previous, CostSum<Cost>* block_least) {
+  using Sum = CostSum<Cost>;
+  using V = typename Vector<Sum>::Type;
   const V bases = all(base);
   const auto rows = all(row);
-  Number least = kUnreachable<Number>;
+  Sum least = kUnreachable<Sum>;
   for (std::size_t begin = 0; begin < columns; begin += kScanBlock) {
     const std::size_t end = begin + kScanBlock < columns ? begin + kScanBlock : columns;
-    V lanes = all(kUnreachable<Number>);
+    V lanes = all(kUnreachable<Sum>);
     std::size_t j = begin;
     for (; j + kLanes <= end; j += kLanes) {
-      const V through = (bases + load_costs<Number>(costs + j)) - load(labels + j);
+      const V through = (bases + load_costs<Sum>(costs + j)) - load(labels + j);
       const V old_distance = load(distance + j);
       const auto nearer = through < old_distance;
       const V new_distance = nearer ? through : old_distance;
@@ -68,9 +68,9 @@ LabelOf<Cost> relax(const Cost* costs, const LabelOf<Cost>* labels, std::size_t 
       store(previous + j, nearer ? rows : load(previous + j));
       lanes = new_distance < lanes ? new_distance : lanes;
     }
-    Number block = kUnreachable<Number>;
+    Sum block = kUnreachable<Sum>;
     for (; j < end; ++j) {
-      const Number through = (base + static_cast<Number>(costs[j])) - labels[j];
+      const Sum through = (base + static_cast<Sum>(costs[j])) - labels[j];
       if (through < distance[j]) {
         distance[j] = through;
         previous[j] = row;
@@ -85,21 +85,21 @@ LabelOf<Cost> relax(const Cost* costs, const LabelOf<Cost>* labels, std::size_t 
 }
 
 template <class Cost>
-void least_two(const Cost* costs, const LabelOf<Cost>* labels, std::size_t columns,
-               LabelOf<Cost>* first, LabelOf<Cost>* second) {
-  using Number = LabelOf<Cost>;
-  using V = typename Vector<Number>::Type;
-  V first_lanes = all(kUnreachable<Number>), second_lanes = first_lanes;
+void least_two(const Cost* costs, const CostSum<Cost>* labels, std::size_t columns,
+               CostSum<Cost>* first, CostSum<Cost>* second) {
+  using Sum = CostSum<Cost>;
+  using V = typename Vector<Sum>::Type;
+  V first_lanes = all(kUnreachable<Sum>), second_lanes = first_lanes;
   std::size_t j = 0;
   for (; j + kLanes <= columns; j += kLanes) {
-    const V value = load_costs<Number>(costs + j) - load(labels + j);
+    const V value = load_costs<Sum>(costs + j) - load(labels + j);
     const auto below = value < first_lanes;
     const V other = below ? first_lanes : value;
     first_lanes = below ? value : first_lanes;
     second_lanes = other < second_lanes ? other : second_lanes;
   }
-  Number a = kUnreachable<Number>, b = a;
-  const auto take = [&](Number value) {
+  Sum a = kUnreachable<Sum>, b = a;
+  const auto take = [&](Sum value) {
     if (value < a) {
       b = a;
       a = value;
@@ -107,7 +107,7 @@ void least_two(const Cost* costs, const LabelOf<Cost>* labels, std::size_t colum
       b = value;
     }
   };
-  for (; j < columns; ++j) take(static_cast<Number>(costs[j]) - labels[j]);
+  for (; j < columns; ++j) take(static_cast<Sum>(costs[j]) - labels[j]);
   for (std::size_t k = 0; k < kLanes; ++k) {
     take(first_lanes[k]);
     take(second_lanes[k]);

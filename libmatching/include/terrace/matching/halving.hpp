@@ -17,8 +17,7 @@
 /// matched at the least total distance (an assignment). Source: J. Skála, Algorithms for
 /// manipulating large geometric data, 7.5.1.
 ///
-/// Neither method is exact. Use point_matching.hpp for that. The first method is the published one,
-/// the second goes one step further.
+/// Neither method is exact; point_matching.hpp is.
 
 namespace terrace::matching {
 
@@ -40,7 +39,7 @@ struct HalvingOptions {
   double seconds = std::numeric_limits<double>::infinity();
   std::uint64_t seed = 1;
   /// Number of iterations of monte_carlo that run concurrently. 0 means one per core. Does not
-  /// change the result unless `seconds` is set.
+  /// change the result unless `seconds` or `progress` ends the search.
   unsigned threads = 1;
   std::uint64_t memory_limit = 0;  ///< limit for the matrices, in bytes. 0 means none
   /// Called on the caller's thread after each iteration (or a few) with the number of iterations
@@ -76,7 +75,8 @@ using PairDistance = std::function<double(std::uint32_t, std::uint32_t)>;
                                                const HalvingOptions& options = {});
 
 /// Matches points by any distance function, as match_by_halving() of points does. Also throws
-/// std::invalid_argument for a distance that is not finite. The message names the pair.
+/// std::invalid_argument for a distance that is not finite or exceeds 1e300 in magnitude. The
+/// message names the pair.
 [[nodiscard]] HalvingMatching match_by_halving(std::size_t count, const PairDistance& distance,
                                                const HalvingOptions& options = {});
 
