@@ -147,5 +147,42 @@ TEST(OrderedWork, StopsAfterCommitError) {
   EXPECT_LT(calls, 1000U);
 }
 
+TEST(OrderedWork, EndsWhenCommitReturnsFalse) {
+  for (const unsigned threads : {1U, 2U, 7U}) {
+    SCOPED_TRACE(threads);
+    std::atomic<unsigned> calls = 0;
+    std::size_t committed = 0;
+    in_order(
+        1000, threads,
+        [&](unsigned, std::size_t i) {
+          ++calls;
+          return i;
+        },
+        [&](std::size_t i, std::size_t) {
+          EXPECT_EQ(i, committed++);
+          return i < 10;
+        });
+    EXPECT_EQ(committed, 11U);
+    EXPECT_LT(calls, 1000U);
+  }
+}
+
+TEST(OrderedWork, FailureAfterTheEndIsIgnored) {
+  for (const unsigned threads : {1U, 4U}) {
+    std::size_t committed = 0;
+    in_order(
+        100, threads,
+        [&](unsigned, std::size_t i) {
+          if (i > 10) throw std::runtime_error("not needed");
+          return i;
+        },
+        [&](std::size_t i, std::size_t) {
+          ++committed;
+          return i < 10;
+        });
+    EXPECT_EQ(committed, 11U);
+  }
+}
+
 }  // namespace
 }  // namespace terrace::base

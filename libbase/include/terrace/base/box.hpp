@@ -16,14 +16,14 @@ using Point2 = std::array<double, 2>;
 using Point3 = std::array<double, 3>;
 
 /// An axis-aligned box, closed on all sides: a point on the border is inside. The default box is
-/// empty (min = +infinity, max = -infinity; for integers, the greatest and the least) and grows by
-/// include().
+/// empty (min = +infinity, max = -infinity; for integers, the largest and the smallest) and grows
+/// by include().
 template <std::size_t D, class T = double>
 struct Box {
   using Point = std::array<T, D>;
 
-  Point min = filled(kGreatest);
-  Point max = filled(kMin);
+  Point min = filled(kLargest);
+  Point max = filled(kSmallest);
 
   /// Returns whether the box contains no point: on some axis min > max, or a bound is NaN.
   [[nodiscard]] constexpr bool empty() const {
@@ -101,8 +101,8 @@ struct Box {
 
  private:
   using Limits = std::numeric_limits<T>;
-  static constexpr T kGreatest = Limits::has_infinity ? Limits::infinity() : Limits::max();
-  static constexpr T kMin = Limits::has_infinity ? -Limits::infinity() : Limits::lowest();
+  static constexpr T kLargest = Limits::has_infinity ? Limits::infinity() : Limits::max();
+  static constexpr T kSmallest = Limits::has_infinity ? -Limits::infinity() : Limits::lowest();
 
   static constexpr Point filled(T value) {
     Point point{};

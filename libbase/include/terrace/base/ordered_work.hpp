@@ -20,20 +20,33 @@ namespace terrace::base {
 /// - next(worker) returns the next item, or nullopt at the end.
 /// - make(worker, item) computes the result of an item on the same thread, whose number is `worker`
 ///   (0 to threads - 1).
-/// - commit(result) receives the results in the order of the items, on any thread.
+/// - commit(result) receives the results in the order of the items, on any thread. It may return
+///   bool: false ends the work, and no later result is committed.
 ///
 /// Calls of next never overlap, nor do calls of commit, so the effect does not depend on the number
 /// of threads. A thread waits only if there is nothing to commit and two results per thread are
 /// uncommitted.
 ///
 /// Rethrows the exception of the first item that failed. An exception from next counts for the item
-/// that it did not return. After a failure the other threads finish their current result and stop.
+/// that it did not return. After a failure, or when commit ended the work, the other threads finish
+/// their current result and stop.
 template <class Next, class Make, class Commit>
 void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& commit) {
   using Item = typename std::invoke_result_t<Next&, unsigned>::value_type;
   using Result = std::invoke_result_t<const Make&, unsigned, Item>;
+  // Returns whether the work continues.
+  const auto commit_one = [&commit](Result&& result) {
+    if constexpr (std::is_same_v<std::invoke_result_t<Commit&, Result>, bool>) {
+      return commit(std::move(result));
+    } else {
+      commit(std::move(result));
+      return true;
+    }
+  };
   if (threads <= 1) {
-    while (std::optional<Item> item = next(0U)) commit(make(0U, std::move(*item)));
+    while (std::optional<Item> item = next(0U)) {
+      if (!commit_one(make(0U, std::move(*item)))) return;
+    }
     return;
   }
 
@@ -56,9 +69,10 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
     while (!stop && slots[committed % capacity].ready()) {
       Slot slot = std::exchange(slots[committed % capacity], Slot{});
       lock.unlock();
+      bool continues = false;
       if (!slot.error) {
         try {
-          commit(std::move(*slot.result));
+          continues = commit_one(std::move(*slot.result));
         } catch (...) {
           slot.error = std::current_exception();
         }
@@ -66,10 +80,8 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
       slot.result.reset();
       lock.lock();
       ++committed;
-      if (slot.error) {
-        failure = slot.error;
-        stop = true;
-      }
+      failure = slot.error;
+      stop = !continues;
       changed.notify_all();
     }
     committing = false;
@@ -124,13 +136,14 @@ void each_in_order(unsigned threads, Next&& next, const Make& make, Commit&& com
 }
 
 /// Runs make(worker, i) for i = 0 to count - 1 on several threads, and commit(i, result) in order.
+/// As in each_in_order(), commit may return false to end the work.
 template <class Make, class Commit>
 void in_order(std::size_t count, unsigned threads, const Make& make, const Commit& commit) {
   std::size_t issued = 0, committed = 0;
   each_in_order(
       static_cast<unsigned>(std::min<std::size_t>(threads, count)),
       [&](unsigned) { return issued < count ? std::optional(issued++) : std::nullopt; }, make,
-      [&](auto&& result) { commit(committed++, std::forward<decltype(result)>(result)); });
+      [&](auto&& result) { return commit(committed++, std::forward<decltype(result)>(result)); });
 }
 
 }  // namespace terrace::base

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +15,13 @@
 /// are exact. Requires -ffp-contract=off.
 
 namespace terrace::base {
+
+/// As std::bit_cast, which the standard library of Emscripten 3.1.6 lacks.
+template <class To, class From>
+[[nodiscard]] constexpr To bit_cast(const From& from) noexcept {
+  static_assert(sizeof(To) == sizeof(From));
+  return __builtin_bit_cast(To, from);
+}
 
 inline constexpr double kRadiansPerDegree = std::numbers::pi / 180.0;
 
@@ -190,11 +196,11 @@ inline double pow(double x, double p) {
     x *= 0x1p64;
     e = -64;
   }
-  const auto bits = std::bit_cast<std::uint64_t>(x);
+  const auto bits = bit_cast<std::uint64_t>(x);
   // Mantissas of at least sqrt(1/2) count towards the next power of two.
   const std::uint64_t up = bits + (0x3ff0000000000000 - 0x3fe6a09e667f3bcd);
   e += static_cast<int>(up >> 52) - 1023;
-  const double m = std::bit_cast<double>(bits - ((up & 0xfff0000000000000) - 0x3ff0000000000000));
+  const double m = bit_cast<double>(bits - ((up & 0xfff0000000000000) - 0x3ff0000000000000));
   const double s = (m - 1.0) / (m + 1.0), q = s * s;
   const double low = e * portable::kLn2Low + 2.0 * (s + s * (q * polynomial(kLogarithm, q)));
   const double y = p * (e * portable::kLn2High + low);
@@ -204,7 +210,7 @@ inline double pow(double x, double p) {
   const double r = (bounded - k * portable::kLn2High) - k * portable::kLn2Low;
   const double result = polynomial(kExponential, r);
   if (std::abs(k) > 1000) return std::ldexp(result, k);
-  return result * std::bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
+  return result * bit_cast<double>(static_cast<std::uint64_t>(k + 1023) << 52);
 }
 
 }  // namespace terrace::base
