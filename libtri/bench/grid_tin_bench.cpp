@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Measures error-bounded meshes of a raster in windows of 512 cells, on one thread: the triangles,
 // and the seconds of meshing (including the settling of sides) and of the check at every sample.
+// Also selects samples for Delaunay triangulations in windows of 128 cells. The samples that two
+// windows share count twice.
 //
 // The raster is the file of 32-bit floats named by TERRACE_GRID, with TERRACE_GRID_COLUMNS per row.
 // Without it, a synthetic raster is used: fractal relief of about the same roughness.
@@ -95,16 +97,15 @@ double steady_seconds() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-/// Calls visit(window, sides) for the windows of 512 cells.
+/// Calls visit(window, sides) for the windows of this many cells.
 template <class Visit>
-void for_windows(double bound, const Visit& visit) {
-  constexpr std::uint32_t kCells = 512;
+void for_windows(double bound, const Visit& visit, std::uint32_t cells = 512) {
   const Raster& all = raster();
   std::vector<float> heights, line;
-  for (std::uint32_t y = 0; y + 1 < all.rows; y += kCells) {
-    for (std::uint32_t x = 0; x + 1 < all.columns; x += kCells) {
-      const std::uint32_t columns = std::min(kCells, all.columns - 1 - x) + 1;
-      const std::uint32_t rows = std::min(kCells, all.rows - 1 - y) + 1;
+  for (std::uint32_t y = 0; y + 1 < all.rows; y += cells) {
+    for (std::uint32_t x = 0; x + 1 < all.columns; x += cells) {
+      const std::uint32_t columns = std::min(cells, all.columns - 1 - x) + 1;
+      const std::uint32_t rows = std::min(cells, all.rows - 1 - y) + 1;
       heights.clear();
       for (std::uint32_t k = 0; k < rows; ++k) {
         const auto row = all.row(y + k, x, columns);
@@ -161,6 +162,19 @@ void mesh(benchmark::State& state) {
   state.counters["rms"] = covered > 0 ? std::sqrt(squares / covered) : 0;
 }
 
+void selection(benchmark::State& state) {
+  const auto bound = static_cast<double>(state.range(0));
+  std::size_t samples = 0;
+  for (auto _ : state) {
+    samples = 0;
+    const auto visit = [&](const GridWindow<float>& window, const GridSides& sides) {
+      samples += select_samples(window, sides, bound).size();
+    };
+    for_windows(bound, visit, 128);
+  }
+  state.counters["samples"] = static_cast<double>(samples);
+}
+
 void best_of_points(benchmark::State& state) {
   const Raster& all = raster();
   GridTin tin;
@@ -176,6 +190,7 @@ void settings(benchmark::internal::Benchmark* benchmark) {
 }
 
 BENCHMARK(mesh)->ArgNames({"quality", "bound"})->Apply(settings)->Unit(benchmark::kMillisecond);
+BENCHMARK(selection)->ArgName("bound")->Arg(20)->Arg(5)->Arg(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(best_of_points)
     ->ArgName("points")
     ->Arg(kSmall ? 500 : 20'000)

@@ -245,6 +245,7 @@ class Timed {
     inner_.take_changes(changes);
   }
   [[nodiscard]] std::size_t vertex_count() const { return inner_.vertex_count(); }
+  [[nodiscard]] bool alive(VertexId vertex) const { return inner_.alive(vertex); }
   [[nodiscard]] const T& inner() const { return inner_; }
 
   static double& seconds() {

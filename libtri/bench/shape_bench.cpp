@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Measures shape restoration, from scratch and after a change, on a noisy torus of 200,000 points.
+// Measures shape restoration, from scratch and after a change, on a noisy torus of 200,000 points,
+// and the smoothing and the normals of its surface.
 // If TERRACE_DATA is set, prints a table of times and quality for the scans in its subfolder `scan`
 // too, except in small runs (TERRACE_BENCH_SMALL).
 //
@@ -22,6 +23,7 @@
 
 #include "../tests/scan_file.hpp"
 #include "terrace/tri/shape.hpp"
+#include "terrace/tri/surface_smoothing.hpp"
 
 namespace {
 
@@ -74,6 +76,23 @@ void restore(benchmark::State& state, const ShapeOptions& options) {
   state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kCount));
   state.counters["kept"] = static_cast<double>(shape.kept_count());
   state.counters["rescued"] = static_cast<double>(shape.rescued_count());
+}
+
+const Surface& restored_torus() {
+  static const Surface surface = restore_surface(torus()).surface;
+  return surface;
+}
+
+void smooth_torus(benchmark::State& state, SurfaceSmoothing method) {
+  const Surface& surface = restored_torus();
+  for (auto _ : state) benchmark::DoNotOptimize(smooth(surface, {.method = method}));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kCount));
+}
+
+void normals_of_torus(benchmark::State& state) {
+  const Surface& surface = restored_torus();
+  for (auto _ : state) benchmark::DoNotOptimize(vertex_normals(surface));
+  state.SetItemsProcessed(state.iterations() * static_cast<std::int64_t>(kCount));
 }
 
 double seconds(const std::function<void()>& work) {
@@ -264,6 +283,9 @@ int main(int argc, char** argv) {
   add("flood/no guard", [=](auto& state) { restore<std::int32_t>(state, no_guard); });
   add("flood/edge length", [=](auto& state) { restore<std::int32_t>(state, edges); });
   add("published", [=](auto& state) { restore<std::int32_t>(state, published); });
+  add("smooth/taubin", [](auto& state) { smooth_torus(state, SurfaceSmoothing::taubin); });
+  add("smooth/bilateral", [](auto& state) { smooth_torus(state, SurfaceSmoothing::bilateral); });
+  add("vertex normals", normals_of_torus);
   const auto add_update = [&](const std::string& name, const ShapeOptions& options) {
     for (const Change change : {Change::expand, Change::collapse}) {
       const std::string of = change == Change::expand ? "/expand" : "/collapse";

@@ -64,9 +64,8 @@ std::vector<VertexId> Delaunay2<Coord, Metric>::build(std::span<const Point> poi
 }
 
 template <class Coord, class Metric>
-VertexId Delaunay2<Coord, Metric>::build_grid(
-    Coord x0, Coord y0, Coord step, std::uint32_t columns,
-    std::uint32_t rows) requires std::is_same_v<Metric, Euclidean> {
+VertexId Delaunay2<Coord, Metric>::build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
+                                              std::uint32_t rows) requires GridMetric<Metric> {
   using Kernel = typename Impl::Kernel;
   assert(vertex_count() == 0);
   if (!(step > 0)) throw std::invalid_argument("grid: step must be positive");
@@ -74,7 +73,7 @@ VertexId Delaunay2<Coord, Metric>::build_grid(
   const std::vector<Coord> xs = grid_lines<Kernel>(x0, step, columns, "x");
   const std::vector<Coord> ys = grid_lines<Kernel>(y0, step, rows, "y");
   // Clang 14 also instantiates members whose constraints are not met.
-  if constexpr (std::is_same_v<Metric, Euclidean>) {
+  if constexpr (GridMetric<Metric>) {
     return VertexId{planar::build_grid<Kernel>(impl_->mesh, xs, ys)};
   } else {
     return kNoVertex;
@@ -228,11 +227,16 @@ Location Delaunay2<Coord, Metric>::locate(const Point& point, VertexId hint) con
 }
 
 template <class Coord, class Metric>
-VertexId Delaunay2<Coord, Metric>::nearest(const Point& point, VertexId hint) const {
+VertexId Delaunay2<Coord, Metric>::nearest(const Point& point, VertexId hint) const
+    requires(!std::is_same_v<Metric, Windowed>) {
   assert(hint == kNoVertex || alive(hint));
   check_points<typename Impl::Kernel>(std::span<const Point>(&point, 1));
   [[maybe_unused]] const auto scope = impl_->scope();
-  return VertexId{planar::nearest(impl_->mesh, point, slot(hint))};
+  if constexpr (!std::is_same_v<Metric, Windowed>) {  // as in build_grid()
+    return VertexId{planar::nearest(impl_->mesh, point, slot(hint))};
+  } else {
+    return kNoVertex;
+  }
 }
 
 template <class Coord, class Metric>
@@ -267,6 +271,7 @@ void Delaunay2<Coord, Metric>::take_changes(Changes& changes) {
 
 #ifdef TERRACE_TRI_CORE
 template class Delaunay2<std::int32_t>;
+template class Delaunay2<std::int32_t, Windowed>;
 #else
 template class Delaunay2<double>;
 template class Delaunay2<double, EllipticalMetric2>;

@@ -3,7 +3,9 @@
 
 #include <cassert>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
+
+#include <terrace/base/portable_math.hpp>
 
 #include "check_input.hpp"
 #include "free_slots.hpp"
@@ -22,13 +24,6 @@ std::uint64_t mix(std::uint64_t x) {
   x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
   x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
   return x ^ (x >> 31);
-}
-
-/// Replaces std::bit_cast, which Debian's Emscripten lacks.
-std::uint64_t bits_of(double value) {
-  std::uint64_t bits = 0;
-  std::memcpy(&bits, &value, sizeof bits);
-  return bits;
 }
 
 }  // namespace
@@ -129,7 +124,7 @@ std::uint64_t PointCloud::hash() const {
   std::uint64_t sum = mix(impl_->count);
   for (const VertexId vertex : all_vertices()) {
     std::uint64_t one = 0;
-    for (const double c : point(vertex)) one = mix(one ^ bits_of(c + 0.0));
+    for (const double c : point(vertex)) one = mix(one ^ base::bit_cast<std::uint64_t>(c + 0.0));
     sum += one;
   }
   return sum;

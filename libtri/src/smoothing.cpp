@@ -51,7 +51,8 @@ struct Rows {
   std::vector<double> weight;  ///< >= 0. The sum per row is 1
 };
 
-/// Scales the vectors from a vertex to its neighbours to at most 1, which does not change angles.
+/// Replaces positions by vectors from `origin`, scaled by one factor so that no component exceeds
+/// 1. Angles do not change.
 void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
   bool huge = false;
   for (const auto& p : at)
@@ -67,9 +68,10 @@ void scale(const planar::Query& origin, std::vector<planar::Query>& at) {
     for (double& c : p) c /= largest;
 }
 
-/// Computes the weights of the neighbours of a vertex at the origin: the sum of the cotangents of
-/// the two angles opposite to an edge, which is twice the common side of the Voronoi cells divided
-/// by the edge's length. Returns false if they are NaN.
+/// Computes the weights of the neighbours of a vertex at the origin, scaled to sum 1: the sum of
+/// the cotangents of the two angles opposite to an edge, which is twice the common side of the
+/// Voronoi cells divided by the edge's length. Returns false if the sum is zero, infinite or NaN,
+/// as for degenerate triangles.
 bool compute_weights(const std::vector<planar::Query>& at, std::vector<double>& weights) {
   weights.assign(at.size(), 0);
   for (std::size_t i = 0; i < at.size(); ++i) {
@@ -137,18 +139,18 @@ Rows make_rows(const Mesh& mesh, std::span<const VertexId> region, base::StopTic
   return rows;
 }
 
-/// Computes next = height + step * (mean of neighbours - height) for rows that move. count(d)
-/// weights a neighbour that is higher by d.
-template <class Count>
+/// Computes next = height + step * (mean of neighbours - height) for rows that move, then swaps
+/// `height` and `next`. `influence(d)`: factor from 0 to 1 for a neighbour that is higher by d.
+template <class Influence>
 void apply_step(const Rows& rows, double step, std::vector<double>& height,
-                std::vector<double>& next, Count count, base::StopTicks& ticks) {
+                std::vector<double>& next, Influence influence, base::StopTicks& ticks) {
   for (std::size_t i = 0; i < rows.moving; ++i) {
     ticks(4 * (rows.begin[i + 1] - rows.begin[i]));
     double sum = 0;
     double weights = 0;
     for (std::size_t k = rows.begin[i]; k < rows.begin[i + 1]; ++k) {
       const double difference = height[rows.neighbour[k]] - height[i];
-      const double weight = rows.weight[k] * count(difference);
+      const double weight = rows.weight[k] * influence(difference);
       sum += weight * difference;
       weights += weight;
     }

@@ -32,6 +32,9 @@ class StandIn {
     std::vector<TriangleId> removed_triangles, added_triangles;
   };
 
+  [[nodiscard]] bool alive(VertexId vertex) const {
+    return state_.vertices.count(static_cast<std::uint32_t>(vertex)) != 0;
+  }
   std::vector<VertexId> build(std::span<const Point> points) {
     std::vector<Insertion> results(points.size());
     insert(points, results, kNoVertex);

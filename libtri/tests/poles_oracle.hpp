@@ -35,18 +35,19 @@ class PolesOracle {
     }
     add_hull_normals(triangulation);
     make_statements();
-    order == Order::kruskal ? grow_by_order() : grow_from_outside();
+    order == Order::kruskal ? label_by_kruskal() : label_by_prim();
     smooth();
     sculpt();
   }
 
   ShapeSet inside;
-  std::set<ShapePoint> off;  ///< vertices that are not on the surface
+  std::set<ShapePoint> missed_vertices;  ///< those that are not on the surface
 
  private:
   using Facet = std::array<ShapePoint, 3>;
   using Node = std::optional<ShapeCorners>;  ///< nullopt: beyond the hull
-  /// Defect, corners, whether it is of a vertex. Then the nodes and whether they are unlike.
+  /// The statement that two nodes are on the same side or, if `unlike`, on different sides. Facets
+  /// have three corners, vertices one. The order is that of the rule: by defect, then by corners.
   struct Statement {
     double defect;
     std::vector<ShapePoint> corners;
@@ -76,7 +77,8 @@ class PolesOracle {
       if (j != i) result[k++] = t[j];
     return result;
   }
-  /// Relative to the first corner, or nullopt if flat up to rounding.
+  /// Returns the circumcentre relative to the first corner; nullopt if the tetrahedron is flat up
+  /// to rounding.
   static std::optional<ShapePoint> centre_of(const ShapeCorners& t) {
     const ShapePoint b = minus(t[1], t[0]), c = minus(t[2], t[0]), d = minus(t[3], t[0]);
     const double volume6 = dot(b, cross(c, d));
@@ -119,8 +121,8 @@ class PolesOracle {
         const Facet f = facet(corners, i);
         if (by_facet_.at(f).size() == 2) continue;
         ShapePoint n = cross(minus(f[1], f[0]), minus(f[2], f[0]));
-        // Checks exactly that the fourth corner is behind, using the triangulation's order of the
-        // corners.
+        // Orients the normal outward exactly, from the parity of the permutation to the
+        // triangulation's corner order, which is positive.
         std::array<ShapePoint, 4> ordered;
         for (std::size_t k = 0; k < 4; ++k) {
           const auto p = triangulation.point(triangulation.vertices(t)[k]);
@@ -137,7 +139,7 @@ class PolesOracle {
             ++swaps;
           }
         }
-        // In order means that the fourth corner is on the side of the normal.
+        // An even permutation means that the normal points to the fourth corner, that is, inward.
         const double length = std::sqrt(dot(n, n));
         for (double& c : n) c = (swaps % 2 == 0 ? -c : c) / length;
         normal_[f] = n;
@@ -188,24 +190,25 @@ class PolesOracle {
     std::sort(statements_.begin(), statements_.end());
   }
 
-  void grow_by_order() {
-    std::map<Node, std::pair<int, bool>> set;  // the number of its set, and whether it is flipped
+  void label_by_kruskal() {
+    // The number of each node's component, and whether the node is flipped.
+    std::map<Node, std::pair<int, bool>> component_of;
     int count = 0;
-    set[std::nullopt] = {count++, false};
-    for (const ShapeCorners& t : all_) set[t] = {count++, false};
+    component_of[std::nullopt] = {count++, false};
+    for (const ShapeCorners& t : all_) component_of[t] = {count++, false};
     for (const Statement& s : statements_) {
-      const auto [set_one, flip_one] = set.at(s.one);
-      const auto [set_other, flip_other] = set.at(s.other);
-      if (set_one == set_other) continue;
+      const auto [component_one, flip_one] = component_of.at(s.one);
+      const auto [component_other, flip_other] = component_of.at(s.other);
+      if (component_one == component_other) continue;
       const bool flip = flip_one != flip_other ? !s.unlike : s.unlike;
-      const int from = set_other, to = set_one;
-      for (auto& [node, entry] : set)
+      const int from = component_other, to = component_one;
+      for (auto& [node, entry] : component_of)
         if (entry.first == from) entry = {to, entry.second != flip};
     }
     for (const ShapeCorners& t : all_)
-      if (set.at(t).second != set.at(std::nullopt).second) inside.insert(t);
+      if (component_of.at(t).second != component_of.at(std::nullopt).second) inside.insert(t);
   }
-  void grow_from_outside() {
+  void label_by_prim() {
     std::map<Node, bool> label{{std::nullopt, false}};
     for (bool grown = true; grown;) {
       grown = false;
@@ -239,8 +242,8 @@ class PolesOracle {
       return std::find(entry.first.begin(), entry.first.end(), v) != entry.first.end();
     });
   }
-  /// The number of tetrahedra at v that are inside, or outside (the space beyond the hull counts as
-  /// many).
+  /// The number of tetrahedra at v that are inside (`label`) or outside. The space beyond the hull
+  /// counts as three that are outside.
   [[nodiscard]] std::size_t count(const ShapePoint& v, bool label) const {
     std::size_t result = !label && on_hull(v) ? 3 : 0;
     for (const ShapeCorners& t : star_.at(v)) result += is_inside(t) == label;
@@ -278,13 +281,14 @@ class PolesOracle {
   }
   void sculpt() {
     for (;;) {
-      off.clear();
+      missed_vertices.clear();
       for (const auto& [v, star] : star_)
-        if (count(v, false) == 0 || count(v, true) == 0) off.insert(v);
+        if (count(v, false) == 0 || count(v, true) == 0) missed_vertices.insert(v);
       std::optional<std::tuple<double, ShapePoint, Facet, ShapeCorners>> best;
       for (const ShapeCorners& t : all_) {
         for (std::size_t i = 0; i < 4; ++i) {
-          if (!off.contains(t[i]) || is_inside(neighbour(t, i)) == is_inside(t)) continue;
+          if (!missed_vertices.contains(t[i]) || is_inside(neighbour(t, i)) == is_inside(t))
+            continue;
           const Facet f = facet(t, i);
           const std::tuple candidate{defect_of(f), t[i], f, t};
           if (!best || candidate < *best) best = candidate;

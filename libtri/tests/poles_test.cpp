@@ -39,7 +39,7 @@ TYPED_TEST(PolesLawTest, EqualsTheDefinition) {
         for (const auto order : {PolesOracle::Order::kruskal, PolesOracle::Order::prim}) {
           const PolesOracle oracle(triangulation, order);
           ASSERT_EQ(kept_set(triangulation, shape), oracle.inside);
-          ASSERT_EQ(shape.lost_vertices().size(), oracle.off.size());
+          ASSERT_EQ(shape.lost_vertices().size(), oracle.missed_vertices.size());
         }
       }
     }

@@ -270,6 +270,11 @@ TEST(StopCheck, EndsTins) {
   }
   const GridWindow<double> window{kSize, kSize, heights};
   const std::vector<Point3> frame{{0, 0, 0}, {100, 0, 0}, {100, 100, 0}, {0, 100, 0}};
+  expect_stops(
+      [&](const base::StopCheck& check) {
+        static_cast<void>(select_samples(window, settle_sides(window, 10), 10, check));
+      },
+      1000);
   for (const TinQuality quality : {TinQuality::greedy, TinQuality::removal, TinQuality::fitted}) {
     SCOPED_TRACE(static_cast<int>(quality));
     GridTinOptions grid{.max_error = 10, .quality = quality};

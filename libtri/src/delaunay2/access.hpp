@@ -12,6 +12,7 @@
 #include "mesh.hpp"
 #include "terrace/tri/delaunay2.hpp"
 #include "terrace/tri/metric.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri {
 namespace planar {
@@ -21,13 +22,23 @@ namespace planar {
 template <class Coord, class Metric>
 struct MetricTraits;
 
-template <class Coord>
-struct MetricTraits<Coord, Euclidean> {
-  using Kernel = std::conditional_t<std::is_same_v<Coord, double>, DoubleKernel, IntKernel>;
-  using Form = Euclidean;
+/// The form and scope of a metric without parameters.
+template <class Metric>
+struct PlainTraits {
+  using Form = Metric;
   struct Scope {
     explicit Scope(Form) {}
   };
+};
+
+template <class Coord>
+struct MetricTraits<Coord, Euclidean> : PlainTraits<Euclidean> {
+  using Kernel = std::conditional_t<std::is_same_v<Coord, double>, DoubleKernel, IntKernel>;
+};
+
+template <>
+struct MetricTraits<std::int32_t, Windowed> : PlainTraits<Windowed> {
+  using Kernel = WindowedKernel;
 };
 
 template <>

@@ -14,6 +14,7 @@
 #include "int_kernel.hpp"
 #include "operations.hpp"
 #include "walk.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -161,6 +162,7 @@ std::vector<VertexId> build(Mesh<Kernel>& mesh, std::span<const typename Kernel:
 
 #ifdef TERRACE_TRI_CORE
 template std::vector<VertexId> build(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
+template std::vector<VertexId> build(Mesh<WindowedKernel>&, std::span<const WindowedKernel::Point>);
 #else
 template std::vector<VertexId> build(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Point>);
 template std::vector<VertexId> build(Mesh<EllipticalKernel>&,

@@ -6,6 +6,7 @@
 #include "int_kernel.hpp"
 #include "operations.hpp"
 #include "predicates.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -124,6 +125,7 @@ void fill_hole(Mesh<Kernel>& mesh) {
 
 #ifdef TERRACE_TRI_CORE
 template void fill_hole(Mesh<IntKernel>&);
+template void fill_hole(Mesh<WindowedKernel>&);
 #else
 template void fill_hole(Mesh<DoubleKernel>&);
 template void fill_hole(Mesh<EllipticalKernel>&);

@@ -136,6 +136,7 @@ std::string find_fault(const Delaunay2<Coord, Metric>& triangulation) {
 
 #ifdef TERRACE_TRI_CORE
 template std::string find_fault(const Delaunay2<std::int32_t>&);
+template std::string find_fault(const Delaunay2<std::int32_t, Windowed>&);
 #else
 template std::string find_fault(const Delaunay2<double>&);
 template std::string find_fault(const Delaunay2<double, EllipticalMetric2>&);

@@ -6,6 +6,7 @@
 #include "double_kernel.hpp"
 #include "elliptical_kernel.hpp"
 #include "int_kernel.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -107,6 +108,10 @@ template Inserted insert_flat(Mesh<IntKernel>&, const IntKernel::Point&);
 template void make_fan(Mesh<IntKernel>&, std::uint32_t);
 template void become_flat(Mesh<IntKernel>&, std::vector<std::uint32_t>);
 template void remove_flat(Mesh<IntKernel>&, std::uint32_t);
+template Inserted insert_flat(Mesh<WindowedKernel>&, const WindowedKernel::Point&);
+template void make_fan(Mesh<WindowedKernel>&, std::uint32_t);
+template void become_flat(Mesh<WindowedKernel>&, std::vector<std::uint32_t>);
+template void remove_flat(Mesh<WindowedKernel>&, std::uint32_t);
 #else
 template Inserted insert_flat(Mesh<DoubleKernel>&, const DoubleKernel::Point&);
 template Inserted insert_flat(Mesh<EllipticalKernel>&, const EllipticalKernel::Point&);

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writes the complete grid directly. All corners of a cell are cocircular, and the perturbation
 // gives every cell the diagonal from lower right to upper left: of the four corners the upper right
-// one is raised most, so the circle through the other three does not contain it.
+// one is raised most, so the circle through the other three does not contain it. The same holds in
+// the metric Windowed with any step: its lift, like x^2 + y^2, is a sum of a convex function of x
+// and one of y, so the lifted corners of a cell are in one plane, and no other vertex is below it.
 #include "double_kernel.hpp"
 #include "int_kernel.hpp"
 #include "operations.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -159,6 +162,8 @@ std::uint32_t build_grid(Mesh<Kernel>& mesh, std::span<const typename Kernel::Co
 #ifdef TERRACE_TRI_CORE
 template std::uint32_t build_grid(Mesh<IntKernel>&, std::span<const IntKernel::Coord>,
                                   std::span<const IntKernel::Coord>);
+template std::uint32_t build_grid(Mesh<WindowedKernel>&, std::span<const WindowedKernel::Coord>,
+                                  std::span<const WindowedKernel::Coord>);
 #else
 template std::uint32_t build_grid(Mesh<DoubleKernel>&, std::span<const DoubleKernel::Coord>,
                                   std::span<const DoubleKernel::Coord>);

@@ -7,6 +7,7 @@
 #include "int_kernel.hpp"
 #include "predicates.hpp"
 #include "walk.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 
@@ -109,6 +110,8 @@ Inserted insert_point(Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::
 #ifdef TERRACE_TRI_CORE
 template void insert_vertex(Mesh<IntKernel>&, std::uint32_t, std::uint32_t);
 template Inserted insert_point(Mesh<IntKernel>&, const IntKernel::Point&, std::uint32_t);
+template void insert_vertex(Mesh<WindowedKernel>&, std::uint32_t, std::uint32_t);
+template Inserted insert_point(Mesh<WindowedKernel>&, const WindowedKernel::Point&, std::uint32_t);
 #else
 template void insert_vertex(Mesh<DoubleKernel>&, std::uint32_t, std::uint32_t);
 template void insert_vertex(Mesh<EllipticalKernel>&, std::uint32_t, std::uint32_t);

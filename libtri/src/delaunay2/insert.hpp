@@ -45,8 +45,9 @@ bool find_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> po
 ///
 /// The circle around a lattice edge of length 1 contains no lattice point, so such an edge between
 /// two vertices is always an edge of the triangulation. A square of four of them is therefore
-/// always two triangles, with the diagonal of build_grid(). The squares around the points inside
-/// are cut out along existing edges and rewritten. All other triangles stay. O(points).
+/// always two triangles, with the diagonal of build_grid(). Both hold in the metric Windowed too,
+/// because such an edge or square is in one window. The squares around the points inside are cut
+/// out along existing edges and rewritten. All other triangles stay. O(points).
 template <class Kernel>
 void fill_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> points);
 

@@ -69,9 +69,11 @@ struct IntKernel {
     return sign(square(a) - square(b));
   }
 
+ protected:
+  static int sign(std::int64_t value) { return (value > 0) - (value < 0); }
+
  private:
   static constexpr std::int64_t kNear = std::int64_t{1} << 30;
-  static int sign(std::int64_t value) { return (value > 0) - (value < 0); }
 };
 
 }  // namespace terrace::tri::planar

@@ -4,6 +4,7 @@
 
 #include "insert.hpp"
 #include "int_kernel.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -241,6 +242,9 @@ void fill_lattice(Mesh<Kernel>& mesh, std::span<const typename Kernel::Point> po
 #ifdef TERRACE_TRI_CORE
 template bool find_lattice(Mesh<IntKernel>&, std::span<const IntKernel::Point>, std::uint32_t);
 template void fill_lattice(Mesh<IntKernel>&, std::span<const IntKernel::Point>);
+template bool find_lattice(Mesh<WindowedKernel>&, std::span<const WindowedKernel::Point>,
+                           std::uint32_t);
+template void fill_lattice(Mesh<WindowedKernel>&, std::span<const WindowedKernel::Point>);
 #endif
 
 }  // namespace terrace::tri::planar

@@ -9,6 +9,7 @@
 #include "int_kernel.hpp"
 #include "operations.hpp"
 #include "walk.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -182,6 +183,10 @@ template std::uint32_t nearest(const Mesh<IntKernel>&, const IntKernel::Point&, 
 template void adjacent(const Mesh<IntKernel>&, std::uint32_t, std::vector<VertexId>&);
 template std::uint32_t degree(const Mesh<IntKernel>&, std::uint32_t);
 template std::uint64_t hash(const Mesh<IntKernel>&);
+template Location locate(const Mesh<WindowedKernel>&, const WindowedKernel::Point&, std::uint32_t);
+template void adjacent(const Mesh<WindowedKernel>&, std::uint32_t, std::vector<VertexId>&);
+template std::uint32_t degree(const Mesh<WindowedKernel>&, std::uint32_t);
+template std::uint64_t hash(const Mesh<WindowedKernel>&);
 #else
 template Location locate(const Mesh<DoubleKernel>&, const DoubleKernel::Point&, std::uint32_t);
 template Location locate(const Mesh<EllipticalKernel>&, const EllipticalKernel::Point&,

@@ -6,6 +6,7 @@
 #include "flat.hpp"
 #include "int_kernel.hpp"
 #include "operations.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -94,6 +95,8 @@ void remove_vertex(Mesh<Kernel>& mesh, std::uint32_t vertex) {
 template void remove_vertex(Mesh<IntKernel>&, std::uint32_t);
 template bool collinear(const Mesh<IntKernel>&, std::span<const std::uint32_t>);
 template void turn_ghost_inside(Hole<IntKernel::Point>&);
+template void remove_vertex(Mesh<WindowedKernel>&, std::uint32_t);
+template bool collinear(const Mesh<WindowedKernel>&, std::span<const std::uint32_t>);
 #else
 template void remove_vertex(Mesh<DoubleKernel>&, std::uint32_t);
 template void remove_vertex(Mesh<EllipticalKernel>&, std::uint32_t);

@@ -15,6 +15,7 @@
 #include "int_kernel.hpp"
 #include "operations.hpp"
 #include "walk.hpp"
+#include "windowed_kernel.hpp"
 
 namespace terrace::tri::planar {
 namespace {
@@ -339,6 +340,7 @@ void remove_set(Mesh<Kernel>& mesh, std::span<const std::uint32_t> vertices) {
 
 #ifdef TERRACE_TRI_CORE
 template void remove_set(Mesh<IntKernel>&, std::span<const std::uint32_t>);
+template void remove_set(Mesh<WindowedKernel>&, std::span<const std::uint32_t>);
 #else
 template void remove_set(Mesh<DoubleKernel>&, std::span<const std::uint32_t>);
 template void remove_set(Mesh<EllipticalKernel>&, std::span<const std::uint32_t>);

@@ -16,7 +16,7 @@ struct WalkEnd {
 /// Remembering stochastic walk (Devillers, Pion, Teillaud, doi:10.1142/S0129054102001047). Goes
 /// from triangle to triangle through an edge that separates the current one from p, and never tests
 /// the edge just crossed. A small generator with a fixed seed chooses which of the other two is
-/// tried first. The walk cannot cycle in a Delaunay triangulation. `start` may be a ghost.
+/// tried first. The walk cannot cycle in a regular triangulation. `start` may be a ghost.
 template <class Kernel>
 WalkEnd walk(const Mesh<Kernel>& mesh, const typename Kernel::Point& p, std::uint32_t start) {
   using Point = typename Kernel::Point;

@@ -41,9 +41,9 @@ class Part {
     std::uint32_t begin, all, first, size;
 
     [[nodiscard]] bool has(std::uint32_t v) const {
-      std::uint32_t place = v - first;
-      if (place >= all) place += all;
-      return place < size;
+      std::uint32_t offset = v - first;
+      if (offset >= all) offset += all;
+      return offset < size;
     }
   };
 

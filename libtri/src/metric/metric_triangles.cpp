@@ -19,16 +19,16 @@ constexpr std::uint32_t kNoRegion = 0xFFFFFFFFu;
 const LinearMap2& map_of(const Euclidean&) { return kIdentityMap<2>; }
 const LinearMap2& map_of(const EllipticalMetric2& metric) { return metric.map(); }
 
-/// A copy of triangles whose edges can be flipped. It has no ghosts. kNoMate represents the
-/// outside.
-class Flips {
+/// A copy of a triangulation in which edges are flipped until each region is Delaunay in its
+/// metric. Instead of ghost triangles, kNoMate marks the border.
+class MetricFlipper {
  public:
   template <class Triangulation>
-  Flips(const Triangulation& triangulation, const MetricField2& field, const TriangleFilter& filter,
-        const base::StopCheck& check_stop)
+  MetricFlipper(const Triangulation& triangulation, const MetricField2& field,
+                const TriangleFilter& filter, const base::StopCheck& check_stop)
       : ticks_(check_stop),
-        point_(triangulation.vertex_slots()),
-        region_(triangulation.vertex_slots(), kNoRegion) {
+        points_(triangulation.vertex_slots()),
+        region_of_vertex_(triangulation.vertex_slots(), kNoRegion) {
     if (!filter) mesh_.triangle.reserve(triangulation.triangle_count());
     // The dense number of each participating triangle.
     std::vector<std::uint32_t> number(triangulation.triangle_slots(), kNone);
@@ -37,7 +37,7 @@ class Flips {
       const auto corners = triangulation.vertices(id);
       for (const VertexId v : corners) {
         const auto p = triangulation.point(v);
-        point_[slot(v)] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
+        points_[slot(v)] = {static_cast<double>(p[0]), static_cast<double>(p[1])};
       }
       if (filter && !filter(id)) continue;
       number[slot(id)] = static_cast<std::uint32_t>(mesh_.triangle.size());
@@ -80,9 +80,10 @@ class Flips {
         for (std::uint32_t i = 0; i < 3; ++i) pending_.push_back(make_side(t, i));
         // Two of the neighbour's corners belong to this triangle, so only the third is checked.
         mesh_.settle<EllipticalKernel>(
-            pending_, point_,
+            pending_, points_,
             [&](Side, Side mate) {
-              return region_[mesh_.triangle[triangle_of(mate)].corner[index_of(mate)]] == region;
+              return region_of_vertex_[mesh_.triangle[triangle_of(mate)].corner[index_of(mate)]] ==
+                     region;
             },
             [this](std::uint32_t, std::uint32_t) { ticks_(256); });
       }
@@ -95,7 +96,7 @@ class Flips {
     for (const Triangle& t : mesh_.triangle) {
       std::uint32_t i = 0;
       for (std::uint32_t k = 1; k < 3; ++k)
-        if (lexicographically_less(point_[t.corner[k]], point_[t.corner[i]])) i = k;
+        if (lexicographically_less(points_[t.corner[k]], points_[t.corner[i]])) i = k;
       all.push_back({VertexId{t.corner[i]}, VertexId{t.corner[next_index(i)]},
                      VertexId{t.corner[previous_index(i)]}});
     }
@@ -110,13 +111,13 @@ class Flips {
     for (const Triangle& t : mesh_.triangle) {
       ticks_(256);
       for (const std::uint32_t v : t.corner) {
-        if (region_[v] != kNoRegion) continue;
-        const LinearMap2 map = field(point_[v]);
+        if (region_of_vertex_[v] != kNoRegion) continue;
+        const LinearMap2 map = field(points_[v]);
         // Successive vertices are mostly in the same region.
         if (maps_.empty() || map != maps_[last_]) {
           // Checked before it becomes a key, because NaN has no order.
-          check_metric(map, "the field of metrics: the map at " + std::to_string(point_[v][0]) +
-                                ", " + std::to_string(point_[v][1]));
+          check_metric(map, "the field of metrics: the map at " + std::to_string(points_[v][0]) +
+                                ", " + std::to_string(points_[v][1]));
           const auto [at, is_new] =
               map_index.try_emplace(map, static_cast<std::uint32_t>(maps_.size()));
           if (is_new) {
@@ -125,19 +126,21 @@ class Flips {
           }
           last_ = at->second;
         }
-        region_[v] = last_;
+        region_of_vertex_[v] = last_;
       }
     }
   }
 
   [[nodiscard]] std::uint32_t region_of(const Triangle& t) const {
-    const std::uint32_t region = region_[t.corner[0]];
-    return region_[t.corner[1]] == region && region_[t.corner[2]] == region ? region : kNoRegion;
+    const std::uint32_t region = region_of_vertex_[t.corner[0]];
+    return region_of_vertex_[t.corner[1]] == region && region_of_vertex_[t.corner[2]] == region
+               ? region
+               : kNoRegion;
   }
 
   base::StopTicks ticks_;
-  std::vector<Point> point_;           // by vertex slot
-  std::vector<std::uint32_t> region_;  // by vertex slot: index in maps_
+  std::vector<Point> points_;                    // by vertex slot
+  std::vector<std::uint32_t> region_of_vertex_;  // by vertex slot: index in maps_
   FlipMesh mesh_;
   std::vector<LinearMap2> maps_;
   std::vector<bool> is_done_;  // true for regions with the metric of the triangulation
@@ -152,9 +155,9 @@ std::vector<std::array<VertexId, 3>> metric_triangles(const Triangulation& trian
                                                       const MetricField2& field,
                                                       const TriangleFilter& filter,
                                                       const base::StopCheck& check_stop) {
-  Flips flips(triangulation, field, filter, check_stop);
-  flips.run();
-  return flips.result();
+  MetricFlipper flipper(triangulation, field, filter, check_stop);
+  flipper.run();
+  return flipper.result();
 }
 
 template <class Triangulation>

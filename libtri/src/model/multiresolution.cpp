@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "multiresolution.hpp"
 
+#include "terrace/tri/thinned_delaunay2.hpp"
 #ifndef TERRACE_TRI_CORE
 #include "terrace/tri/regional_delaunay2.hpp"
 #endif
@@ -9,6 +10,7 @@ namespace terrace::tri {
 
 #ifdef TERRACE_TRI_CORE
 template class MultiresolutionModel<Delaunay2<std::int32_t>>;
+template class MultiresolutionModel<ThinnedDelaunay2>;
 template class MultiresolutionModel<PointCloud>;
 #else
 template class MultiresolutionModel<Delaunay2<double>>;

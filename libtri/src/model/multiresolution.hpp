@@ -40,6 +40,7 @@ concept DynamicTriangulation = requires(T t, const T& c, std::span<const typenam
   t.start_journal();
   t.take_changes(changes);
   { c.vertex_count() } -> std::convertible_to<std::size_t>;
+  { c.alive(hint) } -> std::same_as<bool>;
   { results[0].vertex } -> std::convertible_to<VertexId>;
   { changes.removed_vertices } -> std::convertible_to<std::span<const VertexId>>;
   { changes.added_vertices } -> std::convertible_to<std::span<const VertexId>>;
@@ -116,6 +117,8 @@ struct MultiresolutionModel<Triangulation>::Impl {
   /// can compute it from scratch.
   static constexpr bool kFollows = requires(Triangulation t) { t.follow(); };
   static constexpr bool kRestores = requires(Triangulation t) { t.restore(1u); };
+  /// True if the triangulation chooses its vertices by heights and levels.
+  static constexpr bool kAssigns = requires(Triangulation t) { t.assign(VertexId{}, 0.0, 0u); };
   static constexpr std::size_t kMaxScratchPoints = 1 << 16;
 
   struct Staged {
@@ -139,6 +142,12 @@ struct MultiresolutionModel<Triangulation>::Impl {
   void insert_clusters(bool list_created);
   void build_clusters();
   void record_change(VertexOwners::Change change, VertexId vertex, double former_height);
+  void assign([[maybe_unused]] VertexOwners::Change change, [[maybe_unused]] VertexId vertex) {
+    if constexpr (kAssigns) {
+      if (change == VertexOwners::Change::first || change == VertexOwners::Change::other)
+        triangulation_.assign(vertex, owners_.height(vertex), level(vertex));
+    }
+  }
   void start_delta();
   void finish_delta();
   void finish_reassigned();
@@ -323,6 +332,7 @@ void MultiresolutionModel<Triangulation>::Impl::remove_points(Slot cluster,
     const VertexOwners::Change change = owners_.remove(vertices[i], {cluster, i}, tree_);
     if (change == VertexOwners::Change::last) removed_vertices_.push_back(vertices[i]);
     record_change(change, vertices[i], height);
+    assign(change, vertices[i]);
   }
   triangulation_.remove(removed_vertices_);
   points_ -= vertices.size() - remaining;
@@ -360,6 +370,7 @@ void MultiresolutionModel<Triangulation>::Impl::insert_clusters(bool list_create
       const VertexOwners::Change change =
           owners_.add(vertex, {staged.slot, i}, stage_.heights[staged.first + i], tree_);
       record_change(change, vertex, height);
+      assign(change, vertex);
       if (list_created && change == VertexOwners::Change::first) created_.push_back(vertex);
     }
     points_ += size;
@@ -377,7 +388,8 @@ void MultiresolutionModel<Triangulation>::Impl::build_clusters() {
     const std::span<VertexId> vertices = tree_.vertices(staged.slot);
     for (std::uint32_t i = 0; i < vertices.size(); ++i) {
       vertices[i] = vertices_of_points[staged.first + i];
-      owners_.add(vertices[i], {staged.slot, i}, stage_.heights[staged.first + i], tree_);
+      assign(owners_.add(vertices[i], {staged.slot, i}, stage_.heights[staged.first + i], tree_),
+             vertices[i]);
     }
   }
   points_ = vertices_of_points.size();
@@ -435,7 +447,7 @@ void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
   mark(added, true);
   mark(removed, true);
   std::erase_if(delta_.reassigned, [&](VertexId vertex) {
-    if (!owners_.has_owner(vertex)) return true;  // added and removed again
+    if (!triangulation_.alive(vertex)) return true;  // added and removed again, or not a vertex
     const bool other = marks_[static_cast<std::uint32_t>(vertex)];
     marks_[static_cast<std::uint32_t>(vertex)] = true;
     return other;
@@ -448,7 +460,11 @@ void MultiresolutionModel<Triangulation>::Impl::finish_reassigned() {
 template <class Triangulation>
 void MultiresolutionModel<Triangulation>::Impl::finish_heights() {
   for (const VertexId vertex : delta_.changes.removed_vertices) {
-    delta_.removed_heights.push_back(former_heights_[slot(vertex)]);
+    // A triangulation that chooses its vertices may remove one whose point stays.
+    const bool changed =
+        slot(vertex) < has_former_height_.size() && has_former_height_[slot(vertex)];
+    delta_.removed_heights.push_back(changed ? former_heights_[slot(vertex)]
+                                             : owners_.height(vertex));
   }
   for (const VertexId vertex : delta_.reassigned) {
     delta_.reassigned_heights.push_back(former_heights_[slot(vertex)]);

@@ -61,10 +61,6 @@ class VertexOwners {
     const Owner owner = representatives_[static_cast<std::uint32_t>(vertex)];
     return {owner.slot, owner.index & ~kShared};
   }
-  /// True if a point is on the vertex in this slot, which must be below slots().
-  [[nodiscard]] bool has_owner(VertexId vertex) const {
-    return representatives_[static_cast<std::uint32_t>(vertex)].slot != ClusterTree::kNoSlot;
-  }
   [[nodiscard]] double height(VertexId vertex) const {
     return heights_[static_cast<std::uint32_t>(vertex)];
   }

@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cstring>
+#include <cstdint>
 #include <type_traits>
 #include <utility>
 
+#include <terrace/base/portable_math.hpp>
 #include <terrace/base/stop_check.hpp>
 
 #include "delaunay3/access.hpp"
@@ -41,10 +42,7 @@ std::uint64_t bit_pattern(Coord c) {
   if constexpr (std::is_integral_v<Coord>) {
     return static_cast<std::uint32_t>(c);
   } else {
-    const double value = c + 0.0;
-    std::uint64_t bits = 0;  // replaces std::bit_cast, which Debian's Emscripten lacks
-    std::memcpy(&bits, &value, sizeof bits);
-    return bits;
+    return base::bit_cast<std::uint64_t>(c + 0.0);  // merges -0.0 and 0.0
   }
 }
 

@@ -99,7 +99,7 @@ class LidFinder {
     for_edges(corners,
               [&](Spacing& at, std::uint32_t, std::uint32_t end) { at.removed |= bit(at, end); });
   }
-  /// fresh: by vertex slot, true for added vertices.
+  /// is_new: by vertex slot, true for added vertices.
   void add(const std::array<std::uint32_t, 4>& corners, const std::vector<bool>& is_new) {
     for_edges(corners, [&](Spacing& at, std::uint32_t v, std::uint32_t end) {
       const std::uint8_t end_bit = is_new[end] ? 0 : bit(at, end);
@@ -156,7 +156,7 @@ class LidFinder {
     order(0, 1), order(1, 2), order(0, 1);
     std::array<Vector3, 3> p;
     for (std::size_t i = 0; i < 3; ++i) {
-      p[i] = place(face[i]);
+      p[i] = position(face[i]);
       for (double& c : p[i]) c /= 2;  // so that differences cannot overflow
     }
     Vector3 u = edge(mesh_, p[0], p[1]), v = edge(mesh_, p[0], p[2]);
@@ -180,9 +180,11 @@ class LidFinder {
   }
 
  private:
-  [[nodiscard]] Vector3 place(std::uint32_t v) const { return to_doubles(mesh_.vertex[v].point); }
+  [[nodiscard]] Vector3 position(std::uint32_t v) const {
+    return to_doubles(mesh_.vertex[v].point);
+  }
   [[nodiscard]] double length(std::uint32_t a, std::uint32_t b) const {
-    return edge_length(mesh_, place(a), place(b));
+    return edge_length(mesh_, position(a), position(b));
   }
   static constexpr std::uint8_t kShorter = 1U << kSpacingRank;
 

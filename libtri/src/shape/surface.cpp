@@ -11,6 +11,7 @@
 
 #include <terrace/base/union_find.hpp>
 
+#include "incidence.hpp"
 #include "terrace/tri/shape.hpp"
 
 namespace terrace::tri {
@@ -65,22 +66,6 @@ double volume6_from(const Surface& surface, const Point3& from, std::uint32_t fa
   return (a[0] - from[0]) * normal[0] + (a[1] - from[1]) * normal[1] + (a[2] - from[2]) * normal[2];
 }
 
-void check(const Surface& surface) {
-  for (std::size_t f = 0; f < surface.faces.size(); ++f) {
-    const auto& face = surface.faces[f];
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (face[i] >= surface.points.size())
-        throw std::invalid_argument("face " + std::to_string(f) + ": corner " +
-                                    std::to_string(face[i]) + ", but there are only " +
-                                    std::to_string(surface.points.size()) + " points");
-      if (face[i] == face[(i + 1) % 3])
-        throw std::invalid_argument("face " + std::to_string(f) + ": corner " +
-                                    std::to_string(face[i]) +
-                                    " occurs twice; leave such faces out");
-    }
-  }
-}
-
 void add_areas(const Surface& surface, SurfaceMeasures& result) {
   if (surface.faces.empty()) return;
   // Measured from a point of the surface: far from the origin the volumes would cancel badly.
@@ -98,7 +83,7 @@ void add_areas(const Surface& surface, SurfaceMeasures& result) {
 }  // namespace
 
 SurfaceMeasures measure(const Surface& surface) {
-  check(surface);
+  shape::check_faces(surface);
   SurfaceMeasures result;
   result.faces = surface.faces.size();
   add_areas(surface, result);
@@ -128,7 +113,7 @@ SurfaceMeasures measure(const Surface& surface) {
 }
 
 void turn_outward(Surface& surface) {
-  check(surface);
+  shape::check_faces(surface);
   base::UnionFind parts = parts_of(surface.faces);
   std::vector<double> volume(surface.faces.size());
   for (std::uint32_t f = 0; f < surface.faces.size(); ++f) {

@@ -2,11 +2,12 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <utility>
 #include <vector>
+
+#include <terrace/base/portable_math.hpp>
 
 #include "mesh.hpp"
 
@@ -63,7 +64,7 @@ class ErrorBuckets {
  private:
   static constexpr float kHighest = __builtin_inff();
   static std::size_t octave_quarter(float error) {
-    return std::bit_cast<std::uint32_t>(std::max(error, 0.0F)) >> 21;
+    return base::bit_cast<std::uint32_t>(std::max(error, 0.0F)) >> 21;
   }
   std::size_t bucket_of(float error) const {
     return std::max(octave_quarter(error), base_) - base_;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include <terrace/base/simd.hpp>
 #include <terrace/base/stop_check.hpp>
@@ -19,6 +20,12 @@ namespace terrace::tri::tin {
 template <class T>
 GridTin make_grid_tin(const GridWindow<T>& window, const GridSides& sides,
                       const GridTinOptions& options, base::SimdPath set);
+
+/// select_samples(). T: float or double.
+template <class T>
+std::vector<std::uint32_t> select_samples_with(const GridWindow<T>& window, const GridSides& sides,
+                                               double max_error, base::SimdPath set,
+                                               const base::StopCheck& check_stop = {});
 
 /// check_grid_tin(). T: float or double.
 template <class T>

@@ -61,6 +61,13 @@ bool within_at(const Vertex& a, const Vertex& b, const Vertex& c, const Sample& 
   return std::fabs(sum) <= bound * static_cast<double>(at_a + at_b + at_c);
 }
 
+/// The triangles that may replace those of a removed vertex.
+enum class Fills {
+  wide,              ///< any without small angles
+  wide_or_delaunay,  ///< these, or the Delaunay triangles
+  delaunay,          ///< the Delaunay triangles alone
+};
+
 /// A VertexHole over LatticeSamples.
 template <class S>
 class LatticeHole {
@@ -80,10 +87,11 @@ class LatticeHole {
     return samples_.in_circle(ring_[i], ring_[m], ring_[j], ring_[p]);
   }
   bool fits(std::size_t i, std::size_t m, std::size_t j) const {
-    if constexpr (!S::kThinDelaunay) return fits_and_wide(i, m, j);
+    if constexpr (S::kFills == Fills::wide) return fits_and_wide(i, m, j);
     return samples_.fits(ring_[i], ring_[m], ring_[j], removed_);
   }
   bool fill_otherwise(PolygonFill& fill) const {
+    if constexpr (S::kFills == Fills::delaunay) return false;
     const auto fits = [&](std::size_t i, std::size_t m, std::size_t j) {
       return fits_and_wide(i, m, j);
     };
@@ -109,7 +117,7 @@ class LatticeHole {
 /// - Sample: x, y and z of a sample. sample_of(vertex), and place_of(vertex).
 /// - columns(), rows().
 /// - least_error(): smaller errors need not be ordered.
-/// - kThinDelaunay: true if removal may leave thin triangles that are Delaunay.
+/// - kFills: what removal may leave.
 /// - fits(a, b, c, removed): true if the triangle may help to fill the hole of a removed vertex,
 ///   given that vertex's sample.
 template <class Own, class OwnVertex>
@@ -158,6 +166,9 @@ Refinement<S> start_in_rectangle(S samples, std::vector<typename S::Vertex> fram
   std::size_t corners = 0;
   for (std::uint32_t v = 0; v < frame.size(); ++v)
     if (is_corner(frame[v])) corner[corners++] = v;
+  // The corners are cocircular, so either diagonal is right unless in_circle() breaks ties.
+  if (samples.in_circle(frame[corner[0]], frame[corner[1]], frame[corner[2]], frame[corner[3]]))
+    std::rotate(corner.begin(), corner.begin() + 1, corner.end());
   Refinement<S> refinement(std::move(samples),
                            {std::move(frame),
                             {{{corner[0], corner[1], corner[2]}, {kNone, 1, kNone}, 0, 0.0F},

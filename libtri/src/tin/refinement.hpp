@@ -230,10 +230,12 @@ class Refinement {
   }
 
   /// Removes inner vertices without which the bound still holds, in the order of their numbers.
-  /// Returns their number. They remain as vertices without triangles.
-  std::size_t remove() {
+  /// Returns their number. They remain as vertices without triangles. Further passes, until one
+  /// removes nothing, try the vertices whose stars have changed since the last attempt.
+  std::size_t remove(std::size_t max_passes = 1) {
     std::vector<std::uint32_t> triangle_of =
         triangle_of_vertices(mesh_.triangles, mesh_.vertices.size());
+    std::vector<std::uint8_t> untried(mesh_.vertices.size(), 1);
     Star star;
     PolygonFill fill;
     typename S::Hole hole(samples_);
@@ -246,19 +248,25 @@ class Refinement {
     const auto fits = [&](std::size_t i, std::size_t m, std::size_t j) {
       return hole.fits(i, m, j);
     };
-    std::size_t removed = 0;
-    for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
-      check_stop();
-      if (triangle_of[v] == kNone || !star.gather(mesh_.triangles, v, triangle_of[v]) ||
-          !hole.gather(mesh_, star, v))
-        continue;
-      if (!(fill_delaunay(star.size(), left, inside, fill) && star.all_of(fill, fits)) &&
-          !hole.fill_otherwise(fill))
-        continue;
-      star.replace(mesh_.triangles, fill, triangle_of, v);
-      hole.replaced(mesh_, star, fill);
-      ++removed;
-    }
+    std::size_t removed = 0, before = 0;
+    do {
+      before = removed;
+      for (std::uint32_t v = 0; v < mesh_.vertices.size(); ++v) {
+        if (untried[v] == 0) continue;
+        untried[v] = 0;
+        check_stop();
+        if (triangle_of[v] == kNone || !star.gather(mesh_.triangles, v, triangle_of[v]) ||
+            !hole.gather(mesh_, star, v))
+          continue;
+        if (!(fill_delaunay(star.size(), left, inside, fill) && star.all_of(fill, fits)) &&
+            !hole.fill_otherwise(fill))
+          continue;
+        star.replace(mesh_.triangles, fill, triangle_of, v);
+        hole.replaced(mesh_, star, fill);
+        for (std::size_t i = 0; i < star.size(); ++i) untried[star.ring(i)] = 1;
+        ++removed;
+      }
+    } while (removed > before && --max_passes > 0);
     return removed;
   }
 

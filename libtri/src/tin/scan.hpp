@@ -144,27 +144,32 @@ template <class T>
 using CheckScan = bool (*)(const CheckWindow<T>& window, const CheckTriangle& triangle,
                            CheckSums& sums);
 
-/// The scans for one instruction set.
-struct Scans {
-  GridScan<float> grid_floats;
-  GridScan<double> grid_doubles;
-  RowScan rows[2];  ///< by RowSamples::upright
-  CheckScan<float> check_floats;
-  CheckScan<double> check_doubles;
+struct CheckScans {
+  CheckScan<float> floats;
+  CheckScan<double> doubles;
 
   template <class T>
-  const GridScan<T>& grid() const {
-    if constexpr (std::is_same_v<T, float>) return grid_floats;
-    if constexpr (std::is_same_v<T, double>) return grid_doubles;
-  }
-  template <class T>
-  CheckScan<T> check() const {
-    if constexpr (std::is_same_v<T, float>) return check_floats;
-    if constexpr (std::is_same_v<T, double>) return check_doubles;
+  CheckScan<T> of() const {
+    if constexpr (std::is_same_v<T, float>) return floats;
+    if constexpr (std::is_same_v<T, double>) return doubles;
   }
 };
-const Scans& scans(base::SimdPath set);  ///< requires a supported set
+using RowScans = RowScan[2];  ///< by RowSamples::upright
 
-extern const Scans kScansPortable, kScansAvx2, kScansAvx512;
+/// The scans for one instruction set, which must be supported. Each use has its own table, so that
+/// a program links only those that it uses.
+template <class T>
+const GridScan<T>& grid_scans(base::SimdPath set);
+template <>
+const GridScan<float>& grid_scans(base::SimdPath set);
+template <>
+const GridScan<double>& grid_scans(base::SimdPath set);
+const RowScans& row_scans(base::SimdPath set);
+const CheckScans& check_scans(base::SimdPath set);
+
+extern const GridScan<float> kGridFloatsPortable, kGridFloatsAvx2, kGridFloatsAvx512;
+extern const GridScan<double> kGridDoublesPortable, kGridDoublesAvx2, kGridDoublesAvx512;
+extern const RowScans kRowScansPortable, kRowScansAvx2, kRowScansAvx512;
+extern const CheckScans kCheckScansPortable, kCheckScansAvx2, kCheckScansAvx512;
 
 }  // namespace terrace::tri::tin

@@ -25,6 +25,9 @@ namespace {
 
 namespace terrace::tri::tin {
 
-constinit const Scans kScansAvx2 = all_scans();
+constinit const GridScan<float> kGridFloatsAvx2 = grid_scan<float>();
+constinit const GridScan<double> kGridDoublesAvx2 = grid_scan<double>();
+constinit const RowScans kRowScansAvx2 = {row_scan<false>(), row_scan<true>()};
+constinit const CheckScans kCheckScansAvx2 = {check_in<float>, check_in<double>};
 
 }  // namespace terrace::tri::tin

@@ -79,6 +79,9 @@ template <class Mask>
 
 namespace terrace::tri::tin {
 
-constinit const Scans kScansAvx512 = all_scans();
+constinit const GridScan<float> kGridFloatsAvx512 = grid_scan<float>();
+constinit const GridScan<double> kGridDoublesAvx512 = grid_scan<double>();
+constinit const RowScans kRowScansAvx512 = {row_scan<false>(), row_scan<true>()};
+constinit const CheckScans kCheckScansAvx512 = {check_in<float>, check_in<double>};
 
 }  // namespace terrace::tri::tin

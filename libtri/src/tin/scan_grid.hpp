@@ -58,7 +58,7 @@ struct GridFace {
     const double width = right - left, height = bottom - top;
     const double rise = __builtin_fabs(slope_x) * width + __builtin_fabs(slope_y) * height;
     double rounded = K::kRounding * (6.5 * rise + 4.0 * static_cast<double>(bound));
-    if (K::kLanes == 8)
+    if (std::is_same_v<T, double>)
       rounded +=
           0x1p-50 * (__builtin_fabs(bz) + __builtin_fabs(cz)) * (2.0 * width * height * inverse);
     slack = static_cast<T>(rounded);

@@ -5,20 +5,8 @@
 // not_negative(), at_most(), more(), at_least(), above(), mask_or(), mask_and(), blend(),
 // zero_unless(), exceeding(), equal(), bits_of().
 #include "scan.hpp"
-#include "scan_check.hpp"
 #include "scan_grid.hpp"
+#ifndef TERRACE_TRI_NARROW_LANES
+#include "scan_check.hpp"
 #include "scan_rows.hpp"
-
-namespace terrace::tri::tin {
-namespace {
-
-constexpr Scans all_scans() {
-  return {grid_scan<float>(),
-          grid_scan<double>(),
-          {row_scan<false>(), row_scan<true>()},
-          check_in<float>,
-          check_in<double>};
-}
-
-}  // namespace
-}  // namespace terrace::tri::tin
+#endif

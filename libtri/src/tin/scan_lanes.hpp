@@ -26,8 +26,51 @@ template <class V>
   return b > a ? b : a;
 }
 
+/// kLanes is a multiple of 4, and results do not depend on it.
 template <class T>
 struct Lanes;
+
+#ifdef TERRACE_TRI_NARROW_LANES
+
+/// As below, with vectors of 4 lanes.
+template <class T, class Whole, class RealLanes, class WholeLanes>
+struct NarrowLanes {
+  static constexpr int kLanes = 4;
+  using Int = Whole;
+  using Reals = RealLanes;
+  using Ints = WholeLanes;
+  static constexpr Ints kLane = {0, 1, 2, 3};
+
+  [[gnu::always_inline]] static Reals absolute(Reals lanes) {
+    return (Reals)((Ints)lanes & static_cast<Int>(~std::uint64_t{0} >> (65 - 8 * sizeof(Int))));
+  }
+  [[gnu::always_inline]] static Int greatest_lane(Ints lanes) {
+    Int largest = lanes[0];
+    for (int i = 1; i < kLanes; ++i) largest = lanes[i] > largest ? lanes[i] : largest;
+    return largest;
+  }
+  [[gnu::always_inline]] static Reals load(const T* from) {
+    Reals lanes;
+    __builtin_memcpy(&lanes, from, sizeof lanes);
+    return lanes;
+  }
+};
+
+using Reals4 = float __attribute__((vector_size(16)));
+using Ints4 = std::int32_t __attribute__((vector_size(16)));
+using LongReals4 = double __attribute__((vector_size(32)));
+using LongInts4 = std::int64_t __attribute__((vector_size(32)));
+
+template <>
+struct Lanes<float> : NarrowLanes<float, std::int32_t, Reals4, Ints4> {
+  static constexpr float kRounding = 0x1p-24F;
+};
+template <>
+struct Lanes<double> : NarrowLanes<double, std::int64_t, LongReals4, LongInts4> {
+  static constexpr double kRounding = 0x1p-53;
+};
+
+#else
 
 template <>
 struct Lanes<float> {
@@ -110,6 +153,8 @@ struct Lanes<double> {
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
   }
 };
+
+#endif
 
 }  // namespace
 }  // namespace terrace::tri::tin

@@ -26,7 +26,7 @@ namespace {
 /// for this triangle.
 template <class T>
 [[gnu::always_inline]] inline T greatest_allowed(T bound, T slack) {
-  if constexpr (Lanes<T>::kLanes == 16) return slack <= bound * 0x1p-8F ? bound - slack : kUnsure;
+  if constexpr (std::is_same_v<T, float>) return slack <= bound * 0x1p-8F ? bound - slack : kUnsure;
   return greatest(bound - slack, slack);
 }
 

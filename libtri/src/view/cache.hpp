@@ -13,8 +13,8 @@
 
 namespace terrace::tri {
 
-/// An LRU cache of delivered clusters within a budget of bytes. As a source it returns its contents
-/// and never waits.
+/// An LRU cache of delivered clusters, limited in bytes. As a ClusterSource it serves only cached
+/// clusters, and the one record set by expect().
 class ViewCache final : public ClusterSource {
  public:
   /// counts: number of clusters of each level below the top.
@@ -22,8 +22,8 @@ class ViewCache final : public ClusterSource {
   /// Sets the budget. Must be called before clusters are given. Without it there is no limit.
   void limit(std::size_t max_bytes) { max_bytes_ = max_bytes; }
 
-  /// Stores a cluster in place of an earlier version. Returns false, without storing it, if it is
-  /// larger than the budget.
+  /// Drops an earlier version of the cluster, then stores it. Returns false, without storing it, if
+  /// it is larger than the budget.
   bool give(LoadedCluster cluster);
   /// Returns null if the cluster is not cached. `use`: marks it as most recently used.
   const LoadedCluster* find(ClusterId cluster, bool use);
@@ -33,11 +33,11 @@ class ViewCache final : public ClusterSource {
   [[nodiscard]] std::size_t bytes() const { return bytes_; }
   [[nodiscard]] std::size_t max_bytes() const { return max_bytes_; }
   [[nodiscard]] std::size_t size() const { return places_.size(); }
-  /// Estimated memory of a cluster with this many members, each with as many values as in the last
-  /// one given.
+  /// Estimated memory of a cluster with this many members, in bytes, assuming as many attribute
+  /// bytes per member as in the cluster given last.
   [[nodiscard]] double bytes_of(unsigned level, std::uint64_t members) const;
 
-  /// Provides the record that the model will request.
+  /// Sets the only record that record() can return: the one that the model will request.
   void expect(ClusterId cluster, const ClusterRecord& record) {
     expected_ = cluster;
     record_ = record;

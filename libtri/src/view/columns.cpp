@@ -154,6 +154,12 @@ void check(bool good, const char* what) {
 }  // namespace
 
 void ViewColumns::set(std::size_t i, const ClusterRecord& record, unsigned level) {
+  set_bounds(i, record);
+  levels_[i] = static_cast<std::uint8_t>(level);
+  if (cones_) set_cone(i, {});
+}
+
+void ViewColumns::set_bounds(std::size_t i, const ClusterRecord& record) {
   const Box3& box = record.box;
   bool empty = false;
   for (std::size_t k = 0; k < 3; ++k) empty = empty || !(box.min[k] <= box.max[k]);
@@ -162,8 +168,6 @@ void ViewColumns::set(std::size_t i, const ClusterRecord& record, unsigned level
     columns_[k + 3][i] = empty ? -kFar : std::clamp(box.max[k], -kFar, kFar);
   }
   columns_[kError][i] = record.error >= 0.0 ? std::min(record.error, kFar) : kFar;
-  levels_[i] = static_cast<std::uint8_t>(level);
-  if (cones_) set_cone(i, {});
 }
 
 void ViewColumns::set_cone(std::size_t i, const NormalCone& cone) {

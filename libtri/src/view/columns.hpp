@@ -32,6 +32,8 @@ class ViewColumns {
   /// A box that is empty or has a NaN bound is never in view. A NaN or negative error counts as
   /// infinite.
   void set(std::size_t i, const ClusterRecord& record, unsigned level);
+  /// Sets the box and the error alone.
+  void set_bounds(std::size_t i, const ClusterRecord& record);
   void set_cone(std::size_t i, const NormalCone& cone);
   void set_error(std::size_t i, double error) { columns_[kError][i] = error; }
   void copy(std::size_t i, const ViewColumns& from, std::size_t j);

@@ -48,6 +48,7 @@ ViewOptions checked(ViewOptions options) {
 }  // namespace detail
 
 template class ViewControl<Delaunay2<std::int32_t>>;
+template class ViewControl<ThinnedDelaunay2>;
 template class ViewControl<PointCloud>;
 #else
 template class ViewControl<Delaunay2<double>>;

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <memory>
 #include <set>
 #include <string>
+#include <type_traits>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -14,6 +17,8 @@
 #include "model/multiresolution.hpp"
 #include "model/owners.hpp"
 #include "terrace/tri/view.hpp"
+#include "window_demand.hpp"
+#include "windows.hpp"
 
 /// Implements the template ViewControl of view.hpp, for files that instantiate it.
 
@@ -24,6 +29,24 @@ namespace detail {
 /// Throws HierarchyError if a delivered cluster contradicts itself.
 void check(const LoadedCluster& cluster, unsigned top);
 ViewOptions checked(ViewOptions options);
+
+/// The state of a control that thins a raster. Not a member of the template, so that other controls
+/// do not need the windows.
+struct Thinning {
+  explicit Thinning(const RasterFrame& frame) : windows(frame) {}
+
+  ViewWindows windows;
+  WindowDemand demand;
+  View last_view, view_of_clusters, view_of_windows;
+  std::set<ClusterId> pinned_expanded;  // of level 0
+  int coarser = 0;        // steps by which all windows are coarser than wanted, for lack of room
+  int least_coarser = 0;  // known to be needed for the current view
+  bool full = false;      // there was no room for windows that should become finer
+  std::vector<ThinnedDelaunay2::Target> targets, before;
+};
+struct NoThinning {
+  explicit NoThinning(const RasterFrame&) {}
+};
 
 }  // namespace detail
 
@@ -42,12 +65,14 @@ struct ViewControl<Triangulation>::Impl {
     double bytes = 0.0;
   };
 
+  void set_views(const View& view, detail::Thinning& t);
   void expand_wanted();
+  bool thin();
   bool collapse_unwanted(std::size_t max_remaining);
   enum class Room { enough, none, later };
   [[nodiscard]] std::size_t points_over_limit(std::size_t points) const {
     const std::size_t needed = model_.point_count() + points;
-    return needed > options_.max_points ? needed - options_.max_points : 0;
+    return needed > max_points_ ? needed - max_points_ : 0;
   }
   [[nodiscard]] bool could_fit(const Candidate& candidate, std::size_t points);
   [[nodiscard]] Room make_room(const Candidate& candidate);
@@ -70,6 +95,10 @@ struct ViewControl<Triangulation>::Impl {
     return meter_.has_time_for_usual(StepMeter::kCollapse);
   }
   [[nodiscard]] std::uint32_t points_after_budget(Slot slot);
+  /// The meter's kind of operation for the expansion of a cluster.
+  [[nodiscard]] static std::size_t kind_to_expand(ClusterId id) {
+    return kThins && level_of(id) == 0 ? StepMeter::kLoad : StepMeter::kExpand;
+  }
   bool collapse(Slot slot);
   void withdraw();
 
@@ -78,11 +107,25 @@ struct ViewControl<Triangulation>::Impl {
   static constexpr std::size_t kMaxRequested = 1024;
   /// Number of clusters between two readings of the clock.
   static constexpr std::size_t kClockInterval = 16;
+  /// True if the triangulation shows only some of the model's points. max_points limits its
+  /// vertices, and the points are limited to kPointsPerVertex times as many.
+  static constexpr bool kThins = std::is_same_v<Triangulation, ThinnedDelaunay2>;
+  static constexpr std::size_t kPointsPerVertex = 16;
+  /// Windows to thin between two readings of the clock, and the work of one as a number of points.
+  static constexpr std::size_t kWindowsAtOnce = 4, kPointsOfWindow = 256;
   static constexpr bool kEstimatesWork = requires(const Triangulation& t) { t.removal_work({}); };
 
   ViewOptions options_;
+  std::size_t max_points_;
   ViewCache cache_;
   Model model_;
+  using Thinning = detail::Thinning;
+  static constexpr int kCoarser = ThinnedDelaunay2::kStepsPerDoubling / 2;
+  [[nodiscard]] ClusterAlignment* alignment() {
+    if constexpr (kThins) return &thinning_.windows;
+    return nullptr;
+  }
+  std::conditional_t<kThins, Thinning, detail::NoThinning> thinning_;
   ViewFront front_;
   std::unordered_map<ClusterId, Requested> requested_;
   std::set<ClusterId> faulty_;
@@ -100,6 +143,9 @@ template <class Triangulation>
 ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, LoadedCluster root,
                                        ViewOptions options, Triangulation&& empty)
     : options_(detail::checked(std::move(options))),
+      max_points_(kThins && options_.max_points < SIZE_MAX / kPointsPerVertex
+                      ? options_.max_points * kPointsPerVertex
+                      : options_.max_points),
       cache_([&] {
         if (root.cluster != cluster_id(static_cast<unsigned>(counts.size()), 0)) {
           throw HierarchyError(root.cluster, "it is not the root above " +
@@ -111,7 +157,8 @@ ViewControl<Triangulation>::Impl::Impl(std::vector<std::uint64_t> counts, Loaded
         return cache;
       }()),
       model_(cache_, Detail{}, options_.model, std::move(empty)),
-      front_(tree(), options_) {
+      thinning_(options_.raster),
+      front_(tree(), options_, alignment()) {
   front_.add(ClusterTree::kRoot, root.child_records, nullptr);
   cache_.drop(root.cluster);
   cache_.limit(options_.max_cached_bytes);
@@ -129,7 +176,12 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   reserved_bytes_ = 0.0;
   for (const auto& [id, requested] : requested_) reserved_bytes_ += requested.bytes;
 
-  front_.start(view);
+  if constexpr (kThins) {
+    set_views(view, thinning_);
+    front_.start(thinning_.view_of_clusters);
+  } else {
+    front_.start(view);
+  }
   meter_.start_operations();
   model_.open_step();
   if (partial_ != ClusterTree::kNoSlot) collapse(partial_);
@@ -137,12 +189,108 @@ auto ViewControl<Triangulation>::Impl::step(const View& view, const StepBudget& 
   request_upcoming();
   request_records();
   meter_.end_fixed_work();
-  const bool done = collapse_unwanted(0);
+  const bool thinned = thin();
+  const bool done = collapse_unwanted(0) && thinned;
   withdraw();
   result_.delta = &model_.close_step();
   meter_.end();
-  result_.settled = done && result_.pending == 0 && result_.expanded == 0 && result_.collapsed == 0;
+  result_.settled = done && result_.pending == 0 && result_.expanded == 0 &&
+                    result_.collapsed == 0 && result_.thinned == 0;
   return result_;
+}
+
+// Derives the views by which clusters are loaded and windows thinned.
+//
+// An error in ground units is a promise. For a thinned raster it can be kept only where all samples
+// are known, because of clusters only the range of heights is. An error in pixels is a wish, for
+// which that range is a good estimate.
+template <class Triangulation>
+void ViewControl<Triangulation>::Impl::set_views(const View& view, Thinning& t) {
+  if (!(view == t.last_view)) t.least_coarser = 0;
+  t.last_view = t.view_of_windows = view;
+  for (const ClusterId id : t.pinned_expanded) {
+    if (const auto place = tree().find(id))
+      t.view_of_windows.focuses.push_back({front_.record(*place).box, 0});
+  }
+  t.view_of_clusters = t.view_of_windows;
+  constexpr double kAll = std::numeric_limits<double>::infinity();
+  const auto load = [&](const Box3& box, double error) {
+    if (error < kAll) t.view_of_clusters.focuses.push_back({box, 0});
+  };
+  load({{-kAll, -kAll, -kAll}, {kAll, kAll, kAll}}, view.ground_error);
+  for (const ErrorRegion& region : view.regions) load(region.box, region.error);
+}
+
+// Chooses the vertices of windows whose tolerance should change. Returns false if the budget ended
+// first or the windows must be made coarser.
+template <class Triangulation>
+bool ViewControl<Triangulation>::Impl::thin() {
+  if constexpr (!kThins) {
+    return true;
+  } else {
+    Thinning& t = thinning_;
+    ThinnedDelaunay2& raster = model_.impl_->triangulation_;
+    for (std::uint32_t i = 0; options_.raster_has_gaps && i < raster.window_slots(); ++i) {
+      const ThinnedDelaunay2::Window* const window = raster.window(i);
+      if (window == nullptr || window->complete) continue;
+      Box3 box = t.windows.box_of(*window);
+      box.min[2] = -std::numeric_limits<double>::infinity();
+      box.max[2] = std::numeric_limits<double>::infinity();
+      const auto meets = [&](const Box3& other) { return t.windows.meets(other, *window); };
+      if (!front_.meets_collapsed(box, meets)) raster.set_complete(i);
+    }
+    const auto changes =
+        t.demand.changes(raster, t.windows, t.view_of_windows, options_, t.coarser);
+    const bool coarsens = std::any_of(changes.begin(), changes.end(),
+                                      [](const auto& change) { return change.coarsens; });
+    // Where there was no room, windows become finer only after all others have become coarser.
+    t.full = t.full && coarsens;
+    bool waiting = false;
+    for (std::size_t next = 0; next < changes.size();) {
+      t.targets.clear();
+      t.before.clear();
+      std::size_t end = next;
+      for (; end < changes.size() && t.targets.size() < kWindowsAtOnce; ++end) {
+        const WindowDemand::Change& change = changes[end];
+        if (t.full && !change.coarsens) {
+          waiting = true;
+          continue;
+        }
+        t.targets.push_back(change.target);
+        if (change.coarsens) continue;
+        const ThinnedDelaunay2::Window& window = *raster.window(change.target.window);
+        t.before.push_back(
+            {change.target.window, window.thinned ? window.step : ThinnedDelaunay2::kFewest});
+      }
+      if (!t.targets.empty() && !meter_.has_time_for_usual(StepMeter::kThin)) {
+        result_.pending += changes.size() - next;
+        result_.worst = std::max(result_.worst, changes[next].urgency);
+        return false;
+      }
+      next = end;
+      if (t.targets.empty()) continue;
+      std::size_t chosen = raster.thin(t.targets);
+      t.full = raster.vertex_count() > options_.max_points && !t.before.empty();
+      if (t.full) chosen += raster.thin(t.before);
+      result_.thinned += chosen;
+      meter_.spend(kPointsOfWindow * chosen, StepMeter::kThin);
+      if (!t.full) continue;
+      if (!coarsens) t.least_coarser = t.coarser += kCoarser;
+      return false;
+    }
+    if (waiting) return false;
+    // Tries a finer step where there may be room, once per view.
+    if (t.coarser > t.least_coarser && raster.vertex_count() <= options_.max_points / 2) {
+      t.coarser -= kCoarser;
+      return false;
+    }
+    if (t.coarser > 0) {
+      ++result_.blocked;
+      const auto steps = static_cast<ThinnedDelaunay2::Step>(t.coarser);
+      result_.worst = std::max(result_.worst, ThinnedDelaunay2::tolerance_of(steps));
+    }
+    return true;
+  }
 }
 
 // Collapses until at most this many points of unwanted clusters are left. Returns false if the
@@ -222,7 +370,7 @@ auto ViewControl<Triangulation>::Impl::make_room(const Candidate& candidate) -> 
   // The collapsed cluster may have been above this one.
   const auto place = tree().find(candidate.id);
   if (!place || *place != candidate.place) return Room::none;
-  return meter_.has_time(members) ? Room::enough : Room::later;
+  return meter_.has_time(members, kind_to_expand(candidate.id)) ? Room::enough : Room::later;
 }
 
 template <class Triangulation>
@@ -308,7 +456,7 @@ void ViewControl<Triangulation>::Impl::expand(const Candidate& candidate,
   }
   ++result_.expanded;
   front_.add(tree().child_slot(candidate.place), loaded.child_records, &candidate);
-  meter_.spend(loaded.positions.size());
+  meter_.spend(loaded.positions.size(), kind_to_expand(candidate.id));
 }
 
 // Returns the number of points that remain after collapsing a cluster in the rest of the step. They
@@ -425,10 +573,16 @@ void ViewControl<Triangulation>::forget(ClusterId cluster) {
 template <class Triangulation>
 void ViewControl<Triangulation>::pin(ClusterId cluster, Pin state) {
   impl_->front_.pin(cluster, state);
+  if constexpr (Impl::kThins) {
+    impl_->thinning_.pinned_expanded.erase(cluster);
+    if (level_of(cluster) == 0 && state == Pin::expanded)
+      impl_->thinning_.pinned_expanded.insert(cluster);
+  }
 }
 template <class Triangulation>
 void ViewControl<Triangulation>::unpin(ClusterId cluster) {
   impl_->front_.unpin(cluster);
+  if constexpr (Impl::kThins) impl_->thinning_.pinned_expanded.erase(cluster);
 }
 template <class Triangulation>
 std::size_t ViewControl<Triangulation>::cached_bytes() const {
@@ -436,7 +590,11 @@ std::size_t ViewControl<Triangulation>::cached_bytes() const {
 }
 template <class Triangulation>
 std::size_t ViewControl<Triangulation>::memory_bytes() const {
-  return impl_->model_.memory_bytes() + impl_->front_.memory() + impl_->requested_.size() * 64;
+  std::size_t bytes =
+      impl_->model_.memory_bytes() + impl_->front_.memory() + impl_->requested_.size() * 64;
+  if constexpr (Impl::kThins)
+    bytes += impl_->thinning_.windows.memory() + impl_->thinning_.demand.memory();
+  return bytes;
 }
 
 }  // namespace terrace::tri

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
 
 namespace terrace::tri {
 namespace {
@@ -14,9 +15,11 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-ViewFront::ViewFront(const ClusterTree& tree, const ViewOptions& options)
+ViewFront::ViewFront(const ClusterTree& tree, const ViewOptions& options,
+                     ClusterAlignment* alignment)
     : tree_(&tree),
       options_(&options),
+      alignment_(alignment),
       request_above_(std::max(options.ask_above, options.collapse_below)),
       columns_(options.silhouette < 1.0),
       bounds_(options.silhouette < 1.0) {}
@@ -35,7 +38,7 @@ void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
     columns_.set(slot, {{kLow, {kInfinity, kInfinity, kInfinity}}, kInfinity, 0}, tree_->top());
   } else {
     const std::uint32_t parent = group_of_[place.parent];
-    columns_.copy(slot, groups_[parent]->columns, place.index);
+    columns_.copy(slot, measured(*groups_[parent]), place.index);
     changed_groups_.push_back(parent);
   }
   if (candidate) {
@@ -60,10 +63,15 @@ void ViewFront::add(Slot slot, std::span<const ClusterRecord> children,
   group.parent = slot;
   group.columns = ViewColumns(columns_.cones());
   group.columns.resize(children.size());
+  if (alignment_ != nullptr) {
+    group.aligned = ViewColumns(columns_.cones());
+    group.aligned.resize(children.size());
+  }
   for (std::uint32_t i = 0; i < children.size(); ++i) {
     group.members.push_back(children[i].members);
     set_columns(group, i, children[i]);
   }
+  for (std::uint32_t i = 0; alignment_ != nullptr && i < children.size(); ++i) align(group, i);
   changed_groups_.push_back(number);
   if (candidate) measure_group(number);
 }
@@ -98,7 +106,8 @@ ClusterRecord ViewFront::record(ChildRef child) const {
   return record;
 }
 
-bool ViewFront::meets_collapsed(const Box3& box, Slot below) const {
+bool ViewFront::meets_collapsed(const Box3& box, const std::function<bool(const Box3&)>& counts,
+                                Slot below) const {
   if (group_of_[below] == kNone) return false;
   const ViewColumns& columns = groups_[group_of_[below]]->columns;
   for (std::uint32_t i = 0; i < columns.size(); ++i) {
@@ -106,11 +115,15 @@ bool ViewFront::meets_collapsed(const Box3& box, Slot below) const {
     for (std::size_t k = 0; k < 3 && meets; ++k) {
       meets = columns.column(k)[i] <= box.max[k] && columns.column(k + 3)[i] >= box.min[k];
     }
-    if (!meets) continue;
+    if (!meets || (counts && !counts(record({below, i}).box))) continue;
     const Slot child = tree_->child_slot({below, i});
-    if (child == ClusterTree::kNoSlot || meets_collapsed(box, child)) return true;
+    if (child == ClusterTree::kNoSlot || meets_collapsed(box, counts, child)) return true;
   }
   return false;
+}
+
+bool ViewFront::meets_collapsed(const Box3& box, Slot below) const {
+  return meets_collapsed(box, {}, below);
 }
 
 void ViewFront::set_record(ChildRef child, const ClusterRecord& record) {
@@ -119,15 +132,47 @@ void ViewFront::set_record(ChildRef child, const ClusterRecord& record) {
   if (group.members[child.index] != ClusterRecord::kUnread) return;
   group.members[child.index] = record.members;
   set_columns(group, child.index, record);
+  if (alignment_ != nullptr) align(group, child.index);
   changed_groups_.push_back(number);
 }
 
 void ViewFront::set_columns(Group& group, std::uint32_t i, const ClusterRecord& record) {
-  group.columns.set(i, record, tree_->level(group.parent) - 1);
+  const unsigned level = tree_->level(group.parent) - 1;
+  group.columns.set(i, record, level);
+  if (alignment_ != nullptr) {
+    group.box.include(record.box);
+    if (level == 0 && record.members != ClusterRecord::kUnread && alignment_->add(record))
+      changed_.include(alignment_->aligned(record, level).box);
+  }
   if (!columns_.cones()) return;
   group.columns.set_cone(i, options_->cone
                                 ? options_->cone(tree_->child_id({group.parent, i}), record)
                                 : terrain_cone(record));
+}
+
+void ViewFront::align(Group& group, std::uint32_t i) {
+  const ChildRef child{group.parent, i};
+  const unsigned level = tree_->level(group.parent) - 1;
+  group.aligned.copy(i, group.columns, i);  // with its cone
+  group.aligned.set_bounds(i, alignment_->aligned(record(child), level));
+  const Slot slot = tree_->child_slot(child);
+  if (slot != ClusterTree::kNoSlot) columns_.copy(slot, group.aligned, i);
+}
+
+// Aligns the clusters near changed ones again.
+void ViewFront::align_near(const Box3& changed) {
+  const auto meets = [&](const Box3& box) {
+    return box.min[0] <= changed.max[0] && box.max[0] >= changed.min[0] &&
+           box.min[1] <= changed.max[1] && box.max[1] >= changed.min[1];
+  };
+  for (std::uint32_t number = 0; number < groups_.size(); ++number) {
+    if (!groups_[number] || !meets(groups_[number]->box)) continue;
+    Group& group = *groups_[number];
+    for (std::uint32_t i = 0; i < group.columns.size(); ++i) {
+      if (meets(record({group.parent, i}).box)) align(group, i);
+    }
+    changed_groups_.push_back(number);
+  }
 }
 
 // Computes a box around the collapsed children, and the greatest of their errors.
@@ -139,8 +184,8 @@ void ViewFront::compute_bound(std::uint32_t number) {
   double error = 0.0;
   for (std::uint32_t i = 0; i < group.columns.size(); ++i) {
     if (tree_->child_slot({group.parent, i}) != ClusterTree::kNoSlot) continue;
-    bounds_.join(number, group.columns, i);
-    error = std::max(error, group.columns.error(i));
+    bounds_.join(number, measured(group), i);
+    error = std::max(error, measured(group).error(i));
   }
   bounds_.set_error(number, error);
 }
@@ -155,6 +200,7 @@ void ViewFront::start(const View& view) {
   sorted_below_ = -kInfinity;
   collapsed_ = 0;
   last_id_ = ClusterId{~std::uint64_t{0}};
+  if (!changed_.empty()) align_near(std::exchange(changed_, {}));
   std::sort(changed_groups_.begin(), changed_groups_.end());
   changed_groups_.erase(std::unique(changed_groups_.begin(), changed_groups_.end()),
                         changed_groups_.end());
@@ -222,7 +268,7 @@ void ViewFront::measure_group(std::uint32_t number) {
   if (is_pinned_collapsed(group.parent)) return;
   const std::size_t count = group.columns.size();
   scratch_.resize(std::max(count, scratch_.want.size()));
-  measure(*view_, *options_, group.columns, 0, count, scratch_);
+  measure(*view_, *options_, measured(group), 0, count, scratch_);
   const double max_want = demand_.want[group.parent],
                least_distance = demand_.distance[group.parent];
   const double max_keep = demand_.keep[group.parent];
@@ -264,7 +310,7 @@ void ViewFront::override_by_pins(std::uint32_t number) {
 double ViewFront::keep(ChildRef child) {
   const Group& group = *groups_[group_of_[child.parent]];
   scratch_.resize(std::max(group.columns.size(), scratch_.want.size()));
-  measure(*view_, *options_, group.columns, child.index, child.index + 1, scratch_);
+  measure(*view_, *options_, measured(group), child.index, child.index + 1, scratch_);
   return std::min(scratch_.keep[child.index], demand_.keep[child.parent]);
 }
 
@@ -278,8 +324,8 @@ std::size_t ViewFront::memory() const {
   }
   for (const auto& group : groups_) {
     if (!group) continue;
-    bytes +=
-        sizeof(Group) + group->columns.memory() + group->members.capacity() * sizeof(std::uint64_t);
+    bytes += sizeof(Group) + group->columns.memory() + group->aligned.memory() +
+             group->members.capacity() * sizeof(std::uint64_t);
   }
   return bytes;
 }

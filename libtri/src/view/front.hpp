@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -15,6 +16,17 @@
 #include "terrace/tri/view.hpp"
 
 namespace terrace::tri {
+
+/// Supplies other records by which clusters are measured.
+class ClusterAlignment {
+ public:
+  virtual ~ClusterAlignment() = default;
+  /// Adds a cluster of level 0. Returns true if that changes what aligned() returns for others.
+  virtual bool add(const ClusterRecord& record) = 0;
+  /// The record by which to measure a cluster.
+  [[nodiscard]] virtual ClusterRecord aligned(const ClusterRecord& record,
+                                              unsigned level) const = 0;
+};
 
 /// Decides by a view which clusters to expand and to collapse, and in what order. Depends on the
 /// tree of expanded clusters but not on a triangulation.
@@ -38,8 +50,10 @@ class ViewFront {
   };
   using Pin = ViewPin;
 
-  /// The tree must outlive this object.
-  ViewFront(const ClusterTree& tree, const ViewOptions& options);
+  /// All arguments must outlive this object. alignment: null if clusters are measured by their own
+  /// records.
+  ViewFront(const ClusterTree& tree, const ViewOptions& options,
+            ClusterAlignment* alignment = nullptr);
 
   /// Call this for the root, then for every cluster that was expanded, with the records of its
   /// children in the tree's order. In a step (after start()), `candidate` is the result of next().
@@ -53,6 +67,10 @@ class ViewFront {
   [[nodiscard]] ClusterRecord record(ChildRef child) const;
   /// True if the box of a collapsed cluster below an expanded one meets the given box.
   [[nodiscard]] bool meets_collapsed(const Box3& box, Slot below = ClusterTree::kRoot) const;
+  /// The same for those of them, expanded or not, whose box `counts`.
+  [[nodiscard]] bool meets_collapsed(const Box3& box,
+                                     const std::function<bool(const Box3&)>& counts,
+                                     Slot below = ClusterTree::kRoot) const;
   /// Sets the record of a child of which only bounds were known. Must not be called in a step.
   void set_record(ChildRef child, const ClusterRecord& record);
 
@@ -98,6 +116,10 @@ class ViewFront {
     Slot parent = ClusterTree::kNoSlot;
     std::vector<std::uint64_t> members;  // their numbers
     ViewColumns columns;
+    // With an alignment: the records by which the children are measured, and the box around all
+    // children.
+    ViewColumns aligned;
+    Box3 box;
   };
   struct Ordered {
     double key;
@@ -110,6 +132,11 @@ class ViewFront {
   [[nodiscard]] static bool less_wanted(const Candidate& a, const Candidate& b);
   std::span<const Candidate> first_of(std::vector<Candidate>& list, std::size_t most);
   void set_columns(Group& group, std::uint32_t i, const ClusterRecord& record);
+  [[nodiscard]] const ViewColumns& measured(const Group& group) const {
+    return alignment_ != nullptr ? group.aligned : group.columns;
+  }
+  void align(Group& group, std::uint32_t i);
+  void align_near(const Box3& changed);
   void compute_bound(std::uint32_t group);
   void measure_group(std::uint32_t group);
   void clamp_to_parents();
@@ -124,6 +151,8 @@ class ViewFront {
 
   const ClusterTree* tree_;
   const ViewOptions* options_;
+  ClusterAlignment* alignment_;
+  Box3 changed_;  // around the clusters whose alignment may have changed
   double request_above_;
   std::map<ClusterId, Pin> pins_;
 

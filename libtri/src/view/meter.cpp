@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -24,6 +26,10 @@ constexpr double kPlannedShare = 0.95;
 // the number of points.
 double with_overhead(std::size_t points) { return static_cast<double>(points) + 16.0; }
 
+std::size_t total(const std::array<std::size_t, StepMeter::kKinds>& points) {
+  return std::accumulate(points.begin(), points.end(), std::size_t{0});
+}
+
 }  // namespace
 
 void StepMeter::start(const StepBudget& budget) {
@@ -41,12 +47,14 @@ void StepMeter::start(const StepBudget& budget) {
 bool StepMeter::fits(std::size_t points, std::size_t kind) const {
   if (operations_ >= budget_->operations) return false;
   if (!timed_) return true;
-  const double predicted = with_overhead(points) * operation_rate_[kind] +
-                           with_overhead(points_[0] + points_[1] + points) * end_rate_ +
-                           static_cast<double>(points_[0]) * budget_->after[0] +
-                           static_cast<double>(points_[1]) * budget_->after[1] +
-                           with_overhead(points) * budget_->after[kind] +
-                           (fixed_done_ ? 0.0 : fixed_);
+  // Thinning adds as well as removes.
+  const auto after = [&](std::size_t of) {
+    return of == kLoad ? 0.0 : budget_->after[of == kCollapse ? 1 : 0];
+  };
+  double predicted = with_overhead(points) * operation_rate_[kind] +
+                     with_overhead(total(points_) + points) * end_rate_ +
+                     with_overhead(points) * after(kind) + (fixed_done_ ? 0.0 : fixed_);
+  for (std::size_t k = 0; k < kKinds; ++k) predicted += static_cast<double>(points_[k]) * after(k);
   return last_ - begin_ + predicted < kPlannedShare * budget_->seconds;
 }
 
@@ -68,7 +76,7 @@ void StepMeter::end_fixed_work() {
 
 void StepMeter::end() {
   if (timed_ && operations_ > 0)
-    update_estimate(end_rate_, (now() - last_) / with_overhead(points_[0] + points_[1]));
+    update_estimate(end_rate_, (now() - last_) / with_overhead(total(points_)));
 }
 
 }  // namespace terrace::tri

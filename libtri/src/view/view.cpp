@@ -160,6 +160,52 @@ Camera matrix_camera(const std::array<double, 16>& view_projection, double viewp
   return camera;
 }
 
+Point3 RasterFrame::operator()(const Point3& p) const {
+  Point3 result = origin;
+  for (std::size_t k = 0; k < 3; ++k)
+    for (std::size_t j = 0; j < 3; ++j) result[k] += linear[3 * k + j] * p[j];
+  return result;
+}
+
+Box3 RasterFrame::operator()(const Box3& box) const {
+  Box3 result;
+  for (std::size_t k = 0; k < 3; ++k) {
+    result.min[k] = result.max[k] = origin[k];
+    for (std::size_t j = 0; j < 3; ++j) {
+      const double a = linear[3 * k + j] * box.min[j], b = linear[3 * k + j] * box.max[j];
+      result.min[k] += std::min(a, b);
+      result.max[k] += std::max(a, b);
+    }
+  }
+  return result;
+}
+
+// At a given ground position the column and row depend on the height too, unless columns, rows and
+// heights are mapped independently.
+Box3 RasterFrame::cells(const Box3& ground) const {
+  const auto& m = linear;
+  const auto minor = [&](std::size_t a, std::size_t b, std::size_t c, std::size_t d) {
+    return m[a] * m[d] - m[b] * m[c];
+  };
+  const double determinant =
+      m[0] * minor(4, 5, 7, 8) - m[1] * minor(3, 5, 6, 8) + m[2] * minor(3, 4, 6, 7);
+  const std::array<std::array<double, 3>, 2> inverse{
+      {{minor(4, 5, 7, 8), minor(2, 1, 8, 7), minor(1, 2, 4, 5)},
+       {minor(5, 3, 8, 6), minor(0, 2, 6, 8), minor(2, 0, 5, 3)}}};
+  Box3 result = ground;
+  for (std::size_t k = 0; k < 2; ++k) {
+    result.min[k] = result.max[k] = 0.0;
+    for (std::size_t j = 0; j < 3; ++j) {
+      if (inverse[k][j] == 0.0) continue;
+      const double a = inverse[k][j] / determinant * (ground.min[j] - origin[j]);
+      const double b = inverse[k][j] / determinant * (ground.max[j] - origin[j]);
+      result.min[k] += std::min(a, b);
+      result.max[k] += std::max(a, b);
+    }
+  }
+  return result;
+}
+
 NormalCone terrain_cone(const ClusterRecord& record) {
   const Box3& box = record.box;
   const double rise = box.max[2] - box.min[2];

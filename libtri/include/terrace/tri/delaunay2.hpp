@@ -126,6 +126,31 @@ class AliveRange {
 /// The default metric of a triangulation. Elliptical metrics are in metric.hpp.
 struct Euclidean {};
 
+/// A metric for integers in the plane, under which the sides of square windows act as constraints.
+/// The windows are [i S, (i + 1) S] x [j S, (j + 1) S] with S = kCells. They are closed, so
+/// neighbours share their sides.
+///
+/// The triangulation is regular (weighted Delaunay). It is the lower hull of the points lifted to C
+/// g(x, y) + x^2 + y^2. C is infinitely large, and g is convex, linear in each window, and creased
+/// along all sides. Guarantees:
+/// - Every point is a vertex, and the triangulation is a function of the point set alone.
+/// - The Euclidean triangles of the vertices in a window, ties included, are exactly the triangles
+///   with all corners in that window, whatever points are elsewhere.
+/// - Consecutive vertices on a side of a window are joined by an edge.
+/// - If the four corners of a window are vertices, then no edge crosses its sides. The triangles
+///   inside are the Euclidean triangles of the vertices in the window.
+/// - Vertices at distance 1 are joined by an edge.
+///
+/// Circles through the corners of other triangles may contain vertices.
+struct Windowed {
+  static constexpr unsigned kBits = 7;
+  static constexpr std::int32_t kCells = std::int32_t{1} << kBits;  ///< side of a window
+};
+
+/// The metrics in which the triangles of every complete grid are known.
+template <class Metric>
+concept GridMetric = std::is_same_v<Metric, Euclidean> || std::is_same_v<Metric, Windowed>;
+
 /// A Delaunay triangulation in the plane.
 ///
 /// - Coord = std::int32_t: exact for coordinates of at most 30 bits (0 <= c < 2^30). Uses integer
@@ -133,6 +158,7 @@ struct Euclidean {};
 /// - Coord = double: any finite coordinates, with exact predicates. Points are never moved. -0.0
 ///   and 0.0 are equal. About 68 bytes per vertex.
 /// - Metric = EllipticalMetric2 (with doubles): see metric.hpp.
+/// - Metric = Windowed (with integers): see above.
 ///
 /// Empty sets, one or two points, and collinear points are valid states without triangles. The
 /// limit is 2^29 - 2 vertices. Several threads may call const functions at once.
@@ -164,11 +190,11 @@ class Delaunay2 {
   std::vector<VertexId> build(std::span<const Point> points);
   /// Adds the complete grid x0, x0 + step, ... (columns x rows) to an empty triangulation. Writes
   /// the canonical triangles directly, in O(n) and without predicates. Returns the first vertex.
-  /// The vertex of column i, row j is that plus j * columns + i. Requires step > 0 and the
-  /// Euclidean metric. With doubles, product and sum in x0 + i * step are each rounded once. Throws
-  /// std::invalid_argument if a result is not exact (use build() then).
+  /// The vertex of column i, row j is that plus j * columns + i. Requires step > 0 and the metric
+  /// Euclidean or Windowed. With doubles, product and sum in x0 + i * step are each rounded once.
+  /// Throws std::invalid_argument if a result is not exact (use build() then).
   VertexId build_grid(Coord x0, Coord y0, Coord step, std::uint32_t columns,
-                      std::uint32_t rows) requires std::is_same_v<Metric, Euclidean>;
+                      std::uint32_t rows) requires GridMetric<Metric>;
   /// hint: a vertex near the point, where the walk starts, or kNoVertex for the last vertex used.
   Insertion insert(const Point& point, VertexId hint = kNoVertex);
   /// Inserts a set of points near the hint, in any order (it is sorted internally). `results` is
@@ -229,8 +255,10 @@ class Delaunay2 {
   /// for insert(). Takes about sqrt(n) steps from a distant hint, a few from a near one.
   [[nodiscard]] Location locate(const Point& point, VertexId hint = kNoVertex) const;
   /// The vertex nearest to the point, or kNoVertex if the triangulation is empty. Of equally near
-  /// vertices it is the lexicographically smallest. Exact. Costs a walk.
-  [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const;
+  /// vertices it is the lexicographically smallest. Exact. Costs a walk. Does not exist in the
+  /// metric Windowed, whose edges need not lead to the nearest vertex.
+  [[nodiscard]] VertexId nearest(const Point& point, VertexId hint = kNoVertex) const
+      requires(!std::is_same_v<Metric, Windowed>);
 
   /// A hash of the set of triangles by coordinates, or of the points while there are no triangles.
   /// Equal point sets have equal hashes, whatever their history. O(n).
@@ -278,6 +306,7 @@ void Delaunay2<Coord, Metric>::Changes::clear() {
 }
 
 extern template class Delaunay2<std::int32_t>;
+extern template class Delaunay2<std::int32_t, Windowed>;
 extern template class Delaunay2<double>;
 
 }  // namespace terrace::tri

@@ -24,9 +24,9 @@ namespace terrace::tri {
 /// others as they were. The tetrahedra are a function of the points alone, but in a few pockets the
 /// surface may depend on the order in which the points came. restore() computes it from scratch.
 ///
-/// The surface is closed and oriented outward. It touches itself where kept tetrahedra meet in an
-/// edge or a vertex, see BasicShape3::surface(). For an open scan, which open() reports, the
-/// triangles leave out the lids by the rule of BasicShape3::surface_without_lids(). Facets are
+/// The surface is oriented outward. It touches itself where kept tetrahedra meet in an edge or a
+/// vertex, see BasicShape3::surface(). It is closed, except for an open scan, which open() reports:
+/// its lids are left out by the rule of BasicShape3::surface_without_lids(). Facets are
 /// checked for lids again wherever tetrahedra were exchanged, and sums of areas are exact, so both
 /// the lids and open() are functions of the facets and the points. Vertex handles are those of
 /// Delaunay3. A triangle keeps its handle as long as it is on the surface, even if the tetrahedron

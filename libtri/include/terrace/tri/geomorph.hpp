@@ -9,6 +9,7 @@
 
 #include "terrace/tri/dynamic_surface.hpp"
 #include "terrace/tri/multiresolution.hpp"
+#include "terrace/tri/thinned_delaunay2.hpp"
 
 namespace terrace::tri {
 
@@ -47,8 +48,8 @@ struct Anchor {
 /// the slide moves `removed` and `reassigned` in the same way. A collapse mirrors an expansion: a
 /// step and its inverse give the same slides with start and end exchanged.
 ///
-/// Over the plane (Delaunay2) x and y do not change. A vertex outside the other surface (because
-/// the hull grew, or because there were no triangles) keeps its own height.
+/// Over the plane (Delaunay2, ThinnedDelaunay2) x and y do not change. A vertex outside the other
+/// surface (because the hull grew, or because there were no triangles) keeps its own height.
 ///
 /// In space (DynamicSurface) a vertex moves to the nearest point on the triangles that the step
 /// exchanged within the vertex's own connected part, so it does not cross to the other side of a
@@ -98,6 +99,7 @@ template <class Coord>
 using Geomorph2 = Geomorph<Delaunay2<Coord>>;
 
 extern template class Geomorph<Delaunay2<std::int32_t>>;
+extern template class Geomorph<ThinnedDelaunay2>;
 extern template class Geomorph<Delaunay2<double>>;
 extern template class Geomorph<DynamicSurface<std::int32_t>>;
 extern template class Geomorph<DynamicSurface<double>>;

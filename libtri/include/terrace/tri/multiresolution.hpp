@@ -18,6 +18,7 @@
 #include "terrace/tri/delaunay3.hpp"
 #include "terrace/tri/dynamic_surface.hpp"
 #include "terrace/tri/point_cloud.hpp"
+#include "terrace/tri/thinned_delaunay2.hpp"
 
 /// A triangulation whose detail is raised and lowered by expanding and collapsing the clusters of a
 /// hierarchy, and the interface through which it reads that hierarchy from any storage.
@@ -109,6 +110,7 @@ class HierarchyError : public std::runtime_error {
 struct Focus {
   Box3 box;
   unsigned level = 0;
+  bool operator==(const Focus&) const = default;
 };
 
 /// The detail wanted in each place: all points of `level` and above, and in each focus those of its
@@ -267,6 +269,7 @@ template <class Coord, class Metric = Euclidean>
 using Multiresolution3 = MultiresolutionModel<Delaunay3<Coord, Metric>>;
 
 extern template class MultiresolutionModel<Delaunay2<std::int32_t>>;
+extern template class MultiresolutionModel<ThinnedDelaunay2>;
 extern template class MultiresolutionModel<PointCloud>;
 extern template class MultiresolutionModel<Delaunay2<double>>;
 extern template class MultiresolutionModel<Delaunay3<std::int32_t>>;

@@ -59,6 +59,17 @@ SurfaceMeasures measure(const Surface& surface);
 /// does.
 void turn_outward(Surface& surface);
 
+/// Returns a unit normal for each point of a surface, outward if the faces are oriented outward:
+/// the sum of the unit normals of its faces, each times the face's angle at the point. Unlike a sum
+/// by area it does not depend on how a flat part is cut into triangles (G. Thuermer, C. Wuethrich,
+/// "Computing vertex normals from polygonal facets", doi:10.1080/10867651.1998.10487487). The
+/// normal is zero for a point whose faces have no area or cancel out, or that has no face.
+///
+/// threads: 0 for one per core; the result does not depend on it. Throws std::invalid_argument
+/// naming a point that is not finite or a face with a corner that is not the index of a point.
+/// O(faces).
+[[nodiscard]] std::vector<Point3> vertex_normals(const Surface& surface, unsigned threads = 1);
+
 /// Decides which facets of a tetrahedron are likely to be on the surface ("boundary" facets) as
 /// seen from that tetrahedron: those that are small compared to it. Used by the two rules that
 /// peel.

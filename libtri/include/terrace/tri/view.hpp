@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "terrace/tri/multiresolution.hpp"
+#include "terrace/tri/thinned_delaunay2.hpp"
 
 /// Level of detail by view: the wanted detail (View), the limits (ViewOptions, StepBudget), and the
 /// control that drives a multiresolution model accordingly (ViewControl).
@@ -22,6 +23,7 @@ namespace terrace::tri {
 struct Plane {
   Point3 normal{};
   double offset = 1.0;
+  bool operator==(const Plane&) const = default;
 };
 
 /// A camera's field of view and scale. The field of view is the intersection of five half spaces:
@@ -36,6 +38,7 @@ struct Camera {
   /// Pixels per ground unit: at distance 1 (perspective), or anywhere (orthographic).
   double pixels = 1.0;
   double height = 1.0;  ///< of the picture, in ground units (orthographic only)
+  bool operator==(const Camera&) const = default;
 };
 
 /// Position and viewing direction of a camera. `up` must not be parallel to `direction`. Neither
@@ -62,6 +65,7 @@ Camera matrix_camera(const std::array<double, 16>& view_projection, double viewp
 struct ErrorRegion {
   Box3 box;
   double error = 0.0;  ///< ground units
+  bool operator==(const ErrorRegion&) const = default;
 };
 
 /// The wanted detail. Each part asks for some clusters. A cluster is wanted if any of them asks for
@@ -77,6 +81,7 @@ struct View {
   std::vector<ErrorRegion> regions;
   /// As in Detail.
   std::vector<Focus> focuses;
+  bool operator==(const View&) const = default;
 };
 
 /// Directions of the normals of a cluster's surface.
@@ -88,6 +93,20 @@ struct NormalCone {
 /// The cone of a terrain no steeper than the height range of a cluster over the shorter side of its
 /// box. This is an estimate, because only the box of a cluster is known before it is read.
 NormalCone terrain_cone(const ClusterRecord& record);
+
+/// Maps columns, rows and heights of a raster to ground coordinates.
+struct RasterFrame {
+  std::array<double, 9> linear{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< row-major, not singular
+  Point3 origin{};  ///< ground coordinates of column 0, row 0, height 0
+
+  [[nodiscard]] Point3 operator()(const Point3& p) const;
+  /// The box around a mapped box.
+  [[nodiscard]] Box3 operator()(const Box3& box) const;
+  /// Ground units of height per unit of the raster's heights.
+  [[nodiscard]] double height_scale() const { return linear[8] < 0 ? -linear[8] : linear[8]; }
+  /// The columns and rows in a box on the ground, up to rounding. Its heights are not changed.
+  [[nodiscard]] Box3 cells(const Box3& ground) const;
+};
 
 struct ViewOptions {
   /// A cluster is expanded when its error exceeds the tolerance, and collapsed when it falls below
@@ -104,6 +123,7 @@ struct ViewOptions {
   /// exceeds this and is not below collapse_below. Infinity: never ahead of time.
   double ask_above = 0.85;
   /// Maximum number of points in the model. The root's points are always present.
+  /// ThinnedDelaunay2: maximum number of vertices. At most 16 times as many points are loaded.
   std::size_t max_points = std::size_t{1} << 28;
   /// Memory for the delivered clusters that are kept, see ViewControl::give().
   std::size_t max_cached_bytes = std::size_t{1} << 28;
@@ -114,6 +134,9 @@ struct ViewOptions {
   /// Returns the normals of a cluster. Called once, when its parent is expanded. Empty:
   /// terrain_cone().
   std::function<NormalCone(ClusterId, const ClusterRecord&)> cone;
+  /// ThinnedDelaunay2 only: the raster's frame, and whether samples are missing inside it.
+  RasterFrame raster;
+  bool raster_has_gaps = false;
   ModelOptions model;
 };
 
@@ -137,7 +160,10 @@ struct StepBudget {
 class StepMeter {
  public:
   /// Kinds of operations, each with its own rates.
-  static constexpr std::size_t kExpand = 0, kCollapse = 1;
+  static constexpr std::size_t kExpand = 0, kCollapse = 1, kThin = 2;
+  /// Expansions whose points are not vertices yet, so that they cost nothing after the step.
+  static constexpr std::size_t kLoad = 3;
+  static constexpr std::size_t kKinds = 4;
 
   void start(const StepBudget& budget);
   /// True if one more operation on this many points may begin, because it fits or is the first one.
@@ -172,11 +198,11 @@ class StepMeter {
   bool timed_ = false;
   double begin_ = 0.0, last_ = 0.0;
   std::size_t operations_ = 0;
-  std::array<std::size_t, 2> points_{};  ///< by kind
+  std::array<std::size_t, kKinds> points_{};  ///< by kind
   bool fixed_done_ = false;
   // Estimates from previous steps: seconds per point of operations by kind and of the end, seconds
   // of the fixed work, and points of an operation by kind.
-  std::array<double, 2> operation_rate_{}, usual_points_{};
+  std::array<double, kKinds> operation_rate_{}, usual_points_{};
   double end_rate_ = 0.0, fixed_ = 0.0;
 };
 
@@ -237,6 +263,9 @@ enum class ViewPin : std::uint8_t { expanded, collapsed };
 ///
 /// Triangulation: one of
 /// - Delaunay2, for points in the plane with heights
+/// - ThinnedDelaunay2, for rasters. Errors are ranges of heights, and the vertices are only those
+///   that View asks for in each window. View::ground_error and View::regions hold at every sample,
+///   for which the clusters that they concern are all expanded.
 /// - RegionalDelaunay2, for the same with elliptical metrics in regions
 /// - DynamicSurface, for scans of surfaces in space. Its shape is part of the cost of a step.
 /// - PointCloud, for points in space alone
@@ -255,6 +284,8 @@ class ViewControl {
   struct Step {
     const Delta* delta = nullptr;
     std::size_t expanded = 0, collapsed = 0;  ///< clusters
+    /// Windows whose vertices were chosen again (ThinnedDelaunay2 only).
+    std::size_t thinned = 0;
     /// Wanted clusters that remain collapsed. missing: not delivered yet. pending: delivered, but
     /// the step's budget was spent, or not examined for that reason. blocked: no room under
     /// max_points or max_cached_bytes.
@@ -339,6 +370,7 @@ template <class Coord>
 using ViewControl2 = ViewControl<Delaunay2<Coord>>;
 
 extern template class ViewControl<Delaunay2<std::int32_t>>;
+extern template class ViewControl<ThinnedDelaunay2>;
 extern template class ViewControl<PointCloud>;
 extern template class ViewControl<Delaunay2<double>>;
 extern template class ViewControl<DynamicSurface<std::int32_t>>;

@@ -27,7 +27,7 @@ class Checker {
         heights_(window.heights.data()),
         flags_(window.heights.size() + tin::kCheckLanes, 0),
         window_{heights_, flags_.data(), window.columns, window.rows, tolerance},
-        scan_(tin::scans(set).check<T>()) {}
+        scan_(tin::check_scans(set).of<T>()) {}
 
   /// Measures a triangle. Returns twice its area, of the points as given.
   double visit(const Point3& a, Point3 b, Point3 c) {

@@ -86,7 +86,7 @@ RasterSamples<T>::RasterSamples(const GridWindow<Height>& window, const GridTinO
       sides_fixed_(sides_fixed),
       bound_(options.max_error),
       scan_bound_(rounded_down<T>(options.max_error)),
-      scan_(scans(set).grid<T>()) {
+      scan_(grid_scans<T>(set)) {
   const std::size_t stride = round_up(window.columns + kScanPadRight, 16);
   heights_.resize((window.rows + kScanPadBelow) * stride);
   bool gaps = false;

@@ -8,6 +8,8 @@
 
 #include <terrace/base/simd.hpp>
 
+#include "delaunay2/int_kernel.hpp"
+#include "delaunay2/predicates.hpp"
 #include "terrace/tri/grid_tin.hpp"
 #include "tin/ground.hpp"
 #include "tin/lattice.hpp"
@@ -70,7 +72,7 @@ class RasterSamples : public LatticeSamples<RasterSamples<T>, GridCorner<T>> {
   using Sample = GridCorner<T>;
   using RasterMesh = Mesh<std::vector<Vertex>>;
   static constexpr bool kMovesVertices = false;
-  static constexpr bool kThinDelaunay = false;
+  static constexpr Fills kFills = Fills::wide;
 
   /// `sides_fixed`: samples on the window's sides are not tested and do not become vertices.
   template <class Height>
@@ -121,6 +123,22 @@ class RasterSamples : public LatticeSamples<RasterSamples<T>, GridCorner<T>> {
   GridSamples<T> samples_;
   GridSamples<T> coarse_{};  ///< those of every kGridCoarse-th column and row
   std::optional<GridGaps> gaps_;
+};
+
+/// The samples of a window for a mesh that remains the canonical Delaunay triangulation of its
+/// vertices: that of Delaunay2<std::int32_t> for points (column, row).
+template <class T>
+class CanonicalSamples : public RasterSamples<T> {
+ public:
+  using Vertex = typename RasterSamples<T>::Vertex;
+  using Hole = LatticeHole<CanonicalSamples>;
+  static constexpr Fills kFills = Fills::delaunay;
+
+  using RasterSamples<T>::RasterSamples;
+
+  static bool in_circle(const Vertex& a, const Vertex& b, const Vertex& c, const Vertex& p) {
+    return planar::inside_circle<planar::IntKernel>({a.x, a.y}, {b.x, b.y}, {c.x, c.y}, {p.x, p.y});
+  }
 };
 
 }  // namespace terrace::tri::tin

@@ -113,8 +113,8 @@ void Fan::assign_samples(Sample* samples, std::uint32_t head, std::uint32_t excl
       const double dy = sample.y - apex_.y;
       const std::size_t s = many ? sector_of_many(dx, dy) : sector_of(dx, dy);
       const Plane& plane = planes_[s];
-      const double height =
-          plane.sound ? apex_.z + (plane.gx * dx + plane.gy * dy) : height_without_plane(s, sample);
+      const double height = plane.reliable ? apex_.z + (plane.gx * dx + plane.gy * dy)
+                                           : height_without_plane(s, sample);
       const double error = std::abs(height - sample.z);
       Sector& sector = sectors_[s];
       *sector.end = i;

@@ -98,7 +98,7 @@ bool PointHole::out_of_reach(std::size_t sample) const {
            apexes &= apexes - 1) {
         const auto m = static_cast<std::size_t>(std::countr_zero(apexes));
         const Plane plane = plane_of(ring_[i], ring_[m], ring_[j]);
-        if (plane.sound && !(error_at(plane, ring_[i], sample) > bound)) return false;
+        if (plane.reliable && !(error_at(plane, ring_[i], sample) > bound)) return false;
       }
     }
   }
@@ -151,7 +151,7 @@ double PointHole::error_at(const Plane& plane, const Vertex& a, std::size_t samp
 double PointHole::worst(std::size_t i, std::size_t m, std::size_t j, double limit) {
   const Vertex& a = ring_[i];
   const Plane plane = plane_of(a, ring_[m], ring_[j]);
-  if (!plane.sound) return kImpossible;
+  if (!plane.reliable) return kImpossible;
   const std::uint64_t* const first = sides(i, m).left;
   const std::uint64_t* const second = sides(m, j).left;
   const std::uint64_t* const chord = sides(i, j).right;

@@ -13,7 +13,7 @@ namespace terrace::tri::tin::points {
 using Kernel = planar::DoubleKernel;
 using Place2 = std::array<double, 2>;
 
-/// The predicates of Kernel for integers of at most about 2^15 in absolute value.
+/// The predicates of Kernel for integers from 0 to 2^15. Larger or negative ones would overflow.
 struct SmallIntegerKernel {
   /// Exact, because products are exact.
   static int orientation(const Place2& a, const Place2& b, const Place2& c) {
@@ -42,9 +42,10 @@ struct Vertex {
   std::uint32_t sample;  ///< its index, or kNone for a vertex of the frame
 };
 
-inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;
-inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;
-inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;
+// Values of Sample::next for samples that are in no list.
+inline constexpr std::uint32_t kOutside = 0xFFFFFFFEu;   ///< outside the mesh
+inline constexpr std::uint32_t kIsVertex = 0xFFFFFFFDu;  ///< at a vertex of the mesh
+inline constexpr std::uint32_t kUnlisted = 0xFFFFFFFCu;  ///< not located yet
 
 /// A sample as a member of its triangle's list. It takes half a cache line, so following the list
 /// also loads the values to measure.
@@ -52,7 +53,7 @@ struct Sample {
   double x;
   double y;
   double z;
-  std::uint32_t next;  ///< next in the list, kNone at its end, or why it is not listed
+  std::uint32_t next;  ///< next in the list, kNone at its end, or one of the values above
   /// The caller's number, with kStuck set if it cannot become a vertex.
   std::uint32_t id;
 };
@@ -68,12 +69,12 @@ Place2 place(const At& at) {
   return {at.x, at.y};
 }
 
-/// The plane of a triangle relative to one of its vertices. `sound`: true if doubles can resolve
-/// its slope.
+/// The gradient of a triangle's plane: height per unit of x and of y. `reliable`: false if the
+/// triangle is too thin for doubles to resolve it.
 struct Plane {
   double gx;
   double gy;
-  bool sound;
+  bool reliable;
 };
 inline Plane plane_of(const Vertex& p, const Vertex& a, const Vertex& b) {
   const double ux = a.x - p.x;
@@ -103,7 +104,7 @@ inline double height_in(const Vertex& a, const Vertex& b, const Vertex& c, doubl
   const double wb = positive(cx * ay - cy * ax);
   const double wc = positive(ax * by - ay * bx);
   const double sum = wa + wb + wc;
-  // If all are zero, the place is a vertex, or the triangle's area is zero in doubles.
+  // If all are zero, the triangle's area is zero in doubles: takes the nearest vertex.
   if (!(sum > 0)) {
     const double da = ax * ax + ay * ay;
     const double db = bx * bx + by * by;

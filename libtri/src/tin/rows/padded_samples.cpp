@@ -55,7 +55,8 @@ double per_unit(std::span<const double> places) {
   return extent > 0.0 ? static_cast<double>(places.size() - 1) / extent : 0.0;
 }
 
-/// Copies rows of `columns` numbers into longer rows.
+/// Copies rows of `columns` numbers into rows of `stride`, and fills the rest, and one more row,
+/// with kMissing.
 std::vector<double> pad_rows(std::span<const double> from, std::size_t columns,
                              std::size_t stride) {
   const std::size_t rows = from.size() / columns;
@@ -69,7 +70,8 @@ std::vector<double> pad_rows(std::span<const double> from, std::size_t columns,
   return to;
 }
 
-/// Copies the heights of samples inside the frame. `place_of(row, column)` returns x and y.
+/// Copies the heights, with kMissing for samples outside the frame, and counts all samples that
+/// have one. `place_of(row, column)` returns x and y. Throws as point_tin() does.
 template <class PlaceOf>
 void copy_heights(std::span<const double> from, std::size_t columns, const base::Box2& region,
                   const PlaceOf& place_of, PaddedSamples& out) {
@@ -89,30 +91,33 @@ void copy_heights(std::span<const double> from, std::size_t columns, const base:
   }
 }
 
-/// Finds the affine map between places and columns and rows by least squares over some samples.
+/// Finds the affine map from places to columns and rows by least squares over 8 x 8 samples.
+/// Returns false if they are on one line or not finite.
 bool find_lattice(const SampleGrid& samples, std::size_t rows, RowSamples& layout) {
-  constexpr std::size_t kEach = 8;
+  constexpr std::size_t kSamplesPerAxis = 8;
   const auto spread = [](std::size_t i, std::size_t count) {
-    return i * (count - 1) / (kEach - 1);
+    return i * (count - 1) / (kSamplesPerAxis - 1);
   };
   const double middle_column = static_cast<double>(samples.columns - 1) / 2;
   const double middle_row = static_cast<double>(rows - 1) / 2;
   std::array<double, 2> mean{}, by_column{}, by_row{};
   double columns_squared = 0, rows_squared = 0;
-  for (std::size_t j = 0; j < kEach; ++j) {
-    for (std::size_t i = 0; i < kEach; ++i) {
+  for (std::size_t j = 0; j < kSamplesPerAxis; ++j) {
+    for (std::size_t i = 0; i < kSamplesPerAxis; ++i) {
       // Mirrored, so that rounding keeps the chosen samples symmetric about the middle.
-      const std::size_t column = i < kEach / 2
-                                     ? spread(i, samples.columns)
-                                     : samples.columns - 1 - spread(kEach - 1 - i, samples.columns);
-      const std::size_t row =
-          j < kEach / 2 ? spread(j, rows) : rows - 1 - spread(kEach - 1 - j, rows);
+      const std::size_t column =
+          i < kSamplesPerAxis / 2
+              ? spread(i, samples.columns)
+              : samples.columns - 1 - spread(kSamplesPerAxis - 1 - i, samples.columns);
+      const std::size_t row = j < kSamplesPerAxis / 2
+                                  ? spread(j, rows)
+                                  : rows - 1 - spread(kSamplesPerAxis - 1 - j, rows);
       const std::size_t at = row * samples.columns + column;
       const double c = static_cast<double>(column) - middle_column;
       const double r = static_cast<double>(row) - middle_row;
       const std::array<double, 2> place{samples.x[at], samples.y[at]};
       for (std::size_t k = 0; k < 2; ++k) {
-        mean[k] += place[k] / (kEach * kEach);
+        mean[k] += place[k] / (kSamplesPerAxis * kSamplesPerAxis);
         by_column[k] += c * place[k];
         by_row[k] += r * place[k];
       }

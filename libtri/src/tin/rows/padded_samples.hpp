@@ -12,13 +12,13 @@
 
 namespace terrace::tri::tin::rows {
 
-/// Upper limit of coordinates of frames, below which predicates are exact in 128 bits.
+/// Coordinates of frames are below this, so that predicates are exact in 128 bits.
 inline constexpr double kMaxCoordinate = 0x1p20;
 /// The largest number of columns or rows that fits into Triangle::place.
 inline constexpr std::size_t kMaxRows = 65535;
 
-/// True if the frame is an axis-parallel rectangle with integer coordinates from 0 to
-/// kMaxCoordinate and lists its vertices counter-clockwise along the sides, including the corners.
+/// True if the frame is an axis-parallel rectangle with integer coordinates of at least 0 and below
+/// kMaxCoordinate, and lists its vertices counter-clockwise along the sides, including the corners.
 bool is_rectangle(std::span<const Point3> frame);
 
 /// Samples with the padding that scans require. Samples outside the frame are omitted.

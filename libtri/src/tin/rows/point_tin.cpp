@@ -88,7 +88,7 @@ class PlacedSamples : public LatticeSamples<PlacedSamples, PlacedVertex> {
   using Sample = RowCorner;
   using PlacedMesh = Mesh<std::vector<Vertex>>;
   static constexpr bool kMovesVertices = true;
-  static constexpr bool kThinDelaunay = true;
+  static constexpr Fills kFills = Fills::wide_or_delaunay;
 
   PlacedSamples(PaddedSamples padded, const PointTinOptions& options, base::SimdPath set);
 
@@ -145,7 +145,7 @@ PlacedSamples::PlacedSamples(PaddedSamples padded, const PointTinOptions& option
       lattice_(*options.lattice),
       padded_(std::move(padded)),
       samples_(padded_.view()),
-      scan_(scans(set).rows[samples_.upright ? 1 : 0]) {}
+      scan_(row_scans(set)[samples_.upright ? 1 : 0]) {}
 
 float PlacedSamples::least_error() const {
   return static_cast<float>(std::clamp(bound_, 1e-30, 1e30));
