@@ -24,7 +24,7 @@ bool is_small() { return std::getenv("TERRACE_BENCH_SMALL") != nullptr; }
 
 struct Input {
   StoreSchema schema;
-  std::vector<testing::OwnedBlock> blocks;
+  std::vector<store::RawBlock> blocks;
   std::uint64_t points = 0;
 };
 
@@ -66,7 +66,7 @@ std::filesystem::path store_path(bool grid) {
 
 std::uint64_t write(const Input& in, const std::filesystem::path& path) {
   StoreWriter writer(path, in.schema, /*replace=*/true);
-  for (const testing::OwnedBlock& block : in.blocks) {
+  for (const store::RawBlock& block : in.blocks) {
     if (&block == &in.blocks.back()) return writer.finish(block.view());
     writer.append(writer.encode(block.view()));
   }
@@ -98,7 +98,7 @@ void encode(benchmark::State& state, bool grid) {
   const auto path = store_path(grid).string() + "-encode";
   StoreWriter writer(path, in.schema, true);
   std::vector<ClusteredBlock> level0;
-  for (const testing::OwnedBlock& block : in.blocks) {
+  for (const store::RawBlock& block : in.blocks) {
     if (block.level == 0) level0.push_back(block.view());
   }
   // Tables are made from 64 blocks; a small input is repeated as often as necessary.

@@ -87,7 +87,7 @@ void grow(std::mt19937_64& random, Octree& octree, const OctreeNode& node, std::
     if (random() % 100 >= 48 + 20 / (node.depth + 1)) continue;
     OctreeNode next{.depth = node.depth + 1};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      next.place[axis] = 2 * node.place[axis] + (child >> axis & 1);
+      next.position[axis] = 2 * node.position[axis] + (child >> axis & 1);
     }
     grow(random, octree, next, offset);
   }
@@ -117,7 +117,7 @@ TEST(CopcHierarchy, PagesContainAllNodesAndAreBounded) {
     std::erase_if(with_points, [](const OctreeNode& node) { return node.points == 0; });
     ASSERT_EQ(read.nodes.size(), with_points.size());
     for (std::size_t i = 0; i < with_points.size(); ++i) {
-      ASSERT_EQ(name_of(read.nodes[i]), name_of(with_points[i]));
+      ASSERT_EQ(key_of(read.nodes[i]), key_of(with_points[i]));
       ASSERT_EQ(read.nodes[i].offset, with_points[i].offset);
       ASSERT_EQ(read.nodes[i].bytes, with_points[i].bytes);
       ASSERT_EQ(read.nodes[i].points, with_points[i].points);

@@ -35,7 +35,7 @@ struct BuiltNode {
   std::vector<std::pair<Place, std::uint32_t>> points{};  ///< with the number of each
 
   bool operator==(const BuiltNode& other) const {
-    return name_of(node) == name_of(other.node) && points == other.points;
+    return key_of(node) == key_of(other.node) && points == other.points;
   }
 };
 
@@ -84,7 +84,7 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
   std::vector<bool> found_numbers(places.size());
   std::set<std::string> names;
   for (const BuiltNode& node : nodes) {
-    EXPECT_TRUE(names.insert(name_of(node.node)).second);
+    EXPECT_TRUE(names.insert(key_of(node.node)).second);
     std::uint32_t last = 0;
     for (const auto& [place, number] : node.points) {
       EXPECT_FALSE(found_numbers[number]);
@@ -94,7 +94,7 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
       last = number;
       const Place in = cell_of(place, node.node.depth, 0);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        EXPECT_EQ(static_cast<std::uint32_t>(in[axis]), node.node.place[axis]);
+        EXPECT_EQ(static_cast<std::uint32_t>(in[axis]), node.node.position[axis]);
       }
     }
   }
@@ -110,9 +110,9 @@ std::vector<BuiltNode> expect_octree(const std::vector<Place>& places) {
     std::map<Place, std::size_t> cell_counts;  // points of each cell in nodes down to this depth
     std::set<Place> all, leaves;
     for (const BuiltNode& node : nodes) {
-      const Place at{static_cast<std::int32_t>(node.node.place[0]),
-                     static_cast<std::int32_t>(node.node.place[1]),
-                     static_cast<std::int32_t>(node.node.place[2])};
+      const Place at{static_cast<std::int32_t>(node.node.position[0]),
+                     static_cast<std::int32_t>(node.node.position[1]),
+                     static_cast<std::int32_t>(node.node.position[2])};
       if (node.node.depth == depth && in_cubes[at] <= OctreeBuilder::kLeafPoints) leaves.insert(at);
     }
     for (const BuiltNode& node : nodes) {
@@ -149,7 +149,7 @@ TEST(OctreeBuilder, SurfacesAreEvenAtEachDepth) {
   const std::vector<BuiltNode> nodes = expect_octree(places);
   EXPECT_GT(nodes.size(), 10u);
   // The last is the root, the coarsest part.
-  EXPECT_EQ(name_of(nodes.back().node), "0-0-0-0");
+  EXPECT_EQ(key_of(nodes.back().node), "0-0-0-0");
 }
 
 TEST(OctreeBuilder, KeepsFewPointsInOneNode) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "point_files.hpp"
+#include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/mesh_writer.hpp"
 
 namespace terrace::stream {
@@ -228,6 +229,54 @@ TEST_F(MeshOutput, GlbStoresPositionsRelativeToItsOrigin) {
       }
     }
   }
+}
+
+/// A triangle with a value before and after its normals, the second of which is unknown.
+const std::vector<std::string> kAroundNormals{"level", "nx", "ny", "nz", "weight"};
+const std::vector<float> kNormalValues{1, 0.6F, 0, 0.8F, 7, 2, 0, 0, 0, 8, 3, 0, -1, 0, 9};
+
+void write_with_normals(const std::string& path, const WriterOptions& options = {}) {
+  const auto writer = open_mesh_writer(
+      path, {.vertices = 3, .triangles = 1, .attributes = kAroundNormals}, options);
+  writer->add_vertices(std::vector<Point3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, kNormalValues);
+  writer->add_triangles(std::vector<TriangleIndices>{{0, 1, 2}});
+  writer->finish();
+}
+
+TEST_F(MeshOutput, GlbHasUnitNormalsWithYUp) {
+  write_with_normals(path("n.glb"));
+  const Glb glb(read_text(path("n.glb")));
+  const auto& primitive = glb.json["meshes"][0]["primitives"][0];
+  const auto& attributes = primitive["attributes"];
+  EXPECT_EQ(attributes.size(), 4u);
+  const std::size_t normal = attributes["NORMAL"];
+  EXPECT_EQ(glb.json["accessors"][normal]["type"], "VEC3");
+  const float expected[3][3] = {{0.6F, 0.8F, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (std::size_t v = 0; v < 3; ++v) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_EQ(glb.value<float>(normal, v, k), expected[v][k]) << v << " " << k;
+    }
+    EXPECT_EQ(glb.value<float>(attributes["_LEVEL"], v, 0), static_cast<float>(1 + v));
+    EXPECT_EQ(glb.value<float>(attributes["_WEIGHT"], v, 0), static_cast<float>(7 + v));
+    EXPECT_EQ(glb.value<std::uint32_t>(primitive["indices"], v, 0), v);
+  }
+  const auto back = read_mesh(path("n.glb"));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->triangles, (std::vector<TriangleIndices>{{0, 1, 2}}));
+}
+
+TEST_F(MeshOutput, ObjAndPlyHaveNormals) {
+  write_with_normals(path("n.obj"));
+  EXPECT_EQ(read_text(path("n.obj")),
+            "v 0 0 0\nvn 0.6 0 0.8\nv 1 0 0\nvn 0 0 0\nv 0 1 0\nvn 0 -1 0\nf 1//1 2//2 3//3\n");
+  const auto back = read_mesh(path("n.obj"));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->triangles, (std::vector<TriangleIndices>{{0, 1, 2}}));
+  write_with_normals(path("n.ply"), {.format = "ply-ascii"});
+  const std::string ply = read_text(path("n.ply"));
+  EXPECT_NE(ply.find("property float nx\nproperty float ny\nproperty float nz\n"),
+            std::string::npos);
+  EXPECT_NE(ply.find("\n0 0 0 1 0.6 0 0.8 7\n"), std::string::npos) << ply;
 }
 
 TEST_F(MeshOutput, GlbIsInMetres) {

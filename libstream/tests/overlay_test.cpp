@@ -29,14 +29,13 @@ namespace {
 namespace fs = std::filesystem;
 using testing::bytes_of;
 using testing::contains;
-using testing::TemporaryFolder;
 using testing::write_bytes;
 using Values = std::map<std::pair<ClusterId, std::uint32_t>, double>;
 
 Store make_store(const fs::path& path, int side, std::uint64_t seed) {
   testing::write_store(
       path, testing::grid_schema(ScalarType::i16),
-      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, side, side, 20, seed),
+      testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, side, side, 20, seed),
       {.block_points = 400, .cluster_points = 10, .scale = {1, 1, 1}});
   return Store::open(path);
 }
@@ -96,7 +95,7 @@ std::string refusal(const fs::path& path, const Store& store) {
 }
 
 TEST(StoreOverlay, RoundTrips) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const Store store = make_store(folder.path() / "s", 110, 1);
   int number = 0;
   for (const double part : {0.0, 0.0005, 0.03, 0.6, 1.0}) {
@@ -137,7 +136,7 @@ TEST(StoreOverlay, RoundTrips) {
 }
 
 TEST(StoreOverlay, IsEmptyForAnEmptyStore) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   testing::write_store(folder.path() / "s", testing::cloud_schema(), {},
                        {.block_points = 400, .cluster_points = 10, .scale = {1, 1, 1}});
   const Store store = Store::open(folder.path() / "s");
@@ -150,7 +149,7 @@ TEST(StoreOverlay, IsEmptyForAnEmptyStore) {
 }
 
 TEST(StoreOverlay, WriterRefusesInvalidValuesAndContinues) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 24, 1);
   OverlayWriter writer(path, store, "height");
@@ -181,7 +180,7 @@ TEST(StoreOverlay, WriterRefusesInvalidValuesAndContinues) {
 }
 
 TEST(StoreOverlay, AppearsCompleteOrNotAtAll) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 24, 1);
   { OverlayWriter(path, store, "height").add(store.root(), 0, 1); }
@@ -196,7 +195,7 @@ TEST(StoreOverlay, AppearsCompleteOrNotAtAll) {
 }
 
 TEST(StoreOverlay, NamesBothChecksumsIfMadeForAnotherStore) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const Store one = make_store(folder.path() / "one", 24, 1);
   const Store two = make_store(folder.path() / "two", 24, 2);
   const Store same = make_store(folder.path() / "same", 24, 1);
@@ -221,7 +220,7 @@ TEST(StoreOverlay, NamesBothChecksumsIfMadeForAnotherStore) {
 }
 
 TEST(StoreOverlay, FindsFlippedBytesAndTruncations) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 24, 1);
   write(path, store, some_values(store, 0.1, 1));
@@ -254,7 +253,7 @@ void repair(std::string& bytes, std::size_t header, std::size_t directory,
 }
 
 TEST(StoreOverlay, DamageWithGoodChecksumsIsRefusedOrConsistent) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "o";
   const Store store = make_store(folder.path() / "s", 110, 1);
   write(path, store, some_values(store, 0.9, 1));

@@ -180,7 +180,7 @@ TEST_F(Ply, RejectsTruncationAtAnyByteOrReadsAllVertices) {
   }
 }
 
-TEST_F(Ply, RefusesHostileHeaders) {
+TEST_F(Ply, RejectsHostileHeaders) {
   const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
   const std::string ascii = "ply\nformat ascii 1.0\n";
   const std::string binary = "ply\nformat binary_little_endian 1.0\n";
@@ -247,7 +247,7 @@ TEST_F(Ply, RefusesHostileHeaders) {
   }
 }
 
-TEST_F(Ply, RefusesDamagedBodies) {
+TEST_F(Ply, RejectsDamagedBodies) {
   const std::string ascii =
       "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
       "property float z\nproperty uchar red\nend_header\n";

@@ -19,8 +19,7 @@
 namespace terrace::stream {
 namespace {
 
-using testing::Block;
-using testing::TemporaryFolder;
+using testing::PushedBlock;
 using testing::uniform;
 
 template <class T>
@@ -73,7 +72,7 @@ void check_repacked(const std::filesystem::path& folder) {
   const std::uint64_t bytes = repack(before, folder / "r", false, 3);
   const Store after = Store::open(folder / "r");
   EXPECT_EQ(after.bytes(), bytes);
-  EXPECT_TRUE(after.verify(testing::expect_no_problem));
+  EXPECT_TRUE(after.verify(testing::fail_on_problem));
   const std::size_t content = content_of(before);
   EXPECT_EQ(content_of(after), content);
   EXPECT_EQ(after.points(), before.points());
@@ -86,11 +85,11 @@ void check_repacked(const std::filesystem::path& folder) {
   // A store that is in order already keeps its contents.
   repack(after, folder / "again", false, 2);
   const Store again = Store::open(folder / "again");
-  EXPECT_TRUE(again.verify(testing::expect_no_problem));
+  EXPECT_TRUE(again.verify(testing::fail_on_problem));
   EXPECT_EQ(content_of(again), content);
 }
 
-std::vector<Block> reordered(std::vector<Block> blocks, std::uint64_t seed) {
+std::vector<PushedBlock> reordered(std::vector<PushedBlock> blocks, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   for (std::size_t i = blocks.size(); i > 1; --i) std::swap(blocks[i - 1], blocks[random() % i]);
   return blocks;
@@ -98,10 +97,10 @@ std::vector<Block> reordered(std::vector<Block> blocks, std::uint64_t seed) {
 
 TEST(Repack, KeepsContentsOfRasters) {
   for (const ScalarType type : {ScalarType::i16, ScalarType::f32, ScalarType::u64}) {
-    for (const auto relief : {testing::Relief::flat, testing::Relief::fractal,
-                              testing::Relief::extreme, testing::Relief::decimal}) {
+    for (const auto relief : {testing::ReliefKind::flat, testing::ReliefKind::fractal,
+                              testing::ReliefKind::extreme, testing::ReliefKind::decimal}) {
       SCOPED_TRACE(static_cast<int>(type) * 10 + static_cast<int>(relief));
-      const TemporaryFolder folder;
+      const TempFolder folder;
       testing::write_store(folder.path() / "s", testing::grid_schema(type),
                            reordered(testing::grid_blocks(type, relief, 100, 90, 20, 1), 2),
                            {.block_points = 400, .cluster_points = 9});
@@ -112,22 +111,23 @@ TEST(Repack, KeepsContentsOfRasters) {
 
 TEST(Repack, KeepsContentsOfClouds) {
   std::mt19937_64 random(7);
-  for (const auto numbers :
-       {testing::Numbers::decimals, testing::Numbers::floats, testing::Numbers::doubles,
-        testing::Numbers::extremes, testing::Numbers::mixed, testing::Numbers::lines}) {
-    SCOPED_TRACE(static_cast<int>(numbers));
+  for (const auto kind : {testing::CoordinateKind::decimals, testing::CoordinateKind::floats,
+                          testing::CoordinateKind::doubles, testing::CoordinateKind::extremes,
+                          testing::CoordinateKind::mixed, testing::CoordinateKind::lines}) {
+    SCOPED_TRACE(static_cast<int>(kind));
     StoreSchema schema = testing::cloud_schema();
     for (const ScalarType type : testing::kAllTypes) {
       schema.attributes.push_back(testing::channel("a", type));
       schema.attributes.back().name += std::to_string(schema.attributes.size());
     }
-    std::vector<Block> blocks = testing::cloud_blocks(numbers, 6000 / TERRACE_TEST_SHARE, 300, 3);
-    for (Block& block : blocks) {
+    std::vector<PushedBlock> blocks =
+        testing::cloud_blocks(kind, 6000 / TERRACE_TEST_SHARE, 300, 3);
+    for (PushedBlock& block : blocks) {
       block.payload.resize(block.positions.size() * schema.payload_size());
       const bool still = random() % 3 == 0;
       for (std::byte& byte : block.payload) byte = still ? std::byte{1} : std::byte(random() % 256);
     }
-    const TemporaryFolder folder;
+    const TempFolder folder;
     testing::write_store(folder.path() / "s", schema, blocks,
                          {.block_points = 300, .cluster_points = 10});
     check_repacked(folder.path());
@@ -136,28 +136,28 @@ TEST(Repack, KeepsContentsOfClouds) {
 
 /// More than one segment, with different tables, and more blocks than are encoded in parallel.
 TEST(Repack, KeepsStoresOfManyBlocks) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   testing::write_store(
       folder.path() / "s", testing::grid_schema(ScalarType::u8),
-      testing::grid_blocks(ScalarType::u8, testing::Relief::fractal, 960, 900, 30, 5),
+      testing::grid_blocks(ScalarType::u8, testing::ReliefKind::fractal, 960, 900, 30, 5),
       {.block_points = 900, .cluster_points = 20});
   check_repacked(folder.path());
 }
 
 TEST(Repack, KeepsStoresOfFewPoints) {
   for (const std::size_t points : {0u, 1u, 40u}) {
-    const TemporaryFolder folder;
+    const TempFolder folder;
     testing::write_store(folder.path() / "s", testing::cloud_schema(),
-                         testing::cloud_blocks(testing::Numbers::decimals, points, 20, 1),
+                         testing::cloud_blocks(testing::CoordinateKind::decimals, points, 20, 1),
                          {.block_points = 50, .cluster_points = 5});
     check_repacked(folder.path());
   }
 }
 
 TEST(Repack, ReplacesOnlyIfAsked) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   testing::write_store(folder.path() / "s", testing::cloud_schema(),
-                       testing::cloud_blocks(testing::Numbers::decimals, 500, 100, 1),
+                       testing::cloud_blocks(testing::CoordinateKind::decimals, 500, 100, 1),
                        {.block_points = 100, .cluster_points = 5});
   const Store store = Store::open(folder.path() / "s");
   EXPECT_THROW(repack(store, folder.path() / "s"), Error);
@@ -168,9 +168,9 @@ TEST(Repack, ReplacesOnlyIfAsked) {
 
 /// Neighbouring clusters are read together, however the store was built.
 TEST(Repack, ReadsWindowsInFewerPieces) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto write = [&](const char* name, const StoreSchema& schema,
-                         const std::vector<Block>& blocks) {
+                         const std::vector<PushedBlock>& blocks) {
     testing::write_store(folder.path() / name, schema, blocks,
                          {.block_points = 400, .cluster_points = 10, .scale = {1, 1, 0}});
     const Store store = Store::open(folder.path() / name);
@@ -181,7 +181,7 @@ TEST(Repack, ReadsWindowsInFewerPieces) {
                       testing::pieces_read(folder.path() / packed, boxes).clusters};
   };
   const auto grid =
-      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 400, 400, 20, 4);
+      testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 400, 400, 20, 4);
   const auto in_order = write("rows", testing::grid_schema(ScalarType::i16), grid);
   const auto mixed = write("shuffled", testing::grid_schema(ScalarType::i16), reordered(grid, 9));
   EXPECT_LT(3 * in_order[1], 2 * in_order[0]);
@@ -190,9 +190,9 @@ TEST(Repack, ReadsWindowsInFewerPieces) {
   EXPECT_LT(10 * mixed[1], 11 * in_order[1]);
   // A flat cloud. Its heights have the largest numbers, but must not separate neighbours.
   std::mt19937_64 random(3);
-  std::vector<Block> cloud;
+  std::vector<PushedBlock> cloud;
   for (int tile = 0; tile < 400; ++tile) {
-    Block& block = cloud.emplace_back();
+    PushedBlock& block = cloud.emplace_back();
     for (int i = 0; i < 400; ++i) {
       const double x = tile % 20 + uniform(random), y = tile / 20 + uniform(random);
       block.positions.push_back(

@@ -19,7 +19,6 @@ namespace terrace::stream {
 namespace {
 
 using store::Entry;
-using testing::TemporaryFolder;
 
 /// Returns tables in which every symbol can be coded, so that any cluster can be written.
 store::Tables even_tables(const store::Layout& layout, store::ColumnKind kind) {
@@ -243,7 +242,7 @@ TEST(StoreInvariants, RefusesClustersThatTakeMuchMemory) {
   }
   const std::uint64_t max_points = store::Layout(schema, 0).max_points();
   EXPECT_LE(max_points * schema.payload_size(), std::uint64_t{1} << 28);
-  const TemporaryFolder folder;
+  const TempFolder folder;
   StoreWriter writer(folder.path() / "s", schema);
   const std::vector<Point3> positions(max_points + 1);
   std::vector<std::uint32_t> order(max_points + 1);

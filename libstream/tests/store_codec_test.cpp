@@ -444,7 +444,7 @@ TEST(StoreCodec, BytesDoNotDependOnThreads) {
   for (int b = 0; b < 150; ++b) blocks.push_back(testing::scan_patch(b, 100));
   testing::StandInHierarchy::Options options;
   options.cluster_points = 10;
-  const std::vector<testing::OwnedBlock> recorded = testing::recorded_hierarchy(blocks, options);
+  const std::vector<RawBlock> recorded = testing::recorded_hierarchy(blocks, options);
   const TempFolder folder;
   const auto write = [&](const char* name, unsigned threads) {
     StoreWriter writer(folder.path() / name, {}, false, threads);

@@ -29,7 +29,6 @@ namespace fs = std::filesystem;
 using testing::bytes_of;
 using testing::contains;
 using testing::StandInHierarchy;
-using testing::TemporaryFolder;
 using testing::write_bytes;
 
 /// Overwrites one byte in place. Rewriting complete files would wait for the disk each time.
@@ -61,14 +60,14 @@ void write_small(const fs::path& path, std::uint64_t seed, bool replace = false)
   StandInHierarchy hierarchy(writer,
                              {.block_points = 100, .cluster_points = 10, .scale = {1, 1, 1}});
   for (const auto& block :
-       testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 24, 20, 10, seed)) {
+       testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 24, 20, 10, seed)) {
     hierarchy.push(block.positions);
   }
   hierarchy.finish();
 }
 
 TEST(StoreDamage, FindsEveryFlippedBit) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 1);
   for (const auto& [name, bytes] : files_of(path)) {
@@ -97,11 +96,11 @@ TEST(StoreDamage, FindsEveryFlippedBit) {
       overwrite(path / name, at, bytes[at]);
     }
   }
-  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+  EXPECT_TRUE(Store::open(path).verify(testing::fail_on_problem));
 }
 
 TEST(StoreDamage, ThrowsWhenReadingDamagedClusters) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 2);
   const auto file = path / "level-0.0.clusters";
@@ -115,7 +114,7 @@ TEST(StoreDamage, ThrowsWhenReadingDamagedClusters) {
 }
 
 TEST(StoreDamage, NamesTruncatedAndMissingFiles) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 3);
   for (const auto& [name, bytes] : files_of(path)) {
@@ -130,7 +129,7 @@ TEST(StoreDamage, NamesTruncatedAndMissingFiles) {
 }
 
 TEST(StoreDamage, ReportsStoresOfANewerVersion) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 4);
   std::string text = bytes_of(path / "manifest.json");
@@ -152,7 +151,7 @@ TEST(StoreDamage, ReportsStoresOfANewerVersion) {
 }
 
 TEST(StoreDamage, RefusesWrongOrdinalsAndLevels) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 5);
   const Store store = Store::open(path);
@@ -164,7 +163,7 @@ TEST(StoreDamage, RefusesWrongOrdinalsAndLevels) {
 }
 
 TEST(StoreWriting, RefusesExistingOutputs) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 6);
   const auto before = files_of(path);
@@ -172,7 +171,7 @@ TEST(StoreWriting, RefusesExistingOutputs) {
   EXPECT_EQ(files_of(path), before);
   write_small(path, 7, /*replace=*/true);
   EXPECT_NE(files_of(path), before);
-  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+  EXPECT_TRUE(Store::open(path).verify(testing::fail_on_problem));
 
   fs::create_directory(folder.path() / "other");
   write_bytes(folder.path() / "other" / "precious", "1");
@@ -186,7 +185,7 @@ TEST(StoreWriting, RefusesExistingOutputs) {
 }
 
 TEST(StoreWriting, OfTwoWritersTheFirstToFinishWins) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   StoreWriter first(path, testing::cloud_schema()), second(path, testing::cloud_schema());
   StandInHierarchy a(first, {}), b(second, {});
@@ -198,7 +197,7 @@ TEST(StoreWriting, OfTwoWritersTheFirstToFinishWins) {
 }
 
 TEST(StoreWriting, AbandonedWritersLeaveNothing) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   {
     StoreWriter writer(folder.path() / "s", testing::cloud_schema());
     StandInHierarchy hierarchy(writer, {});
@@ -211,7 +210,7 @@ TEST(StoreWriting, AbandonedWritersLeaveNothing) {
 /// Writes a store in a process that dies before block `last`, if there are that many. Returns
 /// whether the store was completed.
 bool writes_until(const fs::path& path, std::size_t last,
-                  const std::vector<testing::Block>& blocks) {
+                  const std::vector<testing::PushedBlock>& blocks) {
   const pid_t child = ::fork();
   if (child == 0) {
     try {
@@ -237,10 +236,10 @@ bool writes_until(const fs::path& path, std::size_t last,
 
 // tests/cli/crash_cli_test.py tests processes that die within a block, a sync or a rename.
 TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   const auto blocks =
-      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 100, 60, 10, 9);
+      testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 100, 60, 10, 9);
   ASSERT_GT(blocks.size(), 50U);
   for (std::size_t last = 0; last <= blocks.size(); ++last) {
     EXPECT_FALSE(writes_until(path, last, blocks)) << last;
@@ -249,7 +248,7 @@ TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
   }
   EXPECT_TRUE(writes_until(path, blocks.size() + 1, blocks));
   EXPECT_EQ(names_in(folder.path()), (std::vector<std::string>{"s"}));
-  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+  EXPECT_TRUE(Store::open(path).verify(testing::fail_on_problem));
   fs::remove_all(path);
   // The next writer does not touch the files of a live one.
   EXPECT_FALSE(writes_until(path, 1, blocks));
@@ -261,7 +260,7 @@ TEST(StoreWriting, KilledWritersLeaveNothingThatOpensAndAreCleanedUp) {
 }
 
 TEST(StoreWriting, FollowsLinks) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   fs::create_directory(folder.path() / "elsewhere");
   fs::create_symlink("elsewhere/s", folder.path() / "link");
   write_small(folder.path() / "link", 1);
@@ -275,7 +274,7 @@ TEST(StoreWriting, FollowsLinks) {
 
 /// Overlays belong to the store. Any other file prevents replacement, and the message names it.
 TEST(StoreWriting, KeepsStoresThatContainForeignFiles) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 1);
   write_bytes(path / "smooth.overlay", "terrace overlay\nand more");
@@ -302,7 +301,7 @@ TEST(StoreWriting, KeepsStoresThatContainForeignFiles) {
 
 /// A writer may die between the two renames of a replacement.
 TEST(StoreWriting, RestoresAStoreThatWasMovedAside) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   const auto aside = folder.path() / ".s.tmp-1-old";
   write_small(path, 1);
@@ -333,7 +332,7 @@ TEST(StoreWriting, RestoresAStoreThatWasMovedAside) {
 }
 
 TEST(StoreWriting, TrialsLeaveNothing) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   StoreWriter writer(folder.path() / "s", testing::cloud_schema());
   const std::vector<Point3> points{{1, 2, 3}};
   const std::vector<std::uint32_t> first{0, 1}, order{0}, representatives{kNoRepresentative};
@@ -351,7 +350,7 @@ TEST(StoreWriting, TrialsLeaveNothing) {
 }
 
 TEST(StoreWriting, KeepsFilesOfOtherNames) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto name_of_a_dead_writer = [&](const char* store) {
     const StoreWriter writer(folder.path() / store, testing::cloud_schema());
     const std::string name = names_in(folder.path()).front();
@@ -365,10 +364,10 @@ TEST(StoreWriting, KeepsFilesOfOtherNames) {
 }
 
 TEST(StoreWriting, AcceptsTheLongestName) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const fs::path path = folder.path() / std::string(255, 's');
   write_small(path, 10);
-  EXPECT_TRUE(Store::open(path).verify(testing::expect_no_problem));
+  EXPECT_TRUE(Store::open(path).verify(testing::fail_on_problem));
 }
 
 /// Writes a store in a process whose files may not grow beyond `limit`. Returns whether it threw an
@@ -396,7 +395,7 @@ bool throws_under_limit(rlim_t limit, const fs::path& path) {
 }
 
 TEST(StoreWriting, ReportsFullDisksAndLeavesNothing) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   write_small(path, 11);
   std::uint64_t largest = 0;
@@ -413,7 +412,7 @@ TEST(StoreWriting, ReportsFullDisksAndLeavesNothing) {
 }
 
 TEST(StoreWriting, RefusesCoordinatesThatAreNotFinite) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     const std::string words = error_of([&] {
@@ -429,9 +428,9 @@ TEST(StoreWriting, RefusesCoordinatesThatAreNotFinite) {
 /// Returns the files of a store whose blocks are encoded by one thread in order, or by several
 /// ahead of their turn.
 std::map<std::string, std::string> files_for_threads(const StoreSchema& schema,
-                                                     const std::vector<testing::OwnedBlock>& blocks,
+                                                     const std::vector<store::RawBlock>& blocks,
                                                      unsigned ahead) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "s";
   StoreWriter writer(path, schema);
   for (std::size_t start = 0; start < blocks.size(); start += ahead) {

@@ -14,9 +14,8 @@ namespace terrace::stream {
 namespace {
 
 using store::Entry;
-using testing::OwnedBlock;
+using store::RawBlock;
 using testing::StoreFiles;
-using testing::TemporaryFolder;
 
 TEST(StoreInvariants, UpdatingTheChecksumsOfASoundStoreChangesNothing) {
   for (StoreFiles files : {testing::grid_files(), testing::cloud_files()}) {
@@ -25,21 +24,21 @@ TEST(StoreInvariants, UpdatingTheChecksumsOfASoundStoreChangesNothing) {
     EXPECT_TRUE(files == before);
     testing::edit_page(files, 0, 1, [](std::vector<Entry>&, std::uint64_t&) {});
     EXPECT_TRUE(files == before);
-    const TemporaryFolder folder;
+    const TempFolder folder;
     testing::write_files(folder.path(), files);
     EXPECT_EQ(testing::problems_of(Store::open(folder.path())), "");
   }
 }
 
 /// Returns the store of testing::small_blocks() after `edit` changed its hierarchy.
-StoreFiles edited_store(const std::function<void(std::vector<OwnedBlock>&)>& edit) {
+StoreFiles edited_store(const std::function<void(std::vector<RawBlock>&)>& edit) {
   std::vector<std::vector<Point3>> blocks;
   for (const auto& block : testing::small_blocks()) blocks.push_back(block.positions);
-  std::vector<OwnedBlock> recorded = testing::recorded_hierarchy(blocks, testing::kSmallOptions);
+  std::vector<RawBlock> recorded = testing::recorded_hierarchy(blocks, testing::kSmallOptions);
   edit(recorded);
-  const TemporaryFolder folder;
+  const TempFolder folder;
   StoreWriter writer(folder.path() / "s", testing::small_grid());
-  for (const OwnedBlock& block : recorded) {
+  for (const RawBlock& block : recorded) {
     if (block.representatives[0] == kNoRepresentative) {
       writer.finish(block.view());
     } else {
@@ -49,13 +48,13 @@ StoreFiles edited_store(const std::function<void(std::vector<OwnedBlock>&)>& edi
   return testing::read_files(folder.path() / "s");
 }
 
-OwnedBlock& block_of(std::vector<OwnedBlock>& blocks, unsigned level) {
+RawBlock& block_of(std::vector<RawBlock>& blocks, unsigned level) {
   return *std::find_if(blocks.begin(), blocks.end(),
-                       [&](const OwnedBlock& block) { return block.level == level; });
+                       [&](const RawBlock& block) { return block.level == level; });
 }
 
 /// Returns a point of the block that does not represent one of its clusters.
-std::uint32_t first_non_representative(const OwnedBlock& block) {
+std::uint32_t first_non_representative(const RawBlock& block) {
   std::uint32_t point = 0;
   while (std::find(block.representatives.begin(), block.representatives.end(), point) !=
          block.representatives.end()) {
@@ -71,7 +70,7 @@ TEST(StoreInvariants, WritesTheSameStoreFromItsHierarchy) {
 // If two points are parents of the same cluster, another cluster has no parent.
 TEST(StoreInvariants, ReportsClustersWithTwoParentPointsOrNone) {
   const StoreFiles files = edited_store([](auto& blocks) {
-    OwnedBlock& block = block_of(blocks, 1);
+    RawBlock& block = block_of(blocks, 1);
     const std::uint32_t point = first_non_representative(block);
     block.children[point] = block.children[point + 1];
   });
@@ -81,7 +80,7 @@ TEST(StoreInvariants, ReportsClustersWithTwoParentPointsOrNone) {
 
 TEST(StoreInvariants, RejectsChildrenThatDoNotExist) {
   testing::expect_unreadable(edited_store([](auto& blocks) {
-                               OwnedBlock& block = block_of(blocks, 1);
+                               RawBlock& block = block_of(blocks, 1);
                                block.children[first_non_representative(block)] = 1000000;
                              }),
                              "heads a cluster that does not exist");
@@ -89,7 +88,7 @@ TEST(StoreInvariants, RejectsChildrenThatDoNotExist) {
 
 TEST(StoreInvariants, ReportsRepresentativesAtAnotherPosition) {
   testing::expect_problem(edited_store([](auto& blocks) {
-                            OwnedBlock& block = block_of(blocks, 1);
+                            RawBlock& block = block_of(blocks, 1);
                             block.positions[first_non_representative(block)][2] += 1;
                           }),
                           "differ from their parent points");
@@ -97,7 +96,7 @@ TEST(StoreInvariants, ReportsRepresentativesAtAnotherPosition) {
 
 TEST(StoreInvariants, ReportsRepresentativesWithOtherChildren) {
   testing::expect_problem(edited_store([](auto& blocks) {
-                            OwnedBlock& block = block_of(blocks, 1);
+                            RawBlock& block = block_of(blocks, 1);
                             std::swap(block.children[block.representatives[0]],
                                       block.children[block.representatives[1]]);
                           }),
@@ -112,7 +111,7 @@ TEST(StoreInvariants, ReportsWrongNumbersOfDescendants) {
 
 TEST(StoreInvariants, ReportsBoxesThatExcludeClustersBelow) {
   testing::expect_problem(edited_store([](auto& blocks) {
-                            OwnedBlock& block = block_of(blocks, 1);
+                            RawBlock& block = block_of(blocks, 1);
                             const Point3 position = block.positions[block.representatives[0]];
                             block.summaries[0].box = {position, position};
                           }),
@@ -123,7 +122,7 @@ TEST(StoreInvariants, ReportsBoxesThatExcludeClustersBelow) {
 // above must still contain the points themselves.
 TEST(StoreInvariants, VerifyFindsBoxesThatMissOnePoint) {
   for (const int missed : {0, 1, 31}) {
-    const TemporaryFolder folder;
+    const TempFolder folder;
     StoreWriter writer(folder.path() / "s", testing::grid_schema(ScalarType::i16));
     std::vector<Point3> positions;
     std::vector<std::uint32_t> order;

@@ -17,7 +17,6 @@ namespace {
 using nlohmann::ordered_json;
 using store::Entry;
 using testing::StoreFiles;
-using testing::TemporaryFolder;
 
 /// A store whose manifest has fewer columns than its points is refused by every way of reading.
 TEST(StoreInvariants, RefusesPointsOutsideTheRaster) {
@@ -42,7 +41,7 @@ TEST(StoreInvariants, RefusesLevelsWithWrongNumbersOfMembers) {
       m["points"] = level["points"] = level["points"].get<int>() + more;
       level["members"] = level["members"].get<int>() + more;
     });
-    const TemporaryFolder folder;
+    const TempFolder folder;
     testing::write_files(folder.path(), files);
     const Store store = Store::open(folder.path());
     std::uint64_t members = 0;
@@ -220,7 +219,7 @@ StoreFiles with_second_tables(std::uint64_t first, bool damaged) {
 }
 
 TEST(StoreInvariants, ReadsClustersWithTheirSetOfTables) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   testing::write_files(folder.path(), with_second_tables(100, false));
   EXPECT_EQ(testing::problems_of(Store::open(folder.path())), "");
   testing::expect_refused(with_second_tables(0, false),

@@ -7,46 +7,17 @@
 #include <vector>
 
 #include "stand_in_hierarchy.hpp"
+#include "store/write/raw_block.hpp"
 #include "terrace/stream/store.hpp"
 
 /// Realistic inputs for tests and benchmarks of the store.
 
 namespace terrace::stream::testing {
 
-/// A clustered block with its data.
-struct OwnedBlock {
-  unsigned level = 0;
-  std::vector<Point3> positions;
-  std::vector<std::byte> payload;
-  std::vector<std::uint64_t> children;
-  std::vector<std::uint32_t> first, order, representatives;
-  std::vector<ClusterSummary> summaries;
-
-  explicit OwnedBlock(const ClusteredBlock& b)
-      : level(b.level),
-        positions(b.positions.begin(), b.positions.end()),
-        payload(b.payload.begin(), b.payload.end()),
-        children(b.children.begin(), b.children.end()),
-        first(b.first.begin(), b.first.end()),
-        order(b.order.begin(), b.order.end()),
-        representatives(b.representatives.begin(), b.representatives.end()),
-        summaries(b.summaries.begin(), b.summaries.end()) {}
-  [[nodiscard]] ClusteredBlock view() const {
-    return {.level = level,
-            .positions = positions,
-            .payload = payload,
-            .children = children,
-            .first = first,
-            .order = order,
-            .representatives = representatives,
-            .summaries = summaries};
-  }
-};
-
 /// Returns the blocks that a hierarchy would write, the root last, those of each level in order.
-inline std::vector<OwnedBlock> recorded_hierarchy(const std::vector<std::vector<Point3>>& blocks,
-                                                  const StandInHierarchy::Options& options) {
-  std::vector<OwnedBlock> recorded;
+inline std::vector<store::RawBlock> recorded_hierarchy(
+    const std::vector<std::vector<Point3>>& blocks, const StandInHierarchy::Options& options) {
+  std::vector<store::RawBlock> recorded;
   StandInHierarchy hierarchy(0, options,
                              [&](const ClusteredBlock& b) { recorded.emplace_back(b); });
   for (const auto& block : blocks) hierarchy.push(block);

@@ -29,14 +29,14 @@ inline StoreSchema small_grid() {
 
 inline const StandInHierarchy::Options kSmallOptions{.block_points = 200, .cluster_points = 8};
 
-inline std::vector<Block> small_blocks() {
-  return grid_blocks(ScalarType::i16, Relief::fractal, kSmallColumns, kSmallRows, 12, 1);
+inline std::vector<PushedBlock> small_blocks() {
+  return grid_blocks(ScalarType::i16, ReliefKind::fractal, kSmallColumns, kSmallRows, 12, 1);
 }
 
 /// Returns the store of a raster with three levels, and several pages on level 0.
 inline const StoreFiles& grid_files() {
   static const StoreFiles files = [] {
-    const TemporaryFolder folder;
+    const TempFolder folder;
     write_store(folder.path() / "s", small_grid(), small_blocks(), kSmallOptions);
     return read_files(folder.path() / "s");
   }();
@@ -46,9 +46,9 @@ inline const StoreFiles& grid_files() {
 /// Returns the store of a small cloud.
 inline const StoreFiles& cloud_files() {
   static const StoreFiles files = [] {
-    const TemporaryFolder folder;
-    write_store(folder.path() / "s", cloud_schema(), cloud_blocks(Numbers::mixed, 3000, 200, 1),
-                kSmallOptions);
+    const TempFolder folder;
+    write_store(folder.path() / "s", cloud_schema(),
+                cloud_blocks(CoordinateKind::mixed, 3000, 200, 1), kSmallOptions);
     return read_files(folder.path() / "s");
   }();
   return files;
@@ -77,7 +77,7 @@ inline std::string problems_of(const Store& store) {
 /// Expects that the store opens, that reading all of it throws `expected`, and that verify reports
 /// it too.
 inline void expect_unreadable(const StoreFiles& files, const std::string& expected) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   write_files(folder.path(), files);
   const Store store = Store::open(folder.path());
   std::string refused;
@@ -93,7 +93,7 @@ inline void expect_unreadable(const StoreFiles& files, const std::string& expect
 
 /// Expects that verify reports a problem that contains `expected`.
 inline void expect_problem(const StoreFiles& files, const std::string& expected) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   write_files(folder.path(), files);
   const std::string problems = problems_of(Store::open(folder.path()));
   EXPECT_NE(problems.find(expected), problems.npos) << problems << "\nexpected: " << expected;
@@ -101,7 +101,7 @@ inline void expect_problem(const StoreFiles& files, const std::string& expected)
 
 /// Expects that opening the store throws an Error that contains `expected`.
 inline void expect_refused(const StoreFiles& files, const std::string& expected) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   write_files(folder.path(), files);
   const std::string refused = error_of_opening(folder.path());
   EXPECT_NE(refused.find(expected), refused.npos) << refused << "\nexpected: " << expected;

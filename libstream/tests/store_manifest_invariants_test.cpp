@@ -16,7 +16,6 @@ namespace {
 
 using nlohmann::ordered_json;
 using testing::StoreFiles;
-using testing::TemporaryFolder;
 
 struct ManifestCase {
   const char* expected;
@@ -140,7 +139,7 @@ TEST(StoreInvariants, RefusesManifestsWithUnknownWords) {
     StoreFiles files = testing::cloud_files();
     testing::edit_manifest(
         files, [&](ordered_json& m) { parameter(m, std::string(name_of(entities)).c_str()); });
-    const TemporaryFolder folder;
+    const TempFolder folder;
     testing::write_files(folder.path(), files);
     EXPECT_EQ(testing::error_of_opening(folder.path()), "") << name_of(entities);
   }

@@ -24,13 +24,12 @@
 namespace terrace::stream {
 namespace {
 
-using testing::TemporaryFolder;
 using testing::uniform;
 
 /// A store and all its points with their levels, for comparison by brute force.
 class QueriedStore {
  public:
-  QueriedStore(const StoreSchema& schema, const std::vector<testing::Block>& blocks,
+  QueriedStore(const StoreSchema& schema, const std::vector<testing::PushedBlock>& blocks,
                const testing::StandInHierarchy::Options& options) {
     testing::write_store(folder_->path() / "s", schema, blocks, options);
     store_ = std::make_unique<Store>(Store::open(folder_->path() / "s"));
@@ -49,17 +48,17 @@ class QueriedStore {
   [[nodiscard]] const std::vector<FoundPoint>& points() const { return points_; }
 
  private:
-  std::unique_ptr<TemporaryFolder> folder_ = std::make_unique<TemporaryFolder>();
+  std::unique_ptr<TempFolder> folder_ = std::make_unique<TempFolder>();
   std::unique_ptr<Store> store_;
   std::vector<FoundPoint> points_;
 };
 
 /// The points of a small box are found without reading the index of distant clusters.
 TEST(StoreQuery, ReadsOnlyTheNearbyPartOfTheIndex) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   testing::write_store(
       folder.path() / "s", testing::grid_schema(ScalarType::i16),
-      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 600, 600, 30, 1),
+      testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 600, 600, 30, 1),
       {.block_points = 900, .cluster_points = 10});
   std::uint64_t read = 0;
   const Store store = Store::open("s", [&](const std::string& name) {
@@ -86,9 +85,9 @@ TEST(StoreQuery, ReadsOnlyTheNearbyPartOfTheIndex) {
 
 /// In an index of many chapters, only the contents of nearby chapters are read, and once.
 TEST(StoreQuery, ReadsOnlyTheContentsOfNearbyChapters) {
-  const TemporaryFolder folder;
-  const std::vector<testing::Block> blocks =
-      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 1200, 1200, 30, 1);
+  const TempFolder folder;
+  const std::vector<testing::PushedBlock> blocks =
+      testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 1200, 1200, 30, 1);
   testing::write_store(folder.path() / "s", testing::grid_schema(ScalarType::i16), blocks,
                        {.block_points = 900, .cluster_points = 6});
   std::uint64_t reads = 0, read = 0;
@@ -111,7 +110,7 @@ TEST(StoreQuery, ReadsOnlyTheContentsOfNearbyChapters) {
   StoreQuery query(store);
   const Box3 box{{300, 200, -1e9}, {304, 204, 1e9}};
   std::size_t inside = 0;
-  for (const testing::Block& block : blocks) {
+  for (const testing::PushedBlock& block : blocks) {
     for (const Point3& p : block.positions) inside += box.contains(p) ? 1 : 0;
   }
   EXPECT_EQ(query.in_box(box).size(), inside);
@@ -120,7 +119,7 @@ TEST(StoreQuery, ReadsOnlyTheContentsOfNearbyChapters) {
   EXPECT_EQ(query.in_box(box).size(), inside);
   EXPECT_EQ(reads, before);
   EXPECT_EQ(query.count({{-1, -1, -1e9}, {5000, 5000, 1e9}}), store.points());
-  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+  EXPECT_TRUE(store.verify(testing::fail_on_problem));
 }
 
 constexpr double kFarAway = std::numeric_limits<double>::infinity();
@@ -154,21 +153,21 @@ double distance_between(const LinearMap& map, const Point3& a, const Point3& b) 
 
 std::vector<QueriedStore> stores_of_all_kinds() {
   std::vector<QueriedStore> stores;
-  for (const auto numbers : {testing::Numbers::decimals, testing::Numbers::doubles,
-                             testing::Numbers::extremes, testing::Numbers::mixed}) {
+  for (const auto kind : {testing::CoordinateKind::decimals, testing::CoordinateKind::doubles,
+                          testing::CoordinateKind::extremes, testing::CoordinateKind::mixed}) {
     stores.emplace_back(
-        testing::cloud_schema(), testing::cloud_blocks(numbers, 4000, 500, 11),
+        testing::cloud_schema(), testing::cloud_blocks(kind, 4000, 500, 11),
         testing::StandInHierarchy::Options{.block_points = 500, .cluster_points = 40});
   }
   stores.emplace_back(
       testing::grid_schema(ScalarType::i16),
-      testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 70, 60, 20, 12),
+      testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 70, 60, 20, 12),
       testing::StandInHierarchy::Options{.block_points = 400, .cluster_points = 40});
   // One block, so that the root has all points; and an empty store.
   stores.emplace_back(testing::cloud_schema(),
-                      testing::cloud_blocks(testing::Numbers::decimals, 30, 500, 13),
+                      testing::cloud_blocks(testing::CoordinateKind::decimals, 30, 500, 13),
                       testing::StandInHierarchy::Options{});
-  stores.emplace_back(testing::cloud_schema(), std::vector<testing::Block>{},
+  stores.emplace_back(testing::cloud_schema(), std::vector<testing::PushedBlock>{},
                       testing::StandInHierarchy::Options{});
   return stores;
 }
@@ -283,7 +282,7 @@ TEST(StoreQuery, NearestPointsAndRadiiAreThoseOfBruteForce) {
 QueriedStore store_of_sums() {
   StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("sum"));
-  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 3000, 500, 3);
+  auto blocks = testing::cloud_blocks(testing::CoordinateKind::decimals, 3000, 500, 3);
   for (auto& block : blocks) {
     for (const Point3& p : block.positions) {
       const double sum = p[0] + p[1] + p[2];
@@ -440,9 +439,10 @@ TEST(StoreView, CountsOnlyPointsThatMeetTheCondition) {
 }
 
 TEST(StoreQuery, EndsWhenTheStoreIsStopped) {
-  const QueriedStore queried(testing::cloud_schema(),
-                             testing::cloud_blocks(testing::Numbers::decimals, 20000, 500, 5),
-                             {.block_points = 500, .cluster_points = 40});
+  const QueriedStore queried(
+      testing::cloud_schema(),
+      testing::cloud_blocks(testing::CoordinateKind::decimals, 20000, 500, 5),
+      {.block_points = 500, .cluster_points = 40});
   std::stop_source stop;
   const Store stopped = queried.store().with_stop(stop.get_token());
   StoreQuery query(stopped);

@@ -20,11 +20,10 @@ namespace terrace::stream {
 namespace {
 
 using testing::StandInHierarchy;
-using testing::TemporaryFolder;
 using testing::uniform;
 
 TEST(Store, OpensAnEmptyStore) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   StoreWriter writer(folder.path() / "s", testing::grid_schema(ScalarType::i16));
   StandInHierarchy(writer, {}).finish();
   const Store store = Store::open(folder.path() / "s");
@@ -36,22 +35,22 @@ TEST(Store, OpensAnEmptyStore) {
   EXPECT_EQ(points.size(), 0u);
   EXPECT_FALSE(points.has_representative);
   EXPECT_TRUE(store.record(store.root()).summary.box.empty());
-  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+  EXPECT_TRUE(store.verify(testing::fail_on_problem));
 }
 
 TEST(Store, RoundTripsOnePoint) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   StoreWriter writer(folder.path() / "s", testing::cloud_schema());
   StandInHierarchy hierarchy(writer, {});
   hierarchy.push(std::vector<Point3>{{1.5, -0.0, 1e300}});
   hierarchy.finish();
   const Store store = Store::open(folder.path() / "s");
   EXPECT_EQ(testing::all_points(store), (testing::PointBag{{{1.5, -0.0, 1e300}, {}}}));
-  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+  EXPECT_TRUE(store.verify(testing::fail_on_problem));
 }
 
 TEST(Store, ReadingEndsWhenStopped) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   StoreWriter writer(folder.path() / "s", testing::cloud_schema());
   StandInHierarchy hierarchy(writer, {});
   hierarchy.push(std::vector<Point3>{{1, 2, 3}, {4, 5, 6}});
@@ -67,19 +66,19 @@ TEST(Store, ReadingEndsWhenStopped) {
   EXPECT_THROW(stopped.read(stopped.root(), cluster), Stopped);
   EXPECT_THROW(static_cast<void>(stopped.record(stopped.root())), Stopped);
   EXPECT_THROW(testing::all_points(stopped), Stopped);
-  EXPECT_THROW(stopped.verify(testing::expect_no_problem), Stopped);
+  EXPECT_THROW(stopped.verify(testing::fail_on_problem), Stopped);
   for (const Store* unstopped : {&store, &goes_on}) {
     EXPECT_EQ(testing::all_points(*unstopped), points);
-    EXPECT_TRUE(unstopped->verify(testing::expect_no_problem));
+    EXPECT_TRUE(unstopped->verify(testing::fail_on_problem));
   }
 }
 
 /// Rasters of every sample type, smooth and rough, are read back bit for bit.
 TEST(Store, RoundTripsGridsBitForBit) {
   for (const ScalarType type : testing::kAllTypes) {
-    for (const testing::Relief relief :
-         {testing::Relief::flat, testing::Relief::fractal, testing::Relief::noise,
-          testing::Relief::extreme, testing::Relief::decimal}) {
+    for (const testing::ReliefKind relief :
+         {testing::ReliefKind::flat, testing::ReliefKind::fractal, testing::ReliefKind::noise,
+          testing::ReliefKind::extreme, testing::ReliefKind::decimal}) {
       SCOPED_TRACE(::testing::Message()
                    << name_of(type) << ", relief " << static_cast<int>(relief));
       testing::check_round_trip(testing::grid_schema(type),
@@ -90,7 +89,7 @@ TEST(Store, RoundTripsGridsBitForBit) {
 }
 
 TEST(Store, RoundTripsGridsFarFromTheOrigin) {
-  auto blocks = testing::grid_blocks(ScalarType::i16, testing::Relief::fractal, 60, 60, 30, 2);
+  auto blocks = testing::grid_blocks(ScalarType::i16, testing::ReliefKind::fractal, 60, 60, 30, 2);
   for (auto& block : blocks) {
     for (Point3& p : block.positions) {
       p[0] += (1 << 30) - 100;
@@ -102,7 +101,7 @@ TEST(Store, RoundTripsGridsFarFromTheOrigin) {
 }
 
 TEST(Store, KeepsCellsThatOccurTwice) {
-  std::vector<testing::Block> blocks(3);
+  std::vector<testing::PushedBlock> blocks(3);
   std::mt19937_64 random(3);
   for (auto& block : blocks) {
     for (int i = 0; i < 500; ++i) {
@@ -122,11 +121,11 @@ TEST(Store, KeepsCellsThatOccurTwice) {
 }
 
 TEST(Store, RoundTripsCloudsOfAllNumbersBitForBit) {
-  for (const auto numbers :
-       {testing::Numbers::decimals, testing::Numbers::floats, testing::Numbers::doubles,
-        testing::Numbers::extremes, testing::Numbers::mixed, testing::Numbers::lines}) {
-    SCOPED_TRACE(static_cast<int>(numbers));
-    testing::check_round_trip(testing::cloud_schema(), testing::cloud_blocks(numbers, 8000, 900, 4),
+  for (const auto kind : {testing::CoordinateKind::decimals, testing::CoordinateKind::floats,
+                          testing::CoordinateKind::doubles, testing::CoordinateKind::extremes,
+                          testing::CoordinateKind::mixed, testing::CoordinateKind::lines}) {
+    SCOPED_TRACE(static_cast<int>(kind));
+    testing::check_round_trip(testing::cloud_schema(), testing::cloud_blocks(kind, 8000, 900, 4),
                               {.block_points = 900, .cluster_points = 60});
   }
 }
@@ -135,7 +134,7 @@ TEST(Store, RoundTripsAttributesOfAllTypesBitForBit) {
   StoreSchema schema = testing::cloud_schema();
   for (const ScalarType type : testing::kAllTypes)
     schema.attributes.push_back(testing::channel(std::string(name_of(type)), type));
-  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 5);
+  auto blocks = testing::cloud_blocks(testing::CoordinateKind::decimals, 6000, 900, 5);
   std::mt19937_64 random(6);
   std::uint64_t row = 0;
   for (auto& block : blocks) {
@@ -163,7 +162,7 @@ TEST(Store, AttributesOfScanLinesTakeFewBytes) {
   std::array<std::uint64_t, 2> bytes{};
   for (const bool lines : {true, false}) {
     auto blocks = testing::cloud_blocks(
-        lines ? testing::Numbers::lines : testing::Numbers::decimals, 8000, 900, 4);
+        lines ? testing::CoordinateKind::lines : testing::CoordinateKind::decimals, 8000, 900, 4);
     std::mt19937_64 random(5);
     double time = 3e8;
     for (auto& block : blocks) {
@@ -190,7 +189,7 @@ TEST(Store, AttributesOfScanLinesTakeFewBytes) {
 TEST(Store, DecimalAttributesTakeFewBytes) {
   StoreSchema schema = testing::cloud_schema();
   schema.attributes.push_back(testing::channel("t", ScalarType::f64));
-  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 7);
+  auto blocks = testing::cloud_blocks(testing::CoordinateKind::decimals, 6000, 900, 7);
   std::uint64_t row = 0;
   for (auto& block : blocks) {
     for (std::size_t i = 0; i < block.positions.size(); ++i, ++row) {
@@ -215,7 +214,7 @@ TEST(Store, RangesOfAttributesContainTheirValues) {
   }
   schema.attributes[2].scale = -0.5;
   schema.attributes[2].offset = 3;
-  auto blocks = testing::cloud_blocks(testing::Numbers::decimals, 6000, 900, 5);
+  auto blocks = testing::cloud_blocks(testing::CoordinateKind::decimals, 6000, 900, 5);
   std::mt19937_64 random(8);
   std::uint64_t row = 0;
   for (auto& block : blocks) {
@@ -227,7 +226,7 @@ TEST(Store, RangesOfAttributesContainTheirValues) {
       }
     }
   }
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "store";
   testing::write_store(path, schema, blocks, {.block_points = 900, .cluster_points = 60});
   const Store store = Store::open(path);
@@ -283,7 +282,7 @@ TEST(Store, OpensFromMemory) {
     return bytes_in_memory("memory/" + name, files.at(name));
   });
   EXPECT_EQ(store.path(), "memory");
-  EXPECT_TRUE(store.verify(testing::expect_no_problem));
+  EXPECT_TRUE(store.verify(testing::fail_on_problem));
   EXPECT_EQ(testing::all_points(store), testing::all_points(Store::open(folder)));
 }
 
@@ -326,9 +325,9 @@ TEST(Store, PassesOnExceptionsOfTheCallersFiles) {
 TEST(Store, EqualBlocksShareTheirBytes) {
   const auto water = [](int side, bool still) {
     std::mt19937_64 random(1);
-    std::vector<testing::Block> blocks;
+    std::vector<testing::PushedBlock> blocks;
     for (int tile = 0; tile < side * side; ++tile) {
-      testing::Block& block = blocks.emplace_back();
+      testing::PushedBlock& block = blocks.emplace_back();
       for (int cell = 0; cell < 400; ++cell) {
         const int x = 20 * (tile % side) + cell % 20, y = 20 * (tile / side) + cell / 20;
         block.positions.push_back({static_cast<double>(x), static_cast<double>(y),
@@ -341,7 +340,7 @@ TEST(Store, EqualBlocksShareTheirBytes) {
   const StoreSchema schema = testing::grid_schema(ScalarType::i16);
   testing::check_round_trip(schema, water(20, true), options);
   const auto data_bytes = [&](bool still) {
-    const TemporaryFolder folder;
+    const TempFolder folder;
     testing::write_store(folder.path() / "s", schema, water(20, still), options);
     return std::filesystem::file_size(folder.path() / "s" / "level-0.0.clusters");
   };
@@ -364,7 +363,7 @@ TEST(Store, GoldenStoresAreSound) {
     const Store store = Store::open(folder / name);
     EXPECT_EQ(store.version(), 1);
     EXPECT_EQ(store.points(), points);
-    EXPECT_TRUE(store.verify(testing::expect_no_problem));
+    EXPECT_TRUE(store.verify(testing::fail_on_problem));
   }
   const Store store = Store::open(folder / "grid");
   EXPECT_EQ(Overlay::open(folder / "grid.overlay", store).values(), 918u);
@@ -373,7 +372,7 @@ TEST(Store, GoldenStoresAreSound) {
 /// The bytes of a store do not depend on the compiler or its optimisation: GCC at -O3 and with
 /// sanitizers, and Clang at -O1, give these checksums. They change only with the format.
 TEST(Store, ChecksumsAreTheSameWithEveryCompiler) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto checksum = [&](const char* name, const StoreSchema& schema, const auto& blocks) {
     testing::write_store(folder.path() / name, schema, blocks,
                          {.block_points = 900, .cluster_points = 60});
@@ -381,10 +380,10 @@ TEST(Store, ChecksumsAreTheSameWithEveryCompiler) {
   };
   EXPECT_EQ(
       checksum("grid", testing::grid_schema(ScalarType::f32),
-               testing::grid_blocks(ScalarType::f32, testing::Relief::fractal, 96, 88, 30, 1)),
+               testing::grid_blocks(ScalarType::f32, testing::ReliefKind::fractal, 96, 88, 30, 1)),
       0x91caf359u);
   EXPECT_EQ(checksum("cloud", testing::cloud_schema(),
-                     testing::cloud_blocks(testing::Numbers::mixed, 8000, 900, 4)),
+                     testing::cloud_blocks(testing::CoordinateKind::mixed, 8000, 900, 4)),
             0x33b7b423u);
 }
 

@@ -27,8 +27,6 @@ inline constexpr std::array kAllTypes{
     ScalarType::i8,  ScalarType::u8,  ScalarType::i16, ScalarType::u16, ScalarType::i32,
     ScalarType::u32, ScalarType::i64, ScalarType::u64, ScalarType::f32, ScalarType::f64};
 
-using TemporaryFolder = TempFolder;
-
 inline std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
@@ -78,12 +76,12 @@ inline StoreSchema cloud_schema() {
   return schema;
 }
 
-struct Block {
+struct PushedBlock {
   std::vector<Point3> positions;
   std::vector<std::byte> payload;
 };
 
-enum class Relief { flat, fractal, noise, extreme, decimal };
+enum class ReliefKind { flat, fractal, noise, extreme, decimal };
 
 inline double limit_low(ScalarType type) {
   switch (type) {
@@ -135,30 +133,30 @@ inline double limit_high(ScalarType type) {
 
 /// Returns a raster in square tiles of at most `tile` cells per side, with a tenth of the cells
 /// without data.
-inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width, int height,
-                                      int tile, std::uint64_t seed) {
+inline std::vector<PushedBlock> grid_blocks(ScalarType type, ReliefKind relief, int width,
+                                            int height, int tile, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const bool floating = type == ScalarType::f32 || type == ScalarType::f64;
   const auto sample = [&](int x, int y) -> double {
     switch (relief) {
-      case Relief::flat:
+      case ReliefKind::flat:
         return 42;
-      case Relief::fractal: {
+      case ReliefKind::fractal: {
         const double h = 60 + 40 * (std::abs(x % 64 - 32) / 32.0) +
                          15 * (std::abs(y % 20 - 10) / 10.0) + 4 * uniform(random);
         return type == ScalarType::f32   ? static_cast<double>(static_cast<float>(h))
                : type == ScalarType::f64 ? h
                                          : std::floor(h);
       }
-      case Relief::noise:
+      case ReliefKind::noise:
         return static_cast<double>(random() % 128);
-      case Relief::extreme: {
+      case ReliefKind::extreme: {
         if (floating && random() % 7 == 0) return -0.0;
         if (type == ScalarType::f32 && random() % 7 == 0)
           return static_cast<double>(std::numeric_limits<float>::denorm_min());
         return random() % 2 == 0 ? limit_low(type) : limit_high(type);
       }
-      case Relief::decimal: {
+      case ReliefKind::decimal: {
         const double h = static_cast<double>(random() % 100) / 100;
         return type == ScalarType::f32   ? static_cast<double>(static_cast<float>(h))
                : type == ScalarType::f64 ? h
@@ -167,10 +165,10 @@ inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width,
     }
     return 0;
   };
-  std::vector<Block> blocks;
+  std::vector<PushedBlock> blocks;
   for (int ty = 0; ty < height; ty += tile) {
     for (int tx = 0; tx < width; tx += tile) {
-      Block block;
+      PushedBlock block;
       for (int y = ty; y < std::min(height, ty + tile); ++y) {
         for (int x = tx; x < std::min(width, tx + tile); ++x) {
           if (random() % 10 == 0) continue;
@@ -184,35 +182,35 @@ inline std::vector<Block> grid_blocks(ScalarType type, Relief relief, int width,
 }
 
 /// lines: decimals, with each point near the previous one.
-enum class Numbers { decimals, floats, doubles, extremes, mixed, lines };
+enum class CoordinateKind { decimals, floats, doubles, extremes, mixed, lines };
 
-inline std::vector<Block> cloud_blocks(Numbers numbers, std::size_t points,
-                                       std::size_t block_points, std::uint64_t seed) {
+inline std::vector<PushedBlock> cloud_blocks(CoordinateKind kind, std::size_t points,
+                                             std::size_t block_points, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  std::vector<Block> blocks;
+  std::vector<PushedBlock> blocks;
   for (std::size_t start = 0; start < points; start += block_points) {
-    Block block;
-    const Numbers kind =
-        numbers == Numbers::mixed ? static_cast<Numbers>(blocks.size() % 4) : numbers;
+    PushedBlock block;
+    const CoordinateKind block_kind =
+        kind == CoordinateKind::mixed ? static_cast<CoordinateKind>(blocks.size() % 4) : kind;
     const double origin = static_cast<double>(blocks.size() % 3) * 100;
     const auto number = [&]() -> double {
       const double u = origin + 100 * uniform(random);
-      switch (kind) {
-        case Numbers::decimals:
+      switch (block_kind) {
+        case CoordinateKind::decimals:
           return std::nearbyint(u * 1000) / 1000 + 0.0;
-        case Numbers::floats:
+        case CoordinateKind::floats:
           return static_cast<double>(static_cast<float>(u - 150));
-        case Numbers::doubles:
+        case CoordinateKind::doubles:
           return (u - 150) * uniform(random);
-        case Numbers::extremes:
-        case Numbers::mixed:
-        case Numbers::lines:
+        case CoordinateKind::extremes:
+        case CoordinateKind::mixed:
+        case CoordinateKind::lines:
           break;
       }
       return std::array{-0.0, 0.0, 1e308, -1e308, 5e-324, 1.0, 0.1}[random() % 7];
     };
     for (std::size_t i = 0; i < std::min(block_points, points - start); ++i) {
-      if (numbers == Numbers::lines) {
+      if (kind == CoordinateKind::lines) {
         const auto along = static_cast<double>(i % 50), across = static_cast<double>(i / 50);
         block.positions.push_back(
             {(origin + along) / 100, across / 8, std::floor(9 * uniform(random)) / 10});
@@ -248,7 +246,7 @@ class PointBag {
   std::map<std::string, int> counts_;
 };
 
-inline void expect_no_problem(const Problem& problem) {
+inline void fail_on_problem(const Problem& problem) {
   ADD_FAILURE() << problem.file << ", byte " << problem.offset << ": " << problem.what;
 }
 
@@ -267,18 +265,20 @@ inline PointBag all_points(const Store& store) {
 }
 
 inline std::uint64_t write_store(const std::filesystem::path& path, const StoreSchema& schema,
-                                 const std::vector<Block>& blocks,
+                                 const std::vector<PushedBlock>& blocks,
                                  const StandInHierarchy::Options& options) {
   StoreWriter writer(path, schema);
   StandInHierarchy hierarchy(writer, options);
-  for (const Block& block : blocks) hierarchy.push(block.positions, block.payload);
+  for (const PushedBlock& block : blocks) hierarchy.push(block.positions, block.payload);
   return hierarchy.finish();
 }
 
-/// Writes the blocks, reads them back in every way, and verifies. Returns the bytes of the store.
-inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vector<Block>& blocks,
+/// Writes the blocks, reads them back in every way, and verifies. Returns the size of the store in
+/// bytes.
+inline std::uint64_t check_round_trip(const StoreSchema& schema,
+                                      const std::vector<PushedBlock>& blocks,
                                       const StandInHierarchy::Options& options) {
-  const TemporaryFolder folder;
+  const TempFolder folder;
   const auto path = folder.path() / "store";
   const std::uint64_t bytes = write_store(path, schema, blocks, options);
   const Store store = Store::open(path);
@@ -289,7 +289,7 @@ inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vect
   double sum = 0;
   std::uint64_t n = 0;
   const std::size_t stride = schema.payload_size();
-  for (const Block& block : blocks) {
+  for (const PushedBlock& block : blocks) {
     for (std::size_t i = 0; i < block.positions.size(); ++i, ++n) {
       expected.add(block.positions[i], std::span(block.payload).subspan(i * stride, stride));
       bounds.include(block.positions[i]);
@@ -304,7 +304,7 @@ inline std::uint64_t check_round_trip(const StoreSchema& schema, const std::vect
     EXPECT_NEAR(store.mean_height(), mean, 1e-9 * size);
   }
   EXPECT_TRUE(all_points(store) == expected) << "the points differ";
-  EXPECT_TRUE(store.verify(expect_no_problem));
+  EXPECT_TRUE(store.verify(fail_on_problem));
 
   // Reading one by one gives the same as in sequence, and the head of a cluster equals its
   // representative.

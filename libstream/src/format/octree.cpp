@@ -64,7 +64,7 @@ class CubeCheckingReader final : public PartReader {
     return Error(check_->file,
                  "has a point outside its cube: the header or the hierarchy is wrong, and a region "
                  "would miss points")
-        .at("node " + name_of(check_->nodes[part_]))
+        .at("node " + key_of(check_->nodes[part_]))
         .remedy("convert the whole file to LAS or LAZ and select the region from that");
   }
 
@@ -76,20 +76,22 @@ class CubeCheckingReader final : public PartReader {
 
 }  // namespace
 
-std::string name_of(const OctreeNode& node) {
-  return fmt::format("{}-{}-{}-{}", node.depth, node.place[0], node.place[1], node.place[2]);
+std::string key_of(const OctreeNode& node) {
+  return fmt::format("{}-{}-{}-{}", node.depth, node.position[0], node.position[1],
+                     node.position[2]);
 }
 
 bool precedes(const OctreeNode& a, const OctreeNode& b) {
-  // The axis whose places differ in the highest bit decides; in a tie z, then y.
+  // The axis whose positions differ in the highest bit decides; in a tie z, then y.
   std::uint32_t highest_difference = 0;
   bool less = false;
   for (const std::size_t axis : {std::size_t{2}, std::size_t{1}, std::size_t{0}}) {
-    const std::uint32_t p = a.place[axis] << (kDeepestNode - a.depth);
-    const std::uint32_t q = b.place[axis] << (kDeepestNode - b.depth);
-    const std::uint32_t differ = p ^ q;
-    if (highest_difference < differ && highest_difference < (differ ^ highest_difference)) {
-      highest_difference = differ;
+    const std::uint32_t p = a.position[axis] << (kMaxDepth - a.depth);
+    const std::uint32_t q = b.position[axis] << (kMaxDepth - b.depth);
+    const std::uint32_t difference = p ^ q;
+    // True if difference's highest bit is above that of highest_difference (T. Chan's XOR test).
+    if (highest_difference < difference && highest_difference < (difference ^ highest_difference)) {
+      highest_difference = difference;
       less = p < q;
     }
   }
@@ -100,7 +102,7 @@ Box3 Octree::box(const OctreeNode& node) const {
   const double side = std::ldexp(2 * half_size, -static_cast<int>(node.depth));
   Box3 box;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    box.min[axis] = centre[axis] - half_size + side * node.place[axis];
+    box.min[axis] = centre[axis] - half_size + side * node.position[axis];
     box.max[axis] = box.min[axis] + side;
   }
   return box;
@@ -113,9 +115,9 @@ std::uint64_t Octree::points() const {
 }
 
 OctreeInfo Octree::info() const {
-  OctreeInfo facts{.spacing = spacing, .nodes = nodes.size()};
-  for (const OctreeNode& node : nodes) facts.depths = std::max(facts.depths, node.depth + 1);
-  return facts;
+  OctreeInfo info{.spacing = spacing, .nodes = nodes.size()};
+  for (const OctreeNode& node : nodes) info.depths = std::max(info.depths, node.depth + 1);
+  return info;
 }
 
 const OctreeNode* Octree::arrange() {
@@ -127,15 +129,16 @@ const OctreeNode* Octree::arrange() {
 }
 
 void Octree::keep(const std::optional<Box3>& region, double resolution, const Point3& steps) {
-  unsigned deepest = kDeepestNode;
+  unsigned deepest = kMaxDepth;
   if (resolution > 0) {
     deepest = 0;
-    while (deepest < kDeepestNode && std::ldexp(spacing, -static_cast<int>(deepest)) > resolution) {
+    while (deepest < kMaxDepth && std::ldexp(spacing, -static_cast<int>(deepest)) > resolution) {
       ++deepest;
     }
   }
   std::erase_if(nodes, [&](const OctreeNode& node) {
     if (node.depth > deepest) return true;
+    // The first node is kept for any region, see the header.
     if (!region || &node == nodes.data()) return false;
     const Box3 cube = box(node);
     for (std::size_t axis = 0; axis < 3; ++axis) {

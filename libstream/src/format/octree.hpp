@@ -19,18 +19,18 @@
 namespace terrace::stream {
 
 /// Positions of deeper nodes do not fit into COPC's signed 32 bits.
-inline constexpr unsigned kDeepestNode = 30;
+inline constexpr unsigned kMaxDepth = 30;
 
 /// A node with points.
 struct OctreeNode {
   unsigned depth = 0;
-  std::array<std::uint32_t, 3> place{};  ///< along x, y and z, below 2^depth
-  std::uint64_t offset = 0;              ///< offset of its points in the file
+  std::array<std::uint32_t, 3> position{};  ///< along x, y and z, below 2^depth
+  std::uint64_t offset = 0;                 ///< offset of its points in the file
   std::uint64_t bytes = 0, points = 0;
 };
 
-/// "D-X-Y-Z", as EPT names it.
-std::string name_of(const OctreeNode& node);
+/// Returns a node's key as EPT writes it: "D-X-Y-Z".
+std::string key_of(const OctreeNode& node);
 
 /// Orders parents before children, and siblings in Morton order.
 bool precedes(const OctreeNode& a, const OctreeNode& b);

@@ -136,7 +136,9 @@ class WithAuxXml final : public Raster {
         sidecar_(std::move(sidecar)),
         overrides_file_(is_overridden(info_)) {
     if (const XmlElement* const srs = root.child("SRS")) read_crs(crs_of_srs(srs->text));
-    if (const XmlElement* const place = root.child("GeoTransform")) read_place(place->text);
+    if (const XmlElement* const transform = root.child("GeoTransform")) {
+      read_transform(transform->text);
+    }
     if (band != nullptr) read_band(*band, file_nodata);
   }
   /// Applies nothing and adds a comment.
@@ -211,7 +213,7 @@ class WithAuxXml final : public Raster {
     info_.crs = std::move(crs);
   }
 
-  void read_place(const std::string& text) {
+  void read_transform(const std::string& text) {
     const std::vector<std::string_view> words = split_fields(trim(text), ',');
     std::array<double, 6> g{};
     for (std::size_t i = 0; i < g.size(); ++i) {
@@ -221,8 +223,8 @@ class WithAuxXml final : public Raster {
     }
     const double area = g[1] * g[5] - g[2] * g[4];
     if (!std::isfinite(area) || area == 0) return;
-    constexpr std::array<double, 6> kNoPlace{0, 1, 0, 0, 0, 1};  // GDAL's for "not georeferenced"
-    if (g == kNoPlace) return;
+    constexpr std::array<double, 6> kNone{0, 1, 0, 0, 0, 1};  // GDAL's for "not georeferenced"
+    if (g == kNone) return;
     // From the corner of the first cell to its middle.
     const WorldTransform world{
         {g[1], g[2], g[0] + 0.5 * (g[1] + g[2]), g[4], g[5], g[3] + 0.5 * (g[4] + g[5])}};

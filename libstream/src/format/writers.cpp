@@ -91,6 +91,13 @@ std::unique_ptr<MeshWriter> open_mesh_writer(const std::string& path, const Mesh
   return kMeshOpeners[choose_format(kMeshFormats, path, options)](path, header, options);
 }
 
+std::optional<std::size_t> normals_in(std::span<const std::string> attributes) {
+  for (std::size_t i = 0; i + 2 < attributes.size(); ++i) {
+    if (attributes[i] == "nx" && attributes[i + 1] == "ny" && attributes[i + 2] == "nz") return i;
+  }
+  return std::nullopt;
+}
+
 std::string mesh_format(const std::string& path, const WriterOptions& options) {
   return std::string(kMeshFormats[choose_format(kMeshFormats, path, options)].name);
 }

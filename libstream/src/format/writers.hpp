@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -64,6 +65,9 @@ Point3 glb_origin(const Box3& bounds);
 /// inline: where GCC 12 vectorises it and widens the result again immediately, it drops the
 /// rounding.
 float glb_coordinate(double coordinate, double origin, double metres);
+
+/// Returns the index of nx if a mesh has normals: nx, ny and nz follow one another.
+std::optional<std::size_t> normals_in(std::span<const std::string> attributes);
 
 /// Asserts that a mesh writer's caller adds what its header promises.
 class MeshCounts {

@@ -124,7 +124,7 @@ struct AtomicFile::Impl {
     placement = OutputPlacement(shown, place, temporary, naming);
   }
 
-  /// Called after put_together(), when the temporary name is gone or is that of the replaced file.
+  /// Called after complete(), when the temporary name is gone or is that of the replaced file.
   /// The descriptor is closed last, so that the lock outlives the name.
   void finish() {
     const fs::path old = placement.replaced();

@@ -14,12 +14,12 @@
 namespace terrace::stream {
 namespace {
 
-struct Free {
+struct Deleter {
   void operator()(libdeflate_compressor* c) const { libdeflate_free_compressor(c); }
   void operator()(libdeflate_decompressor* d) const { libdeflate_free_decompressor(d); }
 };
 
-Error fault(const std::string& name, std::string cause) {
+Error gzip_error(const std::string& name, std::string cause) {
   return Error(name, std::move(cause)).at("gzip").remedy("recreate the file");
 }
 
@@ -43,7 +43,8 @@ bool is_gzip(std::span<const std::byte> bytes) {
 
 std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
   assert(level >= 1 && level <= 12);
-  const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(level));
+  const std::unique_ptr<libdeflate_compressor, Deleter> compressor(
+      libdeflate_alloc_compressor(level));
   if (!compressor) throw std::bad_alloc();
   std::vector<std::byte> out(libdeflate_gzip_compress_bound(compressor.get(), bytes.size()));
   const std::size_t size = libdeflate_gzip_compress(compressor.get(), bytes.data(), bytes.size(),
@@ -55,13 +56,13 @@ std::vector<std::byte> gzip(std::span<const std::byte> bytes, int level) {
 
 std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t max_bytes,
                               const std::string& name) {
-  if (!is_gzip(bytes) || bytes.size() < kMinBytes) throw fault(name, "not gzip, or truncated");
+  if (!is_gzip(bytes) || bytes.size() < kMinBytes) throw gzip_error(name, "not gzip, or truncated");
   const std::uint64_t size = stated_size(bytes);
   if (size > max_bytes) {
-    throw fault(name, fmt::format("states {}, more than the limit of {}", counted(size, "byte"),
-                                  max_bytes));
+    throw gzip_error(name, fmt::format("states {}, more than the limit of {}",
+                                       counted(size, "byte"), max_bytes));
   }
-  const std::unique_ptr<libdeflate_decompressor, Free> decompressor(
+  const std::unique_ptr<libdeflate_decompressor, Deleter> decompressor(
       libdeflate_alloc_decompressor());
   if (!decompressor) throw std::bad_alloc();
   std::vector<std::byte> out(size);
@@ -69,7 +70,7 @@ std::vector<std::byte> gunzip(std::span<const std::byte> bytes, std::uint64_t ma
   const libdeflate_result result = libdeflate_gzip_decompress_ex(
       decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &consumed, &produced);
   if (result != LIBDEFLATE_SUCCESS || produced != size || consumed != bytes.size()) {
-    throw fault(name, "damaged: the contents do not match their checksum and size");
+    throw gzip_error(name, "damaged: the contents do not match their checksum and size");
   }
   return out;
 }

@@ -86,7 +86,7 @@ struct GpsTime {
   static constexpr int kMaxMultiple = 500, kMinMultiple = -10;
   static constexpr unsigned kMultiples = kMaxMultiple - kMinMultiple + 1;
   /// The symbols after the multiples and "unchanged": a complete time, then the sequences 1 to 3
-  /// places ahead.
+  /// ahead of the current one.
   static constexpr unsigned kFull = kMultiples + kUnchanged;
 
   SymbolModel<5 + kUnchanged> first;  ///< if a sequence has no difference yet
@@ -106,10 +106,10 @@ struct GpsTime {
 
   template <class Coder>
   TERRACE_LAZ_INLINE std::uint64_t code(Coder& coder, std::uint64_t value) {
-    // Distance in places to the sequence that `value` continues; 4: none of the sequences.
-    unsigned places = 0;
+    // How many sequences after the current one is the one that `value` continues; 4: none.
+    unsigned ahead = 0;
     if constexpr (!Coder::kDecoding) {
-      while (places < 4 && !fits(value - time[(current + places) & 3])) ++places;
+      while (ahead < 4 && !fits(value - time[(current + ahead) & 3])) ++ahead;
     }
     for (bool switched = false;; switched = true) {
       coder.reserve();
@@ -118,10 +118,10 @@ struct GpsTime {
       const bool same = kUnchanged > 0 && value == time[current];
       unsigned skip = 0;
       if (step == 0) {
-        const unsigned chosen = places == 4  ? kUnchanged + 1
-                                : places > 0 ? kUnchanged + 1 + places
-                                : same       ? 0
-                                             : kUnchanged;
+        const unsigned chosen = ahead == 4  ? kUnchanged + 1
+                                : ahead > 0 ? kUnchanged + 1 + ahead
+                                : same      ? 0
+                                            : kUnchanged;
         const unsigned symbol = coder.symbol(first, chosen);
         if (symbol < kUnchanged) return time[current];
         if (symbol == kUnchanged) {
@@ -133,10 +133,10 @@ struct GpsTime {
       } else {
         unsigned chosen = 0;
         if constexpr (!Coder::kDecoding) {
-          chosen = places == 4  ? kFull
-                   : places > 0 ? kFull + places
-                   : same       ? kMultiples
-                                : multiple_symbol(delta, step);
+          chosen = ahead == 4  ? kFull
+                   : ahead > 0 ? kFull + ahead
+                   : same      ? kMultiples
+                               : multiple_symbol(delta, step);
         }
         const unsigned symbol = coder.symbol(multiple, chosen);
         if (symbol < kMultiples) return code_multiple(coder, symbol, step, delta);
@@ -148,7 +148,7 @@ struct GpsTime {
         if (switched) coder.refuse();
       }
       current = (current + skip) & 3;
-      places = 0;
+      ahead = 0;
     }
   }
 
@@ -268,7 +268,7 @@ struct WavePacket {
 
   SymbolModel<256> index;
   std::array<SymbolModel<4>, 4> modes;  ///< by the previous point's
-  IntegerModels<32, 1> offset_change, packet_size, return_place;
+  IntegerModels<32, 1> offset_change, packet_size, return_position;
   IntegerModels<32, 3> direction;
   std::int32_t last_change;
   unsigned mode;
@@ -305,7 +305,7 @@ struct WavePacket {
     }
     put<Coder>(record + 1, coded);
     code_part(coder, packet_size, last + 9, record + 9, 0);
-    code_part(coder, return_place, last + 13, record + 13, 0);
+    code_part(coder, return_position, last + 13, record + 13, 0);
     for (unsigned i = 0; i < 3; ++i) {
       code_part(coder, direction, last + 17 + 4 * i, record + 17 + 4 * i, i);
     }

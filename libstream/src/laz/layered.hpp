@@ -175,7 +175,7 @@ class Layered {
     bool new_channel;    ///< whether the channel is new and begins with the values of `last`
     std::uint8_t level;  ///< level context of Z
     std::uint8_t z_context;
-    std::uint8_t place;  ///< 2 for a first return, + 1 for a last
+    std::uint8_t return_kind;  ///< 2 for a first return, + 1 for a last
     bool time_changed, angle_changed, source_changed;
     /// For the items after the point: the channels whose models and whose last value are used, and
     /// the one from which the last value is first copied.
@@ -296,7 +296,7 @@ class Layered {
       point.level = kReturns14.level[returns_byte];
       point.z_context =
           low_byte(z_context((models->x.magnitude + models->y.magnitude) / 2, single));
-      point.place = low_byte((number == 1 ? 2u : 0u) + (number >= returns ? 1u : 0u));
+      point.return_kind = low_byte((number == 1 ? 2u : 0u) + (number >= returns ? 1u : 0u));
       point.time_changed = time_changed;
       point.angle_changed = (mask & kScanAngleBit) != 0;
       point.source_changed = (mask & kSourceBit) != 0;
@@ -424,8 +424,9 @@ class Layered {
     for_each(records, count, kClassificationLayer,
              [this](Coder& coder, const Point& point, Record record) TERRACE_LAZ_INLINE_LAMBDA {
                const std::uint8_t previous = point.last[kClassification];
-               auto& model = channels_[point.channel]
-                                 .classification[2u * (previous & 31) + (point.place == 3 ? 1 : 0)];
+               auto& model =
+                   channels_[point.channel]
+                       .classification[2u * (previous & 31) + (point.return_kind == 3 ? 1 : 0)];
                const unsigned value =
                    coder.symbol(model, input_value<Coder, std::uint8_t>(record + kClassification));
                put<Coder>(record + kClassification, low_byte(value));
@@ -454,11 +455,11 @@ class Layered {
                Channel14& models = channels_[point.channel];
                if (point.new_channel) begin_intensity(models, point.last);
                std::uint16_t& intensity =
-                   models.last_intensity[2u * point.place + (point.time_changed ? 1 : 0)];
+                   models.last_intensity[2u * point.return_kind + (point.time_changed ? 1 : 0)];
                const std::uint16_t previous = intensity;
                intensity = static_cast<std::uint16_t>(models.intensity.code(
                    coder, previous, input_value<Coder, std::uint16_t>(record + kIntensity),
-                   point.place));
+                   point.return_kind));
                put<Coder>(record + kIntensity, intensity);
                return intensity != previous;
              });

@@ -47,18 +47,18 @@ std::vector<KdPlane> kd_planes(std::span<NumberedPoint> points, unsigned depth,
 template <class PlaceOf, class Take>
 void kd_leaves(std::span<const KdPlane> planes, std::size_t count, const PlaceOf& place_of,
                const Take& take) {
-  // Several places go down the tree in parallel, because each step of one place waits for the step
+  // Several points go down the tree in parallel, because each step of one point waits for the step
   // before it.
   constexpr std::size_t kBatch = 8;
-  const auto walk = [&](std::size_t first, auto places) {
-    std::array<std::size_t, places> nodes{};
+  const auto walk = [&](std::size_t first, auto lanes) {
+    std::array<std::size_t, lanes> nodes{};
     for (std::size_t levels = planes.size(); levels > 0; levels /= 2) {
-      for (std::size_t i = 0; i < places; ++i) {
+      for (std::size_t i = 0; i < lanes; ++i) {
         const KdPlane& plane = planes[nodes[i]];
         nodes[i] = 2 * nodes[i] + 1 + (plane.is_above(place_of(first + i)) ? 1 : 0);
       }
     }
-    for (std::size_t i = 0; i < places; ++i) take(first + i, nodes[i] - planes.size());
+    for (std::size_t i = 0; i < lanes; ++i) take(first + i, nodes[i] - planes.size());
   };
   std::size_t i = 0;
   for (; i + kBatch <= count; i += kBatch) {

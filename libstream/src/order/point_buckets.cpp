@@ -241,8 +241,8 @@ void BucketFile::write(Bucket& bucket, RecordPacker& packer) {
 Bucket::Chunk BucketFile::allocate(std::size_t bytes) {
   const auto pages = static_cast<std::uint32_t>((bytes + kPageBytes - 1) / kPageBytes);
   Bucket::Chunk chunk{.page = pages_, .pages = pages, .bytes = static_cast<std::uint32_t>(bytes)};
-  const auto place = free_.lower_bound(pages);
-  if (place == free_.end()) {
+  const auto found = free_.lower_bound(pages);
+  if (found == free_.end()) {
     if (pages > UINT32_MAX - pages_) {
       throw Error(file_.name(), "its points need more than 4 TiB of temporary disk space")
           .remedy("split the input");
@@ -250,10 +250,10 @@ Bucket::Chunk BucketFile::allocate(std::size_t bytes) {
     pages_ += pages;
     return chunk;
   }
-  chunk.pages = place->first;
-  chunk.page = place->second.back();
-  place->second.pop_back();
-  if (place->second.empty()) free_.erase(place);
+  chunk.pages = found->first;
+  chunk.page = found->second.back();
+  found->second.pop_back();
+  if (found->second.empty()) free_.erase(found);
   return chunk;
 }
 

@@ -193,6 +193,10 @@ const JsonValue& JsonValue::at(std::string_view key) const {
   return items_[static_cast<std::size_t>(keys_.rend() - entry) - 1];
 }
 
+bool JsonValue::has(std::string_view key) const {
+  return std::find(keys_.begin(), keys_.end(), key) != keys_.end();
+}
+
 const std::vector<JsonValue>& JsonValue::items() const {
   if (kind_ != Kind::array) throw Damage("a value is not an array");
   return items_;

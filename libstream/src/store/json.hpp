@@ -23,6 +23,8 @@ class JsonValue {
   /// none.
   [[nodiscard]] const JsonValue& at(std::string_view key) const;
 
+  [[nodiscard]] bool has(std::string_view key) const;
+
   // These throw Damage if the value is of another kind.
 
   [[nodiscard]] const std::vector<JsonValue>& items() const;

@@ -131,6 +131,12 @@ Manifest from_json(const JsonValue& json) {
     entry.directory_bytes = segment.at("directory_bytes").count();
     m.levels.push_back(std::move(entry));
   }
+  if (json.has("surface")) {
+    const JsonValue& surface = json.at("surface");
+    m.surface = {.vertices = surface.at("vertices").count(),
+                 .triangles = surface.at("triangles").count(),
+                 .file = file_of(surface.at("data"))};
+  }
   return m;
 }
 
@@ -166,7 +172,15 @@ void check_counts(const Manifest& m) {
   }
 }
 
-void check_places(const Manifest& m) {
+void check_surface(const Manifest& m) {
+  if (!m.surface) return;
+  // A triangle takes at least a 64th of a byte.
+  if (m.surface->vertices > m.points || m.surface->triangles / 64 > m.surface->file.bytes) {
+    throw Damage("the surface has more vertices or triangles than possible");
+  }
+}
+
+void check_coordinates(const Manifest& m) {
   for (const Channel& channel : m.schema.coordinates) {
     if (!std::isfinite(channel.scale) || channel.scale == 0 || !std::isfinite(channel.offset)) {
       throw Damage("a coordinate has an impossible scale or offset");
@@ -283,7 +297,8 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     }
     Manifest manifest = from_json(json);
     check_counts(manifest);
-    check_places(manifest);
+    check_surface(manifest);
+    check_coordinates(manifest);
     check_words(manifest);
     manifest.checksum = checksum;
     return manifest;

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,6 +31,9 @@ inline constexpr std::string_view kChecksumKey = "\"checksum\": \"";
 inline constexpr std::string_view kClosing = "\"\n}\n";
 inline constexpr std::string_view kZeros = "00000000";
 
+/// The file of the surface.
+inline constexpr const char* kSurfaceName = "surface.0";
+
 /// A file as the manifest lists it.
 struct FileEntry {
   std::string name;
@@ -44,6 +48,12 @@ struct LevelEntry {
   std::uint64_t directory_bytes = 0;  ///< at the end of the index file
 };
 
+/// The surface as the manifest lists it.
+struct SurfaceEntry {
+  std::uint64_t vertices = 0, triangles = 0;
+  FileEntry file;
+};
+
 /// The contents of manifest.json.
 struct Manifest {
   int version = kVersion;
@@ -52,7 +62,8 @@ struct Manifest {
   Box3 bounds;
   double mean_height = 0.0;
   std::vector<LevelEntry> levels;  ///< level 0 first
-  std::uint32_t checksum = 0;      ///< checksum of the text; set by parse_manifest()
+  std::optional<SurfaceEntry> surface;
+  std::uint32_t checksum = 0;  ///< checksum of the text; set by parse_manifest()
 };
 
 /// True if the corners of the box in the CRS are finite.

@@ -85,6 +85,11 @@ Json to_json(const Manifest& m) {
                               {"clusters", level.clusters},
                               {"segments", Json::array({segment})}});
   }
+  if (m.surface) {
+    json["surface"] = {{"vertices", m.surface->vertices},
+                       {"triangles", m.surface->triangles},
+                       {"data", file_json(m.surface->file)}};
+  }
   return json;
 }
 

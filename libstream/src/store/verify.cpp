@@ -12,6 +12,7 @@
 #include "store/codec/bytes.hpp"
 #include "store/read/level_reader.hpp"
 #include "store/read/store_impl.hpp"
+#include "terrace/stream/stored_surface.hpp"
 #include "with_type.hpp"
 
 namespace terrace::stream::store {
@@ -83,6 +84,7 @@ class Verification {
     for (unsigned l = 0; l < levels_.size(); ++l) check_level(l);
     for (std::size_t l = 0; l + 1 < levels_.size(); ++l) check_heads(l);
     check_totals();
+    if (manifest_.surface) check_surface();
     return good_;
   }
 
@@ -172,6 +174,14 @@ class Verification {
       if (checksum != expected) problem("the checksum of the file is wrong");
     } catch (const Error& error) {
       problem(error.what());
+    }
+  }
+
+  void check_surface() {
+    try {
+      static_cast<void>(store_.read_surface(cluster_order(store_)));
+    } catch (const Error& error) {
+      problem(manifest_.surface->file.name, 0, error.what());
     }
   }
 
@@ -414,7 +424,7 @@ class Verification {
 
 namespace terrace::stream {
 
-/// Memory: two bits per cluster and some buffers per thread.
+/// Memory: two bits per cluster, some buffers per thread, and the surface, if there is one.
 bool Store::verify(const std::function<void(const Problem&)>& report, unsigned threads) const {
   return store::Verification(*this, *impl_->manifest_file, impl_->manifest, impl_->levels, stop_,
                              threads, report)

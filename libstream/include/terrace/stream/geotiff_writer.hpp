@@ -41,6 +41,10 @@ struct GeoTiffOptions {
   std::stop_token stop{};  ///< ends commit() of a file with overviews, with Stopped
 };
 
+/// Bytes between the header of a file with overviews and its first directory: a description of the
+/// file's layout.
+inline constexpr std::size_t kGeoTiffLayoutBytes = 184;
+
 /// Upper bound of the memory in bytes that a writer needs for the table of the file's tiles.
 std::uint64_t geotiff_table_bytes(const GeoTiffOptions& options);
 

@@ -27,8 +27,10 @@ struct MeshFrame {
 struct MeshHeader {
   std::uint64_t vertices = 0;
   std::uint64_t triangles = 0;
-  std::vector<std::string> attributes{};  ///< names of float values per vertex ("level", ...)
-  std::vector<std::string> comments{};    ///< written if the format has comments (PLY, OBJ)
+  /// Names of float values per vertex ("level", ...). "nx", "ny" and "nz", in this order, are unit
+  /// normals.
+  std::vector<std::string> attributes{};
+  std::vector<std::string> comments{};  ///< written if the format has comments (PLY, OBJ)
   /// Bounding box of all vertices, if known: GLB puts its local origin at the centre. Otherwise the
   /// first vertex is the origin.
   std::optional<Box3> bounds{};
@@ -44,15 +46,16 @@ using TriangleIndices = std::array<std::uint32_t, 3>;
 /// triangles, both in pieces of any size. Memory is bounded; the same mesh gives the same bytes.
 ///
 /// PLY: double coordinates, float attributes, binary little-endian or ASCII; exact.
-/// OBJ: coordinates as the shortest decimals that read back as the same double; attributes cannot
-/// be represented and are dropped.
+/// OBJ: coordinates as the shortest decimals that read back as the same double. Normals become "vn"
+/// lines; other attributes cannot be represented and are dropped.
 /// GLB (binary glTF 2.0): positions are float32 relative to a local origin, which the node's
 /// translation holds in double precision, so each coordinate is off by at most 2^-24 of its
 /// distance from the origin. glTF's y axis points up: (x, y, z) with z up is stored as (x, z, -y).
 /// With a frame, coordinates are converted to metres, and asset.extras has what is needed to
 /// convert a vertex X, Y, Z of the scene back: x = origin[0] + X / metres_per_unit[0], y =
 /// origin[1] - Z / metres_per_unit[1], z = Y / metres_per_unit[2].
-/// Attributes become vertex attributes, "level" as "_LEVEL". Maximum size: 4 GiB. A mesh without
+/// Attributes become vertex attributes, "level" as "_LEVEL". Normals become "NORMAL"; one of length
+/// zero points up, because glTF requires unit length. Maximum size: 4 GiB. A mesh without
 /// triangles is written as a point cloud, one without vertices as an empty scene.
 class MeshWriter {
  public:
@@ -81,6 +84,8 @@ std::string mesh_format(const std::string& path, const WriterOptions& options = 
 /// The rounding of positions by a mesh file.
 class MeshRounding {
  public:
+  /// For vertices that are used as they are, not written.
+  MeshRounding() = default;
   /// For the file that open_mesh_writer() writes with this path and these options, and `bounds` and
   /// `frame` in its header. Throws: std::invalid_argument for an unknown format.
   MeshRounding(const std::string& path, const Box3& bounds, const WriterOptions& options = {},

@@ -8,6 +8,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stop_token>
 #include <string>
@@ -28,7 +29,9 @@
 
 namespace terrace::stream {
 
-struct Ownership;  // atomic_file.hpp
+struct Ownership;      // atomic_file.hpp
+struct StoredSurface;  // stored_surface.hpp
+struct ClusterOrder;
 
 using base::cluster_id;
 using base::ClusteredBlock;
@@ -47,6 +50,8 @@ struct StoreSchema : Schema {
   /// Parameters of the clustering, in this order, as name and text of the value.
   std::vector<std::pair<std::string, std::string>> parameters{};
 };
+
+class Store;
 
 /// Writes a store. It appears under its name, complete and synced, when finish() returns; a writer
 /// that dies or throws before that leaves nothing that can be opened.
@@ -88,7 +93,12 @@ class StoreWriter {
   /// Writes the points of the top level, passed as a block of one cluster without a
   /// representative, syncs and publishes the store. If `publish` is false it is a trial run and
   /// removes the store. Returns the size of the store in bytes.
-  std::uint64_t finish(const ClusteredBlock& root, bool publish = true);
+  ///
+  /// surface: returns the surface through the points of the complete but not yet published store,
+  /// to be stored with it. Its exceptions leave no store.
+  using MakeSurface = std::function<StoredSurface(const Store&, const ClusterOrder&)>;
+  std::uint64_t finish(const ClusteredBlock& root, bool publish = true,
+                       const MakeSurface& surface = {});
 
  private:
   struct Impl;
@@ -133,6 +143,12 @@ struct LevelInfo {
   std::uint64_t index_bytes = 0;
 };
 
+/// The size of a store's surface, as the manifest states it.
+struct SurfaceInfo {
+  std::uint64_t vertices = 0, triangles = 0;
+  std::uint64_t bytes = 0;
+};
+
 /// A fault that Store::verify() reports: what is wrong, and where.
 struct Problem {
   std::string file;
@@ -154,8 +170,8 @@ class Store {
   /// Throws: Error if `path` is not a store, or has a newer version or a damaged manifest.
   static Store open(const std::filesystem::path& path);
   /// Opens a store whose files are not in a folder but in memory, in an archive or on a server.
-  /// `name` replaces the folder in messages and in path(). Throws as above, and what `files`
-  /// throws.
+  /// `name` replaces the folder in messages and in path(). `files` is kept if the store has a
+  /// surface. Throws as above, and what `files` throws.
   static Store open(const std::string& name, const OpenByName& files);
   /// Whether `path` is a store. If a writer moved the store aside in order to replace it and then
   /// died, this gives the store its name back. open() calls this.
@@ -204,6 +220,12 @@ class Store {
   /// Mean of stored coordinate 2 over all points.
   [[nodiscard]] double mean_height() const;
   [[nodiscard]] ClusterId root() const;
+  /// The surface that is stored with the points, of a view that of the whole store; nullopt without
+  /// one.
+  [[nodiscard]] std::optional<SurfaceInfo> surface() const;
+  /// Reads the surface; order: cluster_order() of this store. Throws: Error if there is none, or
+  /// for damage.
+  [[nodiscard]] StoredSurface read_surface(const ClusterOrder& order) const;
 
   /// Reads a cluster's index entry. Throws: Error for a damaged page or an ordinal that does not
   /// exist.
@@ -253,7 +275,8 @@ class Store {
 /// bytes. Its checksum differs, so it does not accept overlays of the old store. Boxes above level
 /// 0 may be wider by a step of their coding. Returns the size of the new store in bytes; its bytes
 /// do not depend on `threads`. Memory: 16 bytes per cluster of level 0, and 64 blocks of 10,000
-/// points. Throws: Error as StoreWriter does, and for damage; Stopped.
+/// points; a stored surface is held as a whole. Throws: Error as StoreWriter does, and for damage;
+/// Stopped.
 std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool replace = false,
                      unsigned threads = 1);
 

@@ -139,9 +139,9 @@ class StoreQuery {
   template <class Wants, class Visit>
   void descend(unsigned level, const Wants& wants, const Visit& visit);
 
-  /// Visits the root and then clusters of `level` and above in ascending order of least(box), as
-  /// long as it does not exceed the last result of visit(node). least: returns a lower bound for
-  /// any point in the box, or infinity to skip it.
+  /// Visits the root and then clusters of `level` and above in ascending order of least(level,
+  /// box), as long as it does not exceed the last result of visit(node). least: returns a lower
+  /// bound for any point in the box around a cluster of that level, or infinity to skip it.
   template <class Least, class Visit>
   void best_first(unsigned level, const Least& least, const Visit& visit);
 
@@ -229,10 +229,10 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
         const auto beyond = [bound](double distance) {
           return distance > bound || distance == std::numeric_limits<double>::infinity();
         };
-        if (beyond(least(node.known_branch(i, below).box))) continue;
-        if (beyond(least(node.near_branch(i, below).box))) continue;
+        if (beyond(least(below, node.known_branch(i, below).box))) continue;
+        if (beyond(least(below, node.near_branch(i, below).box))) continue;
         const Branch& branch = node.branch(i, below);
-        const double distance = least(branch.box);
+        const double distance = least(below, branch.box);
         if (beyond(distance)) continue;
         open_.push_back({distance, cluster_id(below, branch.ordinal)});
         std::push_heap(open_.begin(), open_.end(), later);

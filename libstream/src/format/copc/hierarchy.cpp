@@ -70,16 +70,16 @@ class HierarchyReader {
     OctreeNode node{.offset = load_little_endian<std::uint64_t>(at + 16)};
     const auto bytes = load_little_endian<std::int32_t>(at + 24);
     const auto points = load_little_endian<std::int32_t>(at + 28);
-    if (depth < 0 || depth > static_cast<std::int32_t>(kDeepestNode)) {
+    if (depth < 0 || depth > static_cast<std::int32_t>(kMaxDepth)) {
       throw damaged(file_, byte, fmt::format("a node of the COPC hierarchy has depth {}", depth));
     }
     node.depth = static_cast<unsigned>(depth);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto place = load_little_endian<std::int32_t>(at + 4 + 4 * axis);
-      if (place < 0 || (place >> depth) != 0) {
+      const auto position = load_little_endian<std::int32_t>(at + 4 + 4 * axis);
+      if (position < 0 || (position >> depth) != 0) {
         throw damaged(file_, byte, "a node of the COPC hierarchy is outside its root");
       }
-      node.place[axis] = static_cast<std::uint32_t>(place);
+      node.position[axis] = static_cast<std::uint32_t>(position);
     }
     if (points < -1 || bytes < 0) {
       throw damaged(file_, byte, "a node of the COPC hierarchy has a negative size");
@@ -124,8 +124,8 @@ void check_disjoint(const ByteSource& file, Octree& octree) {
 void append_entry(std::string& page, const OctreeNode& node, std::uint64_t offset,
                   std::uint64_t bytes, std::int64_t points) {
   append_little_endian(page, static_cast<std::int32_t>(node.depth));
-  for (const std::uint32_t place : node.place) {
-    append_little_endian(page, static_cast<std::int32_t>(place));
+  for (const std::uint32_t position : node.position) {
+    append_little_endian(page, static_cast<std::int32_t>(position));
   }
   append_little_endian(page, offset);
   append_little_endian(page, static_cast<std::int32_t>(bytes));

@@ -34,7 +34,8 @@ std::size_t child_of(const std::array<std::uint32_t, 3>& cell, unsigned depth) {
 OctreeNode child(const OctreeNode& node, std::size_t number) {
   OctreeNode child{.depth = node.depth + 1};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    child.place[axis] = 2 * node.place[axis] + static_cast<std::uint32_t>((number >> axis) & 1U);
+    child.position[axis] =
+        2 * node.position[axis] + static_cast<std::uint32_t>((number >> axis) & 1U);
   }
   return child;
 }
@@ -141,8 +142,8 @@ std::array<std::uint32_t, 3> OctreeBuilder::cell_of(const std::byte* record) con
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::int32_t step = 0;
     std::memcpy(&step, record + axis * sizeof step, sizeof step);
-    const double place = step * lattice_.scale[axis] + lattice_.offset[axis];
-    const double at = (place - corner_[axis]) / side_ * kCells;
+    const double coordinate = step * lattice_.scale[axis] + lattice_.offset[axis];
+    const double at = (coordinate - corner_[axis]) / side_ * kCells;
     cell[axis] = static_cast<std::uint32_t>(std::clamp(at, 0.0, kCells - 1));
   }
   return cell;
@@ -159,11 +160,11 @@ OctreeBuilder::NodePoints OctreeBuilder::build(const OctreeNode& node, Bucket bu
     file_.take(bucket, batch_records_ / 8, records);
     for (std::size_t at = 0; at < records.size(); at += numbered_bytes_) {
       const auto cell = cell_of(records.data() + at);
-      std::size_t place = 0;
+      std::size_t index = 0;
       for (unsigned depth = node.depth; depth < node.depth + depths; ++depth) {
-        place = place * kChildren + child_of(cell, depth);
+        index = index * kChildren + child_of(cell, depth);
       }
-      file_.append(buckets[place], std::span(records).subspan(at, numbered_bytes_));
+      file_.append(buckets[index], std::span(records).subspan(at, numbered_bytes_));
     }
   }
   return visit(node, buckets);

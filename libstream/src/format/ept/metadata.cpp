@@ -160,7 +160,7 @@ class EptMetadataReader {
     }
     const Json& span = member(json, "span");
     if (!span.is_number_unsigned() || span.get<std::uint64_t>() == 0 ||
-        span.get<std::uint64_t>() > (1u << kDeepestNode)) {
+        span.get<std::uint64_t>() > (1u << kMaxDepth)) {
       throw fault("is not a number of cells").at("span");
     }
     octree.spacing = 2 * octree.half_size / static_cast<double>(span.get<std::uint64_t>());
@@ -285,22 +285,22 @@ std::optional<OctreeNode> node_of(std::string_view name) {
     return true;
   };
   std::uint32_t depth = 0;
-  if (!read(depth) || depth > kDeepestNode) return {};
+  if (!read(depth) || depth > kMaxDepth) return {};
   node.depth = depth;
-  for (std::uint32_t& place : node.place) {
+  for (std::uint32_t& position : node.position) {
     if (!name.starts_with('-')) return {};
     name.remove_prefix(1);
-    if (!read(place) || (place >> depth) != 0) return {};
+    if (!read(position) || (position >> depth) != 0) return {};
   }
   if (!name.empty()) return {};
   return node;
 }
 
-/// Depth and place. A file of the hierarchy is named after its topmost node.
-using NodeKey = std::array<std::uint32_t, 4>;
+/// Depth and position. A file of the hierarchy is named after its topmost node.
+using NodeNumbers = std::array<std::uint32_t, 4>;
 
-NodeKey key_of(const OctreeNode& node) {
-  return {node.depth, node.place[0], node.place[1], node.place[2]};
+NodeNumbers numbers_of(const OctreeNode& node) {
+  return {node.depth, node.position[0], node.position[1], node.position[2]};
 }
 
 /// The part of the hierarchy read so far.
@@ -308,8 +308,8 @@ struct HierarchyState {
   std::uint64_t points = 0;  ///< promised
   std::uint64_t found = 0;
   std::vector<OctreeNode> nodes{};
-  std::vector<NodeKey> pending{};  ///< of files to be read
-  std::set<NodeKey> files{};       ///< of files
+  std::vector<NodeNumbers> pending{};  ///< of files to be read
+  std::set<NodeNumbers> files{};       ///< of all files that are referred to
 };
 
 /// Takes the entries of one file as they are parsed: an object of names and numbers.
@@ -322,7 +322,7 @@ class EntryParser final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   bool number_unsigned(number_unsigned_t value) override {
-    OctreeNode node = place();
+    OctreeNode node = parsed_node();
     if (value == 0) return true;
     // Compared before adding, because the sum could overflow.
     if (value > state_.points - state_.found) {
@@ -336,13 +336,13 @@ class EntryParser final : public nlohmann::json_sax<nlohmann::json> {
     return true;
   }
   bool number_integer(number_integer_t value) override {
-    const NodeKey key = key_of(place());
+    const NodeNumbers numbers = numbers_of(parsed_node());
     if (value != -1)
       throw ept_fault(file_, fmt::format("has {} points", value)).at("node " + name_);
-    if (!state_.files.insert(key).second) {
+    if (!state_.files.insert(numbers).second) {
       throw ept_fault(file_, "its part of the hierarchy is referred to twice").at("node " + name_);
     }
-    state_.pending.push_back(key);
+    state_.pending.push_back(numbers);
     return true;
   }
   bool start_object(std::size_t) override { return depth_++ == 0 || refuse(); }
@@ -364,7 +364,7 @@ class EntryParser final : public nlohmann::json_sax<nlohmann::json> {
     throw ept_fault(file_, "it does not hold the point counts of nodes")
         .at(name_.empty() ? std::string() : "node " + in_quotes(name_));
   }
-  [[nodiscard]] OctreeNode place() const {
+  [[nodiscard]] OctreeNode parsed_node() const {
     if (depth_ == 0) refuse();
     const std::optional<OctreeNode> node = node_of(name_);
     if (!node) throw ept_fault(file_, in_quotes(name_) + " is not a node of an octree");
@@ -388,7 +388,7 @@ EptMetadata read_ept_metadata(const std::string& file) { return EptMetadataReade
 
 std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
                                            std::uint64_t points) {
-  const NodeKey root = key_of(OctreeNode{});
+  const NodeNumbers root = numbers_of(OctreeNode{});
   /// Enough for some 800,000 nodes; Entwine begins another file after a few depths.
   constexpr std::uint64_t kMaxBytes = 16u << 20;
   HierarchyState state{.points = points};
@@ -397,7 +397,7 @@ std::vector<OctreeNode> read_ept_hierarchy(const std::filesystem::path& folder,
   while (!state.pending.empty()) {
     const auto [depth, x, y, z] = state.pending.back();
     state.pending.pop_back();
-    const std::string name = name_of({.depth = depth, .place = {x, y, z}});
+    const std::string name = key_of({.depth = depth, .position = {x, y, z}});
     const std::string file = (folder / "ept-hierarchy" / (name + ".json")).string();
     if (open_file(file)->size() > kMaxBytes) throw ept_fault(file, "is too large for a hierarchy");
     std::ifstream bytes(file, std::ios::binary);

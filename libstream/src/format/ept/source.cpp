@@ -115,7 +115,7 @@ std::filesystem::path ept_node_file(const std::filesystem::path& folder, EptData
   const char* const ending = data == EptData::laszip   ? ".laz"
                              : data == EptData::binary ? ".bin"
                                                        : ".zst";
-  return folder / "ept-data" / (name_of(node) + ending);
+  return folder / "ept-data" / (key_of(node) + ending);
 }
 
 /// Reads the records of one node at a time, in any encoding.
@@ -223,7 +223,7 @@ std::unique_ptr<PointSource> open_one_ept(const std::string& file, const SourceO
   octree.nodes = read_ept_hierarchy(folder, metadata.points);
   if (const OctreeNode* const duplicate = octree.arrange()) {
     throw ept_fault((folder / "ept-hierarchy").string(), "is listed twice")
-        .at("node " + name_of(*duplicate));
+        .at("node " + key_of(*duplicate));
   }
   LasHeader header;
   if (metadata.data == EptData::laszip && !octree.nodes.empty()) {

@@ -60,16 +60,16 @@ Error GeoJsonItems::fault(std::string cause, std::size_t ahead) const {
 }
 
 /// Returns the byte at a position of the window, which grows as needed; 0 at the end of the input.
-char GeoJsonItems::at(std::size_t place) {
+char GeoJsonItems::at(std::size_t index) {
   window_ = input_->window();
-  if (place < window_.size()) return window_[place];
-  if (place >= max_bytes_) {
+  if (index < window_.size()) return window_[index];
+  if (index >= max_bytes_) {
     throw Error(input_->name(), fmt::format("a feature has more than {} MiB", max_bytes_ >> 20))
         .at_byte(input_->offset())
         .remedy(message("raise {memory_bytes}, or split the feature's lines"));
   }
-  window_ = input_->fill(std::min(max_bytes_, std::max(place + 1, 2 * window_.size())));
-  return place < window_.size() ? window_[place] : '\0';
+  window_ = input_->fill(std::min(max_bytes_, std::max(index + 1, 2 * window_.size())));
+  return index < window_.size() ? window_[index] : '\0';
 }
 
 void GeoJsonItems::skip_white_space() {

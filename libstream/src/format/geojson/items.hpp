@@ -39,7 +39,7 @@ class GeoJsonItems {
     bool in_list = false;
   };
 
-  char at(std::size_t place);
+  char at(std::size_t index);
   void skip_white_space();
   void advance();
   void leave_list();

@@ -110,7 +110,7 @@ GeoTiffBlocks::GeoTiffBlocks(GeoTiffHandle& handle, const GeoTiffLayout& layout,
 
 Error GeoTiffBlocks::fault(const Part& part, std::uint64_t offset, std::string cause) const {
   return handle_.fault(std::move(cause))
-      .at(fmt::format("{} (byte {})", layout_.place(part.across, part.down), offset))
+      .at(fmt::format("{} (byte {})", layout_.block_name(part.across, part.down), offset))
       .remedy(kDamaged);
 }
 
@@ -233,8 +233,9 @@ bool GeoTiffBlocks::read_plain(const Part& part, std::uint64_t offset, std::uint
     const std::uint32_t n = std::min(at_once, part.rows - row);
     if (raw_.size() < n * piece_bytes) raw_.resize(n * piece_bytes);
     const std::span<std::byte> piece(raw_.data(), n * piece_bytes);
-    const std::uint64_t place = offset + (std::uint64_t{part.row} + row) * row_bytes + skip;
-    if (!handle_.read(place, piece)) throw fault(part, place, "extends beyond the end of the file");
+    const std::uint64_t row_offset = offset + (std::uint64_t{part.row} + row) * row_bytes + skip;
+    if (!handle_.read(row_offset, piece))
+      throw fault(part, row_offset, "extends beyond the end of the file");
     if (layout_.swapped) {
       swap_bytes(raw_.data(), size_of(layout_.type), piece.size() / size_of(layout_.type));
     }

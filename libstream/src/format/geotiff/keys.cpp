@@ -73,13 +73,13 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
     count = present;
   }
   for (std::size_t i = 1; i <= count; ++i) {
-    const std::uint16_t key = directory[4 * i], place = directory[4 * i + 1],
+    const std::uint16_t key = directory[4 * i], location = directory[4 * i + 1],
                         length = directory[4 * i + 2], value = directory[4 * i + 3];
-    if (place == 0) {
+    if (location == 0) {
       numbers_[key] = value;
-    } else if (place == kGeoKeyDirectory && value < directory.size()) {
+    } else if (location == kGeoKeyDirectory && value < directory.size()) {
       numbers_[key] = directory[value];
-    } else if (place == kGeoAsciiParams) {
+    } else if (location == kGeoAsciiParams) {
       if (value > ascii.size() || length > ascii.size() - value) {
         faults_.push_back(fmt::format("GeoKey {} points outside GeoAsciiParams", key));
         continue;
@@ -87,7 +87,7 @@ GeoKeys::GeoKeys(std::span<const std::uint16_t> directory, std::span<const doubl
       std::string text = ascii.substr(value, length);
       while (!text.empty() && (text.back() == '|' || text.back() == '\0')) text.pop_back();
       texts_[key] = text;
-    } else if (place == kGeoDoubleParams) {
+    } else if (location == kGeoDoubleParams) {
       if (value > doubles.size() || length > doubles.size() - value) {
         faults_.push_back(fmt::format("GeoKey {} points outside GeoDoubleParams", key));
         continue;

@@ -212,7 +212,7 @@ std::uint32_t bits_at(const std::byte* bytes, std::uint64_t position, unsigned b
 
 }  // namespace
 
-std::string GeoTiffLayout::place(std::uint32_t across, std::uint32_t down) const {
+std::string GeoTiffLayout::block_name(std::uint32_t across, std::uint32_t down) const {
   if (tiled) return fmt::format("tile {},{}", across, down);
   return fmt::format("strip {}", down);
 }

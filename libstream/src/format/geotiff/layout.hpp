@@ -41,7 +41,7 @@ struct GeoTiffLayout {
     return (separate ? band * blocks_across * blocks_down : 0) + down * blocks_across + across;
   }
   /// "tile 3,4" (across, down) or "strip 7": for messages.
-  [[nodiscard]] std::string place(std::uint32_t across, std::uint32_t down) const;
+  [[nodiscard]] std::string block_name(std::uint32_t across, std::uint32_t down) const;
 };
 
 /// Reads and checks the layout of the handle's directory. `band` is counted from 1. Throws: Error

@@ -87,24 +87,24 @@ Overviews::Overviews(const GeoTiffOptions& options, std::vector<GeoTiffLevel> le
 void Overviews::add(std::size_t level, std::uint32_t across, std::uint32_t down,
                     std::span<const std::byte> samples) {
   if (level + 1 == levels_.size()) return;
-  const Place place{across / 2, down / 2};
-  Tile& parent = open_[level + 1][place];
+  const TilePosition position{across / 2, down / 2};
+  Tile& parent = open_[level + 1][position];
   if (!samples.empty()) {
     with_type(options_.sample.type, [&](auto sample) {
       reduce<decltype(sample)>(level, across, down, samples, parent.samples);
     });
   }
   const GeoTiffLevel& current_level = levels_[level];
-  const auto children = std::min(2u, current_level.across - 2 * place.first) *
-                        std::min(2u, current_level.down - 2 * place.second);
+  const auto children = std::min(2u, current_level.across - 2 * position.first) *
+                        std::min(2u, current_level.down - 2 * position.second);
   if (++parent.children < children) return;
-  auto complete_tile = open_[level + 1].extract(place);
-  complete(level + 1, place, std::move(complete_tile.mapped()));
+  auto complete_tile = open_[level + 1].extract(position);
+  complete(level + 1, position, std::move(complete_tile.mapped()));
 }
 
-void Overviews::complete(std::size_t level, Place place, Tile tile) {
-  add(level, place.first, place.second, tile.samples);
-  if (!tile.samples.empty()) write_(level, place.first, place.second, tile.samples);
+void Overviews::complete(std::size_t level, TilePosition position, Tile tile) {
+  add(level, position.first, position.second, tile.samples);
+  if (!tile.samples.empty()) write_(level, position.first, position.second, tile.samples);
 }
 
 void Overviews::finish() {

@@ -49,19 +49,19 @@ class Overviews {
     std::vector<std::byte> samples{};  ///< empty: no data so far
     unsigned children = 0;
   };
-  using Place = std::pair<std::uint32_t, std::uint32_t>;  ///< across, down
+  using TilePosition = std::pair<std::uint32_t, std::uint32_t>;  ///< across, down
 
   void add(std::size_t level, std::uint32_t across, std::uint32_t down,
            std::span<const std::byte> samples);
   template <class T>
   void reduce(std::size_t level, std::uint32_t across, std::uint32_t down,
               std::span<const std::byte> samples, std::vector<std::byte>& parent) const;
-  void complete(std::size_t level, Place place, Tile tile);
+  void complete(std::size_t level, TilePosition position, Tile tile);
 
   GeoTiffOptions options_;
   std::vector<GeoTiffLevel> levels_;
   Write write_;
-  std::vector<std::map<Place, Tile>> open_;  ///< open tiles of each level
+  std::vector<std::map<TilePosition, Tile>> open_;  ///< open tiles of each level
 };
 
 }  // namespace terrace::stream

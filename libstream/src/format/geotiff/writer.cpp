@@ -134,6 +134,7 @@ constexpr std::string_view kLayout =
     "BLOCK_LEADER=SIZE_AS_UINT4\n"
     "BLOCK_TRAILER=LAST_4_BYTES_REPEATED\n"
     "KNOWN_INCOMPATIBLE_EDITION=NO\n ";
+static_assert(kLayout.size() + kLayout.size() % 2 == kGeoTiffLayoutBytes);
 constexpr std::size_t kFrameBytes = 4;      ///< bytes of a leader, and of a trailer
 constexpr std::size_t kTilesPerThread = 2;  ///< waiting to be compressed
 
@@ -144,8 +145,6 @@ struct TileIndex {
   std::vector<std::uint64_t> offsets;
   std::vector<std::uint32_t> bytes;
 };
-
-std::uint64_t even(std::uint64_t number) { return number + number % 2; }
 
 /// True if 4 GiB might not suffice. Compression may enlarge noise slightly.
 bool needs_big(const GeoTiffOptions& options, const std::vector<GeoTiffLevel>& levels) {
@@ -296,7 +295,7 @@ void GeoTiffWriter::Impl::finish_plain() {
 void GeoTiffWriter::Impl::finish_with_overviews() {
   overviews.finish();
   write_queue();
-  std::vector<std::uint64_t> directory_at{even(tiff_head(big, 0).size() + kLayout.size())};
+  std::vector<std::uint64_t> directory_at{tiff_head(big, 0).size() + kGeoTiffLayoutBytes};
   for (std::size_t level = 0; level < levels.size(); ++level) {
     const std::uint64_t at = directory_at.back();
     directory_at.push_back(at + directory(level).bytes(big, at, 0).size());

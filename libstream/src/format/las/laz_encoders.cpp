@@ -7,7 +7,7 @@
 namespace terrace::stream {
 
 LazEncoders::LazEncoders(const laz::Vlr& vlr, unsigned threads, Write write)
-    : write_(std::move(write)), ahead_(threads, [vlr] {
+    : write_(std::move(write)), queue_(threads, [vlr] {
         return [encoder = std::make_shared<laz::Encoder>(vlr)](Chunk& chunk) {
           chunk.coded.clear();
           encoder->encode_chunk(chunk.records, chunk.coded);
@@ -23,23 +23,24 @@ void LazEncoders::encode(std::span<const std::byte> records) {
     write_(coded_);
     return;
   }
-  while (ahead_.threads() > 0 && ahead_.size() > ahead_.threads()) deliver_oldest();
+  while (queue_.size() > queue_.threads()) deliver_oldest();
   Chunk chunk;
   if (!free_chunks_.empty()) {
     chunk = std::move(free_chunks_.back());
     free_chunks_.pop_back();
   }
   chunk.records.assign(records.begin(), records.end());
-  ahead_.give(std::move(chunk));
-  if (ahead_.threads() == 0) deliver_oldest();
+  queue_.give(std::move(chunk));
+  // If the system grants no threads, the queue encodes on this thread.
+  if (queue_.threads() == 0) deliver_oldest();
 }
 
 void LazEncoders::finish() {
-  while (ahead_.size() > 0) deliver_oldest();
+  while (queue_.size() > 0) deliver_oldest();
 }
 
 void LazEncoders::deliver_oldest() {
-  Chunk chunk = ahead_.take();
+  Chunk chunk = queue_.take();
   write_(chunk.coded);
   free_chunks_.push_back(std::move(chunk));
 }

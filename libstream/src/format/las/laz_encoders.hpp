@@ -36,9 +36,9 @@ class LazEncoders {
 
   Write write_;
   std::optional<laz::Encoder> encoder_;  ///< with one thread, which needs no copy of the records
-  std::vector<std::byte> coded_;         ///< by own_
+  std::vector<std::byte> coded_;         ///< by encoder_
   std::vector<Chunk> free_chunks_;       ///< their buffers are used again
-  base::WorkAhead<Chunk> ahead_;
+  base::WorkAhead<Chunk> queue_;
 };
 
 }  // namespace terrace::stream

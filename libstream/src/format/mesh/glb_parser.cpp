@@ -104,8 +104,10 @@ class GlbParser final : public MeshParser {
 
   const char* format() const override { return "glb"; }
   const Input& input() const override { return *input_; }
-  std::optional<std::uint64_t> vertices() const override { return vertices_; }
-  ScalarType type() const override { return has_transforms_ ? ScalarType::f64 : ScalarType::f32; }
+  std::optional<std::uint64_t> stated_vertices() const override { return vertices_; }
+  ScalarType coordinate_type() const override {
+    return has_transforms_ ? ScalarType::f64 : ScalarType::f32;
+  }
 
   Item next() override {
     for (; at_ < parts_.size(); ++at_, begun_ = false) {
@@ -121,7 +123,7 @@ class GlbParser final : public MeshParser {
 
   static constexpr std::uint64_t kMax = std::numeric_limits<std::uint32_t>::max();
   static constexpr std::size_t kMaxJsonBytes = std::size_t{64} << 20;
-  /// Limit of the primitives that nodes place, counting each place.
+  /// Limit of the primitives that nodes use, counting each use.
   static constexpr std::size_t kMaxParts = std::size_t{1} << 20;
 
   /// A primitive (3.7.2.1).

@@ -3,6 +3,8 @@
 #include <cassert>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,7 @@ class GlbWriter final : public MeshWriter {
       : header_(header),
         frame_(header.frame.value_or(MeshFrame{})),
         counts_(header),
+        normals_(normals_in(header.attributes)),
         stride_(4 * (3 + header.attributes.size())) {
     const auto refused = [&](const char* cause) {
       return Error(path, cause).remedy("write PLY, or a smaller part");
@@ -93,8 +96,9 @@ class GlbWriter final : public MeshWriter {
       origin_ = positions.front();
       origin_known_ = true;
     }
-    const float* values = attributes.data();
-    for (const Point3& p : positions) {
+    const std::size_t columns = header_.attributes.size();
+    for (std::size_t v = 0; v < positions.size(); ++v) {
+      const Point3& p = positions[v];
       std::array<float, 3> local{};
       for (std::size_t axis = 0; axis < 3; ++axis) {
         local[axis] = glb_coordinate(p[axis], origin_[axis], frame_.metres[axis]);
@@ -106,9 +110,7 @@ class GlbWriter final : public MeshWriter {
         if (stored > max_[axis]) max_[axis] = stored;
         append_little_endian(piece_, stored);
       }
-      for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
-        append_little_endian(piece_, *values++);
-      }
+      append_attributes(attributes.subspan(v * columns, columns));
       flush_if_full();
     }
     flush();
@@ -145,6 +147,20 @@ class GlbWriter final : public MeshWriter {
 
  private:
   using Json = nlohmann::ordered_json;
+
+  /// Appends the attributes of one vertex, its normal with y up.
+  void append_attributes(std::span<const float> values) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (i != normals_) {
+        append_little_endian(piece_, values[i]);
+        continue;
+      }
+      std::array<float, 3> normal{values[i], values[i + 1], values[i + 2]};
+      if (normal == std::array<float, 3>{}) normal[2] = 1;
+      for (const float value : y_up(normal)) append_little_endian(piece_, value);
+      i += 2;
+    }
+  }
 
   [[nodiscard]] std::uint64_t binary_bytes() const {
     return header_.vertices * stride_ + header_.triangles * 12;
@@ -188,15 +204,34 @@ class GlbWriter final : public MeshWriter {
     return extras;
   }
 
-  /// Names accessors by their numbers: 0 for positions, then the attributes, then the corners of
+  /// An accessor of vertices: an attribute, or three that are normals.
+  struct VertexColumn {
+    std::string name;
+    const char* type;
+    std::size_t offset;  ///< in a vertex, in bytes
+  };
+  [[nodiscard]] std::vector<VertexColumn> columns() const {
+    std::vector<VertexColumn> out;
+    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
+      const std::size_t offset = 12 + 4 * i;
+      if (i == normals_) {
+        out.push_back({"NORMAL", "VEC3", offset});
+        i += 2;
+      } else {
+        out.push_back({attribute_name(header_.attributes[i]), "SCALAR", offset});
+      }
+    }
+    return out;
+  }
+
+  /// Names accessors by their numbers: 0 for positions, then columns(), then the corners of
   /// triangles.
   [[nodiscard]] Json primitive() const {
     Json out;
-    out["attributes"]["POSITION"] = 0;
-    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
-      out["attributes"][attribute_name(header_.attributes[i])] = 1 + i;
-    }
-    if (header_.triangles > 0) out["indices"] = 1 + header_.attributes.size();
+    std::size_t accessor = 0;
+    out["attributes"]["POSITION"] = accessor++;
+    for (const VertexColumn& column : columns()) out["attributes"][column.name] = accessor++;
+    if (header_.triangles > 0) out["indices"] = accessor;
     out["mode"] = header_.triangles > 0 ? glb::kTriangles : glb::kPoints;
     out["material"] = 0;
     return out;
@@ -211,12 +246,12 @@ class GlbWriter final : public MeshWriter {
                    {"type", "VEC3"},
                    {"min", min},
                    {"max", max}});
-    for (std::size_t i = 0; i < header_.attributes.size(); ++i) {
+    for (const VertexColumn& column : columns()) {
       out.push_back({{"bufferView", 0},
-                     {"byteOffset", 12 + 4 * i},
+                     {"byteOffset", column.offset},
                      {"componentType", glb::kFloat},
                      {"count", header_.vertices},
-                     {"type", "SCALAR"}});
+                     {"type", column.type}});
     }
     if (header_.triangles == 0) return out;
     out.push_back({{"bufferView", 1},
@@ -258,6 +293,7 @@ class GlbWriter final : public MeshWriter {
   MeshHeader header_;
   MeshFrame frame_;
   MeshCounts counts_;
+  std::optional<std::size_t> normals_;  ///< index of nx
   std::size_t stride_;
   std::optional<Sink> sink_;
   Point3 origin_{};

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cassert>
+#include <cstddef>
+#include <optional>
 #include <string>
 
 #include "format/writers.hpp"
@@ -12,10 +14,14 @@ namespace {
 constexpr std::size_t kObjTextBytes = 64u << 10;
 
 /// Writes Wavefront OBJ: "v x y z" per vertex, "f a b c" per triangle, vertices counted from 1.
+/// With normals "vn x y z" follows each vertex, and a corner is "a//a".
 class ObjWriter final : public MeshWriter {
  public:
   ObjWriter(const std::string& path, const MeshHeader& header, const WriterOptions& options)
-      : sink_(path, options.replace, options.stop), counts_(header) {
+      : sink_(path, options.replace, options.stop),
+        counts_(header),
+        attributes_(header.attributes.size()),
+        normals_(normals_in(header.attributes)) {
     for (const std::string& comment : header.comments) {
       text_ += "# ";
       for (const char c : comment) text_ += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
@@ -26,9 +32,16 @@ class ObjWriter final : public MeshWriter {
 
   void add_vertices(std::span<const Point3> positions, std::span<const float> attributes) override {
     counts_.add_vertices(positions, attributes);
-    for (const Point3& p : positions) {
+    for (std::size_t i = 0; i < positions.size(); ++i) {
       text_ += 'v';
-      for (const double value : p) {
+      for (const double value : positions[i]) {
+        text_ += ' ';
+        append_number(text_, value);
+      }
+      end_line();
+      if (!normals_) continue;
+      text_ += "vn";
+      for (const float value : attributes.subspan(i * attributes_ + *normals_, 3)) {
         text_ += ' ';
         append_number(text_, value);
       }
@@ -43,6 +56,9 @@ class ObjWriter final : public MeshWriter {
       text_ += 'f';
       for (const std::uint32_t index : triangle) {
         text_ += ' ';
+        append_number(text_, std::uint64_t{index} + 1);
+        if (!normals_) continue;
+        text_ += "//";
         append_number(text_, std::uint64_t{index} + 1);
       }
       end_line();
@@ -67,6 +83,8 @@ class ObjWriter final : public MeshWriter {
 
   Sink sink_;
   MeshCounts counts_;
+  std::size_t attributes_;
+  std::optional<std::size_t> normals_;  ///< index of nx
   std::string text_;
 };
 

@@ -45,7 +45,7 @@ class OffParser final : public MeshParser {
 
   const char* format() const override { return "off"; }
   const Input& input() const override { return *input_; }
-  std::optional<std::uint64_t> vertices() const override { return vertices_; }
+  std::optional<std::uint64_t> stated_vertices() const override { return vertices_; }
 
   Item next() override {
     std::string_view line;

@@ -14,9 +14,9 @@
 #include "terrace/stream/mesh_reader.hpp"
 #include "terrace/stream/schema.hpp"
 
-/// Parsers that read meshes from front to back. GLB, OBJ, OFF and STL have one each, for
-/// read_mesh(), for vertices as points and for triangles; PLY has one for triangles (in
-/// ply/source.cpp).
+/// Parsers that read meshes from front to back. GLB, OBJ, OFF and STL have one each, used by
+/// read_mesh(), by the point source of vertices and by the triangle reader. PLY's, in
+/// ply/source.cpp, serves only the triangle reader.
 
 namespace terrace::stream {
 
@@ -41,8 +41,11 @@ class MeshParser {
   /// True if each face has its own vertices, so that coincident ones are merged (STL).
   [[nodiscard]] virtual bool is_soup() const { return false; }
   /// Returns the number of vertices, if the file states it before them.
-  [[nodiscard]] virtual std::optional<std::uint64_t> vertices() const { return std::nullopt; }
-  [[nodiscard]] virtual ScalarType type() const { return ScalarType::f64; }
+  [[nodiscard]] virtual std::optional<std::uint64_t> stated_vertices() const {
+    return std::nullopt;
+  }
+  /// Returns the type that coordinates have in the file; f64 for text and after transformations.
+  [[nodiscard]] virtual ScalarType coordinate_type() const { return ScalarType::f64; }
   /// Returns the comments read so far.
   [[nodiscard]] const std::vector<std::string>& comments() const { return comments_; }
 
@@ -56,7 +59,7 @@ class MeshParser {
 /// none of them infinite.
 bool read_vertex(std::string_view& text, Point3& vertex);
 
-/// input: at its first byte; must outlive the parser. faces: false skips them.
+/// `input`: positioned at its first byte; must outlive the parser. `faces`: whether to parse faces.
 /// The parser of GLB copies the binary chunk to a temporary file.
 std::unique_ptr<MeshParser> glb_parser(Input& input, bool faces);
 std::unique_ptr<MeshParser> obj_parser(Input& input, bool faces);

@@ -32,10 +32,10 @@ class MeshPoints final : public PointSource {
         block_points_(options.block_points) {
     info_.format = parser_->format();
     info_.files = {file};
-    info_.points = parser_->vertices();
+    info_.points = parser_->stated_vertices();
     constexpr std::array kNames{"x", "y", "z"};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      info_.coordinates[axis] = {.name = kNames[axis], .type = parser_->type()};
+      info_.coordinates[axis] = {.name = kNames[axis], .type = parser_->coordinate_type()};
     }
     if (options.crs) info_.crs = *options.crs;
   }

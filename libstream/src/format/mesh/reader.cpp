@@ -81,7 +81,7 @@ MeshFile read_simple(const std::string& file, const SourceOptions& options,
   mesh.info.points = mesh.vertices.size();
   constexpr std::array kNames{"x", "y", "z"};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    mesh.info.coordinates[axis] = {.name = kNames[axis], .type = parser->type()};
+    mesh.info.coordinates[axis] = {.name = kNames[axis], .type = parser->coordinate_type()};
   }
   if (options.crs) mesh.info.crs = *options.crs;
   return mesh;

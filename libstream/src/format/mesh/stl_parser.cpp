@@ -125,8 +125,10 @@ class StlBinary final : public StlParser {
   }
 
   const Input& input() const override { return *input_; }
-  std::optional<std::uint64_t> vertices() const override { return 3 * std::uint64_t{count_}; }
-  ScalarType type() const override { return ScalarType::f32; }
+  std::optional<std::uint64_t> stated_vertices() const override {
+    return 3 * std::uint64_t{count_};
+  }
+  ScalarType coordinate_type() const override { return ScalarType::f32; }
 
  protected:
   bool read_corner() override {

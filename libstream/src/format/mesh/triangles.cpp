@@ -75,12 +75,12 @@ class TriangleSource final : public PointSource {
   TriangleSource(OpenMesh mesh, const SourceOptions& options)
       : mesh_(std::move(mesh)),
         block_points_(options.block_points),
-        type_(mesh_.parser->type()),
+        type_(mesh_.parser->coordinate_type()),
         vertices_(mesh_.parser->input().name()) {
     info_.format = mesh_.parser->format();
     info_.files = {mesh_.parser->input().name()};
-    if (mesh_.parser->is_soup() && mesh_.parser->vertices()) {
-      info_.points = *mesh_.parser->vertices() / 3;
+    if (mesh_.parser->is_soup() && mesh_.parser->stated_vertices()) {
+      info_.points = *mesh_.parser->stated_vertices() / 3;
     }
     constexpr std::array kNames{"x", "y", "z"};
     for (std::size_t axis = 0; axis < 3; ++axis) {

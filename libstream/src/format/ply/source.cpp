@@ -456,8 +456,8 @@ class PlyParser final : public MeshParser {
 
   const char* format() const override { return "ply"; }
   const Input& input() const override { return source_.input(); }
-  std::optional<std::uint64_t> vertices() const override { return source_.info().points; }
-  ScalarType type() const override {
+  std::optional<std::uint64_t> stated_vertices() const override { return source_.info().points; }
+  ScalarType coordinate_type() const override {
     const auto& coordinates = source_.info().coordinates;
     return std::all_of(coordinates.begin(), coordinates.end(),
                        [](const Channel& c) { return c.type == ScalarType::f32; })

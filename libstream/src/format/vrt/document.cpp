@@ -37,7 +37,7 @@ class VrtReader {
           return take(open, element);
         });
     read_dataset(root);
-    read_place(root);
+    read_georeference(root);
     read_band(root);
   }
 
@@ -114,7 +114,7 @@ class VrtReader {
     return static_cast<std::uint64_t>(value);
   }
 
-  void read_place(const XmlElement& root) {
+  void read_georeference(const XmlElement& root) {
     info_.format = "vrt";
     info_.files = {file_};
     if (const XmlElement* const srs = root.child("SRS")) info_.crs = crs_of_srs(srs->text);
@@ -224,12 +224,13 @@ class VrtReader {
       }
     }
     if (source.file.empty()) throw fault("names no file").at(element.name);
-    place(element, source);
+    read_rectangles(element, source);
     return source;
   }
 
-  /// Reads a source's place. It must be whole cells, and as many of the source as of the mosaic.
-  void place(const XmlElement& element, VrtSource& source) {
+  /// Reads which cells of a source are which cells of the mosaic. They must be whole cells, and as
+  /// many of the source as of the mosaic.
+  void read_rectangles(const XmlElement& element, VrtSource& source) {
     using Rect = std::array<double, 4>;  // offset and size, as in the file
     const auto rect = [&](const char* name) -> std::optional<Rect> {
       const XmlElement* const child = element.child(name);

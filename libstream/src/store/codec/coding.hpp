@@ -37,8 +37,8 @@ TERRACE_STORE_INLINE unsigned code_number(Coder& coder, unsigned context, std::u
 
 /// Maps a position among n to the zigzag of its distance from the middle, which representatives are
 /// mostly near to.
-constexpr std::uint32_t centred(std::uint32_t place, std::uint32_t n) {
-  return static_cast<std::uint32_t>(zigzag(std::int64_t{place} - n / 2));
+constexpr std::uint32_t centred(std::uint32_t position, std::uint32_t n) {
+  return static_cast<std::uint32_t>(zigzag(std::int64_t{position} - n / 2));
 }
 /// Requires code < n.
 constexpr std::uint32_t uncentred(std::uint32_t code, std::uint32_t n) {

@@ -75,15 +75,15 @@ class RecentDifferences {
   static constexpr unsigned kCount = kSize;
 
   [[nodiscard]] std::int64_t operator[](unsigned i) const { return recent_[i]; }
-  /// Returns the position of a difference in the list; kCount if it is not in it.
+  /// Returns the index of a difference in the list; kCount if it is not in it.
   [[nodiscard]] unsigned find(std::int64_t difference) const {
-    unsigned place = kCount;
-    for (unsigned i = kCount; i-- > 0;) place = recent_[i] == difference ? i : place;
-    return place;
+    unsigned index = kCount;
+    for (unsigned i = kCount; i-- > 0;) index = recent_[i] == difference ? i : index;
+    return index;
   }
-  /// Moves the difference at `place`, or a new one (kCount), to the front.
-  void move_to_front(unsigned place, std::int64_t difference) {
-    for (unsigned i = kCount; i-- > 1;) recent_[i] = place >= i ? recent_[i - 1] : recent_[i];
+  /// Moves the difference at `index`, or a new one (kCount), to the front.
+  void move_to_front(unsigned index, std::int64_t difference) {
+    for (unsigned i = kCount; i-- > 1;) recent_[i] = index >= i ? recent_[i - 1] : recent_[i];
     recent_[0] = difference;
   }
 
@@ -199,26 +199,26 @@ bool code_head(Coder& coder, unsigned first, NumberForm* form, std::int64_t& val
   return head / forms != kOneValue;
 }
 
-/// Codes a difference as a position in the list of recent ones, otherwise as a number.
+/// Codes a difference as an index in the list of recent ones, otherwise as a number.
 template <class Coder, unsigned kCount>
 class RecentCoder {
  public:
   TERRACE_STORE_INLINE void code(Coder& coder, unsigned first, std::int64_t& difference) {
-    const unsigned context = first + 2 + std::min(place_, kColumnRecent);
-    if constexpr (!Coder::kDecoding) place_ = recent_.find(difference);
-    code_symbol(coder, context, place_);
-    if (place_ > kCount) throw Damage("a column has an unknown difference");
-    if (place_ == kCount) {
+    const unsigned context = first + 2 + std::min(index_, kColumnRecent);
+    if constexpr (!Coder::kDecoding) index_ = recent_.find(difference);
+    code_symbol(coder, context, index_);
+    if (index_ > kCount) throw Damage("a column has an unknown difference");
+    if (index_ == kCount) {
       step_ = difference_step(code_signed(coder, first + 6 + step_ / 2, difference));
     } else {
-      difference = recent_[place_];
+      difference = recent_[index_];
     }
-    recent_.move_to_front(place_, difference);
+    recent_.move_to_front(index_, difference);
   }
 
  private:
   RecentDifferences<kCount> recent_;
-  unsigned place_ = 0, step_ = 0;
+  unsigned index_ = 0, step_ = 0;
 };
 
 /// Predicts the next difference along a line.

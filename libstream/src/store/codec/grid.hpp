@@ -29,7 +29,7 @@ class GridCodec {
 
   /// For encoding: enters the points, as cells relative to the box. Returns false if two are in one
   /// cell.
-  bool place(std::uint32_t width, std::uint32_t height, const std::uint64_t* x,
+  bool enter(std::uint32_t width, std::uint32_t height, const std::uint64_t* x,
              const std::uint64_t* y, const std::uint64_t* z, std::uint32_t n) {
     start(width, height);
     for (std::uint32_t i = 0; i < n; ++i) {
@@ -110,7 +110,7 @@ class GridCodec {
     if constexpr (Coder::kDecoding) shared = coder;
   }
 
-  /// Codes the heights of the cells, in [0, size). Encoding takes them from place(), decoding fills
+  /// Codes the heights of the cells, in [0, size). Encoding takes them from enter(), decoding fills
   /// z.
   template <class Coder>
   void heights(Coder& shared, const Predictor& predictor, std::uint64_t size, std::uint64_t* z) {
@@ -196,12 +196,12 @@ class GridCodec {
     template <class Coder>
     TERRACE_STORE_INLINE void move(Coder& coder, bool lower_half, std::uint64_t& value) {
       const std::int64_t room = kRight ? width_ - at_ : at_;
-      const unsigned place =
+      const unsigned border_context =
           borders_ + (lower_half ? context::kBorders / 2 : 0) + last_ * context::kBorderRooms +
           static_cast<unsigned>(std::min<std::int64_t>(room, context::kBorderRooms - 1));
       const std::int64_t moved = static_cast<std::int64_t>(value) - at_;
       std::uint64_t number = zigzag(kRight ? moved : -moved);
-      code_number(coder, place, number);
+      code_number(coder, border_context, number);
       if (number > 2ull * UINT32_MAX) throw Damage("a run is outside its cluster");
       const std::int64_t step = unzigzag(number);
       at_ += kRight ? step : -step;

@@ -164,7 +164,7 @@ class SymbolEncoder {
   void finish(std::uint32_t last, Bytes& out) { finish({this, 1}, {&last, 1}, out); }
   /// Number of clusters that are best finished together.
   static constexpr std::size_t kBatch = 4;
-  /// Appends the strings of up to kTogether clusters, one after another. Faster than one by one,
+  /// Appends the strings of up to kBatch clusters, one after another. Faster than one by one,
   /// because each step of rANS waits for the previous one. last: one per cluster; replaced by the
   /// bytes of its string.
   static void finish(std::span<SymbolEncoder> coders, std::span<std::uint32_t> last, Bytes& out);

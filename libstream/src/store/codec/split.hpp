@@ -125,8 +125,8 @@ struct NarrowPoints {
             static_cast<std::uint64_t>(longest_rank) >> 2};
   }
   TERRACE_STORE_INLINE static Limit limit(const Box& box, const BoxSide& side) {
-    const Point in_place = kField << shift(side.axis);
-    return {in_place, (box.low & in_place) + ((side.extent / 2 + 1) << shift(side.axis))};
+    const Point mask = kField << shift(side.axis);
+    return {mask, (box.low & mask) + ((side.extent / 2 + 1) << shift(side.axis))};
   }
   TERRACE_STORE_INLINE static bool is_below(Point point, const Limit& limit) {
     return (point & limit.field) < limit.middle;
@@ -143,7 +143,7 @@ struct NarrowPoints {
     b ^= difference;
   }
   template <class Coder>
-  TERRACE_STORE_INLINE static void place(Coder& coder, const Box& box, Point point) {
+  TERRACE_STORE_INLINE static void code_in_box(Coder& coder, const Box& box, Point point) {
     const Point offset = point - box.low;
     RawBits bits;
     for (unsigned axis = 0; axis < 3; ++axis) {
@@ -208,7 +208,7 @@ struct WidePoints {
     if (whether) std::swap(a, b);
   }
   template <class Coder>
-  static void place(Coder& coder, const Box& box, const Point& point) {
+  static void code_in_box(Coder& coder, const Box& box, const Point& point) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const RawBits coded = uniform_bits(point.at[axis] - box.low[axis], box.extent[axis] + 1);
       coder.raw(coded.value, coded.bits);
@@ -267,7 +267,7 @@ class SplitEncoder {
       }
       switch (n) {
         case 1:
-          return place(box, points[0]);
+          return code_in_box(box, points[0]);
         case 2:
           return split_two(box, points[0], points[1]);
         case 3:
@@ -288,8 +288,8 @@ class SplitEncoder {
         coder.symbol(context::kSplit, 0u + first + second);
         if (first != second) {
           Points::exchange(a, b, second);
-          place(Points::half(box, side, false), a);
-          return place(Points::half(box, side, true), b);
+          code_in_box(Points::half(box, side, false), a);
+          return code_in_box(Points::half(box, side, true), b);
         }
         box = Points::half(box, side, !first);
       }
@@ -303,20 +303,20 @@ class SplitEncoder {
         const std::uint32_t below = partition(points, room.data(), 3, Points::limit(box, side));
         coder.symbol(context::kSplit + 1, below);
         if (below == 1) {
-          place(Points::half(box, side, false), points[0]);
+          code_in_box(Points::half(box, side, false), points[0]);
           return split_two(Points::half(box, side, true), room[0], room[1]);
         }
         if (below == 2) {
           split_two(Points::half(box, side, false), points[0], points[1]);
-          return place(Points::half(box, side, true), room[0]);
+          return code_in_box(Points::half(box, side, true), room[0]);
         }
         if (below == 0) std::copy(room.begin(), room.end(), points);
         box = Points::half(box, side, below == 0);
       }
     }
 
-    void place(const Box& box, const Point& point) {
-      Points::place(coder, box, point);
+    void code_in_box(const Box& box, const Point& point) {
+      Points::code_in_box(coder, box, point);
       *order++ = Points::number(point);
     }
 

@@ -83,10 +83,7 @@ Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts, std::u
   return frequencies;
 }
 
-void Tables::write(Bytes& out) const {
-  predictor.write(out);
-  put_varint(out, guide.exists() ? guide.attribute + std::uint64_t{1} : 0);
-  for (const ColumnKind kind : kinds) out.push_back(static_cast<std::uint8_t>(kind));
+void write_frequencies(std::span<const Frequencies> frequencies, Bytes& out) {
   std::uint64_t unused = 0;  // contexts without symbols, not yet written
   const auto put_unused = [&] {
     if (unused == 0) return;
@@ -114,6 +111,45 @@ void Tables::write(Bytes& out) const {
   put_unused();
 }
 
+std::vector<Frequencies> read_frequencies(ByteReader& in, unsigned contexts) {
+  std::vector<Frequencies> all;
+  all.reserve(contexts);
+  for (unsigned c = 0; c < contexts; ++c) {
+    Frequencies frequencies{};
+    std::uint64_t symbol = 0, remaining = kScale;
+    const std::uint64_t used = in.varint();
+    if (used == 0) {
+      const std::uint64_t more = in.varint();
+      if (more >= contexts - c) throw Damage("a table has too many contexts");
+      all.resize(c + 1 + static_cast<std::size_t>(more), escape_only());
+      c += static_cast<unsigned>(more);
+      continue;
+    }
+    for (std::uint64_t i = 0; i < used; ++i) {
+      const std::uint64_t step = in.varint();
+      if (step >= kClasses || (i > 0 && step == 0) || symbol + step >= kClasses) {
+        throw Damage("a table has an unknown symbol");
+      }
+      symbol += step;
+      const std::uint64_t frequency = in.varint();
+      if (frequency == 0 || frequency >= remaining)
+        throw Damage("the frequencies of a table do not add up");
+      frequencies[static_cast<std::size_t>(symbol)] = static_cast<std::uint16_t>(frequency);
+      remaining -= frequency;
+    }
+    frequencies[kEscape] = static_cast<std::uint16_t>(remaining);
+    all.push_back(frequencies);
+  }
+  return all;
+}
+
+void Tables::write(Bytes& out) const {
+  predictor.write(out);
+  put_varint(out, guide.exists() ? guide.attribute + std::uint64_t{1} : 0);
+  for (const ColumnKind kind : kinds) out.push_back(static_cast<std::uint8_t>(kind));
+  write_frequencies(frequencies, out);
+}
+
 Tables Tables::read(ByteView bytes, const Layout& layout) {
   ByteReader in(bytes);
   Tables tables;
@@ -133,34 +169,7 @@ Tables Tables::read(ByteView bytes, const Layout& layout) {
       throw Damage("a table predicts a column from one that is not an integer attribute");
     }
   }
-  const unsigned contexts = layout.contexts();
-  tables.frequencies.reserve(contexts);
-  for (unsigned c = 0; c < contexts; ++c) {
-    Frequencies frequencies{};
-    std::uint64_t symbol = 0, remaining = kScale;
-    const std::uint64_t used = in.varint();
-    if (used == 0) {
-      const std::uint64_t more = in.varint();
-      if (more >= contexts - c) throw Damage("a table has too many contexts");
-      tables.frequencies.resize(c + 1 + static_cast<std::size_t>(more), escape_only());
-      c += static_cast<unsigned>(more);
-      continue;
-    }
-    for (std::uint64_t i = 0; i < used; ++i) {
-      const std::uint64_t step = in.varint();
-      if (step >= kClasses || (i > 0 && step == 0) || symbol + step >= kClasses) {
-        throw Damage("a table has an unknown symbol");
-      }
-      symbol += step;
-      const std::uint64_t frequency = in.varint();
-      if (frequency == 0 || frequency >= remaining)
-        throw Damage("the frequencies of a table do not add up");
-      frequencies[static_cast<std::size_t>(symbol)] = static_cast<std::uint16_t>(frequency);
-      remaining -= frequency;
-    }
-    frequencies[kEscape] = static_cast<std::uint16_t>(remaining);
-    tables.frequencies.push_back(frequencies);
-  }
+  tables.frequencies = read_frequencies(in, layout.contexts());
   if (in.remaining() != 0) throw Damage("bytes follow the tables");
   return tables;
 }

@@ -26,6 +26,11 @@ using Counts = std::vector<std::array<std::uint32_t, kSymbols>>;
 Frequencies normalised(const std::array<std::uint32_t, kSymbols>& counts,
                        std::uint32_t min_count = 1);
 
+/// Writes the frequencies of contexts; see "Tables" of FORMAT.md.
+void write_frequencies(std::span<const Frequencies> frequencies, Bytes& out);
+/// Reads them. Throws: Damage.
+std::vector<Frequencies> read_frequencies(ByteReader& in, unsigned contexts);
+
 /// The attribute that shows where scan lines begin, the time of the pulses.
 struct Guide {
   static constexpr unsigned kNone = UINT32_MAX;

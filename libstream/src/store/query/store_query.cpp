@@ -255,7 +255,7 @@ std::vector<FoundPoint> StoreQuery::nearest(const Point3& place, std::size_t cou
   std::vector<FoundPoint> points;  // a heap with the farthest on top
   if (count == 0) return points;
   best_first(
-      level, [&](const Box3& box) { return min_distance(metric, place, box); },
+      level, [&](unsigned, const Box3& box) { return min_distance(metric, place, box); },
       [&](const Node& node) {
         for (std::size_t i = 0; i < node.positions.size(); ++i) {
           const FoundPoint point{.position = node.positions[i],

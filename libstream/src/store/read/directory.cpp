@@ -157,8 +157,8 @@ const Directory::Contents& Directory::contents(std::uint64_t number) const {
 
 Directory::Range Directory::page_range(std::uint64_t page) const {
   const std::vector<std::uint64_t>& offsets = contents(page / kChapterPages).offsets;
-  const auto place = static_cast<std::size_t>(page % kChapterPages);
-  return {offsets[place], offsets[place + 1]};
+  const auto index = static_cast<std::size_t>(page % kChapterPages);
+  return {offsets[index], offsets[index + 1]};
 }
 
 Box3 Directory::page_box(std::uint64_t page) const {

@@ -36,17 +36,17 @@ struct QuantisedBox {
     QuantisedBox quantised;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double low = outer.min[axis], high = outer.max[axis];
-      const auto place = [&](double value) {
+      const auto quantise = [&](double value) {
         // Halves, so that no difference overflows.
         const double share = (0.5 * value - 0.5 * low) / (0.5 * high - 0.5 * low) * kMax;
         return static_cast<Number>(share > 0 ? std::min<double>(share, kMax) : 0);
       };
       // Rounding may have moved an end inside.
       Number& first = quantised.low[axis];
-      first = place(box.min[axis]);
+      first = quantise(box.min[axis]);
       while (first > 0 && !(interpolate(low, high, first) <= box.min[axis])) --first;
       Number& last = quantised.high[axis];
-      last = place(box.max[axis]);
+      last = quantise(box.max[axis]);
       while (last < kMax && !(interpolate(low, high, last) >= box.max[axis])) ++last;
     }
     return quantised;
@@ -54,8 +54,8 @@ struct QuantisedBox {
 
  private:
   /// Interpolates; exact at both ends.
-  static double interpolate(double low, double high, Number place) {
-    const double share = place / static_cast<double>(kMax);
+  static double interpolate(double low, double high, Number step) {
+    const double share = step / static_cast<double>(kMax);
     return low * (1 - share) + high * share;
   }
 };
@@ -123,7 +123,7 @@ class Directory {
   std::uint64_t clusters_, pages_;
   std::size_t attributes_;
   Box3 bounds_;
-  Bytes cache_;  ///< the part of the file from held_at_ on that was read with the directory
+  Bytes cache_;  ///< the part of the file from cache_offset_ on that was read with the directory
   std::uint64_t cache_offset_ = 0;
   std::vector<Chapter> chapters_;
   std::vector<TablesPosition> tables_;

@@ -217,7 +217,8 @@ class PageCoder {
 };
 
 Bytes padded_copy(ByteView bytes) {
-  Bytes room(bytes.size() + 2 * kPadding);
+  // The check shows the compiler that the sum does not wrap.
+  Bytes room(memory_size(bytes.size()) + 2 * kPadding);
   std::copy(bytes.begin(), bytes.end(), room.begin() + kPadding);
   return room;
 }

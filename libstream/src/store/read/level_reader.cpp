@@ -10,19 +10,31 @@ namespace terrace::stream::store {
 namespace {
 
 constexpr const char* kRestoreStore = "restore the file or rebuild the store";
-/// About 0.5 KB each, 2 KB for clouds.
+/// Index pages to keep; each takes about 0.5 KB, 2 KB for point clouds.
 constexpr std::uint64_t kCachedPages = 8192;
-/// The ranges of a page take 1 KB per attribute. Few are kept, because callers go from page to
-/// page.
+/// Pages whose ranges to keep; those of a page take 1 KB per attribute. Few are kept, because
+/// callers go from page to page.
 constexpr std::uint64_t kCachedRanges = 64;
-/// About 100 KB each. One set serves about ten million points of level 0.
+/// Decoding tables to keep; each takes about 100 KB and serves about ten million points of level 0.
 constexpr std::uint64_t kCachedTables = 32;
-/// Stores with very many attributes keep fewer tables.
+/// Upper limit of contexts in all cached tables: with very many attributes, fewer tables are kept.
 constexpr std::uint64_t kCachedContexts = 512 * kCachedTables;
 
 Error damaged_file(const ByteSource& file, std::uint64_t offset, const std::string& cause) {
   return Error(file.name(), cause).at_byte(offset).remedy(kRestoreStore);
 }
+
+/// Returns the result of work(). Throws: error_of(cause) if work() throws Damage.
+template <class Work, class ErrorOf>
+auto translate_damage(Work&& work, ErrorOf&& error_of) {
+  try {
+    return work();
+  } catch (const Damage& damage) {
+    throw error_of(damage.what());
+  }
+}
+
+}  // namespace
 
 std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry& entry) {
   auto file = files(entry.name);
@@ -34,15 +46,9 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
   return file;
 }
 
-}  // namespace
-
 template <class Read>
 auto LevelReader::from_directory(Read&& read) const {
-  try {
-    return read();
-  } catch (const Damage& damage) {
-    throw damaged_file(*index_, 0, damage.what());
-  }
+  return translate_damage(read, [&](const char* cause) { return damaged_file(*index_, 0, cause); });
 }
 
 LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
@@ -88,9 +94,9 @@ Box3 LevelReader::page_box(std::uint64_t ordinal) const {
 
 std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
                                                         SequentialBytes* ahead) const {
-  const Directory::Range at = from_directory([&] { return directory_->page_range(number); });
-  const std::uint64_t start = at.begin;
-  const auto size = static_cast<std::size_t>(at.end - start);
+  const Directory::Range range = from_directory([&] { return directory_->page_range(number); });
+  const std::uint64_t start = range.begin;
+  const auto size = static_cast<std::size_t>(range.end - start);
   Bytes buffer;
   ByteView bytes;
   if (ahead != nullptr) {
@@ -100,14 +106,14 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
     index_->read(start, std::as_writable_bytes(std::span(buffer)));
     bytes = buffer;
   }
-  try {
-    const std::uint64_t page_clusters = layout_.page_clusters(), first = number * page_clusters;
-    return std::make_shared<const IndexPage>(
-        bytes, static_cast<std::uint32_t>(std::min(page_clusters, clusters_ - first)), layout_,
-        *tables(first));
-  } catch (const Damage& damage) {
-    throw damaged_file(*index_, start, damage.what());
-  }
+  return translate_damage(
+      [&] {
+        const std::uint64_t page_clusters = layout_.page_clusters(), first = number * page_clusters;
+        return std::make_shared<const IndexPage>(
+            bytes, static_cast<std::uint32_t>(std::min(page_clusters, clusters_ - first)), layout_,
+            *tables(first));
+      },
+      [&](const char* cause) { return damaged_file(*index_, start, cause); });
 }
 
 std::shared_ptr<const IndexPage> LevelReader::page(std::uint64_t number) const {
@@ -126,13 +132,16 @@ Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
 }
 
 Entry LevelReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
-  try {
-    const Entry entry = page.entry(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
-    check_entry(entry);
-    return entry;
-  } catch (const Damage& damage) {
-    throw damaged_file(*index_, page_offset(ordinal / layout_.page_clusters()), damage.what());
-  }
+  const std::uint64_t page_clusters = layout_.page_clusters();
+  return translate_damage(
+      [&] {
+        const Entry entry = page.entry(static_cast<std::uint32_t>(ordinal % page_clusters));
+        check_entry(entry);
+        return entry;
+      },
+      [&](const char* cause) {
+        return damaged_file(*index_, page_offset(ordinal / page_clusters), cause);
+      });
 }
 
 void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
@@ -141,12 +150,12 @@ void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) cons
   const std::uint64_t number = ordinal / layout_.page_clusters();
   const auto columns = range_cache_.get(number, [&] {
     const auto page = this->page(number);
-    try {
-      return std::make_shared<const RangeColumns>(
-          page->ranges(layout_, *tables(number * layout_.page_clusters())));
-    } catch (const Damage& damage) {
-      throw damaged_file(*index_, page_offset(number), damage.what());
-    }
+    return translate_damage(
+        [&] {
+          return std::make_shared<const RangeColumns>(
+              page->ranges(layout_, *tables(number * layout_.page_clusters())));
+        },
+        [&](const char* cause) { return damaged_file(*index_, page_offset(number), cause); });
   });
   for (std::size_t a = 0; a < layout_.attributes.size(); ++a) {
     out.push_back(columns->range(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()), a));
@@ -181,18 +190,18 @@ void LevelReader::check_entry(const Entry& entry) const {
 }
 
 std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal) const {
-  const std::vector<Directory::TablesPosition>& sets = directory_->tables();
-  const auto next = std::upper_bound(
-      sets.begin(), sets.end(), ordinal,
-      [](std::uint64_t value, const Directory::TablesPosition& at) { return value < at.first; });
-  const Directory::TablesPosition& at = *(next - 1);
-  return tables_cache_.get(static_cast<std::uint64_t>(next - 1 - sets.begin()), [&] {
-    try {
-      return std::make_shared<const DecodingTables>(
-          Tables::read(directory_->read_tables(at), layout_));
-    } catch (const Damage& damage) {
-      throw damaged_file(*index_, at.offset, damage.what());
-    }
+  const std::vector<Directory::TablesPosition>& positions = directory_->tables();
+  const auto after =
+      std::upper_bound(positions.begin(), positions.end(), ordinal,
+                       [](std::uint64_t value, const auto& p) { return value < p.first; });
+  const Directory::TablesPosition& position = *(after - 1);
+  return tables_cache_.get(static_cast<std::uint64_t>(after - 1 - positions.begin()), [&] {
+    return translate_damage(
+        [&] {
+          return std::make_shared<const DecodingTables>(
+              Tables::read(directory_->read_tables(position), layout_));
+        },
+        [&](const char* cause) { return damaged_file(*index_, position.offset, cause); });
   });
 }
 
@@ -211,15 +220,15 @@ Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) cons
 
 void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
                          ByteView bytes, ClusterDecoder& decoder, ClusterPoints& out) const {
-  try {
-    if (layout_.checksum(bytes) != entry.checksum) {
-      throw Damage("the checksum of the bytes from " + std::to_string(offset) + " on is wrong");
-    }
-    decoder.decode(layout_, *tables(ordinal), entry, bytes, top_, out);
-    check_points(entry, out);
-  } catch (const Damage& damage) {
-    throw damaged(ordinal, damage.what());
-  }
+  translate_damage(
+      [&] {
+        if (layout_.checksum(bytes) != entry.checksum) {
+          throw Damage("the checksum of the bytes from " + std::to_string(offset) + " on is wrong");
+        }
+        decoder.decode(layout_, *tables(ordinal), entry, bytes, top_, out);
+        check_points(entry, out);
+      },
+      [&](const char* cause) { return damaged(ordinal, cause); });
 }
 
 void LevelReader::check_points(const Entry& entry, const ClusterPoints& points) const {

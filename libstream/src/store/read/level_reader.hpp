@@ -16,6 +16,10 @@
 
 namespace terrace::stream::store {
 
+/// Opens a file that the manifest lists. Throws: Error if its size differs.
+[[nodiscard]] std::unique_ptr<ByteSource> open_listed(const OpenByName& files,
+                                                      const FileEntry& entry);
+
 /// A thread-safe cache of `Value`s by number. A slot holds one value, which the next value for the
 /// slot replaces. Values stay alive as long as callers hold them.
 template <class Value>

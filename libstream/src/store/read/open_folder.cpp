@@ -36,6 +36,9 @@ std::set<std::string> files_of_store(const fs::path& folder) {
     const JsonValue manifest = JsonValue::parse(read_manifest(*open_file(path)));
     if (manifest.at("format").string() != kFormatName) return {};
     names.insert(kManifestName);
+    if (manifest.has("surface")) {
+      names.insert(manifest.at("surface").at("data").at("file").string());
+    }
     for (const JsonValue& level : manifest.at("levels").items()) {
       for (const JsonValue& segment : level.at("segments").items()) {
         for (const char* part : {"data", "index"}) {

@@ -53,6 +53,10 @@ Store Store::open(const std::string& name, const OpenByName& files) {
     impl->bytes += level.data.bytes + level.index.bytes;
     impl->levels.push_back(std::make_unique<LevelReader>(files, impl->manifest, l));
   }
+  if (impl->manifest.surface) {
+    impl->bytes += impl->manifest.surface->file.bytes;
+    impl->files = files;
+  }
   return Store(std::move(impl));
 }
 
@@ -62,6 +66,11 @@ const std::filesystem::path& Store::path() const { return impl_->path; }
 unsigned Store::top() const { return static_cast<unsigned>(impl_->levels.size()) - 1; }
 std::span<const LevelInfo> Store::levels() const { return impl_->infos; }
 std::uint64_t Store::points() const { return impl_->manifest.points; }
+std::optional<SurfaceInfo> Store::surface() const {
+  if (!impl_->manifest.surface) return std::nullopt;
+  const SurfaceEntry& surface = *impl_->manifest.surface;
+  return SurfaceInfo{surface.vertices, surface.triangles, surface.file.bytes};
+}
 std::uint32_t Store::checksum() const { return impl_->manifest.checksum; }
 std::uint64_t Store::bytes() const { return impl_->bytes; }
 const Box3& Store::bounds() const { return view_ ? view_->bounds(*this) : impl_->manifest.bounds; }
@@ -136,8 +145,8 @@ std::uint64_t Store::for_each(unsigned number, std::uint64_t first, std::uint64_
       first, end, [&](const IndexPage& page, std::uint64_t page_first, std::uint64_t page_end) {
         for (std::uint64_t ordinal = page_first; ordinal < page_end; ++ordinal) {
           check_stop();
-          const auto place = static_cast<std::uint32_t>(ordinal % level.layout().page_clusters());
-          const std::uint64_t offset = page.offset(place);
+          const auto index = static_cast<std::uint32_t>(ordinal % level.layout().page_clusters());
+          const std::uint64_t offset = page.offset(index);
           const ClusterId id = cluster_id(number, ordinal);
           const Entry entry = level.entry(page, ordinal);
           const ClusterRecord record = record_of(entry, number, offset, level.top());

@@ -25,6 +25,7 @@ struct Store::Impl {
   std::uint64_t bytes = 0;
   std::vector<LevelInfo> infos;
   std::vector<std::unique_ptr<store::LevelReader>> levels;
+  OpenByName files;  ///< only if there is a surface, to open it when it is first needed
 
   Spares<store::ReadSpace> spaces;
 

@@ -335,7 +335,7 @@ bool BlockEncoder::positions(Coder& coder, const Columns& columns, Use&& heights
   bool grid = layout_->grid && layout_->level == 0 && GridCodec::fits(size[0], size[1], n);
   if (grid || sequence) find_relative();
   grid =
-      grid && grid_.place(static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
+      grid && grid_.enter(static_cast<std::uint32_t>(size[0]), static_cast<std::uint32_t>(size[1]),
                           relative_[0].data(), relative_[1].data(), relative_[2].data(), n);
   coder.symbol(context::kForm, (grid || sequence ? 0 : kSplitForm) | (own_box_ ? kOwnBoxForm : 0));
   if (own_box_) code_box(coder, entry_box_, coded_box_);
@@ -485,7 +485,7 @@ void BlockEncoder::count_kinds(const Predictor& predictor, bool sequence, const 
   }
 }
 
-std::uint32_t BlockEncoder::place_of_representative(std::size_t cluster) const {
+std::uint32_t BlockEncoder::coded_representative(std::size_t cluster) const {
   const std::uint32_t point = block_->representatives[cluster];
   if (point == kNoRepresentative) return 0;
   const auto entry = std::find(coded_.begin(), coded_.end(), point);
@@ -521,7 +521,7 @@ void BlockEncoder::encode(const EncodingTables& tables, bool sequence, Bytes& by
       SymbolEncoder& coder = coders[pending];
       coder.start();
       encode_cluster(coder, tables.predictor, columns);
-      const std::uint32_t at = place_of_representative(c);
+      const std::uint32_t at = coded_representative(c);
       // The positions of most representatives fit into the coder's free 16 bits.
       if (entries.back().points >= kLow) coder.raw(at >> 16, 16);
       last[pending] = at & 0xffff;

@@ -66,7 +66,7 @@ class BlockEncoder {
   void find_relative();
   /// Returns the representative's position in the order of coding, centred(); 0 without a
   /// representative.
-  [[nodiscard]] std::uint32_t place_of_representative(std::size_t cluster) const;
+  [[nodiscard]] std::uint32_t coded_representative(std::size_t cluster) const;
   void gather(const Attribute& attribute);
   /// Returns where to code the form; null for integers.
   static NumberForm* coded_form(Attribute& attribute);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <terrace/base/hilbert.hpp>
@@ -12,6 +13,7 @@
 
 #include "store/write/raw_block.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/stream/stored_surface.hpp"
 
 namespace terrace::stream {
 
@@ -67,15 +69,16 @@ std::vector<std::uint64_t> along_curve(const Store& store, unsigned level) {
     std::array<std::uint32_t, 3> cell{};
     for (std::size_t axis = 0; axis < axes; ++axis) {
       const double scale = extents[axis] > 0 ? shortest / extents[axis] : 1.0;
-      const double place = share(0.5 * box.min[axis] + 0.5 * box.max[axis], axis) * scale;
-      cell[axis] = static_cast<std::uint32_t>(place * static_cast<double>((1u << bits) - 1));
+      const double position = share(0.5 * box.min[axis] + 0.5 * box.max[axis], axis) * scale;
+      cell[axis] = static_cast<std::uint32_t>(position * static_cast<double>((1u << bits) - 1));
     }
-    const std::uint64_t place = axes == 2 ? base::hilbert_index<28>(cell[0], cell[1])
+    const std::uint64_t curve_index = axes == 2
+                                          ? base::hilbert_index<28>(cell[0], cell[1])
                                           : base::hilbert_index<20>(cell[0], cell[1], cell[2]);
-    order[i] = place >> dropped_bits << ordinal_bits | i;
+    order[i] = curve_index >> dropped_bits << ordinal_bits | i;
   }
   std::sort(order.begin(), order.end());
-  for (std::uint64_t& place : order) place &= (std::uint64_t{1} << ordinal_bits) - 1;
+  for (std::uint64_t& key : order) key &= (std::uint64_t{1} << ordinal_bits) - 1;
   return order;
 }
 
@@ -92,6 +95,57 @@ void add(const Store& store, ClusterId id, const Ordinals& new_ordinals, RawBloc
   block.summaries.push_back(store.record(id).summary);
   // A box of points only is recomputed, so that it is not enlarged twice.
   if (block.level == 0) block.summaries.back().box = {};
+}
+
+/// Returns the positions of a cluster's members in ascending order, with their numbers in it.
+std::vector<std::pair<Point3, std::uint32_t>> sorted_members(const Store& store, ClusterId id) {
+  ClusterPoints points;
+  store.read(id, points);
+  std::vector<std::pair<Point3, std::uint32_t>> members;
+  for (const Point3& position : points.positions) {
+    members.emplace_back(position, static_cast<std::uint32_t>(members.size()));
+  }
+  std::sort(members.begin(), members.end());
+  return members;
+}
+
+/// Returns a store's surface by the numbers of the repacked store's points. Clusters have the same
+/// points in another order. ordinals: new ones of the clusters of level 0.
+StoredSurface renumbered_surface(const Store& store, const Store& repacked,
+                                 const ClusterOrder& new_order,
+                                 const std::vector<std::uint64_t>& ordinals) {
+  const ClusterOrder order = cluster_order(store);
+  const StoredSurface old = store.read_surface(order);
+  std::vector<std::uint32_t> new_begins(ordinals.size());
+  for (const ClusterOrder::Cluster& cluster : new_order.clusters) {
+    if (level_of(cluster.id) == 0) new_begins[ordinal_of(cluster.id)] = cluster.begin;
+  }
+  std::vector<std::uint32_t> new_number(order.points());
+  for (const ClusterOrder::Cluster& cluster : order.clusters) {
+    if (level_of(cluster.id) > 0) continue;
+    const std::uint64_t ordinal = ordinals[ordinal_of(cluster.id)];
+    const auto from = sorted_members(store, cluster.id);
+    const auto to = sorted_members(repacked, cluster_id(0, ordinal));
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      new_number[cluster.begin + from[i].second] = new_begins[ordinal] + to[i].second;
+    }
+    // The representative comes last.
+    if (cluster.representative != kNoNumber) {
+      new_number[cluster.representative] =
+          new_begins[ordinal] + static_cast<std::uint32_t>(to.size());
+    }
+  }
+  StoredSurface out(order.points());
+  for (std::uint32_t v = 0; v < order.points(); ++v) {
+    const std::uint32_t number = new_number[v];
+    if (old.parents[v] != kNoNumber) out.parents[number] = new_number[old.parents[v]];
+    out.errors[number] = old.errors[v];
+    out.levels[number] = old.levels[v];
+  }
+  for (const auto& [a, b, c] : old.triangles) {
+    out.triangles.push_back({new_number[a], new_number[b], new_number[c]});
+  }
+  return out;
 }
 
 }  // namespace
@@ -130,7 +184,13 @@ std::uint64_t repack(const Store& store, const std::filesystem::path& path, bool
   RawBlock root;
   root.level = store.top();
   add(store, store.root(), new_ordinals, root);
-  return writer.finish(root.view());
+  StoreWriter::MakeSurface surface;
+  if (store.surface()) {
+    surface = [&](const Store& repacked, const ClusterOrder& order) {
+      return renumbered_surface(store, repacked, order, new_ordinals[0]);
+    };
+  }
+  return writer.finish(root.view(), /*publish=*/true, surface);
 }
 
 }  // namespace terrace::stream

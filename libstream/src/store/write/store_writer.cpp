@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cassert>
 #include <mutex>
 #include <utility>
@@ -11,6 +12,7 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/store.hpp"
+#include "terrace/stream/stored_surface.hpp"
 
 namespace terrace::stream {
 
@@ -66,6 +68,8 @@ struct StoreWriter::Impl {
   }
   EncodedPtr encode(const ClusteredBlock& block);
   std::uint64_t append(EncodedPtr encoded, bool root);
+  /// manifest: the text that it would have without a surface.
+  SurfaceEntry write_surface(const std::string& manifest, const MakeSurface& make);
 
   StoreSchema schema;
   base::ThreadTeam team;  ///< for training
@@ -136,6 +140,28 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   return ordinal;
 }
 
+SurfaceEntry StoreWriter::Impl::write_surface(const std::string& manifest,
+                                              const MakeSurface& make) {
+  const auto files = [&](const std::string& name) {
+    if (name != kManifestName) return open_file(staging.folder() / name);
+    const auto text = std::as_bytes(std::span(manifest));
+    return bytes_in_memory(name, {text.begin(), text.end()});
+  };
+  const Store store = Store::open(staging.target().string(), files);
+  const ClusterOrder order = cluster_order(store);
+  const StoredSurface surface = make(store, order);
+  const std::vector<std::byte> bytes = encode_surface(order, surface);
+  SurfaceEntry entry;
+  entry.triangles = surface.triangles.size();
+  const std::vector<bool> used = surface.on_surface();
+  entry.vertices = static_cast<std::uint64_t>(std::count(used.begin(), used.end(), true));
+  OutputFile file(staging.folder() / kSurfaceName, staging.target());
+  file.write({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
+  file.finish();
+  entry.file = {kSurfaceName, file.size(), file.checksum()};
+  return entry;
+}
+
 StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace,
                          unsigned threads) {
   std::error_code error;
@@ -172,7 +198,8 @@ const StoreSchema& StoreWriter::schema() const { return impl_->schema; }
 
 void StoreWriter::set_nodata(std::uint64_t cells) { impl_->schema.nodata = cells; }
 
-std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
+std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish,
+                                  const MakeSurface& surface) {
   Impl& w = *impl_;
   assert(root.representatives.size() == 1 && root.representatives[0] == kNoRepresentative);
   assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
@@ -209,7 +236,12 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish) {
   assert(manifest.levels.back().points == top_points);
   static_cast<void>(top_points);
   manifest.schema = std::move(w.schema);
-  const std::string text = to_text(manifest);
+  std::string text = to_text(manifest);
+  if (surface) {
+    manifest.surface = w.write_surface(text, surface);
+    bytes += manifest.surface->file.bytes;
+    text = to_text(manifest);
+  }
   w.schema = std::move(manifest.schema);
   // Checks that the manifest can be read, which also finds wrong counts of the caller.
   const auto path = w.staging.folder() / kManifestName;
