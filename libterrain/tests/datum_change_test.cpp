@@ -39,7 +39,7 @@ TEST(DatumChange, UnknownDatumNeedsShift) {
   EXPECT_NEAR(own[1], 49, 1e-9);
 }
 
-// Ordnance Survey's seven parameters.
+// Ordnance Survey's Helmert transformation, OSGB36 to WGS 84: metres, arc seconds, ppm.
 constexpr DatumShift kBritish{446.448, -125.157, 542.060, 0.1502, 0.2470, 0.8421, -20.4894};
 
 TEST(DatumChange, ShiftOverridesDatabase) {
@@ -51,9 +51,10 @@ TEST(DatumChange, ShiftOverridesDatabase) {
   EXPECT_NEAR(place[0], -0.1285, 1e-3);
   EXPECT_NEAR(place[1], 51.5037, 1e-3);
   const Point2 back = shifted.from_geographic(place);
-  EXPECT_NEAR(back[0], 530000, 0.01);  // heights between the ellipsoids are ignored
+  // Not exact: the height difference between the ellipsoids is ignored.
+  EXPECT_NEAR(back[0], 530000, 0.01);
   EXPECT_NEAR(back[1], 180000, 0.01);
-  // Use the record of a store.
+  // Repeats the conversion with the CRS as a store records it.
   const auto again = CoordinateSystem::of(shifted.crs(), "store");
   ASSERT_TRUE(again);
   EXPECT_TRUE(again->same_places(shifted));
@@ -75,7 +76,7 @@ TEST(DatumChange, NamesOperationAndBetterAlternative) {
   EXPECT_TRUE(etrs.counts_as_wgs84());
   EXPECT_EQ(etrs.to_wgs84().accuracy(), 1);
   EXPECT_EQ(CoordinateSystem().to_wgs84().accuracy(), 0);
-  // The operation for all of Czechoslovakia is off by 6 m, the one for this place by 1 m.
+  // The operation for all of Czechoslovakia is accurate to 6 m, the one for this place to 1 m.
   const CoordinateSystem krovak = over("EPSG:5514", -742000, -1043000);
   EXPECT_EQ(krovak.to_wgs84().accuracy(), 1) << krovak.wgs84_note();
   const CoordinateSystem british = over("EPSG:27700", 530000, 180000);

@@ -14,7 +14,7 @@ namespace {
 void expect_refused(const OutputKind& kind, const std::string& path, const std::string& format,
                     const std::string& words) {
   try {
-    format_of_output(kind, path, format);
+    check_output_name(kind, path, format);
     ADD_FAILURE() << path << " " << format;
   } catch (const UsageError& error) {
     EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
@@ -45,8 +45,8 @@ TEST(OutputKinds, RejectsOtherFormatsAndListsChoices) {
 
 TEST(OutputKinds, FreeNamesAllowUnknownEndings) {
   for (const char* name : {"s", "s.terrace", "s.v2", "s.2024-11", ".s"}) {
-    EXPECT_NO_THROW(format_of_output(outputs::kStore, name)) << name;
-    EXPECT_NO_THROW(format_of_output(outputs::kOverlayFile, name)) << name;
+    EXPECT_NO_THROW(check_output_name(outputs::kStore, name)) << name;
+    EXPECT_NO_THROW(check_output_name(outputs::kOverlayFile, name)) << name;
   }
 }
 

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/bounded/point_mesh_cells.hpp"
+#include "surface/bounded/point_mesh_cells.hpp"
 
 namespace terrace::terrain {
 namespace {

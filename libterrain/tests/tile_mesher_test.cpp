@@ -271,7 +271,7 @@ TEST(TileMesher, ReportsHeightsBeyondSteps) {
   const TileRange range = tiles_in(surface.bounds(), 8);
   EXPECT_THROW(static_cast<void>(
                    make_tile({8, range.x0, range.y0}, plan_zoom(8, 1, 1, surface), surface, {})),
-               HeightsTooFar);
+               HeightRangeTooLarge);
 }
 
 TEST(TileMesher, SharedSidesChangeNothing) {

@@ -11,7 +11,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh/bounded/lattice_plan.hpp"
+#include "surface/bounded/lattice_plan.hpp"
 #include "surface/window_sides.hpp"
 
 namespace terrace::terrain {
@@ -93,6 +93,19 @@ TEST(WindowMesh, StopsBeforeTheNextWindow) {
                std::runtime_error);
   EXPECT_EQ(made, 3);
   EXPECT_EQ(taken, 3);
+}
+
+TEST(WindowMesh, EndsAfterTheWindowThatIsEnough) {
+  for (const unsigned threads : {1U, 3U}) {
+    std::size_t taken = 0;
+    mesh_windows(
+        100, threads, [] {}, [](unsigned, std::size_t i) { return square(static_cast<int>(i)); },
+        [&](std::size_t i, const WindowMesh<int>&) {
+          EXPECT_EQ(i, taken++);
+          return i < 3;
+        });
+    EXPECT_EQ(taken, 4U);
+  }
 }
 
 TEST(LatticePlan, CountsTheWindowsOfASample) {

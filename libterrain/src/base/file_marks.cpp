@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include <nlohmann/json.hpp>
+#include <terrace/stream/geotiff_writer.hpp>
 
 namespace terrace::terrain {
 namespace {
@@ -104,7 +105,6 @@ std::uint64_t bytes_of_tiff_type(std::uint64_t type) {
 bool is_our_tiff(std::ifstream& file, bool big_endian, bool big_tiff) {
   constexpr std::string_view kMark("terrace\0", 8), kStructure("GDAL_STRUCTURAL_METADATA_SIZE=");
   constexpr std::uint64_t kSoftware = 305, kTileWidth = 322, kGeoKeys = 34735, kAscii = 2;
-  constexpr std::uint64_t kStructureBytes = 184;
   const std::size_t word = big_tiff ? 8 : 4, entry_bytes = big_tiff ? 20 : 12;
   const std::size_t count_bytes = big_tiff ? 8 : 2, head_bytes = big_tiff ? 16 : 8;
   const auto directory = number_at(read_at(file, big_tiff ? 8 : 4, word), 0, word, big_endian);
@@ -140,7 +140,7 @@ bool is_our_tiff(std::ifstream& file, bool big_endian, bool big_tiff) {
   }
   const bool structured = read_at(file, head_bytes, kStructure.size()) == kStructure;
   return marked && tiled && current &&
-         (structured ? *directory == head_bytes + kStructureBytes : next == size);
+         (structured ? *directory == head_bytes + stream::kGeoTiffLayoutBytes : next == size);
 }
 
 }  // namespace

@@ -27,11 +27,11 @@ void parallel_for(std::size_t items, unsigned threads, const Work& work,
   });
 }
 
-/// Calls work(first_row, last_row) concurrently for bands of rows; last_row is excluded. A band
-/// must not touch the rows of another. Errors and stops: as above.
+/// Calls work(begin, end) concurrently for bands of rows [begin, end). A band must not touch the
+/// rows of another. Throws as parallel_for().
 template <class Work>
-void for_bands(std::uint32_t rows, unsigned threads, const Work& work,
-               const std::stop_token& stop = {}) {
+void parallel_bands(std::uint32_t rows, unsigned threads, const Work& work,
+                    const std::stop_token& stop = {}) {
   const std::uint32_t bands = std::clamp<std::uint32_t>(threads * 4, 1, std::max(rows / 16, 1u));
   parallel_for(
       bands, threads,

@@ -128,14 +128,14 @@ std::vector<float> neighbour_distances(std::span<const stream::Point3> points, u
   };
   const Tree tree(points, check_stop);
   std::vector<float> distances(points.size());
-  for_bands(static_cast<std::uint32_t>(points.size()), threads,
-            [&](std::uint32_t first, std::uint32_t last) {
-              base::StopTicks ticks(check_stop);
-              for (std::uint32_t i = first; i < last; ++i) {
-                ticks(256);
-                distances[i] = static_cast<float>(std::sqrt(tree.square(i, rank)));
-              }
-            });
+  parallel_bands(static_cast<std::uint32_t>(points.size()), threads,
+                 [&](std::uint32_t first, std::uint32_t last) {
+                   base::StopTicks ticks(check_stop);
+                   for (std::uint32_t i = first; i < last; ++i) {
+                     ticks(256);
+                     distances[i] = static_cast<float>(std::sqrt(tree.square(i, rank)));
+                   }
+                 });
   return distances;
 }
 

@@ -487,7 +487,9 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   }
 
   stream::StoreWriter writer(request_.store, schema, request_.replace, threads);
-  StoreSink sink(writer, request_.most_points == 0, context_.stop);
+  const bool trial = request_.most_points > 0;
+  StoreSink sink(writer, !trial, context_.stop,
+                 trial ? stream::StoreWriter::MakeSurface{} : request_.surface);
   cluster::HierarchyOptions options = clustering_of(request_, schema, ground);
   options.threads = threads;
   options.stop = context_.stop;
@@ -506,6 +508,9 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   writer.set_nodata(read.nodata);
   const cluster::HierarchyResult result = builder.finish();
   BuildOutcome outcome = outcome_of(read, result, sink.store_bytes());
+  if (request_.surface && !trial) {
+    outcome.surface = stream::Store::open(request_.store).surface();
+  }
   note(outcome, voids);
   return outcome;
 }

@@ -26,7 +26,7 @@ void StoreSink::commit(unsigned /*level*/, std::unique_ptr<Prepared> prepared) {
 }
 
 void StoreSink::root(const cluster::ClusteredBlock& block) {
-  store_bytes_ = writer_.finish(block, publish_);
+  store_bytes_ = writer_.finish(block, publish_, surface_);
 }
 
 }  // namespace terrace::terrain

@@ -16,6 +16,7 @@
 #include "base/units.hpp"
 #include "contour/parts.hpp"
 #include "contour/text.hpp"
+#include "earth/ground.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -80,6 +81,10 @@ stream::Message reason_for_none(const stream::Store& store, const ContourRequest
   if (request.region) {
     return stream::message("inside the region no multiple of {interval} {} is crossed", interval);
   }
+  if (request.max_error) {
+    return stream::message("no triangle of the surface crosses a multiple of {interval} {}",
+                           interval);
+  }
   if (store.schema().grid && request.level == 0) {
     return stream::message(
         "no square of four neighbouring samples with data crosses a multiple of {interval} {}",
@@ -87,8 +92,8 @@ stream::Message reason_for_none(const stream::Store& store, const ContourRequest
   }
   if (request.level == 0) return "the points are on one line, so they span no triangles";
   return stream::message(
-      "no triangle of the points of level {} crosses a multiple of {interval} {}", request.level,
-      interval);
+      "no triangle of the points of level {}{} crosses a multiple of {interval} {}", request.level,
+      request.focuses.empty() ? "" : " and of the focuses", interval);
 }
 
 }  // namespace
@@ -149,7 +154,10 @@ ContourOutcome write_contours(const stream::Store& input, const ContourRequest& 
            .stop = context.stop},
       .progress = [&](double share) { report.update(text.outcome().lines, share); },
   };
-  if (store.schema().grid && request.level == 0) {
+  if (request.max_error) {
+    say_unknown_height_unit(Ground(store.schema()), context);
+    draw_bounded_contours(parts);
+  } else if (store.schema().grid && request.level == 0) {
     draw_lattice_contours(parts);
   } else {
     draw_point_contours(parts);

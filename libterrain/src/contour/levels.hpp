@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "base/decimal_multiples.hpp"
 #include "terrace/terrain/region.hpp"
@@ -17,8 +18,10 @@ namespace terrace::terrain {
 /// line only around its upper side, and a triangle crossed by a level has one segment of it.
 class ContourLevels {
  public:
-  /// interval: positive. Heights must be within 2^50 intervals.
-  explicit ContourLevels(double interval) : heights_(interval) {}
+  /// interval: positive. Heights must be within 2^50 intervals. by_rows: places are the same to the
+  /// last bit as ContourLines computes them on the edges of a lattice.
+  explicit ContourLevels(double interval, bool by_rows = false)
+      : heights_(interval), by_rows_(by_rows) {}
 
   [[nodiscard]] double height(std::int64_t level) const { return heights_(level); }
 
@@ -56,7 +59,8 @@ class ContourLevels {
   /// same bits for both triangles at the edge.
   [[nodiscard]] Point2 place(std::int64_t level, const Point2& p, double p_height, const Point2& q,
                              double q_height) const {
-    if (q < p) return place(level, q, q_height, p, p_height);
+    const bool is_first = by_rows_ ? std::pair(q[1], q[0]) < std::pair(p[1], p[0]) : q < p;
+    if (is_first) return place(level, q, q_height, p, p_height);
     const double t = share(level, p_height, q_height);
     // An end at the level is met exactly, from either side.
     return t == 1 ? q : Point2{p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])};
@@ -70,6 +74,7 @@ class ContourLevels {
 
  private:
   DecimalMultiples heights_;
+  bool by_rows_;  ///< starts at the end of an edge in the smaller row, not in the smaller column
 };
 
 }  // namespace terrace::terrain

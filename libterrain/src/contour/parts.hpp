@@ -31,8 +31,12 @@ struct ContourParts {
 
 /// Draws the lines of a raster at level 0.
 void draw_lattice_contours(const ContourParts& parts);
-/// Draws the lines of points, or of a raster at a coarser level.
+/// Draws the lines of points, or of a raster at coarser or mixed levels.
 void draw_point_contours(const ContourParts& parts);
+
+/// Draws the lines of the surface within ContourRequest::max_error. Throws: UsageError for options
+/// that exclude it.
+void draw_bounded_contours(const ContourParts& parts);
 
 /// Returns the box in stored coordinates around a region's box.
 StoredBox box_around(const Region& region, const GroundSlope& ground);

@@ -19,6 +19,7 @@
 #include "contour/parts.hpp"
 #include "contour/triangles.hpp"
 #include "surface/point_window.hpp"
+#include "surface/wanted_clusters.hpp"
 #include "surface/window_tree.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -62,10 +63,13 @@ class PointContours {
       : parts_(parts),
         request_(parts.request),
         ground_(parts.store),
-        levels_(request_.interval),
-        tree_(parts.store, request_.level, parts.points_per_part),
+        wanted_(parts.store, request_.level, request_.focuses),
+        by_rows_(parts.store.schema().grid && wanted_.is_mixed()),
+        levels_(request_.interval, by_rows_),
+        tree_(parts.store, wanted_, parts.points_per_part),
         rank_(tree_.size(), kNoPart),
-        is_selective_(request_.max_edge || request_.region) {
+        is_selective_(request_.max_edge || request_.region ||
+                      (parts.store.schema().grid && wanted_.finest() == 0)) {
     const stream::Box3& bounds = parts.store.bounds();
     bounds_ = flat(bounds);
     // Widened, so that a triangle whose rounded middle is in a box meets the box.
@@ -92,8 +96,9 @@ class PointContours {
   void draw() {
     const std::uint64_t memory = parts_.memory_bytes / 2;
     // The order of the lines depends on the parts, so a whole part must fit.
-    const std::uint64_t least = std::min(
-        kBytesPerWindow, parts_.store.levels()[request_.level].points * kBytesPerPointAlone);
+    const std::uint64_t least =
+        std::min(kBytesPerWindow,
+                 static_cast<std::uint64_t>(wanted_.points(parts_.store)) * kBytesPerPointAlone);
     if (memory < least) {
       throw stream::Error(
           parts_.store.path().string(),
@@ -113,9 +118,9 @@ class PointContours {
                         [&](const WindowTree::Part& part) {
                           if (first_at_work(part) < part.end) loads.push_back(&part);
                         });
-    PointCloud cloud(parts_.store, request_.level);
+    PointCloud cloud(parts_.store, wanted_);
     std::vector<std::unique_ptr<PointWindow>> windows(threads);
-    ContourTriangles lines(request_.interval, parts_.emit, parts_.limit);
+    ContourTriangles lines(request_.interval, parts_.emit, parts_.limit, by_rows_);
     std::vector<Triangle> strange;
     base::in_order(
         loads.size(), threads,
@@ -152,12 +157,18 @@ class PointContours {
     for (std::size_t i = 0; request_.max_edge && i < 3; ++i) {
       if (ground_.metres(t[i].place, t[(i + 1) % 3].place) > *request_.max_edge) return false;
     }
-    if (!request_.region) return true;
     Point2 middle{};
+    bool is_lattice_triangle = true;
     for (std::size_t axis = 0; axis < 2; ++axis) {
-      middle[axis] = (t[0].place[axis] + t[1].place[axis] + t[2].place[axis]) / 3;
+      const double a = t[0].place[axis], b = t[1].place[axis], c = t[2].place[axis];
+      middle[axis] = (a + b + c) / 3;
+      is_lattice_triangle = is_lattice_triangle && std::max({a, b, c}) - std::min({a, b, c}) <= 1;
     }
-    return request_.region->covers(ground_.world(middle));
+    // Where all samples are wanted, other triangles of a raster span missing samples.
+    const bool spans_missing =
+        parts_.store.schema().grid && !is_lattice_triangle && wanted_.has_all_samples(middle, 1);
+    if (spans_missing) return false;
+    return !request_.region || request_.region->covers(ground_.world(middle));
   }
 
   /// Returns part.end if none is active.
@@ -233,6 +244,8 @@ class PointContours {
   const ContourParts& parts_;
   const ContourRequest& request_;
   GroundSlope ground_;
+  WantedClusters wanted_;
+  bool by_rows_;  ///< as in ContourLevels: lines in focuses of a raster are those of its lattice
   ContourLevels levels_;
   WindowTree tree_;
   StoredBox bounds_;

@@ -12,8 +12,8 @@
 namespace terrace::terrain {
 
 ContourTriangles::ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
-                                   OpenLineLimit limit)
-    : levels_(interval), joiner_(std::move(emit), std::move(limit)) {}
+                                   OpenLineLimit limit, bool by_rows)
+    : levels_(interval, by_rows), joiner_(std::move(emit), std::move(limit)) {}
 
 std::size_t ContourTriangles::Hash::operator()(const ContourCrossing& c) const {
   // Adding 0 turns -0 into 0, which is equal to it.

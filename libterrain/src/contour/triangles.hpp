@@ -18,9 +18,11 @@ namespace terrace::terrain {
 /// Higher ground is on the left of a line if the second coordinate points upwards. Lines end at
 /// hull edges and at triangles that are left out.
 ///
-/// The triangles are passed in parts 0, 1, ... in this order: each triangle with the first part
-/// that has one of its vertices, or at the end if no part has. So the lines at an edge are complete
-/// when the first part of one of its ends is. Memory: the unfinished lines.
+/// The triangles are passed in parts 0, 1, ... in this order. Each corner names a part, after which
+/// no edge at it has a triangle that was not passed. So either vertices have one part each, and
+/// each triangle comes with the first part that has one of its vertices, or at the end if no part
+/// has. Or parts share vertices, and a corner names the last part that has it. The lines at an edge
+/// are complete when the first part that its ends name is. Memory: the unfinished lines.
 class ContourTriangles {
  public:
   struct Corner {
@@ -32,9 +34,9 @@ class ContourTriangles {
   using Triangle = std::array<Corner, 3>;  ///< counter-clockwise
 
   /// emit: receives every line when it is complete, in an order that depends only on the order of
-  /// the triangles. Lines that shrink to a point are left out.
+  /// the triangles. Lines that shrink to a point are left out. by_rows: as in ContourLevels.
   ContourTriangles(double interval, std::function<void(ContourLine&&)> emit,
-                   OpenLineLimit limit = {});
+                   OpenLineLimit limit = {}, bool by_rows = false);
 
   /// Adds the triangles of the next part; triangles that no level crosses may be left out.
   void add(std::span<const Triangle> triangles);

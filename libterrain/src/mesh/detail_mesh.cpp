@@ -83,21 +83,12 @@ tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& wor
   const stream::Channel& z = placement.coordinates[2];
   double low = (world.min[2] - z.offset) / z.scale, high = (world.max[2] - z.offset) / z.scale;
   if (low > high) std::swap(low, high);
-  // The division rounds, so move the box outward by one part in 2^40 to keep points on its border.
+  // The division rounds, so move the box outward by one part in 2^40. Detail::wants() decides.
   const auto outward = [](double value, double sign) {
     return value + sign * (std::abs(value) * 0x1p-40 + 0x1p-40);
   };
   return {{outward(stored.min[0], -1), outward(stored.min[1], -1), outward(low, -1)},
           {outward(stored.max[0], 1), outward(stored.max[1], 1), outward(high, 1)}};
-}
-
-/// Triangles that reach out of a polygon have corners in the clusters next to it.
-Detail with_margin(const stream::Store& store, Detail detail, const stream::Placement& placement) {
-  const stream::Box3 all = world_box(placement, store.whole().bounds());
-  const auto clusters =
-      static_cast<double>(store.levels()[std::min(detail.finest(), store.top())].clusters);
-  detail.margin = 2 * std::sqrt((all.max[0] - all.min[0]) * (all.max[1] - all.min[1]) / clusters);
-  return detail;
 }
 
 tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement& placement) {
@@ -114,8 +105,7 @@ tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement&
   }
   for (const FinerRegion& focus : detail.focuses) add(focus.region, focus.level);
   stored.needs = [&detail, placement, regions](std::size_t focus, const tri::Box3& box) {
-    return regions[focus].polygons().empty() ||
-           detail.reaches_into(regions[focus], world_box(placement, box));
+    return detail.reaches_into(regions[focus], world_box(placement, box));
   };
   return stored;
 }
@@ -396,7 +386,7 @@ TriangleMesh detail_mesh(const stream::Store& input, const Detail& detail,
   if (detail.cluster && options.heights.any()) {
     throw UsageError(stream::message("{cluster} excludes smoothing and overlays"));
   }
-  const Detail wide = with_margin(store, detail, store.schema());
+  const Detail wide = with_margin(store, detail);
   check_memory(store, wide, context.memory_or(0),
                height_bytes_per_vertex(options.heights) +
                    (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0) +

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <fmt/core.h>
+#include <terrace/tri/shape.hpp>
 
 #include "base/file_marks.hpp"
 #include "base/units.hpp"
@@ -246,6 +247,26 @@ TriangleMesh triangle_mesh_of(stream::MeshFile file) {
   return mesh;
 }
 
+void set_normals(TriangleMesh& mesh, const std::string& path, const stream::WriterOptions& options,
+                 const MeshUnits& units, unsigned threads) {
+  stream::Box3 bounds;
+  for (const stream::Point3& p : mesh.positions) bounds.include(p);
+  const auto frame = mesh_coordinates(path, options, units, bounds).frame;
+  const stream::Point3 metres = frame ? frame->metres : stream::Point3{1, 1, 1};
+  tri::Surface surface{mesh.positions, std::move(mesh.triangles)};
+  for (stream::Point3& p : surface.points) {
+    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] *= metres[axis];
+  }
+  const std::vector<tri::Point3> normals = tri::vertex_normals(surface, threads);
+  mesh.triangles = std::move(surface.faces);
+  mesh.normals.clear();
+  mesh.normals.reserve(normals.size());
+  for (const tri::Point3& n : normals) {
+    mesh.normals.push_back(
+        {static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])});
+  }
+}
+
 MeshCoordinates write_mesh(const std::string& path, const TriangleMesh& mesh,
                            const stream::WriterOptions& options, const MeshUnits& units) {
   constexpr std::size_t kPiece = 65536;
@@ -255,20 +276,26 @@ MeshCoordinates write_mesh(const std::string& path, const TriangleMesh& mesh,
   header.vertices = mesh.positions.size();
   header.triangles = mesh.triangles.size();
   if (!mesh.levels.empty()) header.attributes = {"level"};
+  if (!mesh.normals.empty()) {
+    header.attributes.insert(header.attributes.end(), {"nx", "ny", "nz"});
+  }
   header.comments = {kWriterMark};
   if (!bounds.empty()) header.bounds = bounds;
   MeshCoordinates coordinates = mesh_coordinates(path, options, units, bounds);
   header.frame = coordinates.frame;
   const auto writer = stream::open_mesh_writer(path, header, options);
-  std::vector<float> levels;
+  std::vector<float> values;
   const std::span vertices(mesh.positions);
   for (std::size_t at = 0; at < vertices.size(); at += kPiece) {
     const std::size_t count = std::min(kPiece, vertices.size() - at);
-    if (!mesh.levels.empty()) {
-      levels.assign(mesh.levels.begin() + static_cast<std::ptrdiff_t>(at),
-                    mesh.levels.begin() + static_cast<std::ptrdiff_t>(at + count));
+    values.clear();
+    for (std::size_t v = at; v < at + count; ++v) {
+      if (!mesh.levels.empty()) values.push_back(mesh.levels[v]);
+      if (!mesh.normals.empty()) {
+        values.insert(values.end(), mesh.normals[v].begin(), mesh.normals[v].end());
+      }
     }
-    writer->add_vertices(vertices.subspan(at, count), levels);
+    writer->add_vertices(vertices.subspan(at, count), values);
   }
   writer->add_triangles(mesh.triangles);
   writer->finish();

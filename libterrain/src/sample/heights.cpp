@@ -17,15 +17,18 @@ namespace terrace::terrain {
 std::shared_ptr<SampledCloud> sampled_cloud(const stream::Store& store,
                                             const SamplerOptions& options, const Context& context) {
   need_terrain(store, "the height of a place");
-  need_level(store, options.level);
-  if (store.schema().grid && options.level == 0) return nullptr;
-  return std::make_shared<SampledCloud>(store.with_stop(context.stop), options.level);
+  const WantedClusters wanted(store.with_stop(context.stop), options.level, options.focuses);
+  if (store.schema().grid && wanted.level() == 0) return nullptr;
+  return std::make_shared<SampledCloud>(store.with_stop(context.stop), wanted);
 }
 
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                                             const SamplerOptions& options, const Context& context) {
+  if (auto surface = sampled_surface(store, options, context)) {
+    return make_bounded_sampler(store, std::move(surface), options, context);
+  }
   if (std::shared_ptr<SampledCloud> cloud = sampled_cloud(store, options, context)) {
-    return make_point_sampler(std::move(cloud), options, context);
+    return make_cloud_sampler(std::move(cloud), options, context);
   }
   if (options.max_edge) {
     throw UsageError(stream::message(
@@ -40,7 +43,7 @@ std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<con
   check_latitudes(places, most_latitude(store.schema().crs), store.path().string());
   const std::unique_ptr<HeightSampler> sampler = make_sampler(store, options, context);
   const GroundSlope ground(store);
-  if (options.gradients) say_unknown_height_unit(ground.ground(), context);
+  if (options.gradients || options.max_error) say_unknown_height_unit(ground.ground(), context);
   std::vector<Point2> stored(places.size());
   std::vector<SurfacePoint> surface(places.size());
   std::vector<GroundPoint> points(places.size());

@@ -120,9 +120,11 @@ class PointSampler final : public HeightSampler {
     most_points_ =
         std::min({static_cast<double>(bytes) / kBytesPerExpected, kMaxPointsAtOnce,
                   std::max(65536.0, total / (kPartsPerThread * static_cast<double>(threads)))});
-    const double met = points_met_by_a_place(store, options.level);
+    const WantedClusters& wanted = cloud_.wanted;
+    const double met = points_met_by_a_place(store, wanted.level());
     points_per_place_ = kPointsPerPlace + kReadShare * met;
-    may_load_all_ = store.levels()[options.level].points * PointCells::kBytesPerPoint <= memory_;
+    may_load_all_ = !wanted.is_mixed() &&
+                    store.levels()[wanted.level()].points * PointCells::kBytesPerPoint <= memory_;
     if (options.max_edge) too_long_ = longer_than(store, *options.max_edge);
   }
 
@@ -205,8 +207,8 @@ class PointSampler final : public HeightSampler {
   /// circles in voids extend beyond windows.
   void load_all() {
     auto cells = std::make_unique<PointCells>();
-    may_load_all_ =
-        cells->load_all(cloud_.store, cloud_.level, static_cast<unsigned>(workers_.size()));
+    may_load_all_ = cells->load_all(cloud_.store, cloud_.wanted.level(),
+                                    static_cast<unsigned>(workers_.size()));
     if (may_load_all_) all_cells_ = std::move(cells);
   }
 

@@ -23,6 +23,8 @@
 #include "earth/line_distance.hpp"
 #include "sample/lattice_crossings.hpp"
 #include "sample/samplers.hpp"
+#include "surface/bounded/bounded_surface.hpp"
+#include "surface/corner.hpp"
 #include "surface/ground_slope.hpp"
 #include "surface/point_window.hpp"
 #include "terrace/terrain/error.hpp"
@@ -62,27 +64,69 @@ std::array<double, 2> part_within(const StoredBox& box, const Point2& from, cons
   return {begin, end};
 }
 
-/// Finds the places where a line crosses edges of the triangulation of a store's points (see
-/// PointWindow). The linear surface is straight between these places.
-class SurfaceCrossings {
- public:
-  struct Crossing {
-    double t = 0;     ///< position along the line, between 0 and 1
-    Point2 place{};   ///< stored
-    double height{};  ///< height of the linear surface; NaN on edges longer than
-                      ///< SamplerOptions::max_edge
+/// A place where a line crosses an edge of a triangle.
+struct SurfaceCrossing {
+  double t = 0;    ///< position along the line, between 0 and 1
+  Point2 place{};  ///< stored
+  /// Height of the linear surface; NaN on edges longer than SamplerOptions::max_edge, and where
+  /// the sampler determines it.
+  double height{};
+};
+using VisitCrossing = std::function<void(const SurfaceCrossing&)>;
+
+/// Calls visit for each crossing between stored places `from` and `to`, in order, once per vertex;
+/// crossings closer than 1e-12 of the line are one. Exact predicates decide on which side of the
+/// line the ends of an edge are, so no crossing is missed. Throws: stream::Error, stream::Stopped.
+using FindCrossings =
+    std::function<void(const Point2& from, const Point2& to, const VisitCrossing& visit)>;
+
+/// Calls add(place, a, b, share) where the line from `from` to `to` crosses the edge from corner a
+/// to b, at this share of it, and add(place, a, a, 0) where it meets corner a.
+template <class Add>
+void cross_triangle(const SurfaceTriangle& corner, const Point2& from, const Point2& to,
+                    const Add& add) {
+  std::array<int, 3> side{};
+  for (std::size_t i = 0; i < 3; ++i) side[i] = tri::orientation(from, to, corner[i].place);
+  if (side[0] == side[1] && side[1] == side[2]) return;
+  const double dx = to[0] - from[0], dy = to[1] - from[1];
+  const auto off = [&](const Point2& p) {
+    return std::abs(dx * (p[1] - from[1]) - dy * (p[0] - from[0]));
   };
+  for (std::size_t i = 0; i < 3; ++i) {
+    std::size_t p = i, q = (i + 1) % 3;
+    if (side[p] == 0) add(corner[p].place, corner[p], corner[p], 0.0);
+    if (side[p] * side[q] >= 0) continue;
+    if (corner[q].place < corner[p].place) std::swap(p, q);
+    const SurfaceCorner &c = corner[p], &d = corner[q];
+    const double left = off(c.place), right = off(d.place);
+    const double share = left + right > 0 ? left / (left + right) : 0.5;
+    add(between(c.place, d.place, share), c, d, share);
+  }
+}
 
+/// Returns the position of a place near the line from `from` to `to` along it.
+double along(const Point2& from, const Point2& to, const Point2& place) {
+  const double dx = to[0] - from[0], dy = to[1] - from[1];
+  return (dx * (place[0] - from[0]) + dy * (place[1] - from[1])) / (dx * dx + dy * dy);
+}
+
+void sort_crossings(std::vector<SurfaceCrossing>& crossings) {
+  std::sort(crossings.begin(), crossings.end(),
+            [](const SurfaceCrossing& p, const SurfaceCrossing& q) {
+              return p.t != q.t ? p.t < q.t : p.place < q.place;
+            });
+}
+
+/// Finds crossings with the triangulation of a store's points (see PointWindow). Reads windows of
+/// the store one after another along the line.
+class PointCrossings {
+ public:
   /// Uses the max_edge of the options.
-  SurfaceCrossings(std::shared_ptr<SampledCloud> sampled, const SamplerOptions& options,
-                   std::uint64_t memory_bytes);
+  PointCrossings(std::shared_ptr<SampledCloud> sampled, const SamplerOptions& options,
+                 std::uint64_t memory_bytes);
 
-  /// Calls visit for each crossing between stored places `from` and `to`, in order, once per
-  /// vertex; crossings closer than 1e-12 of the line are one. Exact predicates decide on which side
-  /// of the line the ends of an edge are, so no crossing is missed. Reads windows of the store one
-  /// after another along the line. Throws: stream::Error, stream::Stopped.
-  void operator()(const Point2& from, const Point2& to,
-                  const std::function<void(const Crossing&)>& visit);
+  /// As FindCrossings.
+  void operator()(const Point2& from, const Point2& to, const VisitCrossing& visit);
 
  private:
   void collect(const Point2& from, const Point2& to, double begin, double end, bool is_last);
@@ -90,17 +134,16 @@ class SurfaceCrossings {
   std::shared_ptr<SampledCloud> sampled_;
   TooLong too_long_;
   PointWindow window_;
-  std::vector<Crossing> found_;
+  std::vector<SurfaceCrossing> found_;
 };
 
-SurfaceCrossings::SurfaceCrossings(std::shared_ptr<SampledCloud> sampled,
-                                   const SamplerOptions& options, std::uint64_t memory_bytes)
+PointCrossings::PointCrossings(std::shared_ptr<SampledCloud> sampled, const SamplerOptions& options,
+                               std::uint64_t memory_bytes)
     : sampled_(std::move(sampled)), window_(sampled_->cloud, memory_bytes / 2) {
   if (options.max_edge) too_long_ = longer_than(sampled_->store, *options.max_edge);
 }
 
-void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
-                                  const std::function<void(const Crossing&)>& visit) {
+void PointCrossings::operator()(const Point2& from, const Point2& to, const VisitCrossing& visit) {
   const StoredBox all = flat(sampled_->store.bounds());
   if (from == to) return;
   const auto [first, last] = part_within(all, from, to);
@@ -116,7 +159,7 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
     // Advance at least this far, so that the loop ends.
     end = std::max(end, begin + 1e-9);
     collect(from, to, begin, std::min(end, last), end >= last);
-    for (const Crossing& one : found_) {
+    for (const SurfaceCrossing& one : found_) {
       if (one.t - latest <= kSameCrossing && latest >= 0) continue;
       visit(one);
       latest = one.t;
@@ -126,43 +169,86 @@ void SurfaceCrossings::operator()(const Point2& from, const Point2& to,
   }
 }
 
-void SurfaceCrossings::collect(const Point2& from, const Point2& to, double begin, double end,
-                               bool is_last) {
+void PointCrossings::collect(const Point2& from, const Point2& to, double begin, double end,
+                             bool is_last) {
   // Includes crossings that rounding may move into this piece.
   const Point2 a = between(from, to, std::max(0.0, begin - 1e-9));
   const Point2 b = between(from, to, std::min(1.0, end + 1e-9));
   window_.load(base::box_of(std::array{a, b}));
   found_.clear();
   const auto& triangulation = window_.triangulation();
-  const double dx = to[0] - from[0], dy = to[1] - from[1], square = dx * dx + dy * dy;
-  const auto off = [&](const Point2& p) { return dx * (p[1] - from[1]) - dy * (p[0] - from[0]); };
-  const auto add = [&](const Point2& p, double height) {
-    const double t = (dx * (p[0] - from[0]) + dy * (p[1] - from[1])) / square;
+  const auto add = [&](const Point2& p, const SurfaceCorner& c, const SurfaceCorner& d,
+                       double share) {
+    const bool is_surface = !too_long_ || !too_long_(c.place, d.place);
+    const double height = is_surface && !sampled_->is_lattice(p)
+                              ? c.height + share * (d.height - c.height)
+                              : std::numeric_limits<double>::quiet_NaN();
+    const double t = along(from, to, p);
     if (t > 0 && t < 1 && t >= begin && (t < end || is_last)) found_.push_back({t, p, height});
   };
   for (const tri::TriangleId triangle : triangulation.all_triangles()) {
     if (!window_.is_certain(triangle)) continue;
-    const auto corner = window_.corners_with_heights(triangle);
-    std::array<int, 3> side{};
-    for (std::size_t i = 0; i < 3; ++i) side[i] = tri::orientation(from, to, corner[i].place);
-    if (side[0] == side[1] && side[1] == side[2]) continue;
-    for (std::size_t i = 0; i < 3; ++i) {
-      std::size_t p = i, q = (i + 1) % 3;
-      if (side[p] == 0) add(corner[p].place, corner[p].height);
-      if (side[p] * side[q] >= 0) continue;
-      if (corner[q].place < corner[p].place) std::swap(p, q);
-      const SurfaceCorner &c = corner[p], &d = corner[q];
-      const double left = std::abs(off(c.place)), right = std::abs(off(d.place));
-      const double share = left + right > 0 ? left / (left + right) : 0.5;
-      const bool is_surface = !too_long_ || !too_long_(c.place, d.place);
-      add(between(c.place, d.place, share), is_surface ? c.height + share * (d.height - c.height)
-                                                       : std::numeric_limits<double>::quiet_NaN());
+    cross_triangle(window_.corners_with_heights(triangle), from, to, add);
+  }
+  sort_crossings(found_);
+}
+
+/// Finds crossings with a bounded surface, in one window after another along the line.
+class BoundedCrossings {
+ public:
+  /// has_gaps: leaves heights to the sampler, which knows missing samples.
+  BoundedCrossings(std::shared_ptr<BoundedParts> surface, bool has_gaps)
+      : parts_(std::move(surface)), has_gaps_(has_gaps) {}
+
+  /// As FindCrossings.
+  void operator()(const Point2& from, const Point2& to, const VisitCrossing& visit) const {
+    if (from == to) return;
+    struct Met {
+      double begin = 0;
+      std::uint32_t window = 0;
+    };
+    const BoundedSurface& surface = parts_->surface();
+    std::vector<Met> met;
+    for (std::uint32_t window = 0; window < surface.size(); ++window) {
+      const auto [begin, end] = part_within(surface.box(window), from, to);
+      if (begin <= end) met.push_back({begin, window});
+    }
+    std::stable_sort(met.begin(), met.end(),
+                     [](const Met& a, const Met& b) { return a.begin < b.begin; });
+    const StoredBox leg = base::box_of(std::array{from, to});
+    std::vector<SurfaceCrossing> found;
+    double latest = -1;
+    for (std::size_t i = 0; i < met.size(); ++i) {
+      const std::shared_ptr<const BoundedPart> part = (*parts_)(met[i].window);
+      for (const BoundedPart::Triangle& t : part->triangles()) {
+        const SurfaceTriangle corners = part->corners(t);
+        const auto& [a, b, c] = corners;
+        if (!leg.intersects(base::box_of(std::array{a.place, b.place, c.place}))) continue;
+        cross_triangle(
+            corners, from, to,
+            [&](const Point2& p, const SurfaceCorner& d, const SurfaceCorner& e, double share) {
+              const double at = along(from, to, p);
+              const double height = has_gaps_ ? NAN : d.height + share * (e.height - d.height);
+              if (at > 0 && at < 1) found.push_back({at, p, height});
+            });
+      }
+      sort_crossings(found);
+      // Later windows have no crossings before their boxes.
+      const double next = i + 1 < met.size() ? met[i + 1].begin - kSameCrossing : 2.0;
+      std::size_t done = 0;
+      for (; done < found.size() && found[done].t < next; ++done) {
+        if (found[done].t - latest <= kSameCrossing && latest >= 0) continue;
+        visit(found[done]);
+        latest = found[done].t;
+      }
+      found.erase(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(done));
     }
   }
-  std::sort(found_.begin(), found_.end(), [](const Crossing& p, const Crossing& q) {
-    return p.t != q.t ? p.t < q.t : p.place < q.place;
-  });
-}
+
+ private:
+  std::shared_ptr<BoundedParts> parts_;
+  bool has_gaps_;
+};
 
 class ProfileRun {
  public:
@@ -174,11 +260,21 @@ class ProfileRun {
         ground_(store),
         distance_(LineDistance::of(store)) {
     for (const Point2& place : request.line) line_.push_back(ground_.turned(place));
+    if (const auto surface = sampled_surface(store, request.sampler, context)) {
+      say_unknown_height_unit(ground_.ground(), context);
+      sampler_ = make_bounded_sampler(store, surface, request.sampler, context);
+      if (!request.step) crossings_ = BoundedCrossings(surface, store.schema().grid);
+      return;
+    }
     const std::shared_ptr<SampledCloud> cloud = sampled_cloud(store, request.sampler, context);
-    sampler_ = cloud != nullptr ? make_point_sampler(cloud, request.sampler, context)
+    sampler_ = cloud != nullptr ? make_cloud_sampler(cloud, request.sampler, context)
                                 : make_sampler(store, request.sampler, context);
     if (!request.step && cloud != nullptr) {
-      crossings_.emplace(cloud, request.sampler, working_memory(context));
+      const auto points =
+          std::make_shared<PointCrossings>(cloud, request.sampler, working_memory(context));
+      crossings_ = [points](const Point2& from, const Point2& to, const VisitCrossing& visit) {
+        (*points)(from, to, visit);
+      };
     }
   }
 
@@ -260,7 +356,7 @@ class ProfileRun {
   /// Adds a point at each crossing with an edge of the triangulation.
   void cross_triangles(const Point2& a, const Point2& b) {
     Point2 last = a;
-    (*crossings_)(ground_.stored(a), ground_.stored(b), [&](const auto& crossing) {
+    crossings_(ground_.stored(a), ground_.stored(b), [&](const SurfaceCrossing& crossing) {
       const Point2 crossing_place = between(a, b, crossing.t);
       outcome_.metres += distance_.along(last, crossing_place);
       add(crossing_place, outcome_.metres, crossing.place, crossing.height);
@@ -320,7 +416,7 @@ class ProfileRun {
   double next_step_ = 1, last_ = 0;
   std::vector<Point2> places_, stored_;
   std::vector<double> metres_, known_;
-  std::optional<SurfaceCrossings> crossings_;
+  FindCrossings crossings_;  ///< empty: rows are `step` apart, or at crossings with the lattice
   std::vector<SurfacePoint> surface_;
   std::vector<ProfilePoint> points_;
 };

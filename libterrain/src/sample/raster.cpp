@@ -24,6 +24,7 @@
 #include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "sample/raster_grid.hpp"
+#include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
@@ -96,8 +97,9 @@ constexpr std::uint64_t kBytesPerCell = 130;
 /// The most tiles along a side of the square that is sampled at once.
 constexpr std::int64_t kMaxSide = 8;
 
-constexpr std::uint64_t bytes_of(std::int64_t side) {
-  return static_cast<std::uint64_t>(side * side * kRunTile * kRunTile) * kBytesPerCell;
+std::uint64_t bytes_of(std::int64_t side, const SamplerOptions& options) {
+  const std::uint64_t per_cell = kBytesPerCell + added_bytes_per_place(options);
+  return static_cast<std::uint64_t>(side * side * kRunTile * kRunTile) * per_cell;
 }
 
 /// A tile's column and row among the tiles.
@@ -178,7 +180,7 @@ class RasterRun {
     const std::int64_t across = (grid_.columns + kRunTile - 1) / kRunTile;
     const std::int64_t down = (grid_.rows + kRunTile - 1) / kRunTile;
     std::int64_t side = 1;
-    while (side < kMaxSide && bytes_of(2 * side) <= memory / 2) side *= 2;
+    while (side < kMaxSide && bytes_of(2 * side, request_.sampler) <= memory / 2) side *= 2;
     std::vector<TilePlace> block;
     double done = 0;
     for_each_square({0, 0}, power_of_two(std::max(across, down)), side, {across, down},
@@ -350,6 +352,9 @@ RasterOutcome write_raster(const stream::Store& store, const RasterRequest& requ
   need_terrain(store, "a raster");
   const stream::Store source = store.with_stop(context.stop);
   const ProgressReport report(context, "cells");
+  if (request.sampler.max_error && request.value == RasterValue::height) {
+    say_unknown_height_unit(Ground(store.schema()), context);
+  }
   RasterRequest aligned = request;
   const RasterGrid grid =
       request.align.empty() ? raster_grid(source, request) : aligned_grid(source, aligned, context);

@@ -172,8 +172,9 @@ RasterGrid aligned_grid(const stream::Store& store, RasterRequest& request,
 }
 
 RasterGrid raster_grid(const stream::Store& store, const RasterRequest& request) {
-  const unsigned level = request.sampler.level;
-  need_level(store, level);
+  need_level(store, request.sampler.level);
+  const unsigned level =
+      Detail{.level = request.sampler.level, .focuses = request.sampler.focuses}.finest();
   const auto within_region = [&](stream::Box3 box) {
     if (request.region) {
       const stream::Box3& limits = request.region->extent();

@@ -15,6 +15,7 @@
 #include "base/parallel.hpp"
 #include "base/progress_report.hpp"
 #include "base/units.hpp"
+#include "sample/samplers.hpp"
 #include "surface/ground_slope.hpp"
 #include "terrace/terrain/latitudes.hpp"
 
@@ -205,8 +206,9 @@ SampleCounts answer_places(const stream::Store& store, const SamplerOptions& opt
                            const Context& context) {
   Answers answers(store, options, places, context);
   const std::uint64_t memory = working_memory(context);
-  const auto lines = static_cast<std::size_t>(
-      std::clamp<std::uint64_t>(memory / 4 / kBytesPerLine, 1000, kMaxLines));
+  const std::uint64_t per_line = kBytesPerLine + added_bytes_per_place(options);
+  const auto lines =
+      static_cast<std::size_t>(std::clamp<std::uint64_t>(memory / 4 / per_line, 1000, kMaxLines));
   const auto bytes = static_cast<std::size_t>(
       std::clamp<std::uint64_t>(memory / 16, std::uint64_t{1} << 20, kMaxBytes));
   const ProgressReport report(context, "points");

@@ -9,10 +9,10 @@ constexpr std::uint64_t kCacheBytes = std::uint64_t{2} << 20;
 
 }  // namespace
 
-ClusterFrontier::ClusterFrontier(const stream::Store& store, unsigned level)
+ClusterFrontier::ClusterFrontier(const stream::Store& store, const WantedClusters& wanted)
     : reader_(store, kCacheBytes),
       root_(store.root()),
-      level_(level),
+      wanted_(wanted),
       skips_none_(store.condition() != nullptr) {}
 
 void ClusterFrontier::begin(const Take& take) {
@@ -27,7 +27,7 @@ bool ClusterFrontier::settle(Open& open) const {
   while (true) {
     open.box = entries_[open.entry].box;
     if (open.box.min != open.box.max || skips_none_) return true;
-    if (open.level == level_) return false;
+    if (open.level == open.lowest) return false;
     --open.level;
     --open.entry;
   }
@@ -35,14 +35,20 @@ bool ClusterFrontier::settle(Open& open) const {
 
 void ClusterFrontier::add_below(const stream::StoreQuery::Node& node) {
   const unsigned at = node.level();
-  if (at <= level_) return;
   for (std::size_t i = 0; i < node.heads(); ++i) {
-    for (unsigned below = level_; below < at; ++below) {
+    unsigned lowest = at;
+    while (lowest > wanted_.finest() && wanted_(lowest - 1, node.branch(i, lowest - 1).box)) {
+      --lowest;
+    }
+    if (lowest == at) continue;
+    for (unsigned below = lowest; below < at; ++below) {
       const stream::StoreQuery::Branch& branch = node.branch(i, below);
       entries_.push_back({flat(branch.box), branch.ordinal});
     }
-    Open next{
-        {}, static_cast<std::uint32_t>(entries_.size() - 1), static_cast<std::uint8_t>(at - 1)};
+    Open next{{},
+              static_cast<std::uint32_t>(entries_.size() - 1),
+              static_cast<std::uint8_t>(at - 1),
+              static_cast<std::uint8_t>(lowest)};
     if (settle(next)) open_.push_back(next);
   }
 }
@@ -53,8 +59,8 @@ void ClusterFrontier::read_one(std::size_t at, const Take& take) {
       reader_.node(stream::cluster_id(open.level, entries_[open.entry].ordinal));
   take(node);
   add_below(node);
-  Open next{{}, open.entry - 1, static_cast<std::uint8_t>(open.level - 1)};
-  if (open.level > level_ && settle(next)) {
+  Open next{{}, open.entry - 1, static_cast<std::uint8_t>(open.level - 1), open.lowest};
+  if (open.level > open.lowest && settle(next)) {
     open_[at] = next;
   } else {
     open_[at] = open_.back();

@@ -11,11 +11,12 @@
 #include <terrace/stream/store_query.hpp>
 
 #include "surface/store_window.hpp"
+#include "surface/wanted_clusters.hpp"
 
 namespace terrace::terrain {
 
-/// An incremental descent into a store's clusters. Knows the boxes of all clusters that have not
-/// been read. Outside the boxes of open(), all points are known.
+/// An incremental descent into a store's clusters. Knows the boxes of all wanted clusters that have
+/// not been read. Outside the boxes of open(), all points are known.
 class ClusterFrontier {
  public:
   /// A cluster that has not been read; its box also contains all points below it.
@@ -23,12 +24,13 @@ class ClusterFrontier {
     StoredBox box;
     std::uint32_t entry = 0;  ///< index for ClusterFrontier
     std::uint8_t level = 0;
+    std::uint8_t lowest = 0;  ///< lowest level on which its head's cluster is wanted
   };
   /// Receives the members of a cluster.
   using Take = std::function<void(const stream::StoreQuery::Node& node)>;
 
-  /// level: uses the points of this level and above. The store must outlive this object.
-  ClusterFrontier(const stream::Store& store, unsigned level);
+  /// Descends into wanted clusters only. The store must outlive this object.
+  ClusterFrontier(const stream::Store& store, const WantedClusters& wanted);
 
   /// Clears the state and reads the root.
   void begin(const Take& take);
@@ -58,7 +60,7 @@ class ClusterFrontier {
 
   stream::StoreQuery reader_;
   stream::ClusterId root_;
-  unsigned level_;
+  WantedClusters wanted_;
   bool skips_none_;
   std::vector<Entry> entries_;
   std::vector<Open> open_;

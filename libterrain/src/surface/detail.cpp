@@ -2,6 +2,7 @@
 #include "terrace/terrain/detail.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -40,6 +41,14 @@ bool Detail::reaches_into(const Region& target, const stream::Box3& world_box) c
     wide.max[axis] += margin;
   }
   return target.overlap(wide) != Overlap::none;
+}
+
+Detail with_margin(const stream::Store& store, Detail detail) {
+  const stream::Box3 all = world_box(store.schema(), store.whole().bounds());
+  const auto clusters =
+      static_cast<double>(store.levels()[std::min(detail.finest(), store.top())].clusters);
+  detail.margin = 2 * std::sqrt((all.max[0] - all.min[0]) * (all.max[1] - all.min[1]) / clusters);
+  return detail;
 }
 
 void note_idle_focuses(const stream::Store& store, const Detail& detail, const Context& context) {

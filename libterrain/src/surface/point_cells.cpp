@@ -36,7 +36,7 @@ void PointCells::clear() {
   prefix_sums_.assign(4, 0);
 }
 
-bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox& box,
+bool PointCells::load(stream::StoreQuery& query, const WantedClusters& wanted, const StoredBox& box,
                       std::size_t max_points, bool allow_crowding) {
   clear();
   const stream::Store& store = query.store();
@@ -45,9 +45,9 @@ bool PointCells::load(stream::StoreQuery& query, unsigned level, const StoredBox
   std::vector<double> heights;
   bool too_many = false;
   query.descend(
-      level,
-      [&](unsigned, const stream::StoreQuery::Branch& branch) {
-        return !too_many && box.intersects(flat(branch.box));
+      wanted.finest(),
+      [&](unsigned at, const stream::StoreQuery::Branch& branch) {
+        return !too_many && box.intersects(flat(branch.box)) && wanted(at, branch.box);
       },
       [&](const stream::StoreQuery::Node& node) {
         for (const stream::Point3& p : node.positions) {

@@ -16,6 +16,7 @@
 #include "base/large_array.hpp"
 #include "surface/circle_cover.hpp"
 #include "surface/store_window.hpp"
+#include "surface/wanted_clusters.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -27,15 +28,15 @@ class PointCells {
   /// Peak memory in bytes per point.
   static constexpr std::uint64_t kBytesPerPoint = 58;
 
-  /// Loads the points of `level` and above in the box, replacing the contents. Returns false, with
+  /// Loads the points of wanted clusters in the box, replacing the contents. Returns false, with
   /// no contents, if there are more than max_points, or if they are crowded into few cells and
   /// `allow_crowding` is not set. Takes about 60 ns per point. Throws: stream::Error on a damaged
   /// store, stream::Stopped.
-  bool load(stream::StoreQuery& query, unsigned level, const StoredBox& box, std::size_t max_points,
-            bool allow_crowding);
-  /// Loads all points of a store with several threads. Each thread decodes consecutive clusters,
-  /// then sorts a band of rows. Returns false if the points are crowded, but keeps them. Throws: as
-  /// above.
+  bool load(stream::StoreQuery& query, const WantedClusters& wanted, const StoredBox& box,
+            std::size_t max_points, bool allow_crowding);
+  /// Loads all points of a level and above with several threads. Each thread decodes consecutive
+  /// clusters, then sorts a band of rows. Returns false if the points are crowded, but keeps them.
+  /// Throws: as above.
   bool load_all(const stream::Store& store, unsigned level, unsigned threads);
   void clear();
 

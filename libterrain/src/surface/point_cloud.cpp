@@ -23,8 +23,10 @@ constexpr std::uint64_t kShareOfMemory = 4;
 
 }  // namespace
 
-PointVoids::PointVoids(const stream::Store& store, unsigned level)
-    : store_(store), level_(level), max_looks_(kLooksPerPoint * store.levels()[level].points) {}
+PointVoids::PointVoids(const stream::Store& store, const WantedClusters& wanted)
+    : store_(store),
+      wanted_(wanted),
+      max_looks_(kLooksPerPoint * static_cast<std::uint64_t>(wanted.points(store))) {}
 
 bool PointVoids::count_looks(std::uint64_t boxes) {
   return (looks_ += boxes) > max_looks_ && state_ != State::none;
@@ -34,7 +36,7 @@ bool PointVoids::find(PointWindow& window) {
   std::unique_lock lock(mutex_);
   const std::uint64_t memory = window.memory_bytes();
   if (!tree_) {
-    tree_.emplace(store_, level_, kPointsPerPart);
+    tree_.emplace(store_, wanted_, kPointsPerPart);
     parts_.resize(tree_->size());
   }
   while (state_ == State::unknown && next_ < parts_.size()) {

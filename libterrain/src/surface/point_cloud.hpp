@@ -8,6 +8,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <terrace/stream/store.hpp>
@@ -17,6 +18,7 @@
 #include "surface/corner.hpp"
 #include "surface/point_hull.hpp"
 #include "surface/store_window.hpp"
+#include "surface/wanted_clusters.hpp"
 #include "surface/window_tree.hpp"
 
 namespace terrace::terrain {
@@ -37,7 +39,7 @@ class PointWindow;
 class PointVoids {
  public:
   /// The store must outlive this object.
-  PointVoids(const stream::Store& store, unsigned level);
+  PointVoids(const stream::Store& store, const WantedClusters& wanted);
   PointVoids(const PointVoids&) = delete;
   PointVoids& operator=(const PointVoids&) = delete;
 
@@ -72,7 +74,7 @@ class PointVoids {
   void triangulate();
 
   const stream::Store& store_;
-  unsigned level_;
+  WantedClusters wanted_;
   std::uint64_t max_looks_;
   std::atomic<std::uint64_t> looks_ = 0;
   std::atomic<State> state_ = State::unknown;
@@ -90,16 +92,16 @@ class PointVoids {
   BoxTree triangles_;            ///< by triangle slot
 };
 
-/// A store's points of a level and above, with their hull and the border of their voids. The
+/// The points of a store's wanted clusters, with their hull and the border of their voids. The
 /// windows and surfaces of all threads share one object.
 struct PointCloud {
   /// Finds the hull. The store must outlive this object. Throws: stream::Error on a damaged store,
   /// stream::Stopped.
-  PointCloud(const stream::Store& cloud, unsigned least_level)
-      : store(cloud), level(least_level), hull(cloud, least_level), voids(cloud, least_level) {}
+  PointCloud(const stream::Store& cloud, WantedClusters clusters)
+      : store(cloud), wanted(std::move(clusters)), hull(cloud, wanted), voids(cloud, wanted) {}
 
   const stream::Store& store;
-  unsigned level;
+  WantedClusters wanted;
   PointHull hull;
   PointVoids voids;
 };

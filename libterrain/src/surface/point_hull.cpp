@@ -12,13 +12,14 @@
 
 namespace terrace::terrain {
 
-PointHull::PointHull(const stream::Store& store, unsigned level) {
+PointHull::PointHull(const stream::Store& store, const WantedClusters& wanted) {
   stream::StoreQuery query(store);
   StreamingHull hull;
   std::uint64_t added = 0, compacted_size = 0;
   query.descend(
-      level,
-      [&](unsigned, const stream::StoreQuery::Branch& branch) {
+      wanted.finest(),
+      [&](unsigned at, const stream::StoreQuery::Branch& branch) {
+        if (!wanted(at, branch.box)) return false;
         // Rebuild the hull whenever a quarter more points have arrived.
         if (added > compacted_size + compacted_size / 4) {
           set_corners(hull.corners());

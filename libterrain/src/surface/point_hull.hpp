@@ -8,17 +8,19 @@
 
 #include <terrace/stream/store.hpp>
 
+#include "surface/wanted_clusters.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 
-/// The exact strictly convex hull, in x and y, of a store's points of a level and above. Several
+/// The exact strictly convex hull, in x and y, of the points of a store's wanted clusters. Several
 /// threads may call const members at once.
 class PointHull {
  public:
-  /// Reads the clusters that cross the hull of those read before, coarse levels first: a few per
-  /// cent if points arrived in order. Throws: stream::Error on a damaged store, stream::Stopped.
-  PointHull(const stream::Store& store, unsigned level);
+  /// Descends from the top level and reads only clusters whose box is not inside the hull found so
+  /// far; that is a few per cent of a store whose points arrived in spatial order. Throws:
+  /// stream::Error on a damaged store, stream::Stopped.
+  PointHull(const stream::Store& store, const WantedClusters& wanted);
 
   /// The corners, counter-clockwise from the least in x, then y. Fewer than three mean that all
   /// points are equal or on one line.
@@ -34,8 +36,8 @@ class PointHull {
   /// Locates a place exactly, in O(log corners). Requires a finite place and a hull that is not
   /// flat.
   [[nodiscard]] Found find(const Point2& place) const;
-  /// Returns the distance from a place outside to the hull, in the units of the points; 0 inside.
-  /// O(corners) outside.
+  /// Returns the distance from a place outside to the hull, in the units of the points; 0 inside;
+  /// infinite if the hull has no corners. Accepts a flat hull. O(corners) outside.
   [[nodiscard]] double distance(const Point2& place) const;
 
  private:

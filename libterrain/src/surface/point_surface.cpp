@@ -76,7 +76,7 @@ PointSurface::PointSurface(PointCloud& cloud, TooLong too_long, std::uint64_t me
 
 bool PointSurface::load(const StoredBox& box, std::size_t max_points, bool allow_crowding) {
   cells_ = &loaded_;
-  return loaded_.load(query_, cloud_.level, box, max_points, allow_crowding);
+  return loaded_.load(query_, cloud_.wanted, box, max_points, allow_crowding);
 }
 
 int PointSurface::side_of(const Point2& a, const Point2& b, const Target& target) {
@@ -112,15 +112,16 @@ void PointSurface::read_in(std::span<const CircleCover> covers, const Point2& fr
                            const Visit& visit) {
   std::uint64_t looks = 0;
   query_.best_first(
-      cloud_.level,
-      [&](const stream::Box3& whole) {
+      cloud_.wanted.finest(),
+      [&](unsigned level, const stream::Box3& whole) {
         ++looks;
         const StoredBox box = flat(whole);
         // A box that is a single place adds nothing, because its head is known.
         if (box.min == box.max || cells_->covers(box)) return kFarAway;
         const auto meets = [&](const CircleCover& cover) { return cover.meets(box); };
-        return std::any_of(covers.begin(), covers.end(), meets) ? least_square(box, from)
-                                                                : kFarAway;
+        return std::any_of(covers.begin(), covers.end(), meets) && cloud_.wanted(level, whole)
+                   ? least_square(box, from)
+                   : kFarAway;
       },
       [&](const stream::StoreQuery::Node& node) {
         looks += node.positions.size();
@@ -205,15 +206,20 @@ void PointSurface::narrow_first(const Point2& centre) {
   std::size_t first = 0;
   while (star_.mark(first) != kNone) ++first;
   const Point2 neighbour = star_.neighbour(first);
-  Point2 next = star_.next_neighbour(first);
+  Point2 nearer = neighbour, next = star_.next_neighbour(first);
   CircleCover cover = star_.circle(first);
   cells_->visit_cover(cover, centre, [&](const Point2& p) {
     if (!cover.meets(StoredBox{p, p}) || p == centre || p == neighbour || p == next) return;
-    if (!(tri::orientation(centre, neighbour, p) > 0)) return;
+    const int side = tri::orientation(centre, neighbour, p);
+    // On an edge of the hull, no other triangle leads to a point between its ends.
+    const bool is_nearer = (centre < p && p < nearer) || (nearer < p && p < centre);
+    if (side == 0 && is_nearer) nearer = p;
+    if (side <= 0) return;
     if (!tri::inside_circle(centre, neighbour, next, p)) return;
     next = p;
     cover = CircleCover::of_triangle({centre, neighbour, next});
   });
+  if (nearer != neighbour) return star_.offer(nearer);
   star_.offer(next);
   for (std::size_t i = 0; i < star_.triangles(); ++i) {
     if (star_.neighbour(i) == neighbour) star_.set_mark(i, kMemory);
@@ -310,9 +316,9 @@ double PointSurface::read_height(const Point2& point) {
   const StoredBox box{point, point};
   std::optional<double> found;
   query_.descend(
-      cloud_.level,
-      [&](unsigned, const stream::StoreQuery::Branch& branch) {
-        return !found && box.intersects(flat(branch.box));
+      cloud_.wanted.finest(),
+      [&](unsigned at, const stream::StoreQuery::Branch& branch) {
+        return !found && box.intersects(flat(branch.box)) && cloud_.wanted(at, branch.box);
       },
       [&](const stream::StoreQuery::Node& node) {
         for (const stream::Point3& p : node.positions) {

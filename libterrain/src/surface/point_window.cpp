@@ -39,7 +39,7 @@ PointWindow::PointWindow(PointCloud& cloud, std::uint64_t memory_bytes)
       memory_bytes_(memory_bytes),
       scale_(cloud.store.schema().coordinates[2].scale),
       offset_(cloud.store.schema().coordinates[2].offset),
-      frontier_(cloud.store, cloud.level) {}
+      frontier_(cloud.store, cloud.wanted) {}
 
 SurfaceCorner PointWindow::corner(tri::VertexId vertex) const {
   return {triangulation_.point(vertex), height(vertex)};

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <terrace/base/ordered_work.hpp>
+#include <terrace/stream/point.hpp>
 
 /// Meshes a large region window by window. Neighbours have the same vertices on the side between
 /// them (see WindowSides), so their meshes fit together.
@@ -31,6 +32,22 @@ struct WindowMesh {
   std::vector<Vertex> vertices;
   std::vector<SharedVertex> shared;  ///< ascending by vertex, each once
   std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// Measurements of the mesh of one window, as a reader of its file, if any, decodes it.
+struct WindowMeasures {
+  double max_error = 0.0, rms_error = 0.0;
+  std::uint64_t covered = 0;    ///< samples on triangles
+  std::uint64_t samples = 0;    ///< counted in this window
+  std::uint64_t uncovered = 0;  ///< of these, those on no triangle of any window
+  std::uint64_t duplicates = 0;
+  std::uint64_t work = 0;  ///< the window's share of the whole work
+  double reading_seconds = 0.0, meshing_seconds = 0.0;
+};
+
+/// The mesh of one window, in the coordinates of its samples, measured.
+struct BoundedWindow : WindowMesh<stream::Point3> {
+  WindowMeasures measures;
 };
 
 /// Joins the meshes of windows into one mesh, in which a shared vertex is one vertex.
@@ -88,8 +105,8 @@ class WindowJoiner {
 };
 
 /// Meshes windows with several threads and joins them in order. make(worker, i) returns the mesh of
-/// window i. take(i, mesh) receives its part of the joined mesh. check_stop() is called before each
-/// window and ends the work by an exception.
+/// window i. take(i, mesh) receives its part of the joined mesh, and may return false to end the
+/// work. check_stop() is called before each window and ends the work by an exception.
 template <class CheckStop, class Make, class Take>
 void mesh_windows(std::size_t windows, unsigned threads, const CheckStop& check_stop,
                   const Make& make, const Take& take) {
@@ -102,7 +119,7 @@ void mesh_windows(std::size_t windows, unsigned threads, const CheckStop& check_
       },
       [&](std::size_t i, auto&& mesh) {
         joiner.join(i, mesh);
-        take(i, std::forward<decltype(mesh)>(mesh));
+        return take(i, std::forward<decltype(mesh)>(mesh));
       });
 }
 

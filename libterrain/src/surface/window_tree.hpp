@@ -9,16 +9,30 @@
 #include <terrace/stream/store.hpp>
 
 #include "surface/store_window.hpp"
+#include "surface/wanted_clusters.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
 
-/// Divides a store's area into windows of about `points` points of a level and above: boxes, halved
+/// The places of the points of a level or, to save time, of a coarser one.
+struct CoarsePlaces {
+  std::vector<Point2> places;
+  double each = 1;  ///< points of the level per place
+};
+/// Returns at most 2^18 places unless the level is the top; in a view at least 2^14, if there are
+/// as many. Depends only on the points. Throws: stream::Error on a damaged store, stream::Stopped.
+CoarsePlaces coarse_places(const stream::Store& store, unsigned level);
+
+/// Divides a store's area into windows of about `points` points of wanted clusters: boxes, halved
 /// until they contain few enough. They depend only on the points. The windows of a halved box have
 /// consecutive numbers, so a box may represent them where more points are processed together.
 ///
+/// Windows only group work; their borders are not in results. Bounded meshes need lines that can
+/// become sides of the mesh, so they divide the plane by PointMeshCuts instead.
+///
 /// Counts the points of a coarser level with at most 2^18 points, and scales the counts to the full
-/// number. O(n log n) in these points, which are read once.
+/// number. O(n log n) in these points. With focuses, counts the wanted points of the finest such
+/// level, each for as many points as are wanted around it.
 class WindowTree {
  public:
   /// A window, or a box that was halved into windows.
@@ -35,7 +49,7 @@ class WindowTree {
   };
 
   /// Throws: stream::Error on a damaged store, stream::Stopped.
-  WindowTree(const stream::Store& store, unsigned level, std::size_t points);
+  WindowTree(const stream::Store& store, const WantedClusters& wanted, std::size_t points);
 
   [[nodiscard]] std::size_t size() const { return windows_.size(); }
   /// A closed box in stored coordinates; together they cover the store's bounds.
@@ -57,8 +71,15 @@ class WindowTree {
   }
 
  private:
-  std::uint32_t split(const StoredBox& box, std::span<Point2> sample, double each,
-                      std::size_t max_sample, unsigned depth);
+  /// A place that stands for `weight` points, times a factor for all places.
+  struct Counted {
+    Point2 place{};
+    double weight = 1;
+  };
+  static std::vector<Counted> counted_points(const stream::Store& store,
+                                             const WantedClusters& wanted);
+  std::uint32_t split(const StoredBox& box, std::span<Counted> sample, double each,
+                      double max_sample, unsigned depth);
 
   std::vector<Part> parts_;
   std::vector<std::uint32_t> windows_;  ///< numbers of their parts

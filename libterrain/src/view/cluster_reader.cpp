@@ -114,6 +114,7 @@ double steady_seconds() {
 tri::ClusterRecord FramedSource::exact_record(tri::ClusterId id) {
   tri::ClusterRecord record = inner_.record(id);
   record.box = frame_.box_of(record.box);
+  if (vertical_) record.error = record.box.max[2] - record.box.min[2];
   return record;
 }
 

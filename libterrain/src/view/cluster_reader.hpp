@@ -24,11 +24,16 @@ namespace terrace::terrain {
 class FramedSource final : public tri::ClusterSource {
  public:
   /// If the lattice is null, members are in stored coordinates. `bounds`: records with missing
-  /// bytes may be replaced by bounds (tri::ClusterRecord::kUnread). Keeps references to its
-  /// arguments.
+  /// bytes may be replaced by bounds (tri::ClusterRecord::kUnread). `vertical`: errors are ranges
+  /// of heights. Keeps references to its arguments.
   FramedSource(const stream::Store& store, const ViewFrame& frame, const ViewLattice* lattice,
-               bool bounds)
-      : store_(store), inner_(store), frame_(frame), lattice_(lattice), bounds_(bounds) {}
+               bool bounds, bool vertical)
+      : store_(store),
+        inner_(store),
+        frame_(frame),
+        lattice_(lattice),
+        bounds_(bounds),
+        vertical_(vertical) {}
 
   [[nodiscard]] unsigned top() const override { return inner_.top(); }
   [[nodiscard]] std::uint64_t cluster_count(unsigned level) const override {
@@ -62,6 +67,7 @@ class FramedSource final : public tri::ClusterSource {
   const ViewFrame& frame_;
   const ViewLattice* lattice_;
   bool bounds_;
+  bool vertical_;
   std::vector<stream::Point3> nodes_;  ///< result of the last read(), with a lattice
   /// The index pages and bytes that the cluster being loaded still lacks.
   std::vector<tri::ClusterId> missing_pages_;

@@ -5,7 +5,7 @@
 
 namespace terrace::terrain {
 
-template class StoreView<std::int32_t>;
+template class StoreView<tri::ThinnedDelaunay2>;
 template class StoreView<tri::PointCloud>;
 
 }  // namespace terrace::terrain

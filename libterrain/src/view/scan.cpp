@@ -13,6 +13,13 @@
 #include "view/frame.hpp"
 
 namespace terrace::terrain {
+namespace {
+
+/// Differs from the Delaunay triangulation only next to nearly cocircular points, because a window
+/// is tiny compared to the distances of the points. The viewer needs this metric anyway.
+using TopTriangulation = tri::Delaunay2<std::int32_t, tri::Windowed>;
+
+}  // namespace
 
 bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
   const stream::StoreSchema& schema = store.schema();
@@ -30,7 +37,7 @@ bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
   StoreSource source(store);
   const std::span<const stream::Point3> points =
       source.read(tri::cluster_id(source.top(), 0)).positions;
-  std::vector<tri::Delaunay2<std::int32_t>::Point> places;
+  std::vector<TopTriangulation::Point> places;
   places.reserve(points.size());
   std::vector<stream::Point3> nodes;
   for (const stream::Point3& p : points) {
@@ -38,10 +45,11 @@ bool is_scan(const stream::Store& store, const stream::LinearMap& ground) {
     places.push_back(
         {static_cast<std::int32_t>(nodes.back()[0]), static_cast<std::int32_t>(nodes.back()[1])});
   }
-  tri::Delaunay2<std::int32_t> triangulation;
-  const std::vector<tri::VertexId> vertices = triangulation.build(places);
+  TopTriangulation triangulation;
+  std::vector<TopTriangulation::Insertion> vertices(places.size());
+  triangulation.insert(places, vertices);
   std::vector<double> heights(triangulation.vertex_slots());
-  for (std::size_t i = 0; i < nodes.size(); ++i) heights[slot(vertices[i])] = nodes[i][2];
+  for (std::size_t i = 0; i < nodes.size(); ++i) heights[slot(vertices[i].vertex)] = nodes[i][2];
   Steepness steepness;
   for (const tri::TriangleId triangle : triangulation.all_triangles()) {
     std::array<stream::Point3, 3> p;

@@ -22,11 +22,13 @@ StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& 
         return reader == Reader::thread ? make_reading_thread(source) : make_frame_reader(source);
       })) {}
 
-template StoreView<std::int32_t>::StoreView(const stream::Store&, const tri::ViewOptions&, Reader);
+template StoreView<tri::ThinnedDelaunay2>::StoreView(const stream::Store&, const tri::ViewOptions&,
+                                                     Reader);
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,
                                                Reader);
 template StoreView<tri::DynamicSurface<std::int32_t>>::StoreView(const stream::Store&,
                                                                  const tri::ViewOptions&, Reader);
+template class StoreView<std::int32_t>;
 template class StoreView<double>;
 
 }  // namespace terrace::terrain

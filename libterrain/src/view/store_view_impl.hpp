@@ -26,6 +26,12 @@ template <class Coord>
 inline constexpr bool shows_surface<tri::DynamicSurface<Coord>> = true;
 
 template <class Shown>
+inline constexpr bool kThinned = std::is_same_v<Shown, tri::ThinnedDelaunay2>;
+/// Whether the vertices are samples of a raster.
+template <class Shown>
+inline constexpr bool kShowsRaster = std::is_integral_v<Shown> || kThinned<Shown>;
+
+template <class Shown>
 struct StoreView<Shown>::Impl {
   using MakeReader = std::function<std::unique_ptr<ClusterReader>(FramedSource&)>;
 
@@ -34,10 +40,32 @@ struct StoreView<Shown>::Impl {
       : store(input),
         frame(store, ground),
         lattice(store, frame),
-        source(store, frame, shows_surface<Shown> ? &lattice : nullptr, options.silhouette == 1.0),
-        control(source.counts(), load_root(), options),
+        source(store, frame, shows_surface<Shown> ? &lattice : nullptr, options.silhouette == 1.0,
+               kThinned<Shown>),
+        control(source.counts(), load_root(), options_of(options), empty()),
         reader(make_reader(source)) {
-    assert((!std::is_integral_v<Shown> || store.schema().grid));
+    assert((!kShowsRaster<Shown> || store.schema().grid));
+  }
+
+  /// Adds what a thinned raster needs.
+  [[nodiscard]] tri::ViewOptions options_of(tri::ViewOptions options) const {
+    if constexpr (kThinned<Shown>) {
+      options.raster = {frame.ground(), frame({0, 0, 0})};
+      options.raster_has_gaps =
+          terrain::has_gaps(store) || store.bounds().min[0] > 0 || store.bounds().min[1] > 0;
+    }
+    return options;
+  }
+  [[nodiscard]] auto empty() const {
+    using Triangulation = typename ViewTriangulation<Shown>::type;
+    if constexpr (kThinned<Shown>) {
+      if (store.bounds().empty()) return Triangulation({0, 0});
+      const stream::Point3& last = store.bounds().max;
+      return Triangulation(
+          {static_cast<std::int32_t>(last[0]), static_cast<std::int32_t>(last[1])});
+    } else {
+      return Triangulation();
+    }
   }
 
   tri::LoadedCluster load_root() {
@@ -45,11 +73,24 @@ struct StoreView<Shown>::Impl {
     root_values = root.values;
     return root;
   }
+  /// The values of a cluster's members, read again. Valid until the next call.
+  [[nodiscard]] std::span<const std::byte> values_again(tri::ClusterId cluster) {
+    if (!reread || cluster != reread_cluster) {
+      if (!reread) reread = std::make_unique<StoreSource>(store);
+      reread_values = reread->read(cluster).values;
+      reread_cluster = cluster;
+    }
+    return reread_values;
+  }
+
   stream::Store store;
   ViewFrame frame;
   ViewLattice lattice;
   FramedSource source;
   std::vector<std::byte> root_values;
+  std::unique_ptr<StoreSource> reread;  ///< apart from `source`, which another thread may use
+  tri::ClusterId reread_cluster{};
+  std::span<const std::byte> reread_values;
   Control control;
   bool settled = false;
   std::unique_ptr<ClusterReader> reader;
@@ -152,13 +193,26 @@ stream::Point3 StoreView<Shown>::stored(tri::VertexId vertex) const {
 }
 
 template <class Shown>
+std::size_t StoreView<Shown>::points() const {
+  if constexpr (kThinned<Shown>) return model().triangulation().vertex_count();
+  return model().point_count();
+}
+
+template <class Shown>
 bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
-  if constexpr (!std::is_integral_v<Shown>) {
+  if constexpr (!kShowsRaster<Shown>) {
     return false;
   } else {
     const auto& mesh = model().triangulation();
     const auto corners = mesh.vertices(triangle);
     const auto far = [&](const stream::Box3& cells) {
+      if constexpr (kThinned<Shown>) {
+        // Not all samples of expanded clusters are vertices.
+        if (mesh.is_in_thinned_window(triangle) ||
+            mesh.has_hidden_sample_near((cells.min[0] + cells.max[0]) / 2,
+                                        (cells.min[1] + cells.max[1]) / 2))
+          return false;
+      }
       tri::Box3 near = impl_->frame.box_of(cells);
       near.min[2] = -std::numeric_limits<double>::infinity();
       near.max[2] = std::numeric_limits<double>::infinity();
@@ -176,7 +230,7 @@ bool StoreView<Shown>::spans_gap(tri::TriangleId triangle) const {
 
 template <class Shown>
 bool StoreView<Shown>::has_gaps() const {
-  return std::is_integral_v<Shown> && terrain::has_gaps(impl_->store);
+  return kShowsRaster<Shown> && terrain::has_gaps(impl_->store);
 }
 
 template <class Shown>
@@ -187,6 +241,11 @@ std::span<const std::byte> StoreView<Shown>::attributes(tri::VertexId vertex) co
     return std::span(impl_->root_values).subspan(id.index * bytes, bytes);
   }
   const tri::LoadedCluster* const cached = control().cached_cluster(id.cluster);
+  if constexpr (kThinned<Shown>) {
+    // A vertex may be shown long after its cluster was loaded.
+    if (cached == nullptr && bytes > 0)
+      return impl_->values_again(id.cluster).subspan(id.index * bytes, bytes);
+  }
   if (cached == nullptr) return {};
   return std::span(cached->values).subspan(id.index * bytes, bytes);
 }

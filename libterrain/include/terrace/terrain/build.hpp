@@ -16,6 +16,7 @@
 #include <terrace/cluster/facility_location.hpp>
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/spatial_order.hpp>
+#include <terrace/stream/store.hpp>
 
 #include "terrace/terrain/context.hpp"
 #include "terrace/terrain/metric_choice.hpp"
@@ -66,6 +67,9 @@ struct BuildRequest {
   /// How to order points that are not the cells of a raster: see stream::in_spatial_order(). The
   /// temporary file is next to the store.
   stream::Order order = stream::Order::automatic;
+  /// Returns the surface through the points of the store, to be stored with it, such as
+  /// surface_to_store() of scan_surface.hpp. Called with the complete store before it is published.
+  stream::StoreWriter::MakeSurface surface{};
   /// Ends a trial run after about this many points, without a store. 0 builds the store from all
   /// points.
   std::uint64_t most_points = 0;
@@ -81,6 +85,8 @@ struct BuildOutcome {
   std::uint64_t empty_values = 0;  ///< attribute values missing from their file, stored as NaN
   std::uint64_t withheld = 0;      ///< points that their file marks as withheld; they are kept
   std::uint64_t store_bytes = 0;
+  /// The surface that was stored with the points.
+  std::optional<stream::SurfaceInfo> surface{};
   stream::OrderedSource::Report order{};  ///< the order the points arrived in, and the work to sort
                                           ///< them
   unsigned top = 0;

@@ -46,6 +46,10 @@ struct Detail {
   [[nodiscard]] bool reaches_into(const Region& target, const stream::Box3& world_box) const;
 };
 
+/// Returns the detail with the margin of a mesh: triangles that reach out of a polygon have corners
+/// in the clusters next to it.
+[[nodiscard]] Detail with_margin(const stream::Store& store, Detail detail);
+
 /// Notes each focus that meets none of the store's points and so adds nothing.
 void note_idle_focuses(const stream::Store& store, const Detail& detail, const Context& context);
 

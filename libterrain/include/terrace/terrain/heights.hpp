@@ -12,6 +12,7 @@
 #include <terrace/tri/interpolation.hpp>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/detail.hpp"
 #include "terrace/terrain/region.hpp"
 
 namespace terrace::terrain {
@@ -27,6 +28,11 @@ struct SurfacePoint {
 struct SamplerOptions {
   tri::Interpolation method = tri::Interpolation::linear;
   unsigned level = 0;  ///< uses the points of this level and above
+  /// Uses the points of finer levels too, in these regions: the surface of mixed levels.
+  std::vector<FinerRegion> focuses{};
+  /// Uses a surface of few samples that is within this many metres of every sample, vertically.
+  /// Excludes a level, focuses, max_edge and other methods than linear.
+  std::optional<double> max_error{};
   /// Ignores triangles with a side longer than this, in metres on the ground. Does not apply to
   /// rasters at level 0.
   std::optional<double> max_edge{};
@@ -53,6 +59,27 @@ struct SamplerOptions {
 ///   gradient. NaN outside the hull.
 /// - nearest: the nearest point, on ties the lexicographically smallest; defined everywhere. The
 ///   gradient is the linear surface's at that point.
+/// With focuses, the points of the level also include those of finer levels in all clusters that
+/// reach into a focus, as in detail_mesh(), so the linear surface is that mesh:
+/// - A triangle of level 0 with all corners inside a focus of level 0 is also one of this surface,
+///   and inside it linear results are the same to the last bit (in a raster, up to rounding). The
+///   same holds for a focus of another level, away from finer focuses.
+/// - In a raster, results of all methods are those of level 0 to the last bit, with its missing
+///   data, where the part of the raster within two columns and rows of a place is inside one focus
+///   of level 0. Elsewhere the triangulation also spans missing data, as at higher levels.
+/// - Where no finer point that is used is inside the circumcircle of a triangle of the level, the
+///   surface is that of the level. Between the two are triangles with corners of several levels.
+///
+/// With SamplerOptions::max_error the surface is a triangulation of few samples, made in windows of
+/// about 512 columns and rows, or 65,536 points:
+/// - It is within the bound of every sample, up to rounding. Of several points at one x and y the
+///   first counts. It passes through the samples that are corners of its triangles; on the sides of
+///   windows of points, corners are between samples.
+/// - It has heights where the linear surface of level 0 has them: missing samples of a raster leave
+///   the same gaps. Next to gaps, where no triangle of few samples may be, it is that surface.
+/// - Gradients are those of its triangles, on edges and corners their mean.
+/// - It depends on the store and the bound alone. So a place has the same height in every request.
+///
 /// With SamplerOptions::max_edge every method gives NaN inside triangles with a longer side, but
 /// not on their shorter sides and corners.
 ///
@@ -60,7 +87,9 @@ struct SamplerOptions {
 /// each window once, at about 25 ns per sample. Otherwise nothing is triangulated: the points
 /// around the places are read, at about 0.15 us per point, and each place then costs about 1 us
 /// (natural, and nearest with its gradient: 3 to 9 us). Results depend on neither threads, memory
-/// nor the order of the places.
+/// nor the order of the places. With max_error each window with a place is triangulated, at about
+/// 0.1 us per sample and 5 us per sample that becomes a corner, and kept for later calls while an
+/// eighth of the memory has room; each place then costs about 0.3 us.
 class HeightSampler {
  public:
   virtual ~HeightSampler() = default;
@@ -72,8 +101,9 @@ class HeightSampler {
 };
 
 /// Makes a sampler of a store. It uses half of the available memory unless the context sets another
-/// bound. Throws: UsageError for a level that the store does not have, and for a max_edge that does
-/// not apply; stream::Error; stream::Stopped.
+/// bound. Throws: UsageError for a level that the store does not have, for a max_edge that does not
+/// apply, and for a max_error that is negative or excluded; stream::Error, also if the memory does
+/// not suffice for a window of a max_error; stream::Stopped.
 std::unique_ptr<HeightSampler> make_sampler(const stream::Store& store,
                                             const SamplerOptions& options = {},
                                             const Context& context = {});
@@ -88,7 +118,7 @@ struct GroundPoint {
 
 /// Samples places in the store's CRS, as HeightSampler does for stored coordinates. A place within
 /// a millionth of a cell of a raster's column or row is treated as on it. Uses 90 bytes of memory
-/// per place. Throws: as make_sampler() and HeightSampler::sample().
+/// per place, with focuses or a bound 154. Throws: as make_sampler() and HeightSampler::sample().
 std::vector<GroundPoint> sample_places(const stream::Store& store, std::span<const Point2> places,
                                        const SamplerOptions& options = {},
                                        const Context& context = {});

@@ -79,8 +79,14 @@ std::string endings_of(const OutputKind& kind);
 /// ending, otherwise the only format. "-" gets the first format unless `format` is given. Throws:
 /// UsageError if there is no such format, or if the name has the ending of another one; both
 /// messages list the choices.
-std::string_view format_of_output(const OutputKind& kind, const std::string& path,
-                                  const std::string& format = {});
+[[nodiscard]] std::string_view format_of_output(const OutputKind& kind, const std::string& path,
+                                                const std::string& format = {});
+
+/// Checks the name and the format of an output. Throws: as format_of_output().
+inline void check_output_name(const OutputKind& kind, const std::string& path,
+                              const std::string& format = {}) {
+  static_cast<void>(format_of_output(kind, path, format));
+}
 
 /// Checks the name of an input of this kind. Throws: UsageError if it has the ending of another
 /// format.

@@ -37,13 +37,13 @@ struct RasterOutcome {
 /// centre. Overviews, down to 512 x 512 cells, contain the mean of the cells with data that they
 /// cover. Aspect has no mean, so its overviews contain the first of these cells.
 ///
-/// At level 0 and in the store's CRS, the grid of a raster is its own lattice, unless `cell` is set
-/// or the lattice is rotated. If `cell` is set, cell borders are at multiples of it (as with
-/// gdalwarp -tap), so that all rasters of one cell size match. The grid then covers the part of the
-/// region inside the store's area, ignoring conditions. Otherwise cells start at the upper left
-/// corner of the region or of the selected area. A cell has about the mean area per point of the
-/// level, with its size rounded to two digits. Cells with centres outside the region's polygons are
-/// nodata.
+/// At level 0, or with a focus of level 0, and in the store's CRS, the grid of a raster is its own
+/// lattice, unless `cell` is set or the lattice is rotated. If `cell` is set, cell borders are at
+/// multiples of it (as with gdalwarp -tap), so that all rasters of one cell size match. The grid
+/// then covers the part of the region inside the store's area, ignoring conditions. Otherwise cells
+/// start at the upper left corner of the region or of the selected area. A cell has about the mean
+/// area per point of the finest level that is used, with its size rounded to two digits. Cells with
+/// centres outside the region's polygons are nodata.
 ///
 /// With `align`, the grid is the grid of another raster: its CRS, origin, cell size and extent.
 /// Cells with centres outside the region are then nodata, also for a box.

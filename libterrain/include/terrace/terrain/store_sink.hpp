@@ -18,8 +18,10 @@ class StoreSink final : public cluster::HierarchySink {
  public:
   /// The writer must outlive the sink. publish: false for a trial. stop: ends the build with
   /// stream::Stopped; each thread completes its current block first.
-  explicit StoreSink(stream::StoreWriter& writer, bool publish = true, std::stop_token stop = {})
-      : writer_(writer), publish_(publish), stop_(std::move(stop)) {}
+  /// surface: see stream::StoreWriter::finish().
+  explicit StoreSink(stream::StoreWriter& writer, bool publish = true, std::stop_token stop = {},
+                     stream::StoreWriter::MakeSurface surface = {})
+      : writer_(writer), publish_(publish), stop_(std::move(stop)), surface_(std::move(surface)) {}
 
   std::unique_ptr<Prepared> prepare(const cluster::ClusteredBlock& block) override;
   void commit(unsigned level, std::unique_ptr<Prepared> prepared) override;
@@ -33,6 +35,7 @@ class StoreSink final : public cluster::HierarchySink {
   stream::StoreWriter& writer_;
   bool publish_;
   std::stop_token stop_;
+  stream::StoreWriter::MakeSurface surface_;
   std::uint64_t store_bytes_ = 0;
 };
 

@@ -26,6 +26,10 @@ struct ViewTriangulation {
   using type = tri::Delaunay2<Shown>;
 };
 template <>
+struct ViewTriangulation<tri::ThinnedDelaunay2> {
+  using type = tri::ThinnedDelaunay2;
+};
+template <>
 struct ViewTriangulation<tri::PointCloud> {
   using type = tri::PointCloud;
 };
@@ -52,12 +56,17 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
 /// store, with the CRS's scale at the middle. The triangulation itself stays in stored coordinates;
 /// in_view_frame() converts its vertices.
 ///
-/// Shown selects the structure: std::int32_t for rasters, with exact integer triangulation; double
-/// for any store; tri::PointCloud for points without triangles; or
+/// Shown selects the structure: tri::ThinnedDelaunay2 for rasters, with only the vertices that the
+/// error needs; std::int32_t for rasters with all samples of each expanded cluster; double for any
+/// store; tri::PointCloud for points without triangles; or
 /// tri::DynamicSurface<std::int32_t> for scans. The last one is the surface in space that the
 /// points are on, without lids for open scans. The surface takes part of a frame's budget. Its
 /// vertices are not in stored coordinates but rounded to a lattice in the view frame, with a
 /// spacing that is a power of two metres, 2^-29 to 2^-28 of the longest side of the store's box.
+///
+/// With tri::ThinnedDelaunay2 an error is vertical. The surface of a window whose samples are all
+/// loaded (tri::ThinnedDelaunay2::Window::thinned) is within the error that the view asks for there
+/// at every sample. Elsewhere the ranges of heights of clusters serve as estimates.
 ///
 /// Shows all points of a store, even if a condition was set (stream::Store::where()).
 ///
@@ -74,8 +83,8 @@ class StoreView {
     in_frame  ///< the calling thread, within the frame's time
   };
 
-  /// Requires a raster if Shown is std::int32_t. Throws: stream::Error if the root is damaged;
-  /// std::invalid_argument for options out of range.
+  /// Requires a raster if Shown is std::int32_t or tri::ThinnedDelaunay2. Throws: stream::Error if
+  /// the root is damaged; std::invalid_argument for options out of range.
   explicit StoreView(const stream::Store& store, const tri::ViewOptions& options = {},
                      Reader reader = Reader::thread);
   /// For stores with missing bytes (stream::GivenBytes), read by the calling thread within the
@@ -111,6 +120,9 @@ class StoreView {
   [[nodiscard]] const Control& control() const;
   [[nodiscard]] const typename Control::Model& model() const { return control().model(); }
 
+  /// Number of points that are shown.
+  [[nodiscard]] std::size_t points() const;
+
   /// Maps a difference in stored coordinates to metres.
   [[nodiscard]] const stream::LinearMap& ground() const;
   /// Returns a vertex in stored coordinates; for a surface, up to the lattice's rounding.
@@ -143,6 +155,7 @@ class StoreView {
   std::unique_ptr<Impl> impl_;
 };
 
+extern template class StoreView<tri::ThinnedDelaunay2>;
 extern template class StoreView<std::int32_t>;
 extern template class StoreView<double>;
 extern template class StoreView<tri::PointCloud>;

@@ -79,8 +79,15 @@ struct MeshCoordinates {
                                                const stream::WriterOptions& options,
                                                const MeshUnits& units, const stream::Box3& bounds);
 
-/// Writes a mesh, with its levels if it has any; "-" is standard output. The file is either
-/// complete or absent. Throws: stream::Error, stream::Stopped.
+/// Sets the normals of a mesh's vertices, by tri::vertex_normals() for the coordinates in the file
+/// that write_mesh() writes with the same arguments: metres in GLB, otherwise those of the mesh,
+/// whatever their units. Throws std::invalid_argument as that function does.
+void set_normals(TriangleMesh& mesh, const std::string& path,
+                 const stream::WriterOptions& options = {}, const MeshUnits& units = {},
+                 unsigned threads = 1);
+
+/// Writes a mesh, with its levels and normals if it has any; "-" is standard output. The file is
+/// either complete or absent. Throws: stream::Error, stream::Stopped.
 MeshCoordinates write_mesh(const std::string& path, const TriangleMesh& mesh,
                            const stream::WriterOptions& options = {}, const MeshUnits& units = {});
 

@@ -29,7 +29,7 @@ std::string wkt_name(std::string_view text) {
 }
 
 /// Writes all digits and no exponent, because some readers do not support exponents.
-std::string plain_number(double value) {
+std::string wkt_number(double value) {
   std::array<char, 400> text{};
   const auto [end, error] =
       std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::fixed);
@@ -48,8 +48,8 @@ std::string bound(const std::string& text, const DatumShift& shift) {
   for (std::size_t i = 0; i < kNames.size(); ++i) {
     // WKT writes the scale as 1 + the difference, because an abridged transformation has no units.
     const double value = i == 6 ? 1 + shift[i] * 1e-6 : shift[i];
-    result += fmt::format(R"(,PARAMETER["{}",{},ID["EPSG",{}]])", kNames[i], plain_number(value),
-                          8605 + i);
+    result +=
+        fmt::format(R"(,PARAMETER["{}",{},ID["EPSG",{}]])", kNames[i], wkt_number(value), 8605 + i);
   }
   return result + "]]";
 }
@@ -72,7 +72,7 @@ std::string length_name(double metres) {
 std::string vertical_wkt(const std::string& name, double metres) {
   return "VERTCRS[" + wkt_name(name) +
          ",VDATUM[\"unknown\"],CS[vertical,1],AXIS[\"height (H)\",up]," + "LENGTHUNIT[" +
-         wkt_name(length_name(metres)) + "," + plain_number(metres) + "]]";
+         wkt_name(length_name(metres)) + "," + wkt_number(metres) + "]]";
 }
 
 bool near(const Ellipsoid& a, const Ellipsoid& b) {

@@ -10,20 +10,21 @@
 #include "earth/crs/proj_object.hpp"
 #include "earth/crs/projection.hpp"
 
-/// The choice between GeographicLib and PROJ. The table in projection_engine.cpp alone decides
-/// which of them computes a projection:
+/// The choice between GeographicLib and PROJ. GeographicLib computes a projection if its method is
+/// in the table of projection_engine.cpp and its axes and parameters are ones that it supports;
+/// PROJ computes all others.
 ///
 /// | computed                                              | by            |
 /// |---|---|
-/// | a projection whose method is in the table             | GeographicLib |
+/// | a projection that GeographicLib supports              | GeographicLib |
 /// | any other projection                                  | PROJ          |
 /// | a change of datum (DatumChange)                       | PROJ          |
 /// | a geoid from the database (EllipsoidalHeights)        | PROJ          |
 /// | a geoid from a grid file of GeographicLib (GeoidGrid) | GeographicLib |
 /// | geodesics (LineDistance)                              | GeographicLib |
 ///
-/// The other rows have one engine each: GeographicLib has neither the database's operations nor
-/// their grids, and its geodesics are exact everywhere.
+/// For everything else the engine is fixed. GeographicLib has no datum operations or grids of the
+/// EPSG database; its geodesics are accurate for any two points.
 
 namespace terrace::terrain {
 
@@ -44,7 +45,8 @@ std::shared_ptr<const Projection> projection_of(const CrsDefinition& definition)
 /// As projection_of(), but PROJ always computes it.
 std::shared_ptr<const Projection> proj_projection_of(const CrsDefinition& definition);
 /// Returns the projection as a PROJ pipeline, from longitudes and latitudes of the geographic
-/// system, in its own unit and from its own meridian, to x and y. Throws: CrsError.
+/// system, in that system's angular unit, counted from its prime meridian, to x and y. Throws:
+/// CrsError.
 std::string proj_pipeline_of(const CrsDefinition& definition);
 
 }  // namespace terrace::terrain

@@ -28,22 +28,6 @@ struct Aim {
                        ///< format or conversion is not exact; the actual error is then measured
 };
 
-/// Measurements of the mesh of one window, as a reader of the file decodes it.
-struct WindowMeasures {
-  double max_error = 0.0, rms_error = 0.0;
-  std::uint64_t covered = 0;    ///< samples on triangles
-  std::uint64_t samples = 0;    ///< counted in this window
-  std::uint64_t uncovered = 0;  ///< of these, those on no triangle of any window
-  std::uint64_t duplicates = 0;
-  std::uint64_t work = 0;  ///< the window's share of the whole work
-  double reading_seconds = 0.0, meshing_seconds = 0.0;
-};
-
-/// The mesh of one window, in the CRS of the file.
-struct BoundedWindow : WindowMesh<stream::Point3> {
-  WindowMeasures measures;
-};
-
 /// Meshes the samples of a store window by window, possibly for several bounds in turn. Heights and
 /// errors are in the store's vertical unit.
 class BoundedMesher {
@@ -89,29 +73,28 @@ class BoundedMesher {
     ProgressReport report(context_, "samples");
     double squares = 0.0, covered = 0.0;
     std::uint64_t work = 0;
-    struct Enough {};
-    try {
-      mesh_windows(
-          windows, threads, [&] { context_.check_stop(); }, make,
-          [&](std::size_t i, auto&& mesh) {
-            joined(i, mesh);
-            spool.add_vertices(mesh.vertices);
-            spool.add_triangles(mesh.triangles);
-            const WindowMeasures& window = mesh.measures;
-            work += window.work;
-            if (spool.vertices() > max_vertices) throw Enough{};
-            result.max_error = std::max(result.max_error, window.max_error);
-            const auto count = static_cast<double>(window.covered);
-            squares += window.rms_error * window.rms_error * count;
-            covered += count;
-            result.samples += window.samples;
-            result.uncovered += window.uncovered;
-            result.duplicates += window.duplicates;
-            result.reading_seconds += window.reading_seconds;
-            result.meshing_seconds += window.meshing_seconds;
-            report.update(work, static_cast<double>(work) / static_cast<double>(total_work));
-          });
-    } catch (const Enough&) {
+    mesh_windows(
+        windows, threads, [&] { context_.check_stop(); }, make,
+        [&](std::size_t i, auto&& mesh) {
+          joined(i, mesh);
+          spool.add_vertices(mesh.vertices);
+          spool.add_triangles(mesh.triangles);
+          const WindowMeasures& window = mesh.measures;
+          work += window.work;
+          if (spool.vertices() > max_vertices) return false;
+          result.max_error = std::max(result.max_error, window.max_error);
+          const auto count = static_cast<double>(window.covered);
+          squares += window.rms_error * window.rms_error * count;
+          covered += count;
+          result.samples += window.samples;
+          result.uncovered += window.uncovered;
+          result.duplicates += window.duplicates;
+          result.reading_seconds += window.reading_seconds;
+          result.meshing_seconds += window.meshing_seconds;
+          report.update(work, static_cast<double>(work) / static_cast<double>(total_work));
+          return true;
+        });
+    if (spool.vertices() > max_vertices) {
       const double part =
           std::clamp(static_cast<double>(work) / static_cast<double>(total_work), 1e-9, 1.0);
       result.vertices =

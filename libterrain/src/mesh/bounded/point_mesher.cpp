@@ -17,9 +17,10 @@
 #include "base/stopwatch.hpp"
 #include "base/units.hpp"
 #include "mesh/bounded/mesher.hpp"
-#include "mesh/bounded/point_mesh_cells.hpp"
-#include "mesh/bounded/point_window_tin.hpp"
-#include "mesh/bounded/point_windows.hpp"
+#include "mesh/bounded/point_mesh_samples.hpp"
+#include "surface/bounded/point_mesh_cells.hpp"
+#include "surface/bounded/point_window_tin.hpp"
+#include "surface/bounded/point_windows.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -219,8 +220,10 @@ BoundedMeshResult PointMesher::run_plan(const PointMeshOptions& options, MeshSpo
     max_points = std::max(max_points, points);
     each = std::max(each, points * (window.cells == 1 ? kBytesPerPoint : kBytesPerSample));
   }
-  PointMeshSides sides(plan, *samples_, options.tin.duplicates, options.tin.max_error);
-  const PointWindowMesher mesher(plan, *samples_, sides, options, rounding_, store_);
+  const ReadCells read = [this](std::uint32_t first_cell, std::uint32_t cells, const PlaneBox& box,
+                                MeshSamples& out) { samples_->read(first_cell, cells, box, out); };
+  PointMeshSides sides(plan, read, options.tin.duplicates, options.tin.max_error);
+  const PointWindowMesher mesher(plan, read, sides, options, rounding_, store_);
   return run_windows(
       plan.windows.size(), threads_for(each, max_points), scan_.samples, spool, max_vertices,
       [&](unsigned, std::size_t i) { return mesher.mesh(i); },

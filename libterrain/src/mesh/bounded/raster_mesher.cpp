@@ -17,9 +17,9 @@
 #include <terrace/stream/store.hpp>
 
 #include "earth/ground.hpp"
-#include "mesh/bounded/lattice_plan.hpp"
 #include "mesh/bounded/mesher.hpp"
 #include "mesh/bounded/raster_window_tin.hpp"
+#include "surface/bounded/lattice_plan.hpp"
 #include "surface/store_fill.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/stream/error.hpp"

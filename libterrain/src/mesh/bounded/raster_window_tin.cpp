@@ -134,28 +134,6 @@ double WindowMesher::WindowTin::rounding_of_errors() const {
   return bound;
 }
 
-/// The samples of a window and of the lines around it, as far as the raster extends.
-template <class T>
-struct WindowMesher::Samples {
-  std::int64_t columns = 0, rows = 0;  ///< size of the window
-  std::vector<T> heights;              ///< heights of the window
-  // The lines just outside; empty at the raster's borders.
-  std::vector<T> above, below, left, right;
-  std::uint64_t with_data = 0;
-
-  [[nodiscard]] std::vector<T> column(std::int64_t c) const {
-    std::vector<T> line;
-    for (std::int64_t r = 0; r < rows; ++r) {
-      line.push_back(heights[static_cast<std::size_t>(r * columns + c)]);
-    }
-    return line;
-  }
-  [[nodiscard]] std::vector<T> row(std::int64_t r) const {
-    const auto first = heights.begin() + static_cast<std::ptrdiff_t>(r * columns);
-    return {first, first + static_cast<std::ptrdiff_t>(columns)};
-  }
-};
-
 WindowMesher::WindowMesher(const stream::Store& store, WindowTinOptions options,
                            const stream::MeshRounding& rounding)
     : store_(store),
@@ -174,56 +152,21 @@ bool WindowMesher::in_region(const LatticeWindow& window, std::int64_t column, s
 }
 
 template <class T>
-WindowMesher::Samples<T> WindowMesher::read(const LatticeWindow& window) {
-  const stream::StoreSchema& schema = store_.schema();
-  LatticeWindow wide{window.column - 1, window.row - 1, window.columns + 2, window.rows + 2};
-  std::vector<T> heights(wide.size());
-  reader_.heights(wide, std::span<T>(heights));
-  const bool has_left = window.column > 0, has_above = window.row > 0;
-  const bool has_right = window.column + window.columns < static_cast<std::int64_t>(schema.columns);
-  const bool has_below = window.row + window.rows < static_cast<std::int64_t>(schema.rows);
-
-  Samples<T> samples;
-  samples.columns = window.columns;
-  samples.rows = window.rows;
+LatticeSamples<T> WindowMesher::read(const LatticeWindow& window, std::uint64_t& with_data) {
   const std::int64_t own_column = window.column == options_.lattice.column ? 0 : 1;
   const std::int64_t own_row = window.row == options_.lattice.row ? 0 : 1;
   const auto counts = [&](std::int64_t c, std::int64_t r) {
     return c >= own_column && r >= own_row && c < window.columns && r < window.rows;
   };
-  for (std::int64_t r = -1; r <= window.rows; ++r) {
-    if ((r < 0 && !has_above) || (r == window.rows && !has_below)) continue;
-    for (std::int64_t c = -1; c <= window.columns; ++c) {
-      if ((c < 0 && !has_left) || (c == window.columns && !has_right)) continue;
-      T& height = heights[static_cast<std::size_t>((r + 1) * wide.columns + c + 1)];
-      const bool data = std::isfinite(height);
-      if (data && counts(c, r) && in_region(window, c, r, static_cast<double>(height))) {
-        ++samples.with_data;
-      }
-      if (!data && options_.fill) {
-        height = static_cast<T>(options_.fill(window.column + c, window.row + r));
-      }
+  return LatticeSamples<T>::read(reader_, window, [&](std::int64_t c, std::int64_t r, T& height) {
+    const bool data = std::isfinite(height);
+    if (data && counts(c, r) && in_region(window, c, r, static_cast<double>(height))) {
+      ++with_data;
     }
-  }
-  const auto line = [&](std::int64_t c, std::int64_t r, std::int64_t count, std::int64_t step) {
-    std::vector<T> out;
-    auto at = static_cast<std::size_t>((r + 1) * wide.columns + c + 1);
-    for (std::int64_t i = 0; i < count; ++i, at += static_cast<std::size_t>(step)) {
-      out.push_back(heights[at]);
+    if (!data && options_.fill) {
+      height = static_cast<T>(options_.fill(window.column + c, window.row + r));
     }
-    return out;
-  };
-  if (has_above) samples.above = line(0, -1, window.columns, 1);
-  if (has_below) samples.below = line(0, window.rows, window.columns, 1);
-  if (has_left) samples.left = line(-1, 0, window.rows, wide.columns);
-  if (has_right) samples.right = line(window.columns, 0, window.rows, wide.columns);
-  samples.heights.reserve(window.size());
-  for (std::int64_t r = 0; r < window.rows; ++r) {
-    const auto first = heights.begin() + static_cast<std::ptrdiff_t>((r + 1) * wide.columns + 1);
-    samples.heights.insert(samples.heights.end(), first,
-                           first + static_cast<std::ptrdiff_t>(window.columns));
-  }
-  return samples;
+  });
 }
 
 std::vector<stream::Point3> WindowMesher::positions(const WindowTin& tin) const {
@@ -267,7 +210,7 @@ void WindowMesher::measure_as_read(
 }
 
 template <class T>
-void WindowMesher::measure_moved(const Samples<T>& samples, WindowTin& tin) const {
+void WindowMesher::measure_moved(const LatticeSamples<T>& samples, WindowTin& tin) const {
   std::vector<tri::Point3> read = tin.positions;
   options_.places(std::span<stream::Point3>(read));
   for (tri::Point3& p : read) p = rounding_(p);
@@ -342,30 +285,14 @@ template <class T>
 WindowMesher::WindowTin WindowMesher::mesh_as(const LatticeWindow& window, tri::TinQuality quality,
                                               bool checked) {
   const Stopwatch reading;
-  const Samples<T> samples = read<T>(window);
   WindowTin out;
   out.window = window;
-  out.samples = samples.with_data;
+  const LatticeSamples<T> samples = read<T>(window, out.samples);
   out.reading_seconds = reading.seconds();
 
   const Stopwatch meshing;
-  const auto settle = [&](const std::vector<T>& line, const std::vector<T>& inside,
-                          const std::vector<T>& outside) {
-    return tri::settle_side<T>(line, inside, outside, options_.aim);
-  };
-  const std::int64_t last_column = window.columns - 1, last_row = window.rows - 1;
-  const std::vector<T> none;
-  const tri::GridSides sides{
-      .first_row = settle(samples.row(0), last_row > 0 ? samples.row(1) : none, samples.above),
-      .last_row = settle(samples.row(last_row), last_row > 0 ? samples.row(last_row - 1) : none,
-                         samples.below),
-      .first_column =
-          settle(samples.column(0), last_column > 0 ? samples.column(1) : none, samples.left),
-      .last_column =
-          settle(samples.column(last_column),
-                 last_column > 0 ? samples.column(last_column - 1) : none, samples.right)};
-  const tri::GridWindow<T> grid{static_cast<std::uint32_t>(window.columns),
-                                static_cast<std::uint32_t>(window.rows), samples.heights};
+  const tri::GridSides sides = samples.sides(options_.aim);
+  const tri::GridWindow<T> grid = samples.grid();
   tri::GridTinOptions options = options_.tin;
   options.quality = quality;
   options.measure = false;  // the decoded mesh is checked instead

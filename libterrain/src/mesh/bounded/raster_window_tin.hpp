@@ -14,8 +14,9 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/grid_tin.hpp>
 
-#include "mesh/bounded/lattice_plan.hpp"
 #include "mesh/bounded/mesher.hpp"
+#include "surface/bounded/lattice_plan.hpp"
+#include "surface/bounded/lattice_samples.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/region.hpp"
@@ -70,10 +71,10 @@ class WindowMesher {
 
  private:
   struct WindowTin;
+  /// with_data: adds the samples with data, before filling and inside the region; those on the
+  /// first row and column count in the previous window.
   template <class T>
-  struct Samples;
-  template <class T>
-  Samples<T> read(const LatticeWindow& window);
+  LatticeSamples<T> read(const LatticeWindow& window, std::uint64_t& with_data);
   template <class T>
   WindowTin mesh_as(const LatticeWindow& window, tri::TinQuality quality, bool checked);
   /// Whether a sample of the window is in the region, if there is one.
@@ -87,7 +88,7 @@ class WindowMesher {
   /// Measures a valid mesh of the lattice at its converted positions, and swaps edges of thin
   /// triangles that would be inverted there.
   template <class T>
-  void measure_moved(const Samples<T>& samples, WindowTin& tin) const;
+  void measure_moved(const LatticeSamples<T>& samples, WindowTin& tin) const;
   /// Throws: stream::Error.
   [[nodiscard]] stream::Error fault(const WindowTin& tin, std::string cause) const;
   /// Throws: stream::Error if a reader of the file would see an error beyond the bound, or a hole.

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::int64_t kMaxBlocks = std::int64_t{1} << 20;
 /// The number of clusters that a thread reads at a time.
-constexpr std::uint64_t kClustersAtOnce = 64;
+constexpr std::uint64_t kClustersReadAtOnce = 64;
 constexpr std::size_t kMutexes = 64;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -56,11 +56,11 @@ HeightBlocks::HeightBlocks(const stream::Store& store, unsigned threads)
   std::atomic<std::uint64_t> points = 0;
   for (unsigned level = 0; level <= store.top(); ++level) {
     const std::uint64_t clusters = store.levels()[level].clusters;
-    const std::uint64_t pieces = (clusters + kClustersAtOnce - 1) / kClustersAtOnce;
+    const std::uint64_t pieces = (clusters + kClustersReadAtOnce - 1) / kClustersReadAtOnce;
     parallel_for(pieces, threads, [&](std::size_t piece) {
-      const std::uint64_t end = std::min((piece + 1) * kClustersAtOnce, clusters);
+      const std::uint64_t end = std::min((piece + 1) * kClustersReadAtOnce, clusters);
       stream::ClusterPoints cluster;
-      for (std::uint64_t k = piece * kClustersAtOnce; k < end; ++k) {
+      for (std::uint64_t k = piece * kClustersReadAtOnce; k < end; ++k) {
         const stream::ClusterId id = stream::cluster_id(level, k);
         points += store.record(id).points;
         if (!store.may_match(id)) continue;

@@ -179,7 +179,7 @@ double set_heights(const std::vector<TileVertex>& vertices, double step, TileMes
   constexpr std::int64_t kExactAsFloat = std::int64_t{1} << 24;
   const std::int64_t range = highest - lowest;
   if (range > kTileUnits || lowest < -kExactAsFloat || highest > kExactAsFloat) {
-    throw HeightsTooFar();
+    throw HeightRangeTooLarge();
   }
   mesh.lowest = static_cast<float>(static_cast<double>(lowest) * step);
   mesh.highest = static_cast<float>(static_cast<double>(highest) * step);

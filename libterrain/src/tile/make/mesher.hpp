@@ -15,8 +15,8 @@ namespace terrace::terrain {
 
 struct TileMeshOptions {
   tri::TinQuality quality = tri::TinQuality::removal;
-  bool normals = false;
-  bool water = false;
+  bool normals = false;  ///< add the oct-encoded normals extension
+  bool water = false;    ///< add the water mask extension
 };
 
 /// A tile's mesh and header, and its largest distance from the samples.
@@ -27,18 +27,19 @@ struct BuiltTile {
   bool has_data = false;   ///< whether a sample is in the tile
 };
 
-/// Thrown if the heights of a tile do not fit in the steps of its zoom. The caller then uses larger
-/// steps.
-class HeightsTooFar : public std::runtime_error {
+/// Thrown if a tile's range of heights needs more than kTileUnits steps of plan.height_step, or a
+/// height is beyond 2^24 steps. The caller then uses larger steps.
+class HeightRangeTooLarge : public std::runtime_error {
  public:
-  HeightsTooFar() : std::runtime_error("the heights of a tile need larger steps") {}
+  HeightRangeTooLarge() : std::runtime_error("the heights of a tile need larger steps") {}
 };
 
 /// Meshes a tile within plan.max_error of every sample, with positions and heights rounded as a
-/// client decodes them. If the rounding itself is coarser than the bound, max_error contains the
-/// actual error. Depends only on the arguments; the borders of the tile depend only on the plan and
-/// the surface along them. shared: of the zoom, or null. Memory: for the samples of one leaf,
-/// whatever the tile contains. Throws: HeightsTooFar; stream::Error on a damaged store.
+/// client decodes them. If rounding alone exceeds the bound, the result's max_error exceeds
+/// plan.max_error. Depends only on the arguments; the borders of the tile depend only on the plan
+/// and the surface along them. `shared`: border sides kept for neighbouring tiles of the same zoom;
+/// may be null. Holds the samples of one leaf at a time. Throws: HeightRangeTooLarge; stream::Error
+/// on a damaged store.
 BuiltTile make_tile(const TileAddress& tile, const ZoomPlan& plan, TileSurface& surface,
                     const TileMeshOptions& options, SharedSides* shared = nullptr);
 

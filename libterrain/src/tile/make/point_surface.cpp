@@ -17,7 +17,7 @@ namespace {
 /// The most samples to return at once.
 constexpr double kMaxSamples = 1U << 18;
 /// Margin to load around a part, in mean distances of points.
-constexpr double kMargin = 8;
+constexpr double kTileMargin = 8;
 /// In degrees: a box this narrow is practically one place, so dividing it does not help.
 constexpr double kNarrowest = 1e-9;
 /// The most points to load at once if places need them.
@@ -212,7 +212,7 @@ void PointTileSurface::load(const StoredBox& box) {
   loaded_.reset();  // so that nothing is held if reading fails
   const StoredBox all = cloud_.places.stored_bounds();
   const double area = (all.max[0] - all.min[0]) * (all.max[1] - all.min[1]);
-  const double margin = kMargin * std::sqrt(area / static_cast<double>(cloud_.store.points()));
+  const double margin = kTileMargin * std::sqrt(area / static_cast<double>(cloud_.store.points()));
   const std::size_t max_points = cloud_.window_bytes / PointCells::kBytesPerPoint;
   // Without points in memory, each place reads the points that it needs.
   if (!surface_.load(box.widened(margin), max_points, true)) surface_.load(box, max_points, true);

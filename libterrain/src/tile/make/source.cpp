@@ -28,7 +28,7 @@ constexpr std::uint64_t kTilingFixedBytes = std::uint64_t{80} << 20;
 constexpr std::uint64_t kMinWindowBytes = std::uint64_t{64} << 20;
 
 /// The largest height that is accepted, in metres above or below the ellipsoid.
-constexpr double kFarthest = 1e7;
+constexpr double kFarthestStored = 1e7;
 
 template <class Tiled, class Surface>
 class SourceOf final : public TileSource {
@@ -55,7 +55,7 @@ std::optional<double> flat_height(const stream::Store& store, const TilesRequest
     throw UsageError(stream::message("{fill} none: globes have no holes"));
   }
   if (request.fill == Fill::interpolate) return std::nullopt;
-  if (request.flat_height && !(std::abs(*request.flat_height) <= kFarthest)) {
+  if (request.flat_height && !(std::abs(*request.flat_height) <= kFarthestStored)) {
     throw UsageError(stream::message("{fill} flat: the height is beyond the limit of 10,000 km"));
   }
   const stream::Channel& z = store.schema().coordinates[2];
@@ -68,7 +68,7 @@ void check_heights(const stream::Store& store, double metres) {
   const stream::Channel& z = store.schema().coordinates[2];
   for (const stream::Point3& end : {store.bounds().min, store.bounds().max}) {
     const double height = (end[2] * z.scale + z.offset) * metres;
-    if (std::abs(height) <= kFarthest) continue;
+    if (std::abs(height) <= kFarthestStored) continue;
     throw stream::Error(
         store.path().string(),
         fmt::format("has heights of {} m, beyond the limit of 10,000 km", plain_number(height)))

@@ -224,13 +224,13 @@ std::vector<std::vector<TileSetWriter::Family>> TileSetWriter::stages() {
 void TileSetWriter::write(const Family& family, TileSurface& surface,
                           const std::function<void(const TileAddress&, const Written&)>& done) {
   for (const auto& [zoom, number] : family) {
-    if (zoom->too_far) continue;
+    if (zoom->range_too_large) continue;
     const TileAddress& tile = zoom->tiles[number];
     try {
       zoom->written[number] = write_tile(tile, *zoom, surface);
       done(tile, zoom->written[number]);
-    } catch (const HeightsTooFar&) {
-      zoom->too_far = true;
+    } catch (const HeightRangeTooLarge&) {
+      zoom->range_too_large = true;
     }
   }
 }
@@ -259,14 +259,15 @@ void TileSetWriter::write_zooms() {
           context_.stop);
     }
     // Every tile is also below one of the zoom above that may have data.
-    assert(finished == tiles ||
-           std::ranges::any_of(zooms_, [](const auto& zoom) { return zoom->too_far.load(); }));
+    assert(finished == tiles || std::ranges::any_of(zooms_, [](const auto& zoom) {
+             return zoom->range_too_large.load();
+           }));
     again = false;
     for (auto zoom = zooms_.rbegin(); zoom != zooms_.rend(); ++zoom) {
       (*zoom)->sides.clear();
       // The metadata above list which of these tiles exist.
-      (*zoom)->open = (*zoom)->too_far || (again && options_.request.metadata);
-      if ((*zoom)->too_far) take_larger_steps(**zoom);
+      (*zoom)->open = (*zoom)->range_too_large || (again && options_.request.metadata);
+      if ((*zoom)->range_too_large) take_larger_steps(**zoom);
       again = again || (*zoom)->open;
     }
     repeats_ = again;
@@ -283,7 +284,7 @@ void TileSetWriter::take_larger_steps(Zoom& zoom) {
   zoom.range = std::max(1.0, 2.0 * zoom.range);
   zoom.plan =
       plan_zoom(zoom.plan.zoom, options_.max_error(zoom.plan.zoom), zoom.range, *surfaces_.front());
-  zoom.too_far = false;
+  zoom.range_too_large = false;
 }
 
 void TileSetWriter::conclude(const Zoom& zoom) {

@@ -72,9 +72,9 @@ class TileSetWriter {
     double range = 0.0;              ///< range of heights that a tile's steps must cover
     ZoomPlan plan;
     SharedSides sides{kMaxSharedVertices};
-    bool open = true;                   ///< its tiles remain to be written
-    std::atomic<bool> too_far = false;  ///< the range was not sufficient
-    std::vector<Written> written;       ///< by tile
+    bool open = true;                           ///< its tiles remain to be written
+    std::atomic<bool> range_too_large = false;  ///< a tile needs larger steps of height
+    std::vector<Written> written;               ///< by tile
   };
   /// Tiles that a thread writes one after another: a tile and those below it, each after its
   /// children, so that most of the data decoded for one serves the next.

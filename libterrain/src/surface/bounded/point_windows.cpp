@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/point_windows.hpp"
+#include "surface/bounded/point_windows.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -280,13 +280,15 @@ PointMeshPlan plan_point_mesh(const PointMeshCuts& cuts, std::span<const Point2>
   return Planner(cuts, hull, merge).make();
 }
 
-PointMeshSides::PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
-                               tri::PointDuplicates duplicates, double max_error)
+PointMeshSides::PointMeshSides(const PointMeshPlan& plan, ReadCells read,
+                               tri::PointDuplicates duplicates, double max_error,
+                               std::size_t max_kept)
     : plan_(plan),
-      samples_(samples),
+      read_(std::move(read)),
       duplicates_(duplicates),
       side_error_(kPointSideShare * max_error),
       windows_by_junction_(plan.junctions.size()),
+      cache_(max_kept),
       heights_(plan.junctions.size()) {
   for (const PointMeshPlan::Side& side : plan.sides) {
     for (const std::uint32_t junction : side.junctions) {
@@ -323,7 +325,7 @@ double PointMeshSides::compute_height(std::uint32_t junction) const {
                        {place[0] + distance, place[1] + distance}};
     around = {};
     for (const std::uint32_t w : windows_by_junction_[junction]) {
-      samples_.read(plan_.windows[w].first_cell, plan_.windows[w].cells, box, around);
+      read_(plan_.windows[w].first_cell, plan_.windows[w].cells, box, around);
     }
     if (around.size() >= 3) {
       if (const auto height = LocalSurface(around, duplicates_).height(place)) return *height;
@@ -345,7 +347,7 @@ MeshSamples PointMeshSides::near_side(const PointMeshPlan::Side& side) const {
         plan_.junctions[side.junctions[0]].position[1 - side.axis] - distance;
     strip.max[1 - side.axis] =
         plan_.junctions[side.junctions[1]].position[1 - side.axis] + distance;
-    samples_.read(window.first_cell, window.cells, strip, near);
+    read_(window.first_cell, window.cells, strip, near);
   }
   return near;
 }

@@ -8,9 +8,9 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/point_tin.hpp>
 
-#include "mesh/bounded/mesher.hpp"
-#include "mesh/bounded/point_mesh_cells.hpp"
-#include "mesh/bounded/point_windows.hpp"
+#include "surface/bounded/point_mesh_cells.hpp"
+#include "surface/bounded/point_windows.hpp"
+#include "surface/window_mesh.hpp"
 
 namespace terrace::terrain {
 
@@ -38,7 +38,7 @@ BoundedWindow mesh_samples(const MeshSamples& samples, const std::vector<tri::Po
 class PointWindowMesher {
  public:
   /// store: named in errors.
-  PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples, PointMeshSides& sides,
+  PointWindowMesher(const PointMeshPlan& plan, ReadCells read, PointMeshSides& sides,
                     const PointMeshOptions& options, const stream::MeshRounding& rounding,
                     const stream::Store& store);
 
@@ -46,7 +46,7 @@ class PointWindowMesher {
 
  private:
   const PointMeshPlan& plan_;
-  PointMeshSamples& samples_;
+  ReadCells read_;
   PointMeshSides& sides_;
   const PointMeshOptions& options_;
   const stream::MeshRounding& rounding_;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/lattice_plan.hpp"
+#include "surface/bounded/lattice_plan.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 
 namespace terrace::terrain {
@@ -43,6 +44,29 @@ LatticePlan::Sample LatticePlan::sample(std::size_t i, std::int64_t column,
   sample.windows = (west || east ? 2U : 1U) * (north || south ? 2U : 1U);
   sample.last = (south ? y + 1 : y) * across() + (east ? x + 1 : x);
   return sample;
+}
+
+void LatticePlan::append_windows_at(const base::Point2& place,
+                                    std::vector<std::uint32_t>& out) const {
+  const auto range = [](const std::vector<std::int64_t>& sides, double at) {
+    // The first side after the place, and the number of sides at it.
+    const auto after = std::upper_bound(
+        sides.begin(), sides.end(), at,
+        [](double value, std::int64_t side) { return value < static_cast<double>(side); });
+    const auto end = static_cast<std::size_t>(after - sides.begin());
+    const bool is_outside = end == 0 || at > static_cast<double>(sides.back());
+    if (is_outside || !(at == at)) return std::array<std::size_t, 2>{0, 0};
+    const bool is_side = at == static_cast<double>(sides[end - 1]);
+    const std::size_t first = is_side && end > 1 ? end - 2 : end - 1;
+    return std::array<std::size_t, 2>{first, std::min(end, sides.size() - 1)};
+  };
+  const auto [first_column, end_column] = range(columns_, place[0]);
+  const auto [first_row, end_row] = range(rows_, place[1]);
+  for (std::size_t row = first_row; row < end_row; ++row) {
+    for (std::size_t column = first_column; column < end_column; ++column) {
+      out.push_back(static_cast<std::uint32_t>(row * across() + column));
+    }
+  }
 }
 
 }  // namespace terrace::terrain

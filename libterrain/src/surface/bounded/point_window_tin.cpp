@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh/bounded/point_window_tin.hpp"
+#include "surface/bounded/point_window_tin.hpp"
 
 #include <algorithm>
 #include <cassert>
@@ -362,12 +362,12 @@ BoundedWindow mesh_samples(const MeshSamples& samples, const std::vector<tri::Po
   return mesh_to_aim(samples, frame, box, options, rounding, store, false);
 }
 
-PointWindowMesher::PointWindowMesher(const PointMeshPlan& plan, PointMeshSamples& samples,
+PointWindowMesher::PointWindowMesher(const PointMeshPlan& plan, ReadCells read,
                                      PointMeshSides& sides, const PointMeshOptions& options,
                                      const stream::MeshRounding& rounding,
                                      const stream::Store& store)
     : plan_(plan),
-      samples_(samples),
+      read_(std::move(read)),
       sides_(sides),
       options_(options),
       rounding_(rounding),
@@ -379,8 +379,8 @@ BoundedWindow PointWindowMesher::mesh(std::size_t number) const {
   std::vector<std::shared_ptr<const SideVertices>> sides;
   for (const std::uint32_t side : window.sides) sides.push_back(sides_.vertices(side));
   MeshSamples samples;
-  samples.reserve(samples_.count(window.first_cell, window.cells));
-  samples_.read(window.first_cell, window.cells, {}, samples);
+  samples.reserve(static_cast<std::size_t>(1.125 * window.samples));
+  read_(window.first_cell, window.cells, {}, samples);
   const double reading_seconds = reading.seconds();
 
   const Stopwatch meshing;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -13,7 +14,7 @@
 
 #include <terrace/tri/point_tin.hpp>
 
-#include "mesh/bounded/point_mesh_cells.hpp"
+#include "surface/bounded/point_mesh_cells.hpp"
 #include "surface/window_sides.hpp"
 #include "terrace/terrain/region.hpp"
 
@@ -68,9 +69,10 @@ PointMeshPlan plan_point_mesh(
 /// the same vertices, and the mesh has no cracks. Thread-safe.
 class PointMeshSides {
  public:
-  /// max_error: error bound of the mesh, in the unit of heights.
-  PointMeshSides(const PointMeshPlan& plan, PointMeshSamples& samples,
-                 tri::PointDuplicates duplicates, double max_error);
+  /// max_error: error bound of the mesh, in the unit of heights. max_kept: of vertices, as in
+  /// WindowSides.
+  PointMeshSides(const PointMeshPlan& plan, ReadCells read, tri::PointDuplicates duplicates,
+                 double max_error, std::size_t max_kept = std::numeric_limits<std::size_t>::max());
 
   /// Returns the vertices of a side, ascending, with its junctions. Keeps them until drop().
   std::shared_ptr<const SideVertices> vertices(std::uint32_t side) {
@@ -86,7 +88,7 @@ class PointMeshSides {
   [[nodiscard]] double compute_height(std::uint32_t junction) const;
 
   const PointMeshPlan& plan_;
-  PointMeshSamples& samples_;
+  ReadCells read_;
   tri::PointDuplicates duplicates_;
   double side_error_;
   std::vector<std::vector<std::uint32_t>> windows_by_junction_;

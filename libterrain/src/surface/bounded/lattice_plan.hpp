@@ -31,6 +31,8 @@ class LatticePlan {
   };
   /// column, row: relative to window i.
   [[nodiscard]] Sample sample(std::size_t i, std::int64_t column, std::int64_t row) const;
+  /// Appends the windows that contain a place of the lattice, sides included, ascending.
+  void append_windows_at(const base::Point2& place, std::vector<std::uint32_t>& out) const;
 
  private:
   LatticeWindow lattice_;
