@@ -104,6 +104,9 @@ bool parse(std::string_view name, const std::string& value) {
   if (name == "smooth") {
     const auto smoothing = parse_smoothing(value);
     require(!smoothing || (smoothing->iterations >= 1 && smoothing->iterations <= 10000), "steps");
+  } else if (name == "surface-smooth") {
+    const auto smoothing = parse_surface_smoothing(value);
+    require(!smoothing || (smoothing->iterations >= 1 && smoothing->iterations <= 10000), "steps");
   } else if (name == "view") {
     static_cast<void>(parse_view(value));
   } else if (name == "criterion") {

@@ -36,6 +36,7 @@ constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_
     {"max_points", "--max-points"},
     {"memory_bytes", "--memory"},
     {"metadata", "--metadata"},
+    {"method", "--method"},
     {"metric", "--metric"},
     {"near", "--near"},
     {"outlier_price", "--outlier-price"},

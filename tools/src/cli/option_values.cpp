@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "cli/option_values.hpp"
 
-#include <cmath>
+#include <initializer_list>
+#include <optional>
+#include <string_view>
 #include <utility>
 
 #include <fmt/core.h>
@@ -30,24 +32,41 @@ unsigned level_in_store(std::optional<unsigned> level, const stream::Store& stor
 
 /// Adds the coordinates of each LineString of a GeoJSON object to `lines`. `depth` is the nesting
 /// of the object; deep nesting is ignored, because a crafted file could exhaust the stack.
-void collect_line(const nlohmann::json& object, int depth,
-                  std::vector<std::vector<Point2>>& lines) {
+void collect_line_strings(const nlohmann::json& object, int depth,
+                          std::vector<std::vector<Point2>>& lines) {
   if (depth > 8) return;
   const std::string type = object.value("type", "");
   if (type == "Feature") {
     // A feature may have no geometry (RFC 7946, 3.2).
     const nlohmann::json& geometry = object.at("geometry");
-    return geometry.is_null() ? void() : collect_line(geometry, depth + 1, lines);
+    if (!geometry.is_null()) collect_line_strings(geometry, depth + 1, lines);
+    return;
   }
   if (type == "FeatureCollection") {
     for (const nlohmann::json& feature : object.at("features"))
-      collect_line(feature, depth + 1, lines);
+      collect_line_strings(feature, depth + 1, lines);
   } else if (type == "LineString") {
     lines.emplace_back();
     for (const nlohmann::json& p : object.at("coordinates")) {
       lines.back().push_back({p.at(0).get<double>(), p.at(1).get<double>()});
     }
   }
+}
+
+/// Parses the METHOD[:STEPS] of --smooth.
+template <class Options, class Method>
+std::optional<Options> parse_steps(
+    const std::string& text, std::initializer_list<std::pair<std::string_view, Method>> methods) {
+  if (text.empty()) return std::nullopt;
+  const std::size_t colon = text.find(':');
+  Options options;
+  options.method = choice<Method>(text.substr(0, colon), "--smooth", methods);
+  if (colon != std::string::npos) {
+    const std::uint64_t steps = parse_count(text.substr(colon + 1));
+    if (steps == 0 || steps > 10000) throw UsageError("--smooth takes 1 to 10000 steps");
+    options.iterations = static_cast<unsigned>(steps);
+  }
+  return options;
 }
 
 }  // namespace
@@ -117,7 +136,7 @@ std::pair<std::string, double> parse_channel(const std::string& text) {
   }
   const double weight =
       parse_number(text.substr(colon + 1), fmt::format("the weight of --channel {}", text));
-  if (!(weight >= 0.0) || !std::isfinite(weight)) {
+  if (weight < 0.0) {
     throw UsageError(fmt::format("--channel {}: the weight must not be negative", text));
   }
   return {text.substr(0, colon), weight};
@@ -141,7 +160,8 @@ Detail parse_detail(const stream::Store& store, const std::string& level, const 
     } catch (const UsageError& error) {
       throw UsageError(stream::message("{}: {}", name, error.message()));
     } catch (const stream::Error& error) {
-      // Names the option in place of its value and of "the region".
+      // The message would begin with the region's text or with "the region"; replaces that by the
+      // option.
       stream::Error::Parts parts = error.parts();
       parts.file =
           parts.file.empty() || text.starts_with(parts.file) ? name : name + ": " + parts.file;
@@ -204,7 +224,7 @@ Line parse_line(const std::string& text) {
   if (!json) throw line_error("is neither a list of places nor a readable file");
   std::vector<std::vector<Point2>> lines;
   try {
-    collect_line(*json, 0, lines);
+    collect_line_strings(*json, 0, lines);
     line.crs = crs_of_geojson(*json, text);
   } catch (const nlohmann::json::exception& error) {
     throw line_error(fmt::format("is not GeoJSON ({})", error.what()));
@@ -216,19 +236,16 @@ Line parse_line(const std::string& text) {
 }
 
 std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const std::size_t colon = text.find(':');
-  tri::SmoothingOptions options;
-  options.method = choice<tri::Smoothing>(text.substr(0, colon), "--smooth",
-                                          {{"laplacian", tri::Smoothing::laplacian},
-                                           {"taubin", tri::Smoothing::taubin},
-                                           {"bilateral", tri::Smoothing::bilateral}});
-  if (colon != std::string::npos) {
-    const std::uint64_t steps = parse_count(text.substr(colon + 1));
-    if (steps == 0 || steps > 10000) throw UsageError("--smooth takes 1 to 10000 steps");
-    options.iterations = static_cast<unsigned>(steps);
-  }
-  return options;
+  return parse_steps<tri::SmoothingOptions, tri::Smoothing>(
+      text, {{"laplacian", tri::Smoothing::laplacian},
+             {"taubin", tri::Smoothing::taubin},
+             {"bilateral", tri::Smoothing::bilateral}});
+}
+
+std::optional<tri::SurfaceSmoothingOptions> parse_surface_smoothing(const std::string& text) {
+  return parse_steps<tri::SurfaceSmoothingOptions, tri::SurfaceSmoothing>(
+      text,
+      {{"taubin", tri::SurfaceSmoothing::taubin}, {"bilateral", tri::SurfaceSmoothing::bilateral}});
 }
 
 }  // namespace terrace::tools

@@ -14,6 +14,7 @@
 #include <terrace/tri/interpolation.hpp>
 #include <terrace/tri/point_tin.hpp>
 #include <terrace/tri/smoothing.hpp>
+#include <terrace/tri/surface_smoothing.hpp>
 
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/detail.hpp"
@@ -62,6 +63,8 @@ stream::ClusterId parse_cluster(const std::string& text);
 /// steps (10 by default, at most 10,000). Returns nullopt for an empty text. For "bilateral",
 /// edge_height stays 0 because it depends on the data.
 std::optional<tri::SmoothingOptions> parse_smoothing(const std::string& text);
+/// Parses "taubin" or "bilateral" for surfaces in space, otherwise as parse_smoothing().
+std::optional<tri::SurfaceSmoothingOptions> parse_surface_smoothing(const std::string& text);
 
 /// Parses the NAME:WEIGHT of --channel. The name may contain colons; the weight is a non-negative
 /// number.

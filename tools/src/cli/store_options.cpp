@@ -4,7 +4,10 @@
 #include <utility>
 
 #include <CLI/CLI.hpp>
+#include <fmt/core.h>
+#include <fmt/format.h>
 
+#include "base/units.hpp"
 #include "cli/cli.hpp"
 #include "cli/interrupt.hpp"
 #include "cli/option_values.hpp"
@@ -19,7 +22,9 @@ std::optional<Transformation> CrsOptions::from_store_to_input(const stream::Stor
   if (input_crs_.empty()) return std::nullopt;
   Transformation transformation =
       transformation_to(store, input_crs_, parse_datum_shift(datum_shift_));
-  if (!transformation.note().empty()) common.say(transformation.note());
+  if (!transformation.note().empty() && transformation.note() != noted_) {
+    common.say(noted_ = transformation.note());
+  }
   return transformation;
 }
 
@@ -69,15 +74,24 @@ void CrsOptions::define_input(CLI::App& app, const std::string& name, const std:
                  "only that is not WGS 84");
 }
 
-void PartOptions::define(CLI::App& app, const std::string& region_effect) {
-  app.add_option("STORE", path, "the store to read")->required();
+namespace {
+
+/// Adds --level and --focus.
+void add_levels(CLI::App& app, std::string& level, std::vector<std::string>& focuses) {
   app.add_option("--level", level,
                  "points of this level and above, outside the focuses; a number or top")
       ->default_str("0; with --focus top");
-  app.add_option("--region", region,
-                 region_effect + ": a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
   app.add_option("--focus", focuses, "BOX:L, all points of level L inside the box; repeatable")
       ->allow_extra_args(false);
+}
+
+}  // namespace
+
+void PartOptions::define(CLI::App& app, const std::string& region_effect) {
+  app.add_option("STORE", path, "the store to read")->required();
+  add_levels(app, level, focuses);
+  app.add_option("--region", region,
+                 region_effect + ": a box, minx,miny[,minz],maxx,maxy[,maxz], or a GeoJSON file");
   add_where(app, where);
   crs.define(app);
 }
@@ -110,24 +124,55 @@ void SurfaceOptions::define(CLI::App& app) {
 
 void SurfaceOptions::define_triangles(CLI::App& app) {
   app.add_option("STORE", path, "the store to read")->required();
-  app.add_option("--level", level, "only points of this level and above: a number or top")
-      ->capture_default_str();
+  add_levels(app, level, focuses);
   add_number(
       app, "--max-edge", max_edge,
       "irregular points and coarser levels: triangles with a side longer than this, in metres on "
       "the ground, count as no data, as over water and in shadows (default: no limit)",
       kPositive)
       ->type_name("METRES");
+  add_number(app, "--max-error", max_error,
+             "instead of a level: a surface of few triangles, within this many metres of every "
+             "sample, vertically",
+             kNonNegative)
+      ->type_name("METRES")
+      ->excludes("--level")
+      ->excludes("--focus")
+      ->excludes("--max-edge");
   add_where(app, where);
 }
 
 stream::Store SurfaceOptions::open(SamplerOptions& sampler) const {
   sampler.method = parse_interpolation(method);
+  sampler.max_error = max_error;
   sampler.max_edge = max_edge;
-  const std::optional<unsigned> requested = parse_level(level);
-  stream::Store store = open_store(path, where);
-  sampler.level = requested.value_or(store.top());
-  return store;
+  if (!level.empty()) static_cast<void>(parse_level(level));
+  return open_store(path, where);
+}
+
+Detail SurfaceOptions::detail(const stream::Store& store, const CrsOptions& crs,
+                              const CommonOptions& common, const std::string& region) const {
+  // Without places in the request, the CRS of the store need not be known.
+  if (region.empty() && focuses.empty()) {
+    return {.level = level.empty() ? 0 : parse_level(level).value_or(store.top())};
+  }
+  Detail detail = parse_detail(store, level, region, focuses, crs.regions(store, common));
+  note_idle_focuses(store, detail, common.context());
+  return detail;
+}
+
+void SurfaceOptions::report(const Detail& detail, Summary& summary) const {
+  std::vector<unsigned> levels;
+  for (const FinerRegion& focus : detail.focuses) levels.push_back(focus.level);
+  summary.json["level"] = detail.level;
+  summary.json["focus_levels"] = levels;
+  if (max_error) {
+    summary.json["max_error"] = *max_error;
+    summary.text += fmt::format("within {} m of every sample\n", plain_number(*max_error));
+  }
+  if (levels.empty()) return;
+  summary.text +=
+      fmt::format("level {}, with focuses of level {}\n", detail.level, fmt::join(levels, ", "));
 }
 
 }  // namespace terrace::tools

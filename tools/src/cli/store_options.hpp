@@ -22,6 +22,7 @@ class Option;
 namespace terrace::tools {
 
 struct CommonOptions;
+struct Summary;
 
 /// The CRS of coordinates in the request (--region-crs unless the verb names it otherwise),
 /// --to-crs and --towgs84. All functions that return a transformation or conversion print a note on
@@ -57,6 +58,7 @@ class CrsOptions {
 
  private:
   std::string input_crs_, output_crs_, datum_shift_;
+  mutable std::string noted_;  ///< the last note, so that it is not printed twice
 };
 
 /// Selects a part of a store and its detail: the store, --level, --region, --focus, --cluster,
@@ -75,17 +77,25 @@ struct PartOptions {
                                        const CommonOptions& common) const;
 };
 
-/// Selects the surface through a store's samples: the store, --level, --max-edge, --where and
-/// --method.
+/// Selects the surface through a store's samples: the store, --level, --focus, --max-error,
+/// --max-edge, --where and --method.
 struct SurfaceOptions {
-  std::string path, level = "0", method = "linear", where;
-  std::optional<double> max_edge;
+  std::string path, level, method = "linear", where;
+  std::vector<std::string> focuses;
+  std::optional<double> max_error, max_edge;
 
   void define(CLI::App& app);
   /// Adds all but --method.
   void define_triangles(CLI::App& app);
   /// Checks the options, then opens the store. Throws UsageError and stream::Error.
   [[nodiscard]] stream::Store open(terrain::SamplerOptions& sampler) const;
+  /// Returns the detail of the surface and the region, if the text is not empty. Throws as
+  /// parse_detail does.
+  [[nodiscard]] terrain::Detail detail(const stream::Store& store, const CrsOptions& crs,
+                                       const CommonOptions& common,
+                                       const std::string& region = {}) const;
+  /// Adds the levels of the detail and the bound to a summary.
+  void report(const terrain::Detail& detail, Summary& summary) const;
 };
 
 }  // namespace terrace::tools

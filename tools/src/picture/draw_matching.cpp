@@ -151,7 +151,7 @@ void draw_lines(const std::vector<stream::Point3>& positions,
                 const Camera& camera, const DrawOptions& options, Canvas& canvas) {
   constexpr double kRadius = 1.0;
   const std::vector<std::array<double, 3>> projected = project_all(positions, camera);
-  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
     for (const LineSet::Line& line : lines) {
@@ -187,7 +187,7 @@ void draw_matching(const MatchingPicture& picture, const Camera& camera, const D
   const std::vector<std::uint32_t> order = drawing_order(lines, !crowded);
   const double dot = std::max(2.1 * half_width, 1.5);
 
-  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     fill_with_paper(canvas, first, last);
     Brush brush(canvas, first, last);
     for (const std::uint32_t i : order) {

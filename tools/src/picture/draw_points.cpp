@@ -162,7 +162,7 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
     return centre +
            (sum[0] + sum[1] + sum[2] + sum[3]) / (weight[0] + weight[1] + weight[2] + weight[3]);
   };
-  for_bands(height, threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(height, threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t y = first; y < last; ++y) {
       check_interrupt();
       float* const row = rows.data() + y * row_size;
@@ -171,7 +171,7 @@ void smooth_depths(Canvas& canvas, const Radii& radii, const Camera& camera, uns
         columns[x * column_size + y] = smooth(row, width, x, radii[std::size_t{y} * width + x]);
     }
   });
-  for_bands(width, threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(width, threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t x = first; x < last; ++x) {
       check_interrupt();
       for (std::uint32_t y = 0; y < height; ++y)
@@ -195,7 +195,7 @@ float slope(float before, float here, float after, float max_step) {
 /// Lights every sample by a normal computed from its depth and those of its neighbours.
 void light_by_depth(const Camera& camera, const Light& light, const Radii& radii, unsigned threads,
                     Canvas& canvas) {
-  for_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(canvas.height(), threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::uint32_t y = first; y < last; ++y) {
       check_interrupt();
       for (std::uint32_t x = 0; x < canvas.width(); ++x) {
@@ -246,7 +246,7 @@ Radii draw_splats(const TriangleMesh& cloud, const std::vector<Rgb>& colours,
                   const DrawOptions& options, Canvas& canvas) {
   const bool has_normals = cloud.normals.size() == cloud.positions.size();
   Radii radii = base::filled(std::size_t{canvas.width()} * canvas.height(), 0.0F, check_interrupt);
-  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (std::size_t i = 0; i < splats.size(); ++i) {
       check_interrupt();
       const Splat& s = splats[i];
@@ -333,7 +333,7 @@ void draw_marks(const std::vector<stream::Point3>& positions, const Camera& came
   // the mark. The margin is a share of the depth range, because heights may be in another unit than
   // the scale.
   const double tolerance = std::max(12.0 / camera.scale, 0.02 * (nearest - farthest));
-  for_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
+  parallel_bands(canvas.height(), options.threads, [&](std::uint32_t first, std::uint32_t last) {
     for (const stream::Point3& position : positions) {
       check_interrupt();
       const auto [cx, cy, depth] = camera.project(position);

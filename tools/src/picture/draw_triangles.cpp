@@ -109,25 +109,26 @@ void draw_triangles(const TriangleMesh& mesh, const std::vector<Rgb>& colours, c
     }
   }
 
-  for_bands(canvas.height(), options.threads, [&](std::uint32_t first_row, std::uint32_t last_row) {
-    for (const auto& t : mesh.triangles) {
-      check_interrupt();
-      const float y0 = vertices[t[0]].y, y1 = vertices[t[1]].y, y2 = vertices[t[2]].y;
-      if (std::max({y0, y1, y2}) < static_cast<float>(first_row) ||
-          std::min({y0, y1, y2}) > static_cast<float>(last_row)) {
-        continue;
-      }
-      std::array<ScreenCorner, 3> corners{};
-      for (std::size_t k = 0; k < 3; ++k) {
-        corners[k] = {.p = vertices[t[k]], .colour = as_floats(colours[t[k]])};
-      }
-      if (options.wire) {
-        const float shade = light.shade(unit(area_vector(mesh, t)), camera.toward);
-        for (ScreenCorner& corner : corners) corner.p.shade = shade;
-      }
-      fill(corners, options.wire, first_row, last_row, canvas);
-    }
-  });
+  parallel_bands(
+      canvas.height(), options.threads, [&](std::uint32_t first_row, std::uint32_t last_row) {
+        for (const auto& t : mesh.triangles) {
+          check_interrupt();
+          const float y0 = vertices[t[0]].y, y1 = vertices[t[1]].y, y2 = vertices[t[2]].y;
+          if (std::max({y0, y1, y2}) < static_cast<float>(first_row) ||
+              std::min({y0, y1, y2}) > static_cast<float>(last_row)) {
+            continue;
+          }
+          std::array<ScreenCorner, 3> corners{};
+          for (std::size_t k = 0; k < 3; ++k) {
+            corners[k] = {.p = vertices[t[k]], .colour = as_floats(colours[t[k]])};
+          }
+          if (options.wire) {
+            const float shade = light.shade(unit(area_vector(mesh, t)), camera.toward);
+            for (ScreenCorner& corner : corners) corner.p.shade = shade;
+          }
+          fill(corners, options.wire, first_row, last_row, canvas);
+        }
+      });
 }
 
 void fit(Camera& camera, const std::vector<stream::Point3>& positions, const Canvas& canvas) {

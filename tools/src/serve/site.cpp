@@ -86,6 +86,9 @@ std::vector<std::string> files_of(const stream::Store& store) {
       }
     }
   }
+  if (manifest.contains("surface")) {
+    names.push_back(manifest.at("surface").at("data").at("file").get<std::string>());
+  }
   return names;
 }
 

@@ -27,6 +27,7 @@
 #include "terrace/terrain/crs.hpp"
 #include "terrace/terrain/error.hpp"
 #include "terrace/terrain/output_kinds.hpp"
+#include "terrace/terrain/scan_surface.hpp"
 #include "verbs/verbs.hpp"
 
 namespace terrace::tools {
@@ -81,12 +82,16 @@ class BuildCommand final : public Command {
            "(through a temporary file next to the store), auto sorts only if needed")
         ->check(CLI::IsMember({"auto", "stream", "spatial"}))
         ->capture_default_str();
+    app.add_flag("--surface", surface_,
+                 "also restore the surface that the points were scanned from and store it, so that "
+                 "'terrace surface' needs not, and surfaces of any detail do not tear; all points "
+                 "are held in memory");
     app.add_flag("--dry-run", dry_run_,
                  "only estimate points, disk space and time from a trial run");
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kStore, output_);
+    check_output_name(outputs::kStore, output_);
     request_.store = output_;
     request_.replace = common.force;
     request_.effort = *effort_of(effort_);
@@ -108,6 +113,9 @@ class BuildCommand final : public Command {
     request_.order = order_ == "stream"    ? stream::Order::stream
                      : order_ == "spatial" ? stream::Order::spatial
                                            : stream::Order::automatic;
+    if (surface_ && request_.entities != stream::Entities::points) {
+      throw UsageError("--surface is for points: --entities " + entities_ + " excludes it");
+    }
     std::error_code ignored;
     if (!common.force && std::filesystem::exists(request_.store, ignored)) {
       throw stream::Error(output_, "exists already")
@@ -154,6 +162,12 @@ class BuildCommand final : public Command {
   Summary build(const CommonOptions& common) {
     const Stopwatch watch;
     return_freed_memory();
+    if (surface_) {
+      request_.surface = [context = common.context()](const stream::Store& store,
+                                                      const stream::ClusterOrder& order) {
+        return surface_to_store(store, order, context);
+      };
+    }
     const BuildOutcome outcome = build_store(request_, common.context());
     const double seconds = watch.seconds();
     const double rate = static_cast<double>(outcome.points) / seconds;
@@ -193,6 +207,14 @@ class BuildCommand final : public Command {
                     counted(outcome.points, entity()), exclusions, readable_seconds(seconds),
                     readable_rate(rate), outliers, output_, counted(outcome.top + 1, "level"),
                     readable_bytes(outcome.store_bytes), readable_bytes(peak_rss_bytes()));
+    if (outcome.surface) {
+      summary.json["surface"] = {{"vertices", outcome.surface->vertices},
+                                 {"triangles", outcome.surface->triangles},
+                                 {"bytes", outcome.surface->bytes}};
+      summary.text += fmt::format(
+          "surface: {}, {}, {} of the store\n", counted(outcome.surface->vertices, "vertex"),
+          counted(outcome.surface->triangles, "triangle"), readable_bytes(outcome.surface->bytes));
+    }
     return summary;
   }
 
@@ -274,7 +296,7 @@ class BuildCommand final : public Command {
   std::vector<std::string> channels_;
   std::optional<double> outlier_price_;
   std::uint64_t block_ = 10000;
-  bool dry_run_ = false;
+  bool dry_run_ = false, surface_ = false;
 };
 
 }  // namespace

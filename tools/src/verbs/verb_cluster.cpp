@@ -183,9 +183,9 @@ class ClusterCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    if (!output_.empty()) format_of_output(outputs::kPointFile, output_, format_);
-    if (!labels_.empty()) format_of_output(outputs::kLabelFile, labels_);
-    if (!dendrogram_.empty()) format_of_output(outputs::kDendrogramTable, dendrogram_);
+    if (!output_.empty()) check_output_name(outputs::kPointFile, output_, format_);
+    if (!labels_.empty()) check_output_name(outputs::kLabelFile, labels_);
+    if (!dendrogram_.empty()) check_output_name(outputs::kDendrogramTable, dendrogram_);
     const Stopwatch watch;
     set_request(common);
     check_usage(common);

@@ -25,9 +25,9 @@ class ContourCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     surface_.define_triangles(app);
-    add_output(
-        app, output_,
-        "GeoJSON: lines in longitude and latitude, elev is the height; - is standard output");
+    add_output(app, output_,
+               "GeoJSON file of lines in longitude and latitude with the height as `elev`; - is "
+               "standard output");
     add_number(app, "--interval", interval_,
                "contour interval in the store's vertical unit; lines are at its multiples",
                kPositive)
@@ -42,16 +42,18 @@ class ContourCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kContourFile, output_);
+    check_output_name(outputs::kContourFile, output_);
     const Stopwatch watch;
     ContourRequest request = request_;
     request.interval = *interval_;  // required
     SamplerOptions sampler;
     const stream::Store store = surface_.open(sampler);
-    request.level = sampler.level;
+    const Detail detail = surface_.detail(store, crs_, common, region_);
+    request.level = detail.level;
+    request.focuses = detail.focuses;
+    request.max_error = sampler.max_error;
     request.max_edge = sampler.max_edge;
-    if (!region_.empty())
-      request.region = crs_.regions(store, common)(Region::parse(region_, stop_token()));
+    request.region = detail.region;
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
     const ContourOutcome outcome = write_contours(
         store, request, [&](std::string_view text) { output.write(text); }, common.context());
@@ -67,6 +69,7 @@ class ContourCommand final : public Command {
     summary.text = fmt::format("{}: {}, {} of them closed, {} in {}\n", output_,
                                counted(outcome.lines, "line"), with_commas(outcome.closed),
                                counted(outcome.points, "point"), readable_seconds(watch.seconds()));
+    surface_.report(detail, summary);
     return summary;
   }
 

@@ -51,7 +51,7 @@ class ConvertCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kPointFile, output_, format_);
+    check_output_name(outputs::kPointFile, output_, format_);
     const Stopwatch watch;
     stream::WriterOptions writing = point_writer_options(output_, format_, common);
     stream::SourceOptions reading{.format = input_format_,

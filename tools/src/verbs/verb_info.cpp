@@ -451,6 +451,11 @@ Summary info_of_store(const std::string& path) {
   json["parameters"] = Json::object();
   for (const auto& [name, value] : schema.parameters) json["parameters"][name] = value;
   json["bytes"] = store.bytes();
+  if (const auto surface = store.surface()) {
+    json["surface"] = {{"vertices", surface->vertices},
+                       {"triangles", surface->triangles},
+                       {"bytes", surface->bytes}};
+  }
 
   std::string& text = summary.text;
   text += fmt::format("format:    terrace store, version {}, {} (from {})\n", store.version(),
@@ -466,6 +471,10 @@ Summary info_of_store(const std::string& path) {
   text += '\n';
   text += heights_line(bounds.min[2], bounds.max[2], mean);
   text += channels_line(schema);
+  if (const auto surface = store.surface()) {
+    text += fmt::format("surface:   {}, {}, {}\n", counted(surface->vertices, "vertex"),
+                        counted(surface->triangles, "triangle"), readable_bytes(surface->bytes));
+  }
   for (const auto& [name, value] : schema.parameters)
     text += "parameter: " + printable_line(name + ' ' + value) + '\n';
   add_levels(store, json["levels"], text);

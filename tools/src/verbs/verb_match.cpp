@@ -258,7 +258,7 @@ class MatchCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kPairsTable, output_);
+    check_output_name(outputs::kPairsTable, output_);
     const Stopwatch watch;
     MatchRequest request = request_of(common);
     const stream::Naming replace = may_replace(output_, common.force);

@@ -101,11 +101,11 @@ class MeshCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kMeshFile, output_, format_);
+    check_output_name(outputs::kMeshFile, output_, format_);
     if (save_overlay_ == output_) {
       throw UsageError("--save-overlay and --output are the same file");
     }
-    if (!save_overlay_.empty()) format_of_output(outputs::kOverlayFile, save_overlay_);
+    if (!save_overlay_.empty()) check_output_name(outputs::kOverlayFile, save_overlay_);
     return max_error_ || !max_points_.empty() ? write_bounded(common) : write_detail(common);
   }
 

@@ -34,7 +34,7 @@ class ProfileCommand final : public Command {
                    "straight in the store's CRS")
         ->required()
         ->type_name("LINE");
-    crs_.define_input(app, "--line-crs", "the line's coordinates");
+    crs_.define_input(app, "--line-crs", "the line and focuses");
     add_number(app, "--step", step_,
                "metres between rows (default: a row at each grid line, cell diagonal or triangle "
                "edge that the line crosses)",
@@ -43,13 +43,16 @@ class ProfileCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kProfileTable, output_);
+    check_output_name(outputs::kProfileTable, output_);
     const Stopwatch watch;
     ProfileRequest request;
     request.step = step_;
     Line line = parse_line(line_);
     request.line = std::move(line.places);
     const stream::Store store = surface_.open(request.sampler);
+    const Detail detail = surface_.detail(store, crs_, common);
+    request.sampler.level = detail.level;
+    request.sampler.focuses = detail.focuses;
     request.to_line = crs_.from_store_to_input(store, common);
     if (!request.to_line && line.crs) {
       stream::Box3 box;
@@ -69,6 +72,7 @@ class ProfileCommand final : public Command {
     summary.text =
         fmt::format("{}: {} along {} m in {}\n", output_, counted(outcome.points, "point"),
                     readable_number(outcome.metres, 6), readable_seconds(watch.seconds()));
+    surface_.report(detail, summary);
     return summary;
   }
 

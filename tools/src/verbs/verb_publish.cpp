@@ -29,7 +29,7 @@ class PublishCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kSite, output_);
+    check_output_name(outputs::kSite, output_);
     const Stopwatch watch;
     std::vector<stream::Store> stores;
     for (const std::string& path : stores_) stores.push_back(open_store(path));

@@ -36,8 +36,8 @@ class RasterCommand final : public Command {
     add_number(app, "--cell", cell_,
                "width and height of a cell in units of the output's CRS; cells start at its "
                "multiples, so that rasters with the same cell size align (default: the raster's "
-               "own cells; for points and coarser levels, about as many cells as there are "
-               "points)",
+               "own cells; for points, coarser levels and another CRS, about as many cells as "
+               "there are points)",
                kPositive)
         ->type_name("SIZE");
     app.add_option("--align", align_, "use all cells of this raster, in its CRS")
@@ -49,15 +49,17 @@ class RasterCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kRasterFile, output_);
+    check_output_name(outputs::kRasterFile, output_);
     const Stopwatch watch;
     RasterRequest request;
     request.value = parse_raster_value(value_);
     request.cell = cell_;
     request.align = align_;
     const stream::Store store = surface_.open(request.sampler);
-    if (!region_.empty())
-      request.region = crs_.regions(store, common)(Region::parse(region_, stop_token()));
+    const Detail detail = surface_.detail(store, crs_, common, region_);
+    request.sampler.level = detail.level;
+    request.sampler.focuses = detail.focuses;
+    request.region = detail.region;
     request.to = crs_.from_store_to_output(store, common);
     request.output = output_;
     request.replace = may_replace(output_, common.force);
@@ -74,6 +76,7 @@ class RasterCommand final : public Command {
                     with_commas(outcome.columns), with_commas(outcome.rows),
                     with_commas(outcome.columns * outcome.rows - outcome.cells_with_data),
                     readable_seconds(watch.seconds()));
+    surface_.report(detail, summary);
     return summary;
   }
 

@@ -92,7 +92,7 @@ class RenderCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kPictureFile, output_);
+    check_output_name(outputs::kPictureFile, output_);
     const Stopwatch watch;
     const ImageSize size = parse_size(size_);
     if (size.width > 20000 || size.height > 20000) {

@@ -41,15 +41,18 @@ class SampleCommand final : public Command {
                    "no data")
         ->capture_default_str()
         ->type_name("FILE");
-    crs_.define(app, "--points-crs", "the places");
+    crs_.define(app, "--points-crs", "the places and focuses");
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kSampleTable, output_);
+    check_output_name(outputs::kSampleTable, output_);
     check_input_name(outputs::kPlaceTable, points_);
     const Stopwatch watch;
     SamplerOptions options;
     const stream::Store store = surface_.open(options);
+    const Detail detail = surface_.detail(store, crs_, common);
+    options.level = detail.level;
+    options.focuses = detail.focuses;
     const PlaceConversions conversions = conversions_for(store, common);
     PlaceFile places(points_, stop_token());
     stream::Sink output(output_, may_replace(output_, common.force), stop_token());
@@ -73,6 +76,7 @@ class SampleCommand final : public Command {
         fmt::format("{}, {} of them without a height, in {}, {}\n", counted(counts.points, "point"),
                     with_commas(counts.points - counts.answered), readable_seconds(watch.seconds()),
                     readable_rate(static_cast<double>(counts.points) / watch.seconds()));
+    surface_.report(detail, summary);
     return summary;
   }
 

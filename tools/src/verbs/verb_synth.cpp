@@ -66,7 +66,7 @@ class SynthCommand final : public Command {
 
   Summary run(const CommonOptions& common) override {
     const bool dem = kind_ == "dem";
-    format_of_output(dem ? outputs::kRasterFile : outputs::kPointFile, output_);
+    check_output_name(dem ? outputs::kRasterFile : outputs::kPointFile, output_);
     if (dem && (points_option_->count() > 0 || shuffle_option_->count() > 0)) {
       throw UsageError("synth dem takes --size, not --points or --shuffle");
     }
@@ -129,12 +129,12 @@ class SynthCommand final : public Command {
       for (std::uint64_t first = 0; first < points; first += kBatch) {
         check_interrupt();
         block.positions.resize(std::min(kBatch, points - first));
-        for_bands(static_cast<std::uint32_t>(block.size()), common.threads,
-                  [&](std::uint32_t begin, std::uint32_t end) {
-                    for (std::uint32_t i = begin; i < end; ++i) {
-                      block.positions[i] = cloud(order(first + i));
-                    }
-                  });
+        parallel_bands(static_cast<std::uint32_t>(block.size()), common.threads,
+                       [&](std::uint32_t begin, std::uint32_t end) {
+                         for (std::uint32_t i = begin; i < end; ++i) {
+                           block.positions[i] = cloud(order(first + i));
+                         }
+                       });
         writer->append(block);
         meter.update(first + block.size(),
                      static_cast<double>(first + block.size()) / static_cast<double>(points));

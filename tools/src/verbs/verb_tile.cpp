@@ -91,7 +91,7 @@ class TileCommand final : public Command {
   }
 
   Summary run(const CommonOptions& common) override {
-    format_of_output(outputs::kTileSet, output_);
+    check_output_name(outputs::kTileSet, output_);
     const Stopwatch watch;
     const TilesOutcome result =
         write_tiles(open_store(store_, where_), request(common), common.context());
