@@ -110,14 +110,14 @@ void log_note(const stream::Message& line) {
   py::module_::import("terrace._call").attr("notes").attr("info")("%s", message_of(line));
 }
 
-terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion) {
+terrain::Region to_data_crs(const terrain::Region& region, terrain::RegionConversion conversion) {
   conversion.on_note(log_note);
   return conversion(region);
 }
 
 std::optional<terrain::Region> region_of(const py::object& value, const stream::Store& store) {
   std::optional<terrain::Region> region = region_of(value);
-  if (region) region = converted(*region, terrain::RegionConversion(store));
+  if (region) region = to_data_crs(*region, terrain::RegionConversion(store));
   return region;
 }
 

@@ -28,7 +28,7 @@ namespace terrace::python {
 template <class T>
 using Array = py::array_t<T, py::array::c_style | py::array::forcecast>;
 
-/// Returns an array as rows of N numbers, without a copy.
+/// Returns a view of an array of shape (n, N); valid while the array lives.
 /// Throws: ValueError, which names `what`, for another shape.
 template <std::size_t N, class T>
 std::span<const std::array<T, N>> rows_of(const Array<T>& array, const char* what) {
@@ -43,7 +43,7 @@ std::span<const std::array<T, N>> rows_of(const Array<T>& array, const char* wha
 /// Returns points of shape (n, 3), or of shape (n, 2) with z = 0. Throws: ValueError for others.
 std::vector<std::array<double, 3>> points3_of(const Array<double>& input);
 
-/// Returns a one-dimensional array, without a copy.
+/// Returns a view of a one-dimensional array; valid while the array lives.
 /// Throws: ValueError, which names `what`, for another shape.
 template <class T>
 std::span<const T> numbers_of(const Array<T>& array, const char* what) {
@@ -89,7 +89,8 @@ void take_option(const py::dict& options, const char* name, T& value) {
 
 /// Returns numpy's name of a type, such as "u1" or "f8".
 std::string type_name(stream::ScalarType type);
-/// Throws: TypeError unless it is a number of 8 to 64 bits in native byte order.
+/// Returns the library's type for a numpy type. Throws: TypeError, which names `what`, unless it is
+/// a number of 8 to 64 bits in native byte order.
 stream::ScalarType scalar_type(const py::dtype& type, const std::string& what);
 
 /// Returns numpy's structured type for points, packed: x, y, z as doubles, then the attributes in
@@ -111,7 +112,7 @@ std::optional<terrain::Region> region_of(const py::object& value);
 /// Writes a line to the package's log.
 void log_note(const stream::Message& line);
 /// Converts a region to the CRS of the data and logs assumptions.
-terrain::Region converted(const terrain::Region& region, terrain::RegionConversion conversion);
+terrain::Region to_data_crs(const terrain::Region& region, terrain::RegionConversion conversion);
 /// Converts a region from the package to the CRS of a store.
 std::optional<terrain::Region> region_of(const py::object& value, const stream::Store& store);
 

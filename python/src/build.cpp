@@ -6,6 +6,7 @@
 #include <terrace/terrain/build.hpp>
 #include <terrace/terrain/crs.hpp>
 #include <terrace/terrain/output_kinds.hpp>
+#include <terrace/terrain/scan_surface.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -23,7 +24,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   } else {
     request.open = opener_of(source);
   }
-  format_of_output(terrain::outputs::kStore, path);
+  check_output_name(terrain::outputs::kStore, path);
   request.store = path;
   const auto set = [&](const char* name, auto& to) { take_option(options, name, to); };
   set("replace", request.replace);
@@ -65,9 +66,21 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
 void bind_build(py::module_& module) {
   module.def("build", [](const py::object& source, const std::string& path, const py::dict& options,
                          const py::tuple& settings) {
-    const terrain::BuildRequest request = request_of(source, path, options);
-    const terrain::BuildOutcome outcome = Call(settings).run(
-        [&](const terrain::Context& context) { return terrain::build_store(request, context); });
+    terrain::BuildRequest request = request_of(source, path, options);
+    bool surface = false;
+    take_option(options, "surface", surface);
+    if (surface && request.entities != stream::Entities::points) {
+      throw py::value_error("`surface` is for points, not for other `entities`");
+    }
+    const terrain::BuildOutcome outcome = Call(settings).run([&](const terrain::Context& context) {
+      if (surface) {
+        request.surface = [&context](const stream::Store& store,
+                                     const stream::ClusterOrder& order) {
+          return terrain::surface_to_store(store, order, context);
+        };
+      }
+      return terrain::build_store(request, context);
+    });
     py::dict result;
     result["points"] = outcome.points;
     result["nodata"] = outcome.nodata;

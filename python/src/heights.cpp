@@ -25,20 +25,28 @@
 namespace terrace::python {
 namespace {
 
-terrain::SamplerOptions sampler_of(const std::string& method, unsigned level,
+terrain::SamplerOptions sampler_of(const std::string& method, const terrain::Detail& detail,
+                                   std::optional<double> max_error,
                                    std::optional<double> max_edge) {
-  return {.method = named<tri::Interpolation>(method), .level = level, .max_edge = max_edge};
+  return {.method = named<tri::Interpolation>(method),
+          .level = detail.level,
+          .focuses = detail.focuses,
+          .max_error = max_error,
+          .max_edge = max_edge};
 }
 
 /// Returns rows of height and the gradient to east and north.
 py::array sample(const OpenStore& open, const Array<double>& xy, const std::string& method,
-                 unsigned level, std::optional<double> max_edge, const std::string& crs,
+                 unsigned level, const py::list& focuses, std::optional<double> max_error,
+                 std::optional<double> max_edge, const std::string& crs,
                  const py::tuple& settings) {
   const stream::Store store = open.get();
   const auto input = rows_of<2>(xy, "xy");
-  const terrain::SamplerOptions options = sampler_of(method, level, max_edge);
+  const terrain::Detail detail = detail_of(store, level, py::none(), focuses);
+  const terrain::SamplerOptions options = sampler_of(method, detail, max_error, max_edge);
   std::vector<terrain::GroundPoint> found =
       Call(settings).run([&](const terrain::Context& context) {
+        note_idle_focuses(store, detail, context);
         const auto change = change_to(store, crs);
         if (!change) return sample_places(store, input, options, context);
         std::vector<terrain::Point2> places(input.begin(), input.end());
@@ -58,11 +66,13 @@ py::array sample(const OpenStore& open, const Array<double>& xy, const std::stri
 /// crs: the CRS of GeoJSON as in terrain::PlacesCrs, or None if the line is in the store's CRS.
 py::array profile(const OpenStore& open, const Array<double>& line,
                   const std::optional<std::string>& crs, std::optional<double> step,
-                  const std::string& method, unsigned level, std::optional<double> max_edge,
+                  const std::string& method, unsigned level, const py::list& focuses,
+                  std::optional<double> max_error, std::optional<double> max_edge,
                   const py::tuple& settings) {
   const stream::Store store = open.get();
+  const terrain::Detail detail = detail_of(store, level, py::none(), focuses);
   terrain::ProfileRequest request;
-  request.sampler = sampler_of(method, level, max_edge);
+  request.sampler = sampler_of(method, detail, max_error, max_edge);
   const auto places = rows_of<2>(line, "line");
   request.line.assign(places.begin(), places.end());
   if (crs) {
@@ -75,6 +85,7 @@ py::array profile(const OpenStore& open, const Array<double>& line,
   if (step && !(*step > 0)) throw py::value_error("`step` must be positive");
   request.step = step;
   return to_array(Call(settings).run([&](const terrain::Context& context) {
+    note_idle_focuses(store, detail, context);
     std::vector<std::array<double, 4>> rows;
     // A growing vector needs its old and its new memory at once.
     const std::uint64_t most = context.memory_or(0) / (3 * sizeof rows[0]);
@@ -101,17 +112,22 @@ bool reaches_wgs84(const stream::Store& store) {
 }
 
 /// Returns (GeoJSON, whether it is in the store's CRS).
-py::tuple contours(const OpenStore& open, double interval, unsigned level,
-                   std::optional<double> max_edge, const py::object& region,
-                   std::optional<bool> lonlat, const py::tuple& settings) {
+py::tuple contours(const OpenStore& open, double interval, unsigned level, const py::list& focuses,
+                   std::optional<double> max_error, std::optional<double> max_edge,
+                   const py::object& region, std::optional<bool> lonlat,
+                   const py::tuple& settings) {
   const stream::Store store = open.get();
   if (!(interval > 0)) throw py::value_error("`interval` must be positive");
+  const terrain::Detail detail = detail_of(store, level, region, focuses);
   const terrain::ContourRequest request{.interval = interval,
-                                        .level = level,
+                                        .level = detail.level,
+                                        .focuses = detail.focuses,
+                                        .max_error = max_error,
                                         .max_edge = max_edge,
-                                        .region = region_of(region, store),
+                                        .region = detail.region,
                                         .own_crs = !(lonlat ? *lonlat : reaches_wgs84(store))};
   const std::string text = Call(settings).run([&](const terrain::Context& context) {
+    note_idle_focuses(store, detail, context);
     std::string lines;
     // The growing text needs its old and its new memory at once, and Python copies the result.
     const std::uint64_t most = context.memory_or(0) / 4;
@@ -134,18 +150,21 @@ py::tuple contours(const OpenStore& open, double interval, unsigned level,
 void write_raster(const OpenStore& open, const std::string& path, const std::string& value,
                   std::optional<double> cell, const std::string& align, const py::object& region,
                   const std::string& crs, const std::string& method, unsigned level,
+                  const py::list& focuses, std::optional<double> max_error,
                   std::optional<double> max_edge, bool replace, const py::tuple& settings) {
-  format_of_output(terrain::outputs::kRasterFile, path);
+  check_output_name(terrain::outputs::kRasterFile, path);
   const stream::Store store = open.get();
+  const terrain::Detail detail = detail_of(store, level, region, focuses);
   terrain::RasterRequest request{.value = named<terrain::RasterValue>(value),
-                                 .sampler = sampler_of(method, level, max_edge),
+                                 .sampler = sampler_of(method, detail, max_error, max_edge),
                                  .cell = cell,
                                  .align = align,
-                                 .region = region_of(region, store),
+                                 .region = detail.region,
                                  .output = path,
                                  .replace = replace};
   if (cell && !(*cell > 0)) throw py::value_error("`cell` must be positive");
   Call(settings).run([&](const terrain::Context& context) {
+    note_idle_focuses(store, detail, context);
     request.to = change_to(store, crs);
     terrain::write_raster(store, request, context);
   });

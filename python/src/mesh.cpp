@@ -12,6 +12,8 @@
 #include <terrace/terrain/detail_mesh.hpp>
 #include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/scan_surface.hpp>
+#include <terrace/tri/shape.hpp>
+#include <terrace/tri/surface_smoothing.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -83,7 +85,7 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   take_option(heights, "overlay", overlay_path);
   take_option(heights, "save", save_path);
   take_option(heights, "replace", replace);
-  if (!save_path.empty()) format_of_output(terrain::outputs::kOverlayFile, save_path);
+  if (!save_path.empty()) check_output_name(terrain::outputs::kOverlayFile, save_path);
   terrain::MeshUnits units;
   terrain::TriangleMesh result = Call(settings).run([&](const terrain::Context& context) {
     note_idle_focuses(store, detail, context);
@@ -106,19 +108,60 @@ py::tuple mesh(const OpenStore& open, unsigned level, const py::object& region,
   return arrays_of(std::move(result), to_python(units));
 }
 
+/// Method, iterations and limit.
+using SurfaceSmoothingArguments = std::tuple<std::string, unsigned, std::optional<double>>;
+
+tri::SurfaceSmoothingOptions surface_smoothing(const SurfaceSmoothingArguments& arguments) {
+  const auto& [method, iterations, limit] = arguments;
+  return {.method = named<tri::SurfaceSmoothing>(method), .iterations = iterations, .limit = limit};
+}
+
 /// Returns the surface as arrays_of() does, or (vertices, tetrahedra inside it).
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
-                  const std::string& where, bool tetrahedra, const py::tuple& settings) {
+                  const std::string& where, bool tetrahedra,
+                  const std::optional<SurfaceSmoothingArguments>& smoothing,
+                  std::optional<double> max_error, std::optional<std::size_t> max_points,
+                  bool stored, const py::tuple& settings) {
   const stream::Store store = open.get(where);
   const terrain::Detail detail = detail_of(store, level, region, py::list());
+  terrain::ScanSurfaceOptions options;
+  options.stored = stored;
+  options.tetrahedra = tetrahedra;
+  if (smoothing) options.smoothing = surface_smoothing(*smoothing);
+  options.max_error = max_error;
+  options.max_points = max_points;
   terrain::ScanSurface result = Call(settings).run([&](const terrain::Context& context) {
-    return scan_surface(store, detail, {.tetrahedra = tetrahedra}, context);
+    return scan_surface(store, detail, options, context);
   });
   if (!tetrahedra) {
     return arrays_of(std::move(result.mesh), to_python(terrain::MeshUnits(store)));
   }
   return py::make_tuple(to_array(std::move(result.mesh.positions)),
                         to_array(std::move(result.tetrahedra)));
+}
+
+tri::Surface surface_of_rows(const Array<double>& vertices, const Array<std::uint32_t>& triangles) {
+  const auto places = rows_of<3>(vertices, "vertices");
+  const auto corners = rows_of<3>(triangles, "triangles");
+  return {{places.begin(), places.end()}, {corners.begin(), corners.end()}};
+}
+
+/// Returns the vertices after smoothing.
+py::array smoothed(const Array<double>& vertices, const Array<std::uint32_t>& triangles,
+                   const SurfaceSmoothingArguments& arguments, unsigned threads) {
+  const tri::Surface surface = surface_of_rows(vertices, triangles);
+  tri::SurfaceSmoothingOptions options = surface_smoothing(arguments);
+  options.threads = threads;
+  return to_array(released([&](const std::stop_token& stop) {
+    options.check_stop = stop_check(stop);
+    return tri::smooth(surface, options).points;
+  }));
+}
+
+py::array vertex_normals(const Array<double>& vertices, const Array<std::uint32_t>& triangles,
+                         unsigned threads) {
+  const tri::Surface surface = surface_of_rows(vertices, triangles);
+  return to_array(released([&] { return tri::vertex_normals(surface, threads); }));
 }
 
 /// Returns (vertices, the offset of each line and the total, the number of each line).
@@ -142,7 +185,7 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& arguments,
                       const py::tuple& settings) {
   const stream::Store store = open.get(arguments["where"].cast<std::string>());
-  format_of_output(terrain::outputs::kMeshFile, path);
+  check_output_name(terrain::outputs::kMeshFile, path);
   terrain::BoundedMeshOptions options;
   options.path = path;
   const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
@@ -170,11 +213,40 @@ py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::
   return result;
 }
 
+/// normals: whether the file gets the normals of the vertices. Returns the note on its coordinates.
+py::str write_mesh(const std::string& path, const Array<double>& vertices,
+                   const Array<std::uint32_t>& triangles, bool normals, bool replace,
+                   const py::object& given_units) {
+  check_output_name(terrain::outputs::kMeshFile, path);
+  const terrain::MeshUnits units = units_from(given_units);
+  terrain::TriangleMesh mesh;
+  const auto positions = rows_of<3>(vertices, "vertices");
+  const auto corners = rows_of<3>(triangles, "triangles");
+  mesh.positions.assign(positions.begin(), positions.end());
+  mesh.triangles.assign(corners.begin(), corners.end());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (const std::uint32_t corner : corners[i]) {
+      if (corner >= positions.size()) {
+        throw py::value_error("triangle " + std::to_string(i) + " has a corner " +
+                              std::to_string(corner) + ", but there are " +
+                              std::to_string(positions.size()) + " vertices");
+      }
+    }
+  }
+  return message_of(released([&](const std::stop_token& stop) {
+    const stream::WriterOptions writer{.replace = replace, .stop = stop};
+    if (normals) set_normals(mesh, path, writer, units);
+    return terrain::write_mesh(path, mesh, writer, units).note;
+  }));
+}
+
 }  // namespace
 
 void bind_mesh(py::module_& module) {
   module.def("mesh", &mesh);
   module.def("surface", &surface);
+  module.def("smoothed", &smoothed);
+  module.def("vertex_normals", &vertex_normals);
   module.def("lines", &lines);
   module.def("bounded_mesh", &bounded_mesh);
   module.def("read_mesh", [](const std::string& path) {
@@ -183,29 +255,7 @@ void bind_mesh(py::module_& module) {
     if (!file) throw py::value_error(path + " is not a mesh");
     return arrays_of(terrain::triangle_mesh_of(std::move(*file)));
   });
-  module.def("write_mesh", [](const std::string& path, const Array<double>& vertices,
-                              const Array<std::uint32_t>& triangles, bool replace,
-                              const py::object& given_units) {
-    format_of_output(terrain::outputs::kMeshFile, path);
-    const terrain::MeshUnits units = units_from(given_units);
-    terrain::TriangleMesh mesh;
-    const auto positions = rows_of<3>(vertices, "vertices");
-    const auto corners = rows_of<3>(triangles, "triangles");
-    mesh.positions.assign(positions.begin(), positions.end());
-    mesh.triangles.assign(corners.begin(), corners.end());
-    for (std::size_t i = 0; i < corners.size(); ++i) {
-      for (const std::uint32_t corner : corners[i]) {
-        if (corner >= positions.size()) {
-          throw py::value_error("triangle " + std::to_string(i) + " has a corner " +
-                                std::to_string(corner) + ", but there are " +
-                                std::to_string(positions.size()) + " vertices");
-        }
-      }
-    }
-    return message_of(released([&](const std::stop_token& stop) {
-      return terrain::write_mesh(path, mesh, {.replace = replace, .stop = stop}, units).note;
-    }));
-  });
+  module.def("write_mesh", &write_mesh);
   module.def("units",
              [](const OpenStore& open) { return to_python(terrain::MeshUnits(open.get())); });
   // Units of longitude and latitude in WGS 84.

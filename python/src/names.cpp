@@ -21,6 +21,7 @@
 #include <terrace/tri/point_tin.hpp>
 #include <terrace/tri/shape.hpp>
 #include <terrace/tri/smoothing.hpp>
+#include <terrace/tri/surface_smoothing.hpp>
 
 #include "arrays.hpp"
 
@@ -40,7 +41,7 @@ const auto& tables() {
   using stream::Entities, stream::HeightsOfColour, stream::Order;
   using terrain::Fill, terrain::HeightReference, terrain::RasterValue;
   using tri::GradientFrom, tri::Interpolation, tri::PointDuplicates, tri::ShapeCriterion;
-  using tri::ShapeRule, tri::Smoothing, tri::TinQuality;
+  using tri::ShapeRule, tri::Smoothing, tri::SurfaceSmoothing, tri::TinQuality;
   static const std::tuple all{
       NameTable<Interpolation>{"Interpolation",
                                "method",
@@ -73,6 +74,10 @@ const auto& tables() {
                            {{"laplacian", Smoothing::laplacian},
                             {"taubin", Smoothing::taubin},
                             {"bilateral", Smoothing::bilateral}}},
+      NameTable<SurfaceSmoothing>{
+          "SurfaceSmoothing",
+          "method",
+          {{"taubin", SurfaceSmoothing::taubin}, {"bilateral", SurfaceSmoothing::bilateral}}},
       NameTable<RasterValue>{"RasterValue",
                              "value",
                              {{"height", RasterValue::height},
@@ -188,6 +193,7 @@ template tri::Interpolation named(const std::string& name);
 template tri::GradientFrom named(const std::string& name);
 template tri::TinQuality named(const std::string& name);
 template tri::Smoothing named(const std::string& name);
+template tri::SurfaceSmoothing named(const std::string& name);
 template tri::PointDuplicates named(const std::string& name);
 template tri::ShapeRule named(const std::string& name);
 template tri::ShapeCriterion named(const std::string& name);

@@ -83,7 +83,7 @@ class PointReader {
 /// Returns (points written, points left out because a coordinate is NaN, largest rounding error).
 py::tuple write_points(const py::object& source, const py::dict& arguments, const std::string& path,
                        const std::string& format, bool replace, const py::tuple& settings) {
-  format_of_output(terrain::outputs::kPointFile, path, format);
+  check_output_name(terrain::outputs::kPointFile, path, format);
   const OpenSource open = opener_of(source);
   std::uint64_t points = 0, nodata = 0;
   double rounding = 0;

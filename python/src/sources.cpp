@@ -94,7 +94,7 @@ stream::Selection selection_of(const py::object& source, const py::dict& argumen
   if (region && terrain::RegionConversion::may_turn(*region) && opens_twice(source)) {
     const OpenSource open = opener_of(source);
     const auto info = released([&] { return open(options)->info(); });
-    region = converted(*region, terrain::RegionConversion(info));
+    region = to_data_crs(*region, terrain::RegionConversion(info));
   }
   if (region) region->restrict(selection);
   return selection;

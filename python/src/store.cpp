@@ -85,6 +85,14 @@ py::dict info_of(const OpenStore& open) {
   info["levels"] = levels;
   info["parameters"] = py::cast(schema.parameters);
   info["checksum"] = store.checksum();
+  info["surface"] = py::none();
+  if (const auto surface = store.surface()) {
+    py::dict size;
+    size["vertices"] = surface->vertices;
+    size["triangles"] = surface->triangles;
+    size["bytes"] = surface->bytes;
+    info["surface"] = size;
+  }
   return info;
 }
 

@@ -16,7 +16,7 @@ namespace terrace::python {
 namespace {
 
 terrain::TilesRequest tiles_request(const std::string& folder, const py::dict& arguments) {
-  format_of_output(terrain::outputs::kTileSet, folder);
+  check_output_name(terrain::outputs::kTileSet, folder);
   terrain::TilesRequest request{.folder = folder};
   const auto set = [&](const char* name, auto& to) { take_option(arguments, name, to); };
   set("name", request.name);

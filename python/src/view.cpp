@@ -108,7 +108,7 @@ class ViewOf final : public AnyView {
   ViewChange described(MeshChange&& result) const {
     ViewChange change{std::move(result)};
     change.settled = view_.settled();
-    change.points = view_.model().point_count();
+    change.points = view_.points();
     return change;
   }
 
@@ -136,7 +136,7 @@ class SharedView {
       using Surface = tri::DynamicSurface<std::int32_t>;
       view_ = std::make_unique<ViewOf<Surface>>(store_, options, reads_in_frame);
     } else if (store_.schema().grid) {
-      view_ = std::make_unique<ViewOf<std::int32_t>>(store_, options, reads_in_frame);
+      view_ = std::make_unique<ViewOf<tri::ThinnedDelaunay2>>(store_, options, reads_in_frame);
     } else {
       view_ = std::make_unique<ViewOf<double>>(store_, options, reads_in_frame);
     }

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._arrays import as_numbered, as_rows
-from ._call import notes
+from ._arrays import as_integer, as_numbered, as_rows
+from ._call import notes, thread_count
+from ._names import SurfaceSmoothing
 from ._pictures import light, relief_png, triangles_svg
 from ._types import AnyArray, Array, Float64Array, Path, UInt8Array
 
@@ -25,6 +26,11 @@ def metres_per_unit(places: Float64Array, units: Any) -> Float64Array:
     if units is None or len(known) == 0:
         return np.ones(3)
     return np.array(_core.metres_per_unit(units, *known.min(axis=0), *known.max(axis=0)))
+
+
+def surface_smoothing(method: str = 'taubin', iterations: int = 10, limit: float | None = None) -> tuple[str, int, float | None]:
+    """Returns the options of a smoothing as the compiled half expects them."""
+    return method, as_integer(iterations, 'iterations', bits=32), None if limit is None else float(limit)
 
 
 class Mesh:
@@ -69,7 +75,7 @@ class Mesh:
         with open(path, 'rb'):  # raises OSError if there is no such file
             return Mesh._of(_core.read_mesh(os.fsencode(path)))
 
-    def save(self, path: Path, replace: bool = False) -> None:
+    def save(self, path: Path, replace: bool = False, *, normals: bool = False) -> None:
         """Writes a mesh file in the format of its extension: .ply, .obj or .glb, or .svg for a picture from above.
 
         .ply, .obj and .glb files appear only when complete. glTF knows only metres, so .glb files of a store in
@@ -79,6 +85,7 @@ class Mesh:
 
         path: the file to write.
         replace: whether an existing file is overwritten.
+        normals: whether the file gets a normal for each vertex, as of normals(), for shading. Not in .svg.
         """
         path = os.fspath(path)
         if path.endswith('.svg'):
@@ -86,7 +93,7 @@ class Mesh:
                 vertices = self._in_metres()
                 file.write(triangles_svg(vertices[:, :2], self.triangles, light(vertices, self.triangles)))
             return
-        note = _core.write_mesh(os.fsencode(path), *self._parts(), bool(replace), self._units)
+        note = _core.write_mesh(os.fsencode(path), *self._parts(), bool(normals), bool(replace), self._units)
         if note:
             notes.info(note)
 
@@ -107,6 +114,36 @@ class Mesh:
     def turned_outward(self) -> Mesh:
         """Returns the mesh with components of negative volume turned inside out. Raises: ValueError."""
         return Mesh._of((self.vertices, _core.turned_outward(*self._parts()), self.levels, self._units))
+
+    def smoothed(self, method: SurfaceSmoothing = 'taubin', *, iterations: int = 10, limit: float | None = None,
+                 threads: int | None = None) -> Mesh:
+        """Returns the mesh with noise removed: a surface in space with the same triangles and moved vertices.
+
+        Vertices on the border of an open surface stay. Non-manifold edges, coincident vertices and triangles without
+        area are allowed.
+
+        method: 'taubin' keeps the volume and rounds edges; 'bilateral' filters the normals of the triangles and keeps
+            edges.
+        iterations: pairs of steps, or passes over the normals.
+        limit: no vertex moves farther than this, in the unit of the vertices; by default the median length of the
+            triangles' sides.
+
+        Raises: ValueError.
+
+        Source: G. Taubin, 1995; Y. Zheng, H. Fu, O. Au, C. Tai, 2011.
+        """
+        moved = _core.smoothed(*self._parts(), surface_smoothing(method, iterations, limit), thread_count(threads))
+        return Mesh._of((moved, self.triangles, self.levels, self._units))
+
+    def normals(self, threads: int | None = None) -> Float64Array:
+        """Returns a unit normal for each vertex, float64, shape (n, 3).
+
+        It is the mean of the normals of the triangles around the vertex, weighted by their angles there; zero if they
+        have no area or cancel out.
+
+        Raises: ValueError.
+        """
+        return _core.vertex_normals(*self._parts(), thread_count(threads))
 
     def errors(self, samples: Array) -> dict[str, Any]:
         """Measures the vertical distances of samples from the mesh, in O(n) time.

@@ -18,8 +18,8 @@ from ._arrays import as_integer, as_rows
 from ._call import call_settings, notes
 from ._errors import Error
 from ._geo import CoreRegion, FeatureCollection, geojson, region as as_region
-from ._mesh import BoundedMesh, Mesh
-from ._names import Duplicates, Fill, Interpolation, Quality, RasterValue, Smoothing
+from ._mesh import BoundedMesh, Mesh, surface_smoothing
+from ._names import Duplicates, Fill, Interpolation, Quality, RasterValue, Smoothing, SurfaceSmoothing
 from ._raster import Raster, read_raster
 from ._sources import crs_text, source_of
 from ._types import Array, ClusterId, Crs, Float64Array, Focuses, GeoInterface, Int64Array, Path, Progress, Records, Region, UInt32Array
@@ -27,7 +27,7 @@ from ._types import Array, ClusterId, Crs, Float64Array, Focuses, GeoInterface, 
 _BUILD_OPTIONS = {
     'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
     'outlier_price', 'band', 'cell', 'seed', 'datum_shift', 'where', 'keep', 'drop', 'resolution', 'metric',
-    'region', 'effort', 'order', 'entities', 'method', 'heights_of_colour',
+    'region', 'effort', 'order', 'entities', 'method', 'heights_of_colour', 'surface',
 }
 _TILE_OPTIONS = {
     'name', 'max_error', 'geoid', 'flat_height', 'water', 'water_height', 'normals', 'metadata', 'gzip', 'resume',
@@ -76,6 +76,12 @@ def _smoothing(method: str = 'laplacian', iterations: int = 10, strength: float 
     return method, as_integer(iterations, 'iterations', bits=32), float(strength), float(pass_band), float(edge_height)
 
 
+def _surface_smoothing(smoothing: SurfaceSmoothing | Mapping[str, Any] | None) -> tuple[str, int, float | None] | None:
+    if smoothing is None:
+        return None
+    return surface_smoothing(**({'method': smoothing} if isinstance(smoothing, str) else smoothing))
+
+
 def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None, crs: Crs | None = None,
           nodata: float | None = None, attributes: Mapping[str, Array] | None = None, progress: Progress | None = None,
           threads: int | None = None, memory: int | None = None, **options: Any) -> Store:
@@ -116,6 +122,8 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
       (pairs of an attribute and metres per unit), ``outlier_price`` and ``method``: the clustering, as in cluster().
     - ``order``: 'auto', 'stream' or 'spatial'.
     - ``vertical``: 'ellipsoidal' or 'orthometric'.
+    - ``surface``: whether the surface of a scan is restored and stored with the points, for surface(). All points are
+      then held in memory.
     - ``seed``: of random choices.
 
     Options for files: ``input_format``, ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour``
@@ -222,6 +230,7 @@ class Store:
         levels: level 0 first; ``points`` counts the points on that level and above.
         grid, columns, rows, transform: of a raster; the transform is to the centres of cells.
         nodata: the number of samples left out.
+        surface: the numbers of vertices, triangles and bytes of the stored surface of a scan, or None.
         """
         return json.loads(json.dumps(self._info))
 
@@ -368,14 +377,21 @@ class Store:
             k = as_integer(k, 'k', 1)
         return real_values(self._core.near(place, k, radius, level, where), self._info['attributes'])
 
-    def _sample(self, xy: Array, method: Interpolation, level: int, max_edge: float | None, crs: Crs | None, progress: Progress | None,
-                threads: int | None, memory: int | None) -> Float64Array:
-        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, as_integer(level, 'level', bits=32), max_edge,
+    def _surface(self, level: int | None, focus: Focuses) -> tuple[int, list[tuple[CoreRegion | None, int]]]:
+        focuses = self._focuses(focus)
+        if level is None:
+            level = self.top if focuses else 0
+        return as_integer(level, 'level', bits=32), focuses
+
+    def _sample(self, xy: Array, method: Interpolation, level: int | None, focus: Focuses, max_error: float | None,
+                max_edge: float | None, crs: Crs | None, progress: Progress | None, threads: int | None,
+                memory: int | None) -> Float64Array:
+        return _core.sample(self._core, as_rows(xy, 'xy', (2,)), method, *self._surface(level, focus), max_error, max_edge,
                             crs_text(crs) or '', call_settings(progress, threads, memory))
 
-    def heights(self, xy: Array, method: Interpolation = 'linear', *, level: int = 0, max_edge: float | None = None,
-                crs: Crs | None = None, progress: Progress | None = None, threads: int | None = None,
-                memory: int | None = None) -> Float64Array:
+    def heights(self, xy: Array, method: Interpolation = 'linear', *, level: int | None = None, focus: Focuses = (),
+                max_error: float | None = None, max_edge: float | None = None, crs: Crs | None = None,
+                progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Float64Array:
         """Returns the heights of the surface at places.
 
         Pass many places at once: each takes about a microsecond, and only the parts of the store around them are
@@ -384,28 +400,35 @@ class Store:
         xy: shape (n, 2), in the store's CRS or in ``crs``.
         method: 'linear' on the triangulated samples of a raster or the Delaunay triangulation of points, 'natural'
             neighbours (Sibson), or 'nearest'.
-        level: the points to use: those of this level and above.
+        level: the points to use: those of this level and above. By default 0, or with ``focus`` the coarsest.
+        focus: pairs (region, level) with finer levels, as in mesh(), which returns this surface. Inside a focus the
+            heights are those of its level, up to about one point from its border; in a raster and for level 0, to the
+            last bit where all samples within two columns and rows are inside.
+        max_error: instead of a level: a surface of few triangles that is within this many metres of every sample,
+            vertically. It needs the method 'linear' and excludes max_edge. Each window of about 512 x 512 samples with a
+            place is triangulated.
         max_edge: in metres; triangles with a longer side are left out (not for rasters at level 0).
 
         Returns: float64, shape (n,), in the store's vertical unit; NaN where there is no surface.
         """
-        return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 0]
+        return self._sample(xy, method, level, focus, max_error, max_edge, crs, progress, threads, memory)[:, 0]
 
-    def gradients(self, xy: Array, method: Interpolation = 'linear', *, level: int = 0, max_edge: float | None = None,
-                  crs: Crs | None = None, progress: Progress | None = None, threads: int | None = None,
-                  memory: int | None = None) -> Float64Array:
+    def gradients(self, xy: Array, method: Interpolation = 'linear', *, level: int | None = None, focus: Focuses = (),
+                  max_error: float | None = None, max_edge: float | None = None, crs: Crs | None = None,
+                  progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Float64Array:
         """Returns the gradients of the surface at places, east and north in the store's CRS.
 
         The arguments are those of heights().
 
         Returns: float64, shape (n, 2), in metres of height per metre on the ground; NaN where there is no surface.
         """
-        return self._sample(xy, method, level, max_edge, crs, progress, threads, memory)[:, 1:]
+        return self._sample(xy, method, level, focus, max_error, max_edge, crs, progress, threads, memory)[:, 1:]
 
     def raster(self, value: RasterValue = 'height', *, cell: float | None = None,
                align: Path | None = None, region: Region | None = None, crs: Crs | None = None, method: Interpolation = 'linear',
-               level: int = 0, max_edge: float | None = None, path: Path | None = None, replace: bool = False,
-               progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Raster:
+               level: int | None = None, focus: Focuses = (), max_error: float | None = None, max_edge: float | None = None,
+               path: Path | None = None, replace: bool = False, progress: Progress | None = None, threads: int | None = None,
+               memory: int | None = None) -> Raster:
         """Computes the surface, or a value derived from it, on a grid.
 
         value: 'height', 'slope' (degrees), 'aspect' (degrees clockwise from north, downhill) or 'hillshade' (1 to
@@ -415,6 +438,7 @@ class Store:
         align: a raster file whose grid and CRS to use; replaces ``cell``.
         region: a box or polygons, as in points().
         crs: of the output; the store's by default.
+        level, focus, max_error, max_edge: as in heights(). A raster with a focus of level 0 has the store's own cells by default.
         path: a Cloud Optimized GeoTIFF to write.
         replace: whether an existing file is overwritten.
 
@@ -422,8 +446,8 @@ class Store:
         """
         def make(name: str) -> Raster:
             _core.write_raster(self._core, os.fsencode(name), value, cell, b'' if align is None else os.fsencode(align),
-                               as_region(region), crs_text(crs) or '', method, as_integer(level, 'level', bits=32),
-                               max_edge, replace, call_settings(progress, threads, memory))
+                               as_region(region), crs_text(crs) or '', method, *self._surface(level, focus), max_error, max_edge,
+                               replace, call_settings(progress, threads, memory))
             return read_raster(name)
 
         if path is not None:
@@ -432,14 +456,15 @@ class Store:
             return make(os.path.join(folder, 'raster.tif'))
 
     def profile(self, line: Array | GeoInterface | Mapping[str, Any], step: float | None = None, *,
-                method: Interpolation = 'linear', level: int = 0, max_edge: float | None = None, progress: Progress | None = None,
-                threads: int | None = None) -> Float64Array:
+                method: Interpolation = 'linear', level: int | None = None, focus: Focuses = (), max_error: float | None = None,
+                max_edge: float | None = None, progress: Progress | None = None, threads: int | None = None) -> Float64Array:
         """Returns the surface along a line.
 
         line: shape (n, 2), in the store's CRS; or a LineString as a GeoJSON dict or an object with
             ``__geo_interface__``, with the CRS rules of a region in points().
         step: in metres. By default the profile has the line's own vertices and every place where the linear surface
             bends.
+        level, focus, max_error, max_edge: as in heights().
 
         Returns: float64, shape (m, 4): metres from the start of the line (geodesic if the CRS is known), x, y, height
             (NaN where there is no surface).
@@ -449,15 +474,17 @@ class Store:
         if hasattr(line, '__geo_interface__') or isinstance(line, dict):
             arguments, crs = geojson(line)
             places = np.asarray([place[:2] for place in arguments['coordinates']])
-        return _core.profile(self._core, as_rows(places, 'line', (2,)), crs, step, method, as_integer(level, 'level', bits=32), max_edge,
-                             call_settings(progress, threads))
+        return _core.profile(self._core, as_rows(places, 'line', (2,)), crs, step, method, *self._surface(level, focus), max_error,
+                             max_edge, call_settings(progress, threads))
 
-    def contours(self, interval: float, *, level: int = 0, max_edge: float | None = None, region: Region | None = None,
-                 lonlat: bool | None = None, progress: Progress | None = None, threads: int | None = None,
+    def contours(self, interval: float, *, level: int | None = None, focus: Focuses = (), max_error: float | None = None,
+                 max_edge: float | None = None, region: Region | None = None, lonlat: bool | None = None,
+                 progress: Progress | None = None, threads: int | None = None,
                  memory: int | None = None) -> FeatureCollection:
         """Returns contour lines of the surface.
 
         interval: the height between contours, in the store's vertical unit.
+        level, focus, max_error, max_edge: as in heights().
         lonlat: True for longitude and latitude in WGS 84, as GeoJSON requires; False for the store's x and y. By
             default longitude and latitude if the CRS can be converted to them; otherwise x and y, which is logged.
 
@@ -465,8 +492,8 @@ class Store:
             property ``elev``. Higher ground is to the right of a line.
         Raises: Error if longitude and latitude are requested but not known.
         """
-        text, own = _core.contours(self._core, float(interval), as_integer(level, 'level', bits=32), max_edge, as_region(region),
-                                   None if lonlat is None else bool(lonlat), call_settings(progress, threads, memory))
+        text, own = _core.contours(self._core, float(interval), *self._surface(level, focus), max_error, max_edge,
+                                   as_region(region), None if lonlat is None else bool(lonlat), call_settings(progress, threads, memory))
         if own and lonlat is None:
             notes.info('contours are in the store\'s own x and y: its CRS cannot be converted to WGS 84')
         lines = FeatureCollection(json.loads(text))
@@ -529,14 +556,19 @@ class Store:
 
     @overload
     def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: Literal[False] = False,
+                smoothing: SurfaceSmoothing | Mapping[str, Any] | None = None,
+                max_error: float | None = None, max_points: int | None = None, stored: bool = True,
                 progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Mesh: ...
 
     @overload
     def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: Literal[True],
+                max_error: None = None, max_points: None = None, stored: bool = True,
                 progress: Progress | None = None, threads: int | None = None,
                 memory: int | None = None) -> tuple[Float64Array, UInt32Array]: ...
 
     def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: bool = False,
+                smoothing: SurfaceSmoothing | Mapping[str, Any] | None = None,
+                max_error: float | None = None, max_points: int | None = None, stored: bool = True,
                 progress: Progress | None = None, threads: int | None = None,
                 memory: int | None = None) -> Mesh | tuple[Float64Array, UInt32Array]:
         """Reconstructs the surface in space that a scan was taken from, through its points.
@@ -545,6 +577,14 @@ class Store:
 
         level, region, where: as in points().
         tetrahedra: whether to return the solid inside the closed surface instead.
+        smoothing: removes noise: a method of Mesh.smoothed(), or a dict of ``method``, ``iterations`` and ``limit``,
+            here in metres on the ground. Not with ``tetrahedra``.
+        max_error: simplifies the surface through all points (level 0) within this distance in metres, measured from
+            all vertices of the full surface and from about as many places on the triangles. Parts, holes and handles
+            stay.
+        max_points: instead of bounding the error, simplifies to at most this many vertices, as far as that is possible.
+        stored: whether a surface that build(surface=True) has stored is used, without ``region``, ``where`` and
+            ``tetrahedra``. Coarse levels of it do not tear; max_error and max_points leave more vertices than without.
 
         Returns: a Mesh with triangles counter-clockwise seen from outside; with ``tetrahedra`` (vertices, float64,
             shape (n, 3); tetrahedra, uint32, shape (m, 4)).
@@ -552,7 +592,10 @@ class Store:
         Source: J. Skala, section 8.3.
         """
         result = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
-                             call_settings(progress, threads, memory))
+                             _surface_smoothing(smoothing),
+                             None if max_error is None else float(max_error),
+                             None if max_points is None else as_integer(max_points, 'max_points'),
+                             bool(stored), call_settings(progress, threads, memory))
         return result if tetrahedra else Mesh._of(result)
 
     def bounded_mesh(self, max_error: float | None = None, *, max_points: int | None = None, quality: Quality = 'removal',

@@ -110,6 +110,11 @@ class View:
         focus: pairs of a box (four or six numbers in metres, minima first) and the level required in it.
         regions: pairs of a box and the largest error in it, in metres.
 
+        Errors of a raster's mesh are vertical. Once the view has settled, ``ground_error`` and ``regions`` hold at every
+        sample, for which all samples are read; ``pixel_error`` holds wherever the samples are read, and elsewhere the
+        ranges of heights of clusters are estimates. Errors of other views are distances of the points left out from
+        points that are shown.
+
         Returns: a ViewDelta.
         Raises: Error if a cluster is damaged.
         """

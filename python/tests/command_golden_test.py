@@ -97,7 +97,7 @@ class Golden(unittest.TestCase):
         self.hills.raster('slope', cell=40, path='slope.tif')
         self.check('terrace raster hills.terrace --value slope --cell 40 -o slope.tif')
         with open('contour.geojson', 'w', encoding='ascii') as file:
-            file.write(_core.contours(self.hills._core, 100, 0, None, None, None, call_settings())[0])
+            file.write(_core.contours(self.hills._core, 100, 0, [], None, None, None, None, call_settings())[0])
         self.check('terrace contour hills.terrace --interval 100 -o contour.geojson')
         coast = terrace.build('coast.tif', 'coast.terrace', block_points=500, vertical='ellipsoidal')
         coast.tiles('coast-tiles', (0, 11))

@@ -118,6 +118,64 @@ class Heights(StoreCase):
         with self.assertRaisesRegex(ValueError, 'max_edge'):
             self.raster.heights([[0, 0]], max_edge=3.0)
 
+    def test_a_focus_has_the_heights_of_its_level(self):
+        for store, middle in ((self.raster, (500700, 4999400)), (self.scan, (300500, 5200400))):
+            (x, y) = middle
+            box = (x - 200, y - 200, x + 200, y + 200)
+            inside = np.random.default_rng(2).random((500, 2)) * 240 + [x - 120, y - 120]
+            fine = store.heights(inside)
+            self.assertFalse(np.isnan(fine).all())
+            np.testing.assert_array_equal(store.heights(inside, focus=[(box, 0)]), fine)
+            np.testing.assert_array_equal(store.gradients(inside, level=store.top, focus=[(box, 0)]), store.gradients(inside))
+            self.assertFalse(np.array_equal(store.heights(inside, level=store.top), fine, equal_nan=True))
+            # The surface is the mesh.
+            mesh = store.mesh(level=store.top, focus=[(box, 0)])
+            np.testing.assert_allclose(store.heights(mesh.vertices[:, :2], focus=[(box, 0)]), mesh.vertices[:, 2], rtol=0, atol=1e-6)
+
+    def test_a_bound_holds_at_every_sample(self):
+        for store in self.raster, self.scan:
+            records = store.points()
+            points = np.column_stack([records[axis] for axis in 'xyz'])
+            exact = store.heights(points[:, :2])
+            few = store.heights(points[:, :2], max_error=3)
+            self.assertEqual(np.isnan(few).tolist(), np.isnan(exact).tolist())
+            self.assertLessEqual(np.nanmax(np.abs(few - exact)), 3 + 1e-6)
+            np.testing.assert_allclose(store.heights(points[:, :2], max_error=0), exact, rtol=0, atol=1e-6)
+            np.testing.assert_array_equal(store.heights(points[5:9, :2], max_error=3), few[5:9])
+            self.assertEqual(store.gradients(points[:9, :2], max_error=3).shape, (9, 2))
+        line = [[500040, 4999100], [501300, 4999900]]
+        for count in (lambda **options: len(self.raster.profile(line, **options)),
+                      lambda **options: sum(len(f['geometry']['coordinates']) for f in self.raster.contours(5, **options)['features'])):
+            self.assertLess(count(max_error=3), count())
+        difference = np.abs(self.raster.raster(max_error=3).values - self.raster.raster().values)
+        self.assertLessEqual(np.nanmax(difference), 3 + 1e-3)
+        for wrong in ({'level': 1}, {'max_edge': 9}, {'method': 'natural'}, {'max_error': -1}):
+            with self.assertRaises(ValueError):
+                self.raster.heights(points[:3, :2], **{'max_error': 3, **wrong})
+
+    def test_rasters_profiles_and_contours_take_a_focus(self):
+        box = (500500, 4999200, 500900, 4999600)
+        focus = [(box, 0)]
+        mixed, fine = self.raster.raster(focus=focus), self.raster.raster()
+        self.assertEqual(mixed.values.shape, fine.values.shape)
+        here = cell_centres(*fine.values.shape)
+        margin = 2.5 * TRANSFORM[0]
+        inside = np.all((here > np.array(box[:2]) + margin) & (here < np.array(box[2:]) - margin), axis=-1)
+        self.assertGreater(inside.sum(), 10)
+        np.testing.assert_array_equal(mixed.values[inside], fine.values[inside])
+        self.assertFalse(np.array_equal(mixed.values, fine.values))
+        line = [(500100, 4999000), (501300, 4999800)]
+        top = self.raster.top
+        rows = [len(self.raster.profile(line, **options)) for options in ({'level': top}, {'focus': focus}, {})]
+        self.assertTrue(rows[0] < rows[1] < rows[2], rows)
+        counts = [sum(len(f['geometry']['coordinates']) for f in self.raster.contours(10, **options)['features'])
+                  for options in ({'level': top}, {'focus': focus}, {})]
+        self.assertTrue(counts[0] < counts[1] < counts[2], counts)
+        for call in (lambda f: self.raster.heights([[0, 0]], focus=f), lambda f: self.raster.raster(focus=f),
+                     lambda f: self.raster.profile(line, focus=f), lambda f: self.raster.contours(10, focus=f)):
+            with self.assertRaisesRegex(ValueError, 'no level 99'):
+                call([(box, 99)])
+
 
 class Rasters(StoreCase):
     def test_raster_keeps_its_grid(self):

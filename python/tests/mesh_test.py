@@ -10,7 +10,7 @@ import terrace
 from python_case import StoreCase, hills, sorted_rows
 
 try:
-    from scipy.spatial import ConvexHull, Delaunay
+    from scipy.spatial import ConvexHull, Delaunay, cKDTree
 except ImportError:
     Delaunay = None
 
@@ -171,6 +171,49 @@ class Meshes(StoreCase):
         volumes = np.einsum('ij,ij->i', np.cross(b - a, c - a), d - a) / 6
         self.assertGreater(volumes.min(), 0)
         self.assertAlmostEqual(volumes.sum(), 4 / 3 * np.pi * 100 ** 3, delta=2e4)
+
+    @unittest.skipIf(Delaunay is None, 'SciPy is missing')
+    def test_a_simplified_surface_is_within_its_bound(self):
+        random = np.random.default_rng(5).normal(size=(4000, 3))
+        ball = 100 * random / np.linalg.norm(random, axis=1)[:, None]
+        store = terrace.build(ball, self.path('light'))
+        full, light = store.surface(), store.surface(max_error=3)
+        self.assertLess(len(light.vertices), 400)
+        a, b, c = (light.vertices[light.triangles[:, i]] for i in range(3))
+        weights = [(i / 20, j / 20) for i in range(21) for j in range(21 - i)]
+        places = np.concatenate([a + u * (b - a) + v * (c - a) for u, v in weights])
+        step = max(np.linalg.norm(b - a, axis=1).max(), np.linalg.norm(c - a, axis=1).max()) / 20
+        distances, _ = cKDTree(places).query(full.vertices)
+        self.assertLessEqual(distances.max(), 3 + step)
+        directed = {(int(t[i]), int(t[i - 1])) for t in light.triangles for i in range(3)}
+        self.assertEqual(len(directed), 3 * len(light.triangles))
+        self.assertTrue(all((q, p) in directed for p, q in directed))  # closed
+        self.assertEqual(len(store.surface(max_points=60).vertices), 60)
+        for wrong in ({'max_error': -1}, {'max_points': 3}, {'max_error': 1, 'max_points': 9}, {'max_error': float('nan')},
+                      {'max_error': 1, 'tetrahedra': True}, {'max_error': 1, 'level': 1}, {'max_points': 0}):
+            with self.assertRaises(ValueError):
+                store.surface(**wrong)
+
+    def test_a_stored_surface_is_cut(self):
+        random = np.random.default_rng(6).normal(size=(4000, 3))
+        ball = 100 * random / np.linalg.norm(random, axis=1)[:, None]
+        store = terrace.build(ball, self.path('kept'), surface=True, block_points=1000)
+        self.assertEqual({key: store.info['surface'][key] for key in ('vertices', 'triangles')},
+                         {'vertices': 4000, 'triangles': 7996})
+        full, restored = store.surface(), store.surface(stored=False)
+        self.assertAlmostEqual(full.measures()['volume'], restored.measures()['volume'], 3)
+        self.assertEqual({tuple(v) for v in full.vertices}, {tuple(v) for v in ball})
+        self.assertEqual(sorted(map(tuple, full.vertices[full.triangles].min(axis=1))),
+                         sorted(map(tuple, restored.vertices[restored.triangles].min(axis=1))))
+        vertices = 4000
+        for options in ({'max_error': 1}, {'max_points': 300}, {'level': 1}):
+            cut = store.surface(**options)
+            self.assertTrue(cut.measures()['closed'])
+            self.assertLess(len(cut.vertices), vertices)
+        self.assertLessEqual(len(store.surface(max_points=100).vertices), 100)
+        with self.assertRaises(ValueError):
+            terrace.build(ball, self.path('no'), surface=True, entities='triangles')
+        self.assertIsNone(terrace.build(ball, self.path('without')).info['surface'])
 
     def test_files(self):
         mesh = self.raster.bounded_mesh(4, path=self.path('hills.ply'))

@@ -131,6 +131,33 @@ class Views(StoreCase):
         now = view.snapshot().added_positions
         np.testing.assert_allclose(np.ptp(now, axis=0), np.ptp(self.points, axis=0), rtol=1e-3)
 
+    def test_raster_keeps_its_error_at_every_sample(self):
+        rows, columns = self.samples.shape
+        x, y = np.meshgrid(np.arange(columns) + 0.5, np.arange(rows) + 0.5)
+        a, b, c, d, e, f = TRANSFORM
+        places = np.column_stack([(a * x + b * y + c).ravel(), (d * x + e * y + f).ravel(), self.samples.ravel()])
+        before = self.samples.size
+        for error in (1.0, 5.0, 25.0):
+            view = terrace.View(self.raster, reader='frame')
+            now = self.settled(view, ground_error=error)
+            self.assertLess(len(now.added_vertices), before)
+            before = len(now.added_vertices)
+            ground = view.to_metres(places)
+            number = np.searchsorted(now.added_vertices, now.added_corners)
+            worst, found = 0.0, np.zeros(len(ground), bool)
+            for a, b, c in now.added_positions[number]:
+                low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+                near = np.flatnonzero(((ground[:, :2] >= low[:2] - 1e-6) & (ground[:, :2] <= high[:2] + 1e-6)).all(axis=1))
+                weights = np.linalg.solve(np.array([[a[0], b[0], c[0]], [a[1], b[1], c[1]], [1, 1, 1]]),
+                                          np.vstack([ground[near, :2].T, np.ones(len(near))]))
+                inside = (weights >= -1e-9).all(axis=0)
+                found[near[inside]] = True
+                heights = np.array([a[2], b[2], c[2]]) @ weights[:, inside]
+                worst = max(worst, np.abs(heights - ground[near[inside], 2]).max(initial=0.0))
+            self.assertLessEqual(worst, error + 1e-6)
+            self.assertGreater(worst, error / 4)
+            self.assertTrue(found.all())
+
     def test_matrix_cameras(self):
         # Orthographic from above, 4 km wide and high.
         matrix = np.diag([1 / 2000, 1 / 2000, -1 / 5000, 1.0])
