@@ -41,7 +41,6 @@ struct Module {
   viewer::SceneState state;
   std::vector<double> numbers;
   std::string text, lacking;  // lacking: bytes missing in the last frame
-  std::optional<viewer::SceneHit> hit;
   std::optional<terrain::StoreProbe> probe;
 };
 
@@ -159,6 +158,7 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
     std::memcpy(ground.data(), m.input.data(), sizeof ground);
     if (!m.store) m.store = stream::Store::open("store", m.given.open());
     m.probe.emplace(*m.store, ground);
+    m.scene.reset();  // first, because its memory serves the next one
     reserve_memory(kMemory + kPointMemory * static_cast<std::size_t>(max_points));
     m.scene =
         viewer::Scene::open(*m.store, ground, static_cast<std::size_t>(max_points),
@@ -183,7 +183,8 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
 }
 
 /// input: eye, direction, up; field of view in degrees, aspect, height in pixels; error in pixels;
-/// seconds to spend; the time; the minimum level everywhere, whatever the error (255: none).
+/// seconds to spend; the time; the minimum level everywhere, whatever the error (255: none), and
+/// that of a box; both corners of the box.
 /// numbers: points, triangles, expanded clusters, slots of vertices and of triangles, whether it is
 /// settled, the worst demand, clusters and bytes read, whether removed parts are still drawn,
 /// whether the same bytes are missing as after the last frame. text: the missing bytes.
@@ -198,6 +199,10 @@ TERRACE_EXPORT(frame) int terrace_frame() {
     if (in[15] < tri::Detail::kTop) {
       constexpr double kFar = 1e30;
       view.focuses = {{{{-kFar, -kFar, -kFar}, {kFar, kFar, kFar}}, static_cast<unsigned>(in[15])}};
+    }
+    if (in[16] < tri::Detail::kTop) {
+      view.focuses.push_back(
+          {{point_of(in + 17), point_of(in + 20)}, static_cast<unsigned>(in[16])});
     }
     if (free_memory() < kLeastMemory) reserve_memory(8 * kLeastMemory);
     const viewer::SceneState s = m.scene->frame(view, in[13], in[14]);
@@ -255,28 +260,30 @@ TERRACE_EXPORT(hash) int terrace_hash() {
 }
 
 /// input: origin, direction, angle. numbers: 1 for a hit or 0; stored place; place in the view
-/// frame; level; level and ordinal of the cluster; reach; the number of known attributes, and their
-/// values.
+/// frame; level; level and ordinal of the cluster; reach; level and ordinal of the cluster to
+/// expand (255: none); the number of known attributes, and their values.
 TERRACE_EXPORT(pick) int terrace_pick() {
   return guarded([&] {
     Module& m = module();
     const double* in = m.input.data();
-    m.hit = m.scene->pick(point_of(in), point_of(in + 3), in[6]);
+    const auto hit = m.scene->pick(point_of(in), point_of(in + 3), in[6]);
     m.numbers = {0};
-    if (m.hit) {
+    if (hit) {
       m.numbers = {1,
-                   m.hit->stored[0],
-                   m.hit->stored[1],
-                   m.hit->stored[2],
-                   m.hit->place[0],
-                   m.hit->place[1],
-                   m.hit->place[2],
-                   static_cast<double>(m.hit->level),
-                   static_cast<double>(tri::level_of(m.hit->cluster)),
-                   static_cast<double>(tri::ordinal_of(m.hit->cluster)),
-                   m.hit->corner_distance,
-                   static_cast<double>(m.hit->attributes.size())};
-      m.numbers.insert(m.numbers.end(), m.hit->attributes.begin(), m.hit->attributes.end());
+                   hit->stored[0],
+                   hit->stored[1],
+                   hit->stored[2],
+                   hit->place[0],
+                   hit->place[1],
+                   hit->place[2],
+                   static_cast<double>(hit->level),
+                   static_cast<double>(tri::level_of(hit->cluster)),
+                   static_cast<double>(tri::ordinal_of(hit->cluster)),
+                   hit->corner_distance,
+                   hit->expandable ? static_cast<double>(tri::level_of(*hit->expandable)) : 255.0,
+                   hit->expandable ? static_cast<double>(tri::ordinal_of(*hit->expandable)) : 0.0,
+                   static_cast<double>(hit->attributes.size())};
+      m.numbers.insert(m.numbers.end(), hit->attributes.begin(), hit->attributes.end());
     }
     return kDone;
   });
@@ -342,14 +349,16 @@ TERRACE_EXPORT(outline) int terrace_outline(unsigned level, double ordinal) {
   });
 }
 
-/// Pins the cluster picked last: 1 expands it, 0 collapses it, -1 releases every pin.
-TERRACE_EXPORT(pin) int terrace_pin(int pin) {
+/// Takes level and ordinal of a cluster. 1 keeps it expanded, 0 keeps it collapsed, -1 releases
+/// every pinned cluster.
+TERRACE_EXPORT(pin) int terrace_pin(unsigned level, double ordinal, int pin) {
   return guarded([&] {
     Module& m = module();
     if (pin < 0) {
       m.scene->release();
-    } else if (m.hit) {
-      m.scene->pin(*m.hit, pin > 0 ? tri::ViewPin::expanded : tri::ViewPin::collapsed);
+    } else {
+      m.scene->pin(tri::cluster_id(level, static_cast<std::uint64_t>(ordinal)),
+                   pin > 0 ? tri::ViewPin::expanded : tri::ViewPin::collapsed);
     }
     return kDone;
   });

@@ -41,7 +41,7 @@ class SceneOf final : public Scene {
  public:
   using View = terrain::StoreView<Shown>;
   using Triangulation = terrain::ViewTriangulation<Shown>;
-  static constexpr bool kRaster = std::is_integral_v<Shown>;
+  static constexpr bool kRaster = std::is_same_v<Shown, tri::ThinnedDelaunay2>;
   static constexpr bool kTriangles = !std::is_same_v<Shown, tri::PointCloud>;
   using Vertex = std::conditional_t<kRaster, SceneVertex,
                                     std::conditional_t<kTriangles, SceneBodyPoint, ScenePoint>>;
@@ -86,9 +86,9 @@ class SceneOf final : public Scene {
     removed_points_ += static_cast<double>(step.delta->changes.removed_vertices.size());
     apply_seconds_ += now() - begin;
     const terrain::ViewTraffic traffic = view_.traffic();
-    SceneState state{.points = view_.model().point_count(),
+    SceneState state{.points = view_.points(),
                      .expanded = view_.model().expanded_count(),
-                     .vertex_slots = kSpareVertices + mesh().vertex_slots(),
+                     .vertex_slots = kSpareVertices + vertex_slots(),
                      .settled = view_.settled(),
                      .waiting = !transitions_.empty() || unsure_ > 0,
                      .worst = step.worst,
@@ -121,20 +121,10 @@ class SceneOf final : public Scene {
                                              double angle) const override;
   [[nodiscard]] std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const override;
-  void pin(const SceneHit& hit, tri::ViewPin pin) override {
-    std::vector<tri::ClusterId> clusters;
-    if (pin == tri::ViewPin::collapsed) {
-      if (tri::level_of(hit.cluster) < view_.model().top()) clusters = {hit.cluster};
-    } else if (mesh().alive(picked_)) {
-      view_.model().heads(picked_, clusters);
-      // The coarsest cluster that the point heads and that is not expanded.
-      std::erase_if(clusters, [&](tri::ClusterId id) { return !view_.model().can_expand(id); });
-      if (clusters.size() > 1) clusters.resize(1);
-    }
-    for (const tri::ClusterId id : clusters) {
-      view_.pin(id, pin);
-      pinned_.push_back(id);
-    }
+  void pin(tri::ClusterId cluster, tri::ViewPin pin) override {
+    if (pin == tri::ViewPin::collapsed && tri::level_of(cluster) >= view_.model().top()) return;
+    view_.pin(cluster, pin);
+    pinned_.push_back(cluster);
   }
   void release() override {
     for (const tri::ClusterId id : pinned_) view_.unpin(id);
@@ -170,22 +160,32 @@ class SceneOf final : public Scene {
     point_cost_[1] = std::max(0.0, point_cost_[1] + step * removed_points_);
   }
   [[nodiscard]] const auto& mesh() const { return view_.model().triangulation(); }
-  [[nodiscard]] static std::uint32_t draw_slot(tri::VertexId v) { return kSpareVertices + slot(v); }
+  [[nodiscard]] std::uint32_t vertex_slots() const {
+    if constexpr (kRaster) return mesh().dense_slots();
+    return mesh().vertex_slots();
+  }
+  /// A removed vertex has a slot until others are placed.
+  [[nodiscard]] std::uint32_t draw_slot(tri::VertexId v) const {
+    if constexpr (kRaster) return drawn_at_[slot(v)];
+    return kSpareVertices + slot(v);
+  }
   [[nodiscard]] static std::uint32_t draw_slot(tri::TriangleId t) {
     return kSpareTriangles + slot(t);
   }
-  [[nodiscard]] static SceneTriangle draw_slot(const std::array<tri::VertexId, 3>& corners) {
+  [[nodiscard]] SceneTriangle draw_slot(const std::array<tri::VertexId, 3>& corners) const {
     return {draw_slot(corners[0]), draw_slot(corners[1]), draw_slot(corners[2])};
   }
   void grow() {
-    vertices_.grow(kSpareVertices + mesh().vertex_slots());
+    vertices_.grow(kSpareVertices + vertex_slots());
     is_queued_.resize(mesh().vertex_slots());
+    if constexpr (kRaster) drawn_at_.resize(mesh().vertex_slots());
     if constexpr (kTriangles) triangles_.grow(kSpareTriangles + mesh().triangle_slots());
     if constexpr (kRaster) spans_gap_.resize(has_gaps_ ? mesh().triangle_slots() : 0);
     if constexpr (kTriangles && !kRaster) normals_.grow(mesh().vertex_slots());
   }
   /// Places a vertex without sliding.
   void place(tri::VertexId vertex) {
+    if constexpr (kRaster) drawn_at_[slot(vertex)] = kSpareVertices + mesh().dense_slot(vertex);
     const Point3 p = difference(view_.in_view_frame(vertex), base_);
     Vertex& v = vertices_.change(draw_slot(vertex));
     v.x = static_cast<float>(p[0]);
@@ -216,20 +216,9 @@ class SceneOf final : public Scene {
     stale_normals_.push_back(vertex);
   }
   void update_normals();
-  template <class Visit>
-  void for_triangles_around(tri::VertexId vertex, const Visit& visit) const {
-    // Go counter-clockwise, and from the hull the other way as well.
-    const tri::TriangleId first = mesh().triangle_at(vertex);
-    for (const std::size_t turn : {std::size_t{1}, std::size_t{2}}) {
-      for (tri::TriangleId at = first; at != tri::kNoTriangle;) {
-        if (turn == 1 || at != first) visit(at);
-        const auto corners = mesh().vertices(at);
-        const std::size_t i = corners[0] == vertex ? 0 : corners[1] == vertex ? 1 : 2;
-        at = mesh().neighbours(at)[(i + turn) % 3];
-        if (at == first) return;
-      }
-    }
-  }
+  /// SceneHit::expandable of a vertex that is a member of `cluster`.
+  [[nodiscard]] std::optional<tri::ClusterId> cluster_to_expand(tri::VertexId vertex,
+                                                                tri::ClusterId cluster) const;
   /// Returns where the page draws a vertex at a time.
   [[nodiscard]] static Point3 position_at(const Vertex& v, double time) {
     const double t = std::clamp((time - v.start_time) / kSlide, 0.0, 1.0);
@@ -305,15 +294,16 @@ class SceneOf final : public Scene {
   std::vector<Vertex> changed_vertices_;
   Blocks<SceneTriangle> triangles_;
   SceneChanges changes_;
-  std::vector<bool> is_queued_;  // in stale_normals_, by slot
+  std::vector<std::uint32_t> drawn_at_;  // of a raster's vertices, by slot; see draw_slot()
+  std::vector<bool> is_queued_;          // in stale_normals_, by slot
   std::vector<tri::VertexId> stale_normals_, ring_;
+  std::vector<tri::TriangleId> around_;
   std::vector<tri::ClusterId> pinned_;
   bool has_gaps_ = view_.has_gaps();
   std::vector<bool> spans_gap_;  ///< whether a triangle spans a gap, by slot
   std::size_t gaps_ = 0;         ///< number of triangles that span one
   /// Triangle slots to check from next_unsure_ on; see update_gaps().
   std::uint32_t unsure_ = 0, next_unsure_ = 0;
-  mutable tri::VertexId picked_ = tri::kNoVertex;
   /// Seconds that the changes of an added, or removed, point cost after a step.
   std::array<double, 2> point_cost_{};
   double apply_seconds_ = 0, added_points_ = 0,
@@ -326,7 +316,8 @@ class SceneOf final : public Scene {
   /// A connected part of the last step.
   struct Part {
     std::uint32_t vertices = 0, triangles = 0;  ///< removed ones
-    bool delayed = true;
+    std::uint32_t added = 0;                    ///< vertices
+    bool delayed = false;
     std::uint32_t group = 0;
   };
   std::vector<Part> parts_;
@@ -364,9 +355,9 @@ void SceneOf<Shown>::update_gaps(double until) {
   }
 }
 
-/// Delays the removal of the connected parts of a step that only remove vertices (collapses). If a
-/// part changes hidden triangles, it joins the group that hides them. If the part is not delayed,
-/// that group ends.
+/// Delays the removal of the connected parts of a step that only remove vertices (collapses) or,
+/// for a raster, remove more than they add. If a part changes hidden triangles, it joins the group
+/// that hides them. If the part is not delayed, that group ends.
 template <class Shown>
 template <class Delta>
 void SceneOf<Shown>::delay_removals(const Delta& delta, double time) {
@@ -376,11 +367,13 @@ void SceneOf<Shown>::delay_removals(const Delta& delta, double time) {
   parts_.assign(numbers.count, {});
   for (const std::uint32_t p : numbers.removed) ++parts_[p].vertices;
   for (const std::uint32_t p : numbers.removed_triangles) ++parts_[p].triangles;
-  for (const std::uint32_t p : numbers.added) parts_[p].delayed = false;
+  for (const std::uint32_t p : numbers.added) ++parts_[p].added;
   std::size_t vertices = transitions_.vertex_room(), triangles = transitions_.triangle_room();
   for (Part& part : parts_) {
-    part.delayed = part.delayed && part.vertices > 0 && part.vertices <= vertices &&
-                   part.triangles <= triangles;
+    // A window of a raster becomes coarser by many vertices that go and a few that come.
+    const bool shrinks = kRaster ? part.vertices > part.added : part.added == 0;
+    part.delayed =
+        shrinks && part.vertices > 0 && part.vertices <= vertices && part.triangles <= triangles;
     if (!part.delayed) continue;
     vertices -= part.vertices;
     triangles -= part.triangles;
@@ -528,15 +521,16 @@ void SceneOf<Shown>::update_normals() {
       is_queued_[slot(vertex)] = false;
       if (!mesh().alive(vertex)) continue;
       Point3 sum{};
-      for_triangles_around(vertex, [&](tri::TriangleId triangle) {
-        if (is_gap(triangle)) return;
+      mesh().triangles_around(vertex, around_);
+      for (const tri::TriangleId triangle : around_) {
+        if (is_gap(triangle)) continue;
         const auto c = mesh().vertices(triangle);
         const Point3 a = position(c[0]);
         const Point3 normal = cross(difference(position(c[1]), a), difference(position(c[2]), a));
         // Rows grow downward, so the same triangle has the opposite orientation in the view frame.
         const double sign = normal[2] < 0 ? -1 : 1;
         for (std::size_t k = 0; k < 3; ++k) sum[k] += sign * normal[k];
-      });
+      }
       const double length = std::sqrt(dot(sum, sum));
       SceneVertex& v = vertices_.change(draw_slot(vertex));
       for (std::size_t k = 0; k < 3; ++k) {
@@ -556,12 +550,14 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
   double best = std::numeric_limits<double>::infinity();
   std::optional<SceneHit> hit;
   const auto hit_at = [&](tri::VertexId vertex, const Point3& stored, const Point3& place) {
-    picked_ = vertex;
     const tri::PointId id = view_.model().point_id(vertex);
     hit = {.stored = stored,
            .place = place,
            .level = tri::level_of(id.cluster),
-           .cluster = id.cluster};
+           .cluster = id.cluster,
+           .expandable = cluster_to_expand(vertex, id.cluster)};
+    // The page reads those of rasters from the store.
+    if constexpr (kRaster) return;
     const stream::StoreSchema& schema = store_.schema();
     const auto record = view_.attributes(vertex);
     for (std::size_t i = 0; i < schema.attributes.size() && !record.empty(); ++i) {
@@ -630,6 +626,22 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
 }
 
 template <class Shown>
+std::optional<tri::ClusterId> SceneOf<Shown>::cluster_to_expand(tri::VertexId vertex,
+                                                                tri::ClusterId cluster) const {
+  std::vector<tri::ClusterId> heads;
+  view_.model().heads(vertex, heads);
+  for (const tri::ClusterId id : heads) {
+    if (view_.model().can_expand(id)) return id;
+  }
+  // All samples around it are known, of which a raster shows only some.
+  if (!kRaster) return {};
+  const tri::ClusterId finest = heads.empty() ? cluster : heads.back();
+  const bool shows_some = tri::level_of(finest) == 0 && view_.model().top() > 0;
+  if (!shows_some || !view_.model().is_expanded(finest)) return {};
+  return finest;
+}
+
+template <class Shown>
 std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId cluster) const {
   std::vector<std::array<std::uint32_t, 2>> lines;
   const auto& model = view_.model();
@@ -647,7 +659,8 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
     is_inside[draw_slot(vertex)] =
         std::binary_search(inside.begin(), inside.end(), model.point_id(vertex).cluster);
   }
-  is_inside[draw_slot(model.head_vertex(cluster))] = true;
+  const tri::VertexId head = model.head_vertex(cluster);
+  if (mesh().alive(head)) is_inside[draw_slot(head)] = true;
   if constexpr (!kTriangles) {
     for (std::uint32_t i = 0; i < is_inside.size(); ++i) {
       if (is_inside[i]) lines.push_back({i, i});
@@ -657,7 +670,9 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
     std::vector<std::array<std::uint32_t, 2>> edges;
     for (const tri::TriangleId triangle : mesh().all_triangles()) {
       const SceneTriangle c = draw_slot(mesh().vertices(triangle));
-      if (!is_inside[c[0]] || !is_inside[c[1]] || !is_inside[c[2]]) continue;
+      // Few samples of a raster's cluster are vertices, so triangles that reach into it count.
+      const int corners = is_inside[c[0]] + is_inside[c[1]] + is_inside[c[2]];
+      if (corners < (kRaster ? 1 : 3) || is_gap(triangle)) continue;
       for (std::size_t i = 0; i < 3; ++i) edges.push_back({c[i], c[(i + 1) % 3]});
     }
     std::sort(edges.begin(), edges.end());
@@ -686,7 +701,7 @@ std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::Lin
 #else
   if (store.schema().grid) {
     options.model.old_heights = true;  // for the slides
-    return std::make_unique<SceneOf<std::int32_t>>(store, ground, options, has_bytes);
+    return std::make_unique<SceneOf<tri::ThinnedDelaunay2>>(store, ground, options, has_bytes);
   }
   return std::make_unique<SceneOf<tri::PointCloud>>(store, ground, options, has_bytes);
 #endif

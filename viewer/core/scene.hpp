@@ -64,7 +64,8 @@ struct SceneChanges {
 };
 
 struct SceneState {
-  std::size_t points = 0, triangles = 0, expanded = 0;
+  std::size_t points = 0;  ///< drawn; a raster may know more samples
+  std::size_t triangles = 0, expanded = 0;
   std::size_t vertex_slots = 0, triangle_slots = 0;
   bool settled = false;
   bool waiting = false;  ///< removed parts are still drawn until a later frame
@@ -77,14 +78,21 @@ struct SceneHit {
   stream::Point3 place{};    ///< the same in the view frame
   unsigned level = 0;        ///< level of the nearest corner
   tri::ClusterId cluster{};  ///< the cluster that has that corner as a member
+  /// The cluster to expand here: the coarsest collapsed one that the corner heads. If all samples
+  /// around a raster's corner are known, its cluster of level 0, of which all samples will be
+  /// shown.
+  std::optional<tri::ClusterId> expandable{};
   double corner_distance =
       0;  ///< on a surface: upper bound of the metres to that corner; for points 0
-  std::vector<double> attributes{};  ///< stored values of that corner; empty if no longer kept
+  /// Stored values of that corner. Empty for rasters, and if the corner's cluster is no longer in
+  /// memory.
+  std::vector<double> attributes{};
 };
 
-/// A store under a camera as arrays to draw: triangles for rasters, points for other stores. In the
-/// module for bodies (TERRACE_VIEWER_BODY) it is the surface that the points were scanned from.
-/// Bytes of the store may be missing.
+/// A store under a camera as arrays to draw: triangles for rasters, with the few vertices that the
+/// error needs (tri::ThinnedDelaunay2), points for other stores. In the module for bodies
+/// (TERRACE_VIEWER_BODY) it is the surface that the points were scanned from. Bytes of the store
+/// may be missing.
 class Scene {
  public:
   /// Opens a store; `has_bytes` is as in terrain::StoreView. Throws stream::MissingBytes,
@@ -112,13 +120,14 @@ class Scene {
   [[nodiscard]] virtual std::optional<SceneHit> pick(const stream::Point3& origin,
                                                      const stream::Point3& direction,
                                                      double angle) const = 0;
-  /// Expands the clusters headed by the vertex nearest to a hit, one level down, or collapses the
-  /// cluster that it is a member of. They stay so until release().
-  virtual void pin(const SceneHit& hit, tri::ViewPin pin) = 0;
+  /// Keeps a cluster expanded or collapsed until release(), or until it is pinned the other way.
+  /// The cluster of the coarsest level stays expanded.
+  virtual void pin(tri::ClusterId cluster, tri::ViewPin pin) = 0;
   virtual void release() = 0;
   /// Returns the lines, as slots of their ends, around the triangles whose corners all belong to a
-  /// cluster, that is, to its head or below it. For points, returns the points themselves, each as
-  /// both ends. Empty for clusters that are not expanded. O(drawn vertices and triangles).
+  /// cluster, that is, to its head or below it; for rasters, at least one corner. For points,
+  /// returns the points themselves, each as both ends. Empty for clusters that are not expanded.
+  /// O(drawn vertices and triangles).
   [[nodiscard]] virtual std::vector<std::array<std::uint32_t, 2>> outline(
       tri::ClusterId cluster) const = 0;
   /// Returns the attributes that can colour points; none for rasters.

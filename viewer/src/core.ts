@@ -39,6 +39,12 @@ export interface Camera {
   height: number;  ///< pixels
   error: number;   ///< pixels
   level?: number;  ///< minimum detail everywhere, whatever the error
+  region?: {level: number, box: number[]};  ///< minimum detail in a box of the view frame
+}
+
+export interface Cluster {
+  level: number;
+  ordinal: number;
 }
 
 /// The first part of the picture on a ray.
@@ -49,6 +55,7 @@ export interface Hit {
   clusterLevel: number;
   clusterOrdinal: number;
   reach: number;         ///< metres to the nearest corner; 0 for a point itself
+  expandable: Cluster|null;  ///< the cluster to expand here
   attributes: number[];  ///< stored values, in the manifest's order; empty if unknown
 }
 
@@ -117,7 +124,7 @@ interface Exports {
   probe(): number;
   profile(): number;
   outline(level: number, ordinal: number): number;
-  pin(pin: number): number;
+  pin(level: number, ordinal: number, pin: number): number;
 }
 
 export class Core {
@@ -178,7 +185,7 @@ export class Core {
   frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[]} {
     this.writeNumbers([
       ...camera.eye, ...camera.direction, ...camera.up, camera.fov, camera.aspect, camera.height, camera.error, seconds,
-      time, camera.level ?? 255
+      time, camera.level ?? 255, camera.region?.level ?? 255, ...(camera.region?.box ?? [])
     ]);
     this.check(this.wasm.frame());
     const n = this.numbers(11);
@@ -237,7 +244,7 @@ export class Core {
     this.writeNumbers([...origin, ...direction, angle]);
     this.check(this.wasm.pick());
     if (this.numbers(1)[0] === 0) return null;
-    const n = this.numbers(12);
+    const n = this.numbers(14);
     return {
       stored: n.slice(1, 4),
       place: n.slice(4, 7),
@@ -245,7 +252,8 @@ export class Core {
       clusterLevel: n[8],
       clusterOrdinal: n[9],
       reach: n[10],
-      attributes: this.numbers(12 + n[11]).slice(12)
+      expandable: n[11] === 255 ? null : {level: n[11], ordinal: n[12]},
+      attributes: this.numbers(14 + n[13]).slice(14)
     };
   }
   /// Not available in the module for surfaces, nor is profile().
@@ -269,9 +277,9 @@ export class Core {
     this.check(this.wasm.outline(level, ordinal));
     return Uint32Array.from(this.numbers(1 + 2 * this.numbers(1)[0]).slice(1));
   }
-  /// Pins the last pick: 1 expands, 0 collapses, -1 releases all pins.
-  pin(pin: number): void {
-    this.check(this.wasm.pin(pin));
+  /// 1 keeps a cluster expanded, 0 keeps it collapsed, -1 releases all pinned clusters.
+  pin({level, ordinal}: Cluster, pin: number): void {
+    this.check(this.wasm.pin(level, ordinal, pin));
   }
 
   private buffer(bytes: number): ArrayBuffer {

@@ -13,12 +13,13 @@ export const GREYS: Stop[] = [[0, 28, 30, 34], [1, 245, 245, 240]];
 /// Surfaces without other colours, as in `terrace render`.
 export const PLAIN: Stop[] = [[0, 205, 205, 200], [1, 205, 205, 200]];
 /// Returns the colour of a class, the customary one for the standard classes of ASPRS LAS 1.4.
-export function classColour(group: number): number[] {
-  return ramps.classes[group] ?? ramps.categories[group % ramps.categories.length];
+export function classColour(classCode: number): number[] {
+  return ramps.classes[classCode] ?? ramps.categories[classCode % ramps.categories.length];
 }
 export const LIGHT = ramps.light;
 
-/// Returns the tint of heights as shares from low to high, with a shore at 0 if there is both land and sea.
+/// Returns the colours of heights, at positions from 0 (`low`) to 1 (`high`). If the sea is deeper than 5 % of the highest
+/// land, its colours end at height 0.
 export function heightStops(low: number, high: number): Stop[] {
   if (!(low < 0 && high > 0 && -low > 0.05 * high)) return ramps.land;
   const shore = -low / (high - low);
@@ -28,7 +29,8 @@ export function heightStops(low: number, high: number): Stop[] {
   ];
 }
 
-/// Returns `count` colours from the first stop to the last, as RGBA bytes.
+/// Returns `count` colours from the first stop to the last, as RGBA bytes. `count` must be at least 2. The first stop must be
+/// at 0.
 export function texels(stops: Stop[], count: number): Uint8Array {
   const result = new Uint8Array(4 * count), last = stops[stops.length - 1][0];
   for (let i = 0; i < count; ++i) {
@@ -41,7 +43,7 @@ export function texels(stops: Stop[], count: number): Uint8Array {
   return result;
 }
 
-/// Returns the same gradient for a style sheet.
+/// Returns the stops as a CSS linear gradient. The first stop must be at 0.
 export function gradient(stops: Stop[]): string {
   const last = stops[stops.length - 1][0];
   return `linear-gradient(90deg,${stops.map(([place, ...rgb]) => `rgb(${rgb.join(' ')}) ${(100 * place / last).toFixed(1)}%`).join(',')})`;

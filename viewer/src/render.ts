@@ -2,7 +2,8 @@
 /// Draws the scene with WebGL 2 from buffers indexed by the core's slots.
 
 import {BLOCK, type Changes, type Kind, type State, VERTEX_BYTES} from './core';
-import {add, dot, type OrbitCamera, unit, type Vec3} from './camera';
+import {add, dot, FOV, type OrbitCamera, unit, type Vec3} from './camera';
+import {DepthShading, link} from './depth_shading';
 import {classColour, GREYS, heightStops, LEVELS, LIGHT, PLAIN, SLOPE, type Stop, texels} from './ramps';
 
 export const COLOURS = ['height', 'slope', 'level', 'rgb', 'class', 'intensity', 'grey'] as const;
@@ -12,11 +13,22 @@ export interface Look {
   colour: Colour;
   wire: boolean;
   dark: boolean;
-  pointSize: number;
+  pointSize: number;         ///< in CSS pixels
+  fillGaps: boolean;         ///< enlarge points that are far from each other in the picture
+  depthShading: boolean;     ///< darken points next to nearer ones
+  hidden: Set<number>;       ///< classes
+  light: [number, number];   ///< on rasters: degrees clockwise from north, FOLLOW: from the upper left of the picture; elevation
+  exaggeration: number;      ///< of the heights of the scene
+  adaptiveSpacing: number;   ///< metres between points at full resolution
 }
 
-/// Colour of the lines around the cluster of a place.
+/// The light that turns with the viewer.
+export const FOLLOW = -1;
+
+/// Colour of the lines around the cluster of a place, and of measured lines.
 const OUTLINE = [214, 40, 110];
+/// Largest points that fill gaps, in CSS pixels.
+const LARGEST_POINT = 16;
 
 const SLIDE_SECONDS = 0.45;
 
@@ -33,6 +45,9 @@ layout(location = 7) in float exponent;
 uniform mat4 matrix;
 uniform int slides;  // 0 not, 1 up and down, 2 in space
 uniform float time, pointSize;
+uniform vec2 spacing;      // of points: pixels at a distance of 1, and the largest size
+uniform uint hidden[8];    // classes, a bit for each
+uniform vec2 nudge;        // in the picture
 out vec3 at;
 out vec3 up;
 out float levelOf;
@@ -48,8 +63,11 @@ void main() {
   own = rgb;
   attributesOf = attributes;
   levelOf = level * 255.0;
-  gl_Position = levelOf > 254.0 ? vec4(2.0, 2.0, 2.0, 1.0) : matrix * vec4(at, 1.0);
-  gl_PointSize = pointSize;
+  uint group = uint(attributes.x * 255.0 + 0.5);
+  bool shown = levelOf < 254.5 && (hidden[group >> 5] >> (group & 31u) & 1u) == 0u;
+  gl_Position = shown ? matrix * vec4(at, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+  gl_Position.xy += nudge * gl_Position.w;
+  gl_PointSize = max(pointSize, min(spacing.x / gl_Position.w, spacing.y));
 }`;
 
 const FRAGMENT = `#version 300 es
@@ -71,15 +89,18 @@ uniform vec3 sun;
 uniform vec3 sky;
 uniform vec3 eye;
 uniform float haze;
+uniform float exaggeration;
+uniform bool rounded;  // points
 out vec4 colour;
 void main() {
+  if (rounded && distance(gl_PointCoord, vec2(0.5)) > 0.5) discard;
   if (mode == -1) {
     colour = wire;
     return;
   }
   vec3 n = lit > 0 ? normalize(up) : vec3(0.0, 0.0, 1.0);
   float share = mode == 0 ? (dot(at, axis) - heights.x) / max(heights.y - heights.x, 1e-30)
-      : mode == 1 ? degrees(acos(clamp(n.z, 0.0, 1.0))) / 60.0
+      : mode == 1 ? degrees(atan(length(n.xy), exaggeration * n.z)) / 60.0  // without the exaggeration
       : abs(mode) == 2 ? 1.0 - levelOf / max(top, 1.0)
       : mode == 4 ? (floor(attributesOf.x * 255.0 + 0.5) + 0.5) / 256.0
       : attributesOf.y;
@@ -146,6 +167,8 @@ export class Renderer {
   private rim!: WebGLBuffer;
   private rims!: WebGLVertexArrayObject;
   private rimCount = 0;
+  private readonly depthShading: DepthShading;
+  private paths: Array<{buffer: WebGLBuffer, array: WebGLVertexArrayObject, count: number}> = [];
   private linesStale = true;
   private state: State|null = null;
   private box = [0, 0, 0, 1, 1, 1];
@@ -158,17 +181,7 @@ export class Renderer {
     const gl = canvas.getContext('webgl2', {antialias: true, alpha: false, preserveDrawingBuffer: true});
     if (!gl) throw new Error('This browser has no WebGL 2, which the viewer needs.');
     this.gl = gl;
-    this.program = gl.createProgram()!;
-    for (const [type, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]] as const) {
-      const shader = gl.createShader(type)!;
-      gl.shaderSource(shader, text);
-      gl.compileShader(shader);
-      gl.attachShader(this.program, shader);
-    }
-    gl.linkProgram(this.program);
-    if (!gl.getProgramParameter(this.program, gl.LINK_STATUS)) {
-      throw new Error(`The graphics driver rejects the shaders: ${gl.getProgramInfoLog(this.program)}`);
-    }
+    this.program = link(gl, VERTEX, FRAGMENT);
     this.ramps = {
       height: gl.createTexture()!,
       slope: this.ramp(SLOPE),
@@ -179,6 +192,7 @@ export class Renderer {
       grey: this.ramp(PLAIN)
     };
     gl.enable(gl.DEPTH_TEST);
+    this.depthShading = new DepthShading(gl);
     this.clear();
   }
 
@@ -195,6 +209,7 @@ export class Renderer {
     this.rimCount = 0;
     this.linesStale = true;
     this.state = null;
+    this.setPaths([]);
   }
   show(box: number[], top: number, kind: Kind, scan: boolean): void {
     this.box = box;
@@ -226,6 +241,32 @@ export class Renderer {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, this.rim);
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, lines, gl.DYNAMIC_DRAW);
   }
+  /// Sets the measured lines, as places of the view frame.
+  setPaths(paths: number[][][]): void {
+    const gl = this.gl;
+    for (const {buffer, array} of this.paths) {
+      gl.deleteBuffer(buffer);
+      gl.deleteVertexArray(array);
+    }
+    const middle = this.middleHeight;
+    this.paths = paths.map(path => {
+      const buffer = gl.createBuffer()!, array = gl.createVertexArray()!;
+      gl.bindVertexArray(array);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(path.flatMap(([x, y, z]) => [x, y, z - middle])), gl.STATIC_DRAW);
+      gl.vertexAttribPointer(0, 3, gl.FLOAT, false, 0, 0);
+      gl.enableVertexAttribArray(0);
+      gl.bindVertexArray(null);
+      return {buffer, array, count: path.length};
+    });
+  }
+  get drawnPaths(): number[] {
+    return this.paths.map(path => path.count);
+  }
+  /// Heights of vertices are relative to the middle of the box.
+  private get middleHeight(): number {
+    return (this.box[2] + this.box[5]) / 2;
+  }
   /// Returns whether any vertices are still sliding.
   sliding(time: number): boolean {
     return time < this.slidingUntil;
@@ -243,13 +284,14 @@ export class Renderer {
   draw(camera: OrbitCamera, look: Look, time: number): void {
     const gl = this.gl;
     const sky = look.dark ? [0.075, 0.09, 0.115] : [0.86, 0.90, 0.94];
+    const shaded = look.depthShading && this.kind === 'points' && this.state !== null;
+    if (shaded) this.depthShading.begin(this.canvas.width, this.canvas.height);
     gl.viewport(0, 0, this.canvas.width, this.canvas.height);
     gl.clearColor(sky[0], sky[1], sky[2], 1);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     if (!this.state) return;
     const aspect = this.canvas.width / this.canvas.height;
-    // Heights are relative to the middle of the box, like those of the vertices.
-    const middleHeight = (this.box[2] + this.box[5]) / 2;
+    const middleHeight = this.middleHeight;
     const eye = add(camera.eye, [0, 0, middleHeight], -1), box = this.box.map((c, i) => i % 3 === 2 ? c - middleHeight : c);
     const extent = Math.hypot(box[3] - box[0], box[4] - box[1], box[5] - box[2]) || 1;
     let farthest = 0;
@@ -264,6 +306,14 @@ export class Renderer {
     gl.uniform1f(this.uniform('time'), time);
     const pointSize = look.pointSize * this.canvas.width / this.canvas.clientWidth;
     gl.uniform1f(this.uniform('pointSize'), pointSize);
+    const dense = look.fillGaps && this.kind === 'points' ? look.adaptiveSpacing * this.canvas.height / 2 / Math.tan(FOV / 2 * Math.PI / 180) : 0;
+    gl.uniform2f(this.uniform('spacing'), dense, LARGEST_POINT * this.canvas.width / this.canvas.clientWidth);
+    gl.uniform1i(this.uniform('rounded'), dense > 0 ? 1 : 0);
+    const hidden = new Uint32Array(8);
+    if (this.kind === 'points') for (const group of look.hidden) hidden[group >> 5] |= 1 << (group & 31);
+    gl.uniform1uiv(this.uniform('hidden'), hidden);
+    gl.uniform2f(this.uniform('nudge'), 0, 0);
+    gl.uniform1f(this.uniform('exaggeration'), look.exaggeration);
     const yUp = camera.body && camera.yUp;
     gl.uniform3f(this.uniform('axis'), 0, yUp ? 1 : 0, yUp ? 0 : 1);
     // A flat scene has the middle colour; differences from rounding are ignored.
@@ -272,8 +322,9 @@ export class Renderer {
     gl.uniform2f(this.uniform('heights'), middle - reach, middle + reach);
     gl.uniform1f(this.uniform('top'), this.top);
     gl.uniform1i(this.uniform('lit'), {points: 0, raster: 1, surface: 2}[this.kind]);
-    // Cartographic light from the upper left that turns with the viewer; for a body, from next to the eye.
-    const turn = (camera.azimuth + LIGHT.turn) * Math.PI / 180, elevation = LIGHT.elevation * Math.PI / 180;
+    // Cartographic light from the upper left that turns with the viewer, or a direction; for a body, from next to the eye.
+    const turn = (look.light[0] === FOLLOW ? camera.azimuth + LIGHT.turn : look.light[0]) * Math.PI / 180;
+    const elevation = look.light[1] * Math.PI / 180;
     const toward = add([0, 0, 0], camera.direction, -1), surface = this.kind === 'surface';
     const sun: Vec3 = surface ? unit(add(add(toward, camera.up, 0.45), camera.right, -0.45)) :
                                 [Math.sin(turn) * Math.cos(elevation), Math.cos(turn) * Math.cos(elevation), Math.sin(elevation)];
@@ -291,12 +342,15 @@ export class Renderer {
       gl.uniform1i(this.uniform('lit'), 0);
       gl.bindVertexArray(this.surface);
       gl.drawArrays(gl.POINTS, 0, this.state.vertexSlots);
-      if (this.rimCount === 0) return;
       gl.uniform1i(this.uniform('mode'), -1);
-      gl.uniform1f(this.uniform('pointSize'), pointSize + 2);
-      gl.depthFunc(gl.LEQUAL);
-      this.drawRim(gl.POINTS);
-      gl.depthFunc(gl.LESS);
+      if (this.rimCount > 0) {
+        gl.uniform1f(this.uniform('pointSize'), pointSize + 2);
+        gl.depthFunc(gl.LEQUAL);
+        this.drawRim(gl.POINTS);
+        gl.depthFunc(gl.LESS);
+      }
+      if (shaded) this.depthShading.end(near, far);
+      this.drawPaths();
       return;
     }
     gl.enable(gl.POLYGON_OFFSET_FILL);
@@ -322,6 +376,35 @@ export class Renderer {
     }
     gl.uniform1i(this.uniform('mode'), -1);
     if (this.rimCount > 0) this.drawRim(gl.LINES);
+    this.drawPaths();
+  }
+  /// Draws the measured lines three pixels wide, faintly where something is in front of them.
+  private drawPaths(): void {
+    if (this.paths.length === 0) return;
+    const gl = this.gl, ratio = this.canvas.width / this.canvas.clientWidth;
+    gl.useProgram(this.program);
+    gl.uniform1i(this.uniform('rounded'), 0);
+    gl.uniform1i(this.uniform('slides'), 0);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
+    gl.depthMask(false);
+    for (const infront of [false, true]) {
+      gl.uniform4f(this.uniform('wire'), OUTLINE[0] / 255, OUTLINE[1] / 255, OUTLINE[2] / 255, infront ? 1 : 0.12);
+      // The drawn surface is coarser than the store, so the lines are a bit above or below it.
+      gl.depthRange(0, infront ? 0.9999 : 1);
+      if (!infront) gl.disable(gl.DEPTH_TEST);
+      for (const [x, y] of [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]]) {
+        gl.uniform2f(this.uniform('nudge'), 2 * x * ratio / this.canvas.width, 2 * y * ratio / this.canvas.height);
+        for (const {array, count} of this.paths) {
+          gl.bindVertexArray(array);
+          gl.drawArrays(gl.LINE_STRIP, 0, count);
+        }
+      }
+      gl.enable(gl.DEPTH_TEST);
+    }
+    gl.depthRange(0, 1);
+    gl.depthMask(true);
+    gl.disable(gl.BLEND);
   }
 
   private drawRim(what: number): void {

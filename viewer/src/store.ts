@@ -22,6 +22,7 @@ export interface Manifest {
   kind: 'grid'|'cloud';
   points: number;
   checksum: string;
+  bounds: {min: number[], max: number[]};  ///< stored coordinates
   world: number[];
   coordinates: Channel[];
   attributes: Channel[];
@@ -76,16 +77,51 @@ export function worldPoint(manifest: Manifest, stored: number[]): number[] {
   ];
 }
 
+/// Converts a horizontal position in the CRS to stored coordinates.
+export function storedPoint(manifest: Manifest, [x, y]: number[]): [number, number] {
+  const [a, b, c, d, e, f] = manifest.world, det = a * e - b * d;
+  return [((x - c) * e - (y - f) * b) / det, ((y - f) * a - (x - c) * d) / det];
+}
+
+const RADIUS = 6378137, SQUARE = 0.00669437999014;  // WGS 84: equatorial radius in metres, squared eccentricity
+const DEGREE = Math.PI / 180;
+
+/// Returns whether positions are longitudes and latitudes in degrees.
+export function inDegrees({crs}: Manifest): boolean {
+  return crs.geographic && crs.horizontal_unit === 'degree';
+}
+/// Returns metres on the WGS 84 ellipsoid per degree of longitude and of latitude.
+export function metresPerDegree(latitude: number): [number, number] {
+  const w = Math.sqrt(1 - SQUARE * Math.sin(latitude * DEGREE) ** 2);
+  return [RADIUS / w * Math.cos(latitude * DEGREE) * DEGREE, RADIUS * (1 - SQUARE) / w ** 3 * DEGREE];
+}
 /// Returns the length in metres, on the WGS 84 ellipsoid, of the line between two places of the CRS that is straight in
 /// longitude and latitude; null if coordinates are not degrees.
 export function lengthOnEarth(manifest: Manifest, from: number[], to: number[]): number|null {
-  if (!manifest.crs.geographic || manifest.crs.horizontal_unit !== 'degree') return null;
-  const PIECES = 256, RADIUS = 6378137, SQUARE = 0.00669437999014;  // squared eccentricity
-  const degree = Math.PI / 180, east = (to[0] - from[0]) * degree / PIECES, north = (to[1] - from[1]) * degree / PIECES;
+  if (!inDegrees(manifest)) return null;
+  const PIECES = 256, east = (to[0] - from[0]) / PIECES, north = (to[1] - from[1]) / PIECES;
   let metres = 0;
   for (let i = 0; i < PIECES; ++i) {
-    const latitude = from[1] * degree + (i + 0.5) * north, w = Math.sqrt(1 - SQUARE * Math.sin(latitude) ** 2);
-    metres += Math.hypot(RADIUS * (1 - SQUARE) / w ** 3 * north, RADIUS / w * Math.cos(latitude) * east);
+    const [x, y] = metresPerDegree(from[1] + (i + 0.5) * north);
+    metres += Math.hypot(y * north, x * east);
   }
   return metres;
+}
+/// Returns the area in square metres, on the WGS 84 ellipsoid, of a polygon whose edges are straight in longitude and latitude.
+export function areaOnEarth(polygon: number[][]): number {
+  const PIECES = 256, e = Math.sqrt(SQUARE);
+  // The area between the equator and a latitude, per radian of longitude.
+  const zone = (latitude: number) => {
+    const s = Math.sin(latitude * DEGREE);
+    return RADIUS ** 2 * (1 - SQUARE) / 2 * (s / (1 - SQUARE * s * s) + Math.atanh(e * s) / e);
+  };
+  // Differences from the first corner's zone keep digits of small polygons.
+  const base = zone(polygon[0][1]);
+  let area = 0;
+  polygon.forEach((from, i) => {
+    const to = polygon[(i + 1) % polygon.length];
+    const east = (to[0] - from[0]) * DEGREE / PIECES, north = (to[1] - from[1]) / PIECES;
+    for (let piece = 0.5; piece < PIECES; ++piece) area += (zone(from[1] + piece * north) - base) * east;
+  });
+  return Math.abs(area);
 }

@@ -11,6 +11,8 @@ import {type Listed, type Manifest, parseManifest, parseStart} from './store';
 const FRAME = 10, IN_HAND = 3;
 /// Work and memory of a point on a surface in space, relative to other points.
 const SURFACE_COST = 4;
+/// The same for a vertex of a raster, whose model knows samples that are not drawn.
+const RASTER_COST = 2;
 /// Maximum number of a scan's bytes kept for the other module.
 const MOST_GIVEN = 64 << 20;
 /// Milliseconds without changes after which the surface is recomputed from scratch.
@@ -34,7 +36,9 @@ class Session {
   private points!: Core;                ///< shows rasters and points
   private surface: Core|null = null;    ///< shows the surface of a scan
   private scan = false;
+  private terrain = false;              ///< known not to be a scan
   private asPoints: boolean;
+  private exaggeration: number;
   private restored = false;             ///< the surface was just recomputed
   private followed = false;             ///< the surface has changed since it was last recomputed
   private restTimer: ReturnType<typeof setTimeout>|undefined;
@@ -63,6 +67,7 @@ class Session {
 
   constructor(private readonly request: ToWorker&{type: 'open'}) {
     this.asPoints = request.asPoints;
+    this.exaggeration = request.exaggeration;
     this.turns.port1.onmessage = () => {
       this.scheduled = false;
       this.step();
@@ -164,8 +169,8 @@ class Session {
   outline(request: ToWorker&{type: 'outline'}): void {
     if (this.opened) post({type: 'outlined', lines: this.core.outline(request.level, request.ordinal)});
   }
-  pin(pin: number): void {
-    if (this.opened) this.core.pin(pin);
+  pin({cluster, pin}: ToWorker&{type: 'pin'}): void {
+    if (this.opened) this.core.pin(cluster, pin);
     this.wake();
   }
   /// Shows a scan as a surface or as points.
@@ -173,6 +178,13 @@ class Session {
     if (asPoints === this.asPoints || !this.scan) return;
     this.asPoints = asPoints;
     if (this.opened) await this.change();
+  }
+  exaggerate(exaggeration: number): void {
+    if (exaggeration === this.exaggeration) return;
+    this.exaggeration = exaggeration;
+    if (!this.terrain) return;  // not open yet, or a scan
+    this.opened = false;
+    this.wake();
   }
   hash(id: number): void {
     if (this.opened && this.showsSurface) {
@@ -266,14 +278,21 @@ class Session {
     this.core.give(file, offset, data);
   }
   private tryToOpen(): void {
-    const maxPoints = Math.round(this.request.maxPoints / (this.showsSurface ? SURFACE_COST : 1));
-    const result = this.core.open(this.ground, maxPoints);
+    const cost = this.showsSurface ? SURFACE_COST : this.manifest.kind === 'grid' ? RASTER_COST : 1;
+    const maxPoints = Math.round(this.request.maxPoints / cost);
+    // Heights do not decide any more whether it is a scan.
+    const exaggeration = this.terrain ? this.exaggeration : 1, ground = this.ground.map((n, i) => i < 6 ? n : n * exaggeration);
+    const result = this.core.open(ground, maxPoints);
     if ('missing' in result) {
       post({type: 'progress', bytes: this.ranges.stats.bytes});
       this.ranges.want(result.missing, 0, performance.now());
       return;
     }
-    this.scan ||= result.scan;
+    if (!this.terrain) this.scan ||= result.scan;
+    if (!this.scan && !this.terrain) {
+      this.terrain = true;
+      if (this.exaggeration !== 1) return this.tryToOpen();
+    }
     if (this.scan && this.showsSurface === this.asPoints) {
       void this.change();
       return;
@@ -283,8 +302,7 @@ class Session {
     if (result.colours.classes.length > 0) this.classKind = result.kind;
     for (const group of result.colours.classes) this.classes.add(group);
     result.colours.classes = this.listed();
-    const heightUnit = this.ground[8] / this.manifest.coordinates[2].scale || 1;
-    post({type: 'opened', manifest: this.manifest, scene: {...result, scan: this.scan}, heightUnit});
+    post({type: 'opened', manifest: this.manifest, scene: {...result, scan: this.scan}, ground, exaggeration});
     this.schedule();
   }
   private listed(): number[] {
@@ -369,7 +387,7 @@ class Session {
             bytes: this.ranges.stats.bytes + this.probing.stats.bytes
           },
           milliseconds,
-          loading: !state.settled,
+          loading: !state.settled || (this.showsSurface && this.followed),
           time: begin / 1000
         },
         [changes.buffer]);
@@ -405,10 +423,13 @@ self.onmessage = event => {
       session?.outline(message);
       break;
     case 'pin':
-      session?.pin(message.pin);
+      session?.pin(message);
       break;
     case 'show':
       void session?.show(message.asPoints);
+      break;
+    case 'exaggerate':
+      session?.exaggerate(message.exaggeration);
       break;
     case 'hash':
       session?.hash(message.id);
