@@ -101,8 +101,12 @@ class ClusteringOptionsTest(unittest.TestCase):
         together, _ = mixed(self.build('together.st', '--channel', 'kind:0', *options)[1])
         self.assertGreater(together, clusters // 4)
         self.expect_error('kind', 'build', self.file, '-o', self.path('no.st'), '--channel', 'colour:1')
-        for bad in ('kind', ':1', 'kind:-1', 'kind:nan', 'kind:'):
+        for bad in ('kind', ':1', 'kind:'):
             self.expect_error('--channel', 'build', self.file, '-o', self.path('no.st'), '--channel', bad)
+        for weight, reason in (('-1', '--channel kind:-1: the weight must not be negative'),
+                               ('inf', "'inf' is not a number in the weight of --channel kind:inf"),
+                               ('nan', "'nan' is not a number in the weight of --channel kind:nan")):
+            self.expect_error(reason, 'build', self.file, '-o', self.path('no.st'), '--channel', 'kind:' + weight)
 
     def test_a_channel_with_nan_is_an_error(self):
         holes = self.path('holes.csv')

@@ -27,7 +27,7 @@ def terrace(*args):
 
 
 class Glb:
-    """The single mesh of a file, read by the specification of glTF 2.0, with the node's transformation applied."""
+    """The single mesh of a file, read by the specification of glTF 2.0, with the node's translation applied."""
 
     def __init__(self, path):
         with open(path, 'rb') as file:
@@ -58,8 +58,8 @@ class Glb:
         origin, metres = self.extras['origin'], self.extras['metres_per_unit']
         return [(origin[0] + x / metres[0], origin[1] - z / metres[1], y / metres[2]) for x, y, z in self.scene]
 
-    def to_scene(self, place):
-        """East, north and up of coordinates in the CRS, the inverse."""
+    def to_enu(self, place):
+        """Returns east, north and up of a place given in the CRS."""
         origin, metres = self.extras['origin'], self.extras['metres_per_unit']
         return tuple((p - o) * m for p, o, m in zip(place, origin, metres))
 
@@ -206,7 +206,7 @@ class MetresTest(unittest.TestCase):
         for bound in 0.02, 4, 60:
             summary, _, path = self.mesh(store, 'dem.glb', '--max-error', bound)
             glb = Glb(path)
-            largest, uncovered = measure(glb.vertices, glb.faces, [glb.to_scene(s) for s in samples])
+            largest, uncovered = measure(glb.vertices, glb.faces, [glb.to_enu(s) for s in samples])
             self.assertLessEqual(largest, bound * (1 + 1e-6))
             self.assertLessEqual(largest, summary['max_error'] + 1e-3)
             self.assertLess(len(uncovered), 300)  # at the border, by rounding
@@ -281,7 +281,7 @@ class MetresTest(unittest.TestCase):
             samples = [tuple(map(float, line.split())) for line in file]
         summary, _, path = self.mesh(cloud, 'cloud.glb', '--max-error', 20)
         glb = Glb(path)
-        largest, _ = measure(glb.vertices, glb.faces, [glb.to_scene(s) for s in samples])
+        largest, _ = measure(glb.vertices, glb.faces, [glb.to_enu(s) for s in samples])
         self.assertLessEqual(largest, 20.0001)
         self.assertAlmostEqual(largest, summary['max_error'], delta=1e-3)
         # With another CRS they are meshed in that CRS.
@@ -338,7 +338,7 @@ class MetresTest(unittest.TestCase):
     def test_a_bound_in_another_crs(self):
         def void(x, y):
             return math.hypot(x - 60, y - 30) < 12 or (x * 7 + y * 13) % 97 == 0
-        # Half a degree from east to west, where lines of samples are curved.
+        # Rasters 0.13 and 2.6 degrees wide. In the wide one, rows of samples are curved in UTM.
         for cell in 0.001, 0.02:
             for holes in False, True:
                 store, samples = self.raster(GEOGRAPHIC, (8, 60), cell, 130, 120, void if holes else lambda x, y: False,
@@ -355,13 +355,14 @@ class MetresTest(unittest.TestCase):
                         if how[0] == '--max-error':
                             self.assertLessEqual(largest, how[1] + 1e-3)
                         self.assertLessEqual(largest, summary['max_error'] + 1e-3)
-                        # Only at the border, where mesh edges are straight.
+                        # Only samples at the border are not covered, because mesh edges are straight.
                         edge = {i for i, (x, y, _) in enumerate(samples)
                                 if not (8 + cell < x < 8 + 129 * cell and 60 - 119 * cell < y < 60 - cell)}
-                        off = {i for i, place in enumerate(there) if place in set(uncovered)} if uncovered else set()
+                        missed_places = set(uncovered)
+                        missed = {i for i, place in enumerate(there) if place in missed_places}
                         if not holes:
-                            self.assertLessEqual(off, edge)
-                        # All triangles face up, and none covers the lake.
+                            self.assertLessEqual(missed, edge)
+                        # All triangles face up. With holes, none covers the middle of the lake.
                         middle = (*utm_32(8 + 60.5 * cell, 60 - 30.5 * cell), 0)
                         for face in faces:
                             a, b, c = (vertices[i] for i in face)

@@ -511,5 +511,188 @@ class ProfileTest(QueryTest):
         self.expect_error(2, 'profile', self.store, '--line', '1,2,3,4', '--step', 0, '-o', out)
 
 
+class FocusTest(QueryTest):
+    """Mixed levels are the mesh of mixed levels, level 0 inside the focus and level `top` far from it."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        middle = [0.5 * (low + high) for low, high in zip(cls.low, cls.high)]
+        cls.box = [middle[0] - 1500, middle[1] - 1200, middle[0] + 1500, middle[1] + 1200]
+        cls.mixed = '--level', 'top', '--focus', ','.join(map(str, cls.box)) + ':0'
+
+    def is_inside(self, x, y, margin):
+        return (self.box[0] + margin < x < self.box[2] - margin and
+                self.box[1] + margin < y < self.box[3] - margin)
+
+    def test_heights_are_those_of_a_level_inside_and_far_outside(self):
+        places = self.somewhere(5, 3000)
+        text = 'x,y\n' + ''.join(f'{x!r},{y!r}\n' for x, y in places)
+        mixed = self.answers(text, *self.mixed)[1:]
+        fine, coarse = self.answers(text)[1:], self.answers(text, '--level', 'top')[1:]
+        inside = outside = 0
+        for (x, y), got, exact, rough in zip(places, mixed, fine, coarse):
+            if self.is_inside(x, y, 2 * CELL):
+                self.assertEqual(got, exact)
+                inside += 1
+            elif not self.is_inside(x, y, -2000):
+                outside += got == rough
+        self.assertGreater(inside, 100)
+        self.assertGreater(outside, 100)
+        self.assertNotEqual(mixed, coarse)
+
+    def test_heights_are_those_of_the_mesh(self):
+        mesh = self.path('mixed.ply')
+        self.run_ok('mesh', self.store, *self.mixed, '--format', 'ply-ascii', '-o', mesh)
+        with open(mesh, encoding='utf-8') as file:
+            header, body = file.read().split('end_header\n')
+        count = int(re.search(r'element vertex (\d+)', header).group(1))
+        vertices = [line.split()[:3] for line in body.splitlines()[:count]]
+        text = 'x,y\n' + ''.join(f'{x},{y}\n' for x, y, _ in vertices)
+        for (_, _, z), answer in zip(vertices, self.answers(text, *self.mixed)[1:]):
+            self.assertAlmostEqual(float(answer[2]), float(z), places=3)
+
+    @needs('gdal_translate')
+    def test_rasters_have_the_cells_of_level_0_inside(self):
+        fine, mixed = self.path('fine.tif'), self.path('mixed.tif')
+        self.run_ok('raster', self.store, '-o', fine)
+        self.run_ok('raster', self.store, *self.mixed, '-o', mixed)
+        inside = other = 0
+        for i, (got, exact) in enumerate(zip(self.samples(mixed), self.samples(fine))):
+            x = self.low[0] + i % SIZE * CELL
+            y = self.high[1] - i // SIZE * CELL
+            if self.is_inside(x, y, 2 * CELL):
+                self.assertEqual(got, exact)
+                inside += 1
+            else:
+                other += got != exact
+        self.assertGreater(inside, 1000)
+        self.assertGreater(other, 1000)
+
+    def test_contours_and_profiles_have_more_points_in_the_focus(self):
+        ends = [self.low[0] + 10, self.low[1] + 20, self.high[0] - 30, self.high[1] - 10]
+        for name, verb in ('lines.geojson', ('contour', '--interval', 20)), \
+                          ('way.csv', ('profile', '--line', ','.join(map(str, ends)))):
+            out = self.path(name)
+            points = [json.loads(self.run_ok(verb[0], self.store, *verb[1:], *options, '--json', '--force',
+                                             '-o', out))['points']
+                      for options in (('--level', 'top'), self.mixed, ())]
+            self.assertLess(points[0], points[1])
+            self.assertLess(points[1], points[2])
+
+    def test_summaries_name_the_levels(self):
+        top = len(json.loads(self.run_ok('info', self.store, '--json'))['levels']) - 1
+        out = self.path('summary.tif')
+        verb = 'raster', self.store, '--cell', 300, '--force', '-o', out
+        self.assertIn(f'level {top}, with focuses of level 0\n', terrace(*verb, *self.mixed).stderr)
+        self.assertNotIn('focuses', terrace(*verb).stderr)
+        for options, expected in ((), [0, []]), (('--level', 1), [1, []]), (self.mixed, [top, [0]]), \
+                                 (self.mixed[2:], [top, [0]]):
+            summary = json.loads(self.run_ok(*verb, *options, '--json'))
+            self.assertEqual([summary['level'], summary['focus_levels']], expected)
+
+    def test_focuses_are_read_as_by_mesh(self):
+        x, y = self.low[0] + 500, self.low[1] + 500
+        line = f'{x},{y},{x + 900},{y + 800}'
+        verbs = [('sample', self.store, '--points', '-', '--focus'),
+                 ('raster', self.store, '--cell', 100, '-o', self.path('x.tif'), '--force', '--focus'),
+                 ('contour', self.store, '--interval', 20, '-o', self.path('x.geojson'), '--force', '--focus'),
+                 ('profile', self.store, '--line', line, '-o', self.path('x.csv'), '--force', '--focus')]
+        mesh = 'mesh', self.store, '-o', self.path('x.ply'), '--force', '--focus'
+        for wrong in '1,2,3,4', '1,2,3:0', '3,2,1,4:0', f'{line}:99', f'{line}:x', 'none.geojson:0':
+            expected = terrace(*mesh, wrong)
+            self.assertNotEqual(expected.returncode, 0)
+            for verb in verbs:
+                result = terrace(*verb, wrong, text='1,2\n')
+                self.assertEqual((result.returncode, result.stderr.replace(f'terrace {verb[0]}', 'terrace mesh')),
+                                 (expected.returncode, expected.stderr))
+        for verb in verbs:
+            result = terrace(*verb, '0,0,1,1:0', text=f'{x},{y}\n')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertIn('--focus is outside the store and adds no points', result.stderr)
+
+    def test_focuses_are_in_the_reference_system_of_the_places(self):
+        [(x, y)] = self.somewhere(8, 1)
+        [[_, _, *expected]] = self.answers(f'{x},{y}\n')
+        lonlat = self.run_ok('sample', self.store, '--to-crs', 'EPSG:4326', text=f'{x},{y}\n').split(',')[:2]
+        box = ','.join(str(float(c) + d) for d in (-0.01, 0.01) for c in lonlat)
+        got = self.run_ok('sample', self.store, '--points-crs', 'EPSG:4326', '--level', 'top', '--focus',
+                          box + ':0', text=','.join(lonlat) + '\n').strip().split(',')
+        self.assertAlmostEqual(float(got[2]), float(expected[0]), places=3)
+
+
+class BoundTest(QueryTest):
+    """A surface of few triangles is within --max-error of every sample."""
+
+    @needs('gdal_translate')
+    def test_rasters_are_within_the_bound(self):
+        fine, few, steep = self.path('fine.tif'), self.path('few.tif'), self.path('steep.tif')
+        self.run_ok('raster', self.store, '-o', fine)
+        text = terrace('raster', self.store, '--max-error', 5, '-o', few).stderr
+        self.assertIn('within 5 m of every sample\n', text)
+        errors = [abs(a - b) for a, b in zip(self.samples(few), self.samples(fine))]
+        self.assertLessEqual(max(errors), 5.001)
+        self.assertGreater(max(errors), 3)
+        self.assertGreater(errors.count(0.0), 100)
+        # A part of the raster has the same cells.
+        box = [self.low[0] + 40 * CELL, self.low[1] + 50 * CELL, self.low[0] + 90 * CELL, self.low[1] + 80 * CELL]
+        self.run_ok('raster', self.store, '--max-error', 5, '--region', ','.join(map(str, box)), '-o', steep)
+        part, whole = list(self.samples(steep)), list(self.samples(few))
+        self.assertEqual(len(part), 51 * 31)
+        for row in range(31):
+            begin = (SIZE - 1 - 80 + row) * SIZE + 40
+            self.assertEqual(part[row * 51:row * 51 + 51], whole[begin:begin + 51])
+
+    def test_samples_have_the_heights_and_slopes_of_the_triangles(self):
+        places = self.somewhere(6, 500)
+        text = 'x,y\n' + ''.join(f'{x!r},{y!r}\n' for x, y in places)
+        exact, few = self.answers(text)[1:], self.answers(text, '--max-error', 5)[1:]
+        self.assertLess(len({row[3] for row in few}), len({row[3] for row in exact}))
+        self.assertNotEqual(exact, few)
+        # Alone, places have the same answers.
+        for i in (3, 77, 401):
+            x, y = places[i]
+            alone = self.run_ok('sample', self.store, '--max-error', 5, text=f'{x!r},{y!r}\n')
+            self.assertEqual(alone.strip().split(','), few[i])
+        [x, y], samples = self.low[:2], []
+        for i in range(0, 40, 3):
+            samples.append(f'{x + i * CELL!r},{y + (60 - i) * CELL!r}\n')
+        for a, b in zip(self.answers(''.join(samples)), self.answers(''.join(samples), '--max-error', 5)):
+            self.assertLessEqual(abs(float(a[2]) - float(b[2])), 5.001)
+
+    def test_contours_and_profiles_have_few_points(self):
+        ends = [self.low[0] + 10, self.low[1] + 20, self.high[0] - 30, self.high[1] - 10]
+        for name, verb in ('few.geojson', ('contour', '--interval', 20)), \
+                          ('few.csv', ('profile', '--line', ','.join(map(str, ends)))):
+            out = self.path(name)
+            summaries = [json.loads(self.run_ok(verb[0], self.store, *verb[1:], *options, '--json', '--force', '-o', out))
+                         for options in ((), ('--max-error', 5), ('--max-error', 30))]
+            points = [summary['points'] for summary in summaries]
+            self.assertGreater(points[0], points[1])
+            self.assertGreater(points[1], points[2])
+            self.assertEqual([summary.get('max_error') for summary in summaries], [None, 5, 30])
+        self.run_ok('contour', self.store, '--interval', 20, '--max-error', 5, '--own-crs', '-o', self.path('own.geojson'))
+        self.run_ok('profile', self.store, '--line', ','.join(map(str, ends)), '--max-error', 5, '-o', self.path('own.csv'))
+        with open(self.path('own.csv'), encoding='utf-8') as file:
+            rows = list(csv.DictReader(file))
+        got = self.answers('x,y\n' + ''.join(f"{row['x']},{row['y']}\n" for row in rows[1:-1]), '--max-error', 5)[1:]
+        for row, answer in zip(rows[1:-1], got):
+            self.assertAlmostEqual(float(row['height']), float(answer[2]), delta=0.01)
+        with open(self.path('own.geojson'), encoding='utf-8') as file:
+            lines = json.load(file)['features']
+        for line in lines[:50]:
+            [[x, y], *_] = line['geometry']['coordinates'][1:]
+            [[_, _, height, *_]] = self.answers(f'{x},{y}\n', '--max-error', 5)
+            self.assertAlmostEqual(float(height), line['properties']['elev'], delta=0.01)
+
+    def test_the_bound_excludes_other_surfaces(self):
+        out = self.path('none.tif')
+        for wrong in ('--level', 1), ('--focus', '0,0,1,1:0'), ('--max-edge', 9), ('--method', 'natural'), ('--method', 'nearest'):
+            error = self.expect_error(2, 'raster', self.store, '--max-error', 5, *wrong, '-o', out)
+            self.assertIn('--max-error', error)
+        self.expect_error(2, 'raster', self.store, '--max-error', -1, '-o', out)
+        self.assertFalse(os.path.exists(out))
+
+
 if __name__ == '__main__':
     unittest.main()

@@ -9,6 +9,7 @@ import collections
 import json
 import math
 import os
+import random
 import struct
 import subprocess
 import tempfile
@@ -68,6 +69,88 @@ class SurfaceTest(unittest.TestCase):
                     faces.append([int(word.split('/')[0]) - 1 for word in words[1:4]])
         return vertices, faces
 
+    def noisy_ball(self):
+        """A store of the ball with noise of up to 0.3 along its radii."""
+        store = self.path('noisy.terrace')
+        if not os.path.exists(store):
+            random_numbers = random.Random(1)
+            with open(self.path('noisy.xyz'), 'w') as file:
+                for place in sphere(3000):
+                    factor = 1 + 0.03 * random_numbers.uniform(-1, 1)
+                    file.write('{} {} {}\n'.format(*(factor * x for x in place)))
+            self.assertEqual(terrace('build', self.path('noisy.xyz'), '-o', store).returncode, 0)
+        return store
+
+    def test_smoothing_removes_noise_within_the_limit(self):
+        def surface(name, *options):
+            result = terrace('surface', self.noisy_ball(), '-o', self.path(name), '--json', '--force', *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            return json.loads(result.stdout), *self.read_obj(self.path(name))
+
+        summary, rough, faces = surface('rough.obj')
+        self.assertNotIn('moves', summary)
+
+        def error(vertices):
+            return sum(abs(math.hypot(*v) - RADIUS) for v in vertices) / len(vertices)
+
+        for options in (['taubin'], ['bilateral'], ['taubin:3', '--smooth-limit', 0.1], ['bilateral:2', '--smooth-limit', 0.05]):
+            summary, smooth, same_faces = surface('smooth.obj', '--smooth', *options)
+            self.assertEqual(same_faces, faces)
+            moved = [math.dist(a, b) for a, b in zip(rough, smooth)]
+            moves = summary['moves']
+            self.assertAlmostEqual(moves['largest'], max(moved), places=9)
+            self.assertAlmostEqual(moves['mean'], sum(moved) / len(moved), places=9)
+            self.assertLessEqual(max(moved), moves['limit'])
+            self.assertTrue(summary['closed'])
+            if '--smooth-limit' in options:
+                self.assertEqual(moves['limit'], options[2])
+                self.assertEqual(moves['limited'], sum(m > options[2] - 1e-9 for m in moved))
+                self.assertGreater(moves['limited'], 0)
+            else:
+                self.assertLess(error(smooth), 0.6 * error(rough))
+                self.assertAlmostEqual(summary['volume'], 4 / 3 * math.pi * RADIUS ** 3, delta=50)
+            # Threads do not change a byte.
+            surface('one.obj', '--smooth', *options, '--threads', 1)
+            with open(self.path('one.obj')) as one, open(self.path('smooth.obj')) as other:
+                self.assertEqual(one.read(), other.read())
+        result = terrace('surface', self.noisy_ball(), '-o', self.path('smooth.ply'), '--smooth', 'taubin', '--smooth-limit', 0.1)
+        self.assertRegex(result.stderr, r'smoothed: vertices moved by 0\.\d+ m, at most 0\.1 m; [\d,]+ stopped at the limit of 0\.1 m')
+
+    def test_normals_are_written_in_every_format(self):
+        plain, _ = self.surface('plain.obj')
+        summary, out = self.surface('normals.obj', '--normals')
+        self.assertEqual(summary['vertices'], plain['vertices'])
+        vertices, faces = self.read_obj(out)
+        self.assertEqual((vertices, faces), self.read_obj(self.path('plain.obj')))
+        with open(out) as file:
+            normals = [tuple(map(float, line.split()[1:])) for line in file if line.startswith('vn ')]
+        self.assertEqual(len(normals), len(vertices))
+
+        def check(normals):
+            for n, p in zip(normals, vertices):
+                self.assertAlmostEqual(math.hypot(*n), 1, places=6)
+                self.assertGreater(sum(x * y for x, y in zip(n, p)) / math.hypot(*p), 0.99)
+
+        check(normals)
+        _, out = self.surface('normals.ply', '--normals', '--format', 'ply-ascii')
+        with open(out) as file:
+            head, body = file.read().split('end_header\n')
+        self.assertIn('property float level\nproperty float nx\nproperty float ny\nproperty float nz\n', head)
+        rows = [line.split() for line in body.splitlines()[:len(vertices)]]
+        self.assertEqual([tuple(map(float, row[4:])) for row in rows], normals)
+        _, out = self.surface('normals.glb', '--normals')
+        with open(out, 'rb') as file:
+            data = file.read()
+        size = struct.unpack_from('<I', data, 12)[0]
+        scene = json.loads(data[20:20 + size])
+        accessor = scene['accessors'][scene['meshes'][0]['primitives'][0]['attributes']['NORMAL']]
+        self.assertEqual((accessor['type'], accessor['count']), ('VEC3', len(vertices)))
+        stride = scene['bufferViews'][0]['byteStride']
+        stored = [struct.unpack_from('<3f', data, 28 + size + accessor['byteOffset'] + i * stride) for i in range(len(vertices))]
+        check([(x, -z, y) for x, y, z in stored])
+        # A picture of the file does not change.
+        self.assertEqual(terrace('render', self.path('normals.ply'), '-o', self.path('normals.png'), '--size', '64x64').returncode, 0)
+
     def test_the_surface_of_a_ball_is_closed_and_faces_outward(self):
         summary, out = self.surface('ball.obj')
         vertices, faces = self.read_obj(out)
@@ -85,6 +168,45 @@ class SurfaceTest(unittest.TestCase):
         self.assertTrue(all(directed[b, a] == count for (a, b), count in directed.items()))
         self.assertAlmostEqual(volume, 4 / 3 * math.pi * RADIUS ** 3, delta=40)
         self.assertAlmostEqual(volume, summary['volume'], places=6)
+
+    def test_a_simplified_surface_keeps_its_bound_and_stays_closed(self):
+        full, _ = self.surface('full.obj')
+        summary, out = self.surface('light.obj', '--max-error', 0.5)
+        vertices, faces = self.read_obj(out)
+        self.assertEqual((summary['vertices'], summary['triangles']), (len(vertices), len(faces)))
+        self.assertLess(len(vertices), 200)
+        self.assertEqual((summary['full_vertices'], summary['full_triangles']), (3000, 5996))
+        self.assertEqual(summary['full_volume'], full['volume'])
+        self.assertTrue(0 < summary['max_error'] <= 0.5)
+        self.assertTrue(summary['closed'])
+        self.assertEqual((summary['components'], summary['euler_characteristic']), (1, 2))
+        # All vertices are on the ball, so a triangle is farthest from it at the foot of the perpendicular from its
+        # centre. The full surface is within 0.01 of the ball.
+        for a, b, c in faces:
+            u = [q - p for p, q in zip(vertices[a], vertices[b])]
+            v = [q - p for p, q in zip(vertices[a], vertices[c])]
+            n = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+            depth = RADIUS - sum(p * q for p, q in zip(vertices[a], n)) / math.hypot(*n)
+            self.assertLess(depth, 0.75)  # that foot may be outside the triangle, and some places are measured only
+        few, _ = self.surface('few.obj', '--max-points', 40)
+        self.assertEqual(few['vertices'], 40)
+        self.assertGreater(few['max_error'], summary['max_error'])
+        result = terrace('surface', self.store, '-o', self.path('few.ply'), '--max-points', 40, '--normals')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        with open(self.path('few.ply'), 'rb') as file:
+            header = file.read(400)
+        self.assertIn(b'element vertex 40\n', header)
+        self.assertIn(b' nx\n', header)
+        result = terrace('surface', self.store, '-o', self.path('light.obj'), '--force', '--max-error', 0.5)
+        self.assertIn(' m of the full surface with 3,000 vertices', result.stderr)
+        for wrong, text in ((['--max-error', 1, '--max-points', 9], 'not both'), (['--max-points', 3], 'at least 4'),
+                            (['--max-error', 1, '--level', 1], 'exclude --level'),
+                            (['--max-error', 1, '--tetrahedra'], 'not for the tetrahedra')):
+            ending = '.vtk' if '--tetrahedra' in wrong else '.obj'
+            result = terrace('surface', self.store, '-o', self.path('wrong' + ending), *wrong)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn(text, result.stderr)
+            self.assertFalse(os.path.exists(self.path('wrong' + ending)))
 
     def test_an_open_scan_is_left_open_and_the_summary_says_so(self):
         with open(self.path('bowl.xyz'), 'w') as file:
@@ -314,6 +436,8 @@ class SurfaceTest(unittest.TestCase):
         out = self.path('none.ply')
         for code, options in ((2, ['--criterion', 'best']), (2, ['--criterion', 'edge:-1']),
                               (2, ['--criterion', 'gabriel:1']), (2, ['--tetrahedra']),
+                              (2, ['--smooth', 'laplacian']), (2, ['--smooth', 'taubin:0']),
+                              (2, ['--smooth-limit', 1]), (2, ['--smooth', 'taubin', '--smooth-limit', -1]),
                               (2, ['--level', 9]), (1, ['--memory', '1M']), (2, ['--metric', boxed]),
                               (2, ['--metric', 'squared']), (1, ['--metric', 'elliptical:none']),
                               (2, ['--metric', round_one, '--criterion', 'alpha-wrap'])):
@@ -323,9 +447,64 @@ class SurfaceTest(unittest.TestCase):
             self.assertFalse(os.path.exists(out))
         result = terrace('surface', self.store, '-o', self.path('none.vtk'))
         self.assertEqual(result.returncode, 2, result.stderr)
-        result = terrace('surface', self.store, '-o', self.path('none.vtk'), '--tetrahedra',
-                         '--criterion', 'alpha-wrap')
-        self.assertEqual(result.returncode, 2, result.stderr)
+        for options in (['--criterion', 'alpha-wrap'], ['--smooth', 'taubin'], ['--normals']):
+            result = terrace('surface', self.store, '-o', self.path('none.vtk'), '--tetrahedra', *options)
+            self.assertEqual(result.returncode, 2, result.stderr)
+            self.assertIn('--tetrahedra', result.stderr)
+
+    def test_stored_surface(self):
+        store = self.path('kept.terrace')
+        result = terrace('build', self.path('ball.xyz'), '-o', store, '--block', 1000, '--surface', '--json')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        built = json.loads(result.stdout)['surface']
+        self.assertEqual((built['vertices'], built['triangles']), (3000, 5996))
+        self.assertLess(built['bytes'], 8 * 3000)
+        self.assertEqual(json.loads(terrace('info', store, '--json').stdout)['surface'], built)
+        self.assertIn('surface:   3,000 vertices', terrace('info', store).stdout)
+        self.assertEqual(terrace('verify', store).returncode, 0)
+        restored, _ = self.surface('restored.obj')
+        self.assertFalse(restored['stored'])
+        summaries = {}
+        for name, options in {'full': (), 'poles': ('--criterion', 'poles'), 'coarse': ('--level', '1'),
+                              'near': ('--max-error', '0.5'), 'few': ('--max-points', '100'),
+                              'mixed': ('--level', '1', '--focus', '-10,-10,0,0:0')}.items():
+            out = self.path(f'stored-{name}.obj')
+            result = terrace('surface', store, '-o', out, '--json', *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            summaries[name] = json.loads(result.stdout)
+            self.assertEqual(summaries[name]['stored'], name != 'poles')
+            self.assertTrue(summaries[name]['closed'], name)
+            vertices, faces = self.read_obj(out)
+            self.assertEqual((len(vertices), len(faces)), (summaries[name]['vertices'], summaries[name]['triangles']))
+        for name in ('full', 'poles'):
+            for key in ('vertices', 'triangles', 'area', 'volume', 'components', 'samples_off'):
+                self.assertAlmostEqual(summaries[name][key], restored[key], 6, key)
+        self.assertLess(summaries['coarse']['vertices'], summaries['mixed']['vertices'])
+        self.assertLessEqual(summaries['few']['vertices'], 100)
+        self.assertLessEqual(summaries['near']['max_error'], 0.5)
+        self.assertEqual(summaries['near']['full_vertices'], 3000)
+        self.assertIn('from the stored surface', terrace('surface', store, '-o', self.path('text.obj')).stderr)
+        # Published stores have it too.
+        for name, options in {'same': (), 'repacked': ('--repack',)}.items():
+            self.assertEqual(terrace('publish', store, '-o', self.path(name), *options).returncode, 0)
+            copy = self.path(f'{name}/stores/kept')
+            self.assertEqual(terrace('verify', copy).returncode, 0)
+            out = self.path(f'stored-{name}.obj')
+            result = terrace('surface', copy, '-o', out, '--max-error', '0.5', '--json')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            summary = json.loads(result.stdout)
+            self.assertTrue(summary['stored'])
+            for key in ('vertices', 'triangles', 'area', 'volume', 'max_error'):
+                self.assertAlmostEqual(summary[key], summaries['near'][key], 9, key)
+
+    def test_stored_surface_needs_a_body(self):
+        with open(self.path('flat.xyz'), 'w') as file:
+            file.writelines(f'{i % 10} {i // 10} 0\n' for i in range(100))
+        store = self.path('flat.terrace')
+        result = terrace('build', self.path('flat.xyz'), '-o', store, '--surface')
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('enclose no volume', result.stderr)
+        self.assertFalse(os.path.exists(store))
 
 
 if __name__ == '__main__':

@@ -185,23 +185,29 @@ struct Whole {
   std::vector<double> heights;
   std::map<Triangle, std::array<double, 3>> triangles;
 
-  Whole(const stream::Store& store, unsigned level) {
-    constexpr double kAll = std::numeric_limits<double>::infinity();
-    terrain::StoreWindow reader(store);
-    terrain::WindowPoints points;
-    reader.points({{-kAll, -kAll}, {kAll, kAll}}, points, level);
-    const stream::Channel& z = store.schema().coordinates[2];
-    for (const stream::Point3& p : points.positions) {
+  Whole(const stream::Store& store, unsigned level) : Whole(points_in(store, level)) {}
+  /// points: x and y as stored, heights in the vertical unit.
+  explicit Whole(std::span<const stream::Point3> points) {
+    for (const stream::Point3& p : points) {
       const auto inserted = triangulation.insert({p[0], p[1]});
       if (!inserted.created) continue;  // keep the first of several
       heights.resize(triangulation.vertex_slots());
-      heights[tri::slot(inserted.vertex)] = p[2] * z.scale + z.offset;
+      heights[tri::slot(inserted.vertex)] = p[2];
     }
     for (const tri::TriangleId t : triangulation.all_triangles()) {
       add_triangle(triangulation, heights, t, triangles);
     }
   }
 
+  static Points points_in(const stream::Store& store, unsigned level) {
+    constexpr double kAll = std::numeric_limits<double>::infinity();
+    terrain::StoreWindow reader(store);
+    terrain::WindowPoints points;
+    reader.points({{-kAll, -kAll}, {kAll, kAll}}, points, level);
+    const stream::Channel& z = store.schema().coordinates[2];
+    for (stream::Point3& p : points.positions) p[2] = p[2] * z.scale + z.offset;
+    return points.positions;
+  }
   [[nodiscard]] terrain::SurfaceCorner corner(tri::VertexId v) const {
     return {triangulation.point(v), heights[tri::slot(v)]};
   }

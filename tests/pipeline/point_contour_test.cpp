@@ -9,6 +9,7 @@
 #include <fstream>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <random>
 #include <set>
@@ -27,6 +28,7 @@
 #include "../../libterrain/tests/temporary_folder.hpp"
 #include "cloud_case.hpp"
 #include "contour/parts.hpp"
+#include "focus_case.hpp"
 #include "surface/store_window.hpp"
 #include "terrace/terrain/build.hpp"
 #include "terrace/terrain/error.hpp"
@@ -104,9 +106,10 @@ std::vector<Corners> triangles_of(const stream::Store& store, unsigned level) {
 }
 
 /// Cuts each triangle separately; the gradient puts higher ground on the left. Skips segments of
-/// zero length.
+/// zero length. by_rows: as in terrain::ContourLevels.
 std::multiset<Segment> segments_of(const std::vector<Corners>& triangles, double interval,
-                                   const std::function<bool(const Corners&)>& wanted) {
+                                   const std::function<bool(const Corners&)>& wanted,
+                                   bool by_rows = false) {
   // The intervals have at most one decimal, so the multiples do too.
   const auto height = [&](std::int64_t level) {
     return std::round(10 * interval * static_cast<double>(level)) / 10;
@@ -122,7 +125,7 @@ std::multiset<Segment> segments_of(const std::vector<Corners>& triangles, double
       Point2 up{};
       for (std::size_t i = 0; i < 3; ++i) {
         stream::Point3 a = t[i], b = t[(i + 1) % 3];
-        if (b < a) std::swap(a, b);
+        if (by_rows ? std::pair(b[1], b[0]) < std::pair(a[1], a[0]) : b < a) std::swap(a, b);
         if ((a[2] > h) == (b[2] > h)) continue;
         const double share = (h - a[2]) / (b[2] - a[2]);
         const Point2 step{b[0] - a[0], b[1] - a[1]};
@@ -160,7 +163,7 @@ std::vector<terrain::ContourLine> lines_of(const stream::Store& store,
 /// Checks that the lines match the full triangulation, in the same order for any number of threads
 /// and any memory.
 void expect_contours(const stream::Store& store, const terrain::ContourRequest& request,
-                     const std::vector<Corners>& triangles) {
+                     const std::vector<Corners>& triangles, bool by_rows = false) {
   const auto wanted = [&](const Corners& t) {
     for (std::size_t i = 0; request.max_edge && i < 3; ++i) {
       const stream::Point3 &a = t[i], &b = t[(i + 1) % 3];
@@ -170,7 +173,7 @@ void expect_contours(const stream::Store& store, const terrain::ContourRequest& 
                                 (t[0][1] + t[1][1] + t[2][1]) / 3, 0};
     return !request.region || request.region->contains(middle);
   };
-  const auto expected = segments_of(triangles, request.interval, wanted);
+  const auto expected = segments_of(triangles, request.interval, wanted, by_rows);
   for (const std::uint64_t most : {1u << 20, 900u, 70u}) {
     SCOPED_TRACE("parts of " + std::to_string(most));
     const std::vector<terrain::ContourLine> lines = lines_of(store, request, most);
@@ -296,6 +299,96 @@ TEST(PointContours, MatchTheSamplesOfACoarserRasterLevel) {
   ASSERT_GE(store.top(), 1u);
   const std::vector<Corners> triangles = triangles_of(store, 1);
   expect_contours(store, {.interval = 7, .level = 1}, triangles);
+}
+
+/// Returns the number of ends that lines have: places where one of the segments ends alone.
+std::size_t ends_of(const std::multiset<Segment>& segments) {
+  std::map<std::pair<std::int64_t, Point2>, int> balance;
+  for (const auto& [level, from, to] : segments) {
+    ++balance[{level, from}];
+    --balance[{level, to}];
+  }
+  return static_cast<std::size_t>(std::count_if(balance.begin(), balance.end(),
+                                                [](const auto& one) { return one.second != 0; }));
+}
+
+TEST(PointContours, OfMixedLevelsAreThoseOfTheMeshAndClosedAcrossLevels) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const tests::TemporaryFolder folder;
+    const stream::Store store = cloud(folder.path(), lake_shore(seed, false));
+    ASSERT_GE(store.top(), 1u);
+    tests::Random random(seed);
+    const terrain::Detail detail = tests::random_detail(store, random);
+    const terrain::ContourRequest request{
+        .interval = 3.3, .level = detail.level, .focuses = detail.focuses};
+    const tests::FocusMesh mesh(store, detail);
+    expect_contours(store, request, mesh.triangles);
+    const auto lines = lines_of(store, request, 300);
+    const auto open =
+        std::count_if(lines.begin(), lines.end(), [](const auto& line) { return !line.closed; });
+    const auto segments =
+        segments_of(mesh.triangles, request.interval, [](const Corners&) { return true; });
+    EXPECT_EQ(2 * static_cast<std::size_t>(open), ends_of(segments));
+  }
+}
+
+TEST(PointContours, OfMixedLevelsOfARasterAreThoseOfLevel0InFocuses) {
+  const tests::TemporaryFolder folder;
+  const stream::Store store = stream::Store::open(tests::raster_store(folder.path()));
+  std::vector<terrain::ContourLine> lattice;
+  const terrain::ContourRequest fine{.interval = 50};
+  terrain::draw_lattice_contours(
+      {.store = store,
+       .request = fine,
+       .emit = [&](const terrain::ContourLine& line) { lattice.push_back(line); },
+       .limit = {},
+       .progress = [](double) {}});
+  std::size_t inside = 0, left_out = 0;
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    tests::Random random(seed);
+    terrain::Detail detail = tests::random_detail(store, random);
+    // Around a part of the missing samples.
+    if (seed == 1)
+      detail.focuses.push_back({terrain::Region::parse("501000,5197500,503000,5199000"), 0});
+    const terrain::ContourRequest request{
+        .interval = 50, .level = detail.level, .focuses = detail.focuses};
+    std::vector<Corners> triangles;
+    for (const auto& [corners, heights] :
+         tests::Whole(tests::FocusMesh(store, detail).points).triangles) {
+      bool neighbours = true;
+      Point2 middle{};
+      for (std::size_t k = 0; k < 2; ++k) {
+        const auto [low, high] = std::minmax({corners[0][k], corners[1][k], corners[2][k]});
+        neighbours = neighbours && high - low <= 1;
+        middle[k] = (corners[0][k] + corners[1][k] + corners[2][k]) / 3;
+      }
+      if (!neighbours && tests::is_in_full_detail(store, detail, middle, 1)) {
+        ++left_out;
+        continue;
+      }
+      Corners triangle{};
+      for (std::size_t i = 0; i < 3; ++i) triangle[i] = {corners[i][0], corners[i][1], heights[i]};
+      triangles.push_back(triangle);
+    }
+    expect_contours(store, request, triangles, true);
+    std::multiset<Segment> segments;
+    for (const terrain::ContourLine& line : lines_of(store, request, 900)) {
+      for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+        segments.insert({line.level, line.points[i], line.points[i + 1]});
+      }
+    }
+    for (const terrain::ContourLine& line : lattice) {
+      for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+        if (!tests::is_in_full_detail(store, detail, line.points[i], 2)) continue;
+        EXPECT_TRUE(segments.contains({line.level, line.points[i], line.points[i + 1]}));
+        ++inside;
+      }
+    }
+  }
+  EXPECT_GT(inside, 0u);
+  EXPECT_GT(left_out, 0u);
 }
 
 TEST(PointContours, AreEmptyForFewFlatAndCollinearPoints) {

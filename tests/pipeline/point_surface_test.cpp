@@ -117,6 +117,28 @@ INSTANTIATE_TEST_SUITE_P(PointSurface, SurfaceOfClouds,
                            return name;
                          });
 
+// Points between the ends of an edge of the hull were not found if they were many cells away, so
+// gradients at its ends were wrong.
+TEST(PointSurface, FindsSparsePointsOnAnEdgeOfTheHull) {
+  const tests::TemporaryFolder folder;
+  Random random(5);
+  Points points{{225, 1, 3}};
+  for (int i = 0; i < 3000; ++i) points.push_back({random.unit() * 40, 0, random.unit()});
+  for (const double x : {50.0, 60.0, 72.0, 87.0, 120.0, 200.0, 449.0}) {
+    points.push_back({x, 0, 10 * random.unit()});
+  }
+  const stream::Store store = stream::Store::open(cloud_store(folder.path(), points));
+  const Whole whole(store, 0);
+  PointCloud cloud(store, 0);
+  PointSurface surface(cloud);
+  ASSERT_TRUE(surface.load(terrain::flat(store.bounds()), 1U << 20, true));
+  for (const stream::Point3& p : points) {
+    const SurfacePoint expected = whole.at({p[0], p[1]}), found = surface.linear({p[0], p[1]});
+    ASSERT_TRUE(same_bits(found.per_column, expected.per_column)) << p[0];
+    ASSERT_TRUE(same_bits(found.per_row, expected.per_row)) << p[0];
+  }
+}
+
 // The circle above a position in a bend contains most of the swath's border. Each position once
 // searched all of it separately, which took minutes.
 TEST(PointSurface, SearchesInBendsOfASwathVisitFewPoints) {

@@ -62,7 +62,7 @@ int fly(const stream::Store& store, std::size_t max_points) {
     std::printf(
         "{\"eye\":[%.17g,%.17g,%.17g],\"direction\":[%.17g,%.17g,%.17g],\"error\":%.17g,"
         "\"points\":%zu,\"expanded\":%zu,\"open\":%s,\"hash\":\"%016llx\"}\n",
-        eye[0], eye[1], eye[2], way[0], way[1], way[2], stop.error, view.model().point_count(),
+        eye[0], eye[1], eye[2], way[0], way[1], way[2], stop.error, view.points(),
         view.model().expanded_count(), is_open(view.model().triangulation()) ? "true" : "false",
         static_cast<unsigned long long>(view.model().triangulation().hash()));
   }
@@ -82,7 +82,7 @@ int main(int arguments, char** values) {
       if (!terrain::is_scan(store, ground)) throw std::invalid_argument("the store is not a scan");
       return fly<tri::DynamicSurface<std::int32_t>>(store, max_points);
     }
-    return store.schema().grid ? fly<std::int32_t>(store, max_points)
+    return store.schema().grid ? fly<tri::ThinnedDelaunay2>(store, max_points)
                                : fly<tri::PointCloud>(store, max_points);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "flight_hashes: %s\n", error.what());

@@ -5,7 +5,7 @@
 export class Flyer {
   /// connect(receive): starts worker.js and returns {send(message)}; `receive` takes its messages.
   /// base: the URL of a published folder. name: a store in it. choose: as in messages.ts.
-  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, choose = false, receive = () => {}} = {}) {
+  constructor(connect, base, name, {maxPoints = 1_500_000, asPoints = false, choose = false, exaggeration = 1, receive = () => {}} = {}) {
     this.serial = 0;
     this.waiting = [];
     this.last = null;  ///< frame
@@ -21,6 +21,7 @@ export class Flyer {
       name,
       choose,
       asPoints,
+      exaggeration,
       maxPoints
     });
   }

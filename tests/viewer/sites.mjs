@@ -103,14 +103,14 @@ export class Sites {
     }
     this.terrace('publish', ...stores, '-o', 'site', '-q');
   }
-  /// kind: 'surface' for the surface of a scan, for which the worker allows a quarter of the
-  /// points.
+  /// kind: how the store is shown. The worker allows a quarter of the points for surfaces, and half
+  /// of them for rasters.
   flight(name, {maxPoints = MAX_POINTS, kind = 'points'} = {}) {
     const key = `${name} ${maxPoints} ${kind}`, known = this.flights.get(key);
     if (known) return known;
-    const surface = kind === 'surface';
+    const surface = kind === 'surface', cost = {points: 1, raster: 2, surface: 4}[kind];
     const out = execFileSync(process.env.FLIGHT_HASHES,
-                             [join(this.folder, `${name}.store`), String(surface ? maxPoints / 4 : maxPoints), ...(surface ? [kind] : [])],
+                             [join(this.folder, `${name}.store`), String(maxPoints / cost), ...(surface ? [kind] : [])],
                              {encoding: 'utf8', maxBuffer: 1 << 24});
     const stops = out.trim().split('\n').map(line => JSON.parse(line));
     this.flights.set(key, stops);

@@ -20,7 +20,7 @@ after(() => sites.remove());
 
 /// A worker over a store of the site.
 class Tested extends Flyer {
-  constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, choose = false, haste = 1, changed = () => {}} = {}) {
+  constructor(name, {fault, latency, site = sites.site, maxPoints = MAX_POINTS, asPoints = false, choose = false, exaggeration = 1, haste = 1, changed = () => {}} = {}) {
     const {fetch, log} = folderFetch(site, fault, latency);
     const messages = [];
     let blocks = 0, broken = null;
@@ -28,6 +28,7 @@ class Tested extends Flyer {
       maxPoints,
       choose,
       asPoints,
+      exaggeration,
       receive: message => {
         messages.push(message.type);
         // The worker would report an exception from here as its own error.
@@ -41,8 +42,8 @@ class Tested extends Flyer {
     });
     Object.assign(this, {log, messages, blocks: () => blocks, broken: () => broken});
   }
-  async settle({eye, direction, error}) {
-    return (await this.view({eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error})).state;
+  async settle({eye, direction, error, level}) {
+    return (await this.view({eye, direction, up: [0, 0, 1], fov: 45, aspect: 1.5, height: 800, error, level})).state;
   }
   /// Sends a message and resolves to the answer of that type.
   async ask(message, type) {
@@ -285,7 +286,7 @@ for (const [name, kind] of [['alps', 'raster'], ['ball', 'surface']]) {
     });
     await flyer.opened();
     // Hundreds of points disappear; the space for waiting vertices suffices, however many go in a frame.
-    const [fine] = sites.flight(name, {kind}), coarse = {...fine, error: 4 * fine.error};
+    const [stop] = sites.flight(name, {kind}), fine = {...stop, error: kind === 'raster' ? 1 : stop.error}, coarse = {...fine, error: 4 * fine.error};
     await flyer.settle(fine);
     await flyer.rest();
     begin = 0;
@@ -354,7 +355,7 @@ test('leaving a raster in a flight: no holes, no overlaps, and smaller jumps tha
     }
   });
   ({scene: {box}} = await flyer.opened());
-  const [stop] = sites.flight('hills', {kind: 'raster'}), close = {...stop, error: stop.error / 1.5};
+  const [stop] = sites.flight('hills', {kind: 'raster'}), close = {...stop, error: 1};
   await flyer.settle(close);
   await flyer.rest();
   // Fly away, so that points disappear from near to far.
@@ -364,7 +365,7 @@ test('leaving a raster in a flight: no holes, no overlaps, and smaller jumps tha
     await new Promise(resume => setTimeout(resume, 30));
   }
   await flyer.rest();
-  assert.ok(slides > 0 && jumps < 0.3 * slides, `${jumps} of ${slides}`);
+  assert.ok(slides > 0 && jumps < 0.5 * slides, `${jumps} of ${slides}`);
 });
 
 /// Largest deviation of vertex normals, times 127, from the area-weighted normals of the triangles
@@ -395,10 +396,10 @@ test('a raster with voids: they are not drawn, picked or in profiles', async () 
   const middle = [-500, 0, 0], column = 74.5 - 500 / 30;
   const cut = () => flyer.profile([column, 2.5, 0], [column, 196.5, 0], 2);
   const meets = async (x, y) => (await flyer.ask({type: 'pick', id: 1, origin: [x, y, 3000], direction: [0, 0, -1], angle: 0.001}, 'picked')).hit !== null;
-  for (const error of [1e6, 0.001, 1e6, 0.001]) {
-    const state = await flyer.settle({...above, error});
+  for (const fine of [false, true, false, true]) {
+    const view = {...above, error: 1e6, level: fine ? 0 : undefined};
+    const state = await flyer.settle(view);
     await flyer.rest();
-    const fine = error < 1;
     assert.equal(state.points === 19_099, fine, `${state.points} points`);
     if (fine) assert.ok(longest() < 1.5 * 30, `${longest()} m`);
     assert.ok(fine || longest() < 2500, `${longest()} m`);
@@ -413,7 +414,7 @@ test('a raster with voids: they are not drawn, picked or in profiles', async () 
     }
     const fresh = new Arrays(24), other = new Tested('coast', {changed: message => fresh.apply(message)});
     await other.opened();
-    await other.settle({...above, error});
+    await other.settle(view);
     await other.rest();
     assert.deepEqual(arrays.listed(), fresh.listed());
   }
@@ -422,7 +423,7 @@ test('a raster with voids: they are not drawn, picked or in profiles', async () 
 test('a raster whose samples have no neighbours is shown as points', async () => {
   const flyer = new Tested('sparse');
   await flyer.opened();
-  const state = await flyer.settle({eye: [0, 0, 900], direction: [0, 0.001, -1], error: 0.001});
+  const state = await flyer.settle({eye: [0, 0, 900], direction: [0, 0.001, -1], error: 1, level: 0});
   await flyer.rest();
   assert.deepEqual([state.points, flyer.last.state.triangles], [800, 0]);
   const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [3, 4, 900], direction: [0, 0, -1], angle: 0.02}, 'picked');
@@ -449,6 +450,49 @@ test('a scan switches to points and back without further requests', async () => 
   assert.equal(flyer.log.filter(request => request.path === '/body.wasm').length, 1);
 });
 
+test('exaggerated heights change the view frame and nothing that is read, without further requests', async () => {
+  const flyer = new Tested('hills'), first = await flyer.opened(), {box} = first.scene;
+  assert.equal(first.exaggeration, 1);
+  const camera = {eye: [0, 0, box[5] + 20_000], direction: [0, 0.01, -1], error: 2};
+  const {points} = await flyer.settle(camera);
+  const stored = [421.25, 377.5], before = await flyer.probe([...stored, 0], 0), line = [[...stored, 0], [500, 300, 0], 2];
+  const profile = await flyer.profile(...line);
+  const opened = flyer.opened();
+  flyer.worker.send({type: 'exaggerate', exaggeration: 3});
+  const again = await opened;
+  assert.equal(again.exaggeration, 3);
+  const near = (a, b) => assert.ok(Math.abs(a - b) <= 1e-9 * Math.abs(b), `${a} for ${b}`);
+  again.scene.box.forEach((c, i) => near(c, i % 3 === 2 ? 3 * box[i] : box[i]));
+  // Errors are larger now.
+  assert.ok((await flyer.settle(camera)).points > points);
+  const after = await flyer.probe([...stored, 0], 0);
+  assert.deepEqual([...after.stored], [...before.stored]);
+  near(after.place[2], 3 * before.place[2]);
+  assert.deepEqual(await flyer.profile(...line), profile);
+  const ranges = flyer.log.filter(({range}) => range).map(({path, range}) => path + range);
+  // Questions and the picture fetch separately.
+  assert.ok(new Set(ranges).size > 0.8 * ranges.length);
+  // A link opens it like this at once; a scan ignores it.
+  const linked = new Tested('hills', {exaggeration: 3});
+  assert.deepEqual(Array.from((await linked.opened()).scene.box), Array.from(again.scene.box));
+  const scan = new Tested('ball', {exaggeration: 3}), plain = new Tested('ball');
+  const [stretched, usual] = await Promise.all([scan.opened(), plain.opened()]);
+  assert.equal(stretched.exaggeration, 1);
+  assert.deepEqual(Array.from(stretched.scene.box), Array.from(usual.scene.box));
+});
+
+test('a region has at least its level, and the rest of the store keeps its own', async () => {
+  const flyer = new Tested('cloud'), {scene: {box}} = await flyer.opened();
+  const view = region => flyer.view({eye: [0, 0, 300], direction: [0, 0.01, -1], up: [0, 1, 0], fov: 45, aspect: 1.5, height: 800, error: 1e6, region});
+  const coarse = (await view()).state.points;
+  const corner = [box[0], box[1], -1e30, box[0] + 20, box[1] + 20, 1e30];
+  const fine = (await view({level: 0, box: corner})).state.points;
+  // The corner has 5 % of the 40,000 points; clusters reach over its border.
+  assert.ok(fine > coarse + 1800 && fine < coarse + 10_000, `${coarse} ${fine}`);
+  assert.ok((await view({level: 1, box: corner})).state.points < fine);
+  assert.equal((await view()).state.points, coarse);
+});
+
 test('manual control: a cluster of a surface expands, collapses and is released; a point of it is picked', async () => {
   const flyer = new Tested('ball');
   await flyer.opened();
@@ -456,12 +500,17 @@ test('manual control: a cluster of a surface expands, collapses and is released;
   const before = (await flyer.settle(camera)).points;
   const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
   assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));
-  flyer.worker.send({type: 'pin', pin: 1});
+  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 1});
   const more = (await flyer.settle(camera)).points;
   assert.ok(more > before, `${before} ${more}`);
   const {lines} = await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
   assert.equal(lines.length % 2, 0);
-  flyer.worker.send({type: 'pin', pin: -1});
+  // Both ways by the same name.
+  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 0});
+  assert.equal((await flyer.settle(camera)).points, before);
+  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 1});
+  assert.equal((await flyer.settle(camera)).points, more);
+  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: -1});
   assert.equal((await flyer.settle(camera)).points, before);
 });
 
@@ -474,7 +523,7 @@ test('a cluster of points expands manually, and its outline lists its points', a
   const pick = async () => (await flyer.ask({type: 'pick', id: 1, origin: [0, 0, 300], direction: [0, 0, -1], angle: 0.05}, 'picked')).hit;
   const coarse = await pick();
   assert.equal((await outline(coarse)).length, 0, 'a cluster of the top is expanded');
-  flyer.worker.send({type: 'pin', pin: 1});
+  flyer.worker.send({type: 'pin', cluster: coarse.expandable, pin: 1});
   const more = (await flyer.settle(camera)).points - before;
   assert.ok(more > 0);
   let lines = new Uint32Array();
@@ -680,7 +729,7 @@ test('few requests: small ones wait for open ones, and an index is read in block
   const {scene: {box}} = await flyer.opened();
   const middle = [(box[0] + box[3]) / 2, (box[1] + box[4]) / 2], high = box[4] - box[1];
   // The whole store in view, which needs the index of level 0.
-  await flyer.settle({eye: [middle[0], middle[1] - high, box[5] + high], direction: [0, Math.SQRT1_2, -Math.SQRT1_2], error: 4});
+  await flyer.settle({eye: [middle[0], middle[1] - high, box[5] + high], direction: [0, Math.SQRT1_2, -Math.SQRT1_2], error: 1});
   let small = 0;
   const asked = [];  // parts of indices
   for (const {path, range, unanswered} of flyer.log.filter(request => request.range)) {
