@@ -72,7 +72,7 @@ class JsonKeysTest(unittest.TestCase):
     @classmethod
     def make_inputs(cls):
         for line in ('synth dem --size 129x129 -o dem.tif', 'build dem.tif -o dem.st', 'synth surface --points 2k -o scan.ply',
-                     'build scan.ply -o scan.st', 'build scan.ply --crs EPSG:2225 -o feet.st', 'tile dem.st --vertical ignore --zoom 0-11 -o tiles',
+                     'build scan.ply -o scan.st', 'build scan.ply -o body.st --surface', 'build scan.ply --crs EPSG:2225 -o feet.st', 'tile dem.st --vertical ignore --zoom 0-11 -o tiles',
                      'mesh dem.st --smooth laplacian -o smooth.ply --save-overlay heights.overlay',
                      'convert scan.ply -o scan.copc.laz', 'surface scan.st -o body.ply',
                      'cluster scan.ply --method single --dendrogram tree.csv', 'match scan.ply -o pairs.csv'):
@@ -98,17 +98,21 @@ class JsonKeysTest(unittest.TestCase):
     @classmethod
     def run_all(cls):
         for line, exit_code in (
-                ('build dem.tif -o a.st', 0), ('info dem.tif', 0), ('info dem.st', 0), ('info scan.copc.laz', 0),
+                ('build dem.tif -o a.st', 0), ('build scan.ply -o b.st --surface', 0), ('info body.st', 0), ('info dem.tif', 0), ('info dem.st', 0), ('info scan.copc.laz', 0),
                 ('info gaps.csv', 0), ('info withheld.las', 0), ('verify dem.st', 0), ('verify damaged.st', 1),
                 ('verify tiles --store dem.st --vertical ignore', 0), ('points dem.st --level 1 -o a.csv', 0),
                 ('points dem.st --near 400100,5199900 -k 3 -o b.csv', 0), ('points dem.st --overlay heights.overlay -o c.csv', 0),
                 ('build lines.geojson -o lines.st --entities polylines', 0), ('points lines.st -o part.geojson', 0),
                 ('points dem.st --to-crs EPSG:4326 -o d.las', 0),
                 ('mesh dem.st --smooth laplacian -o e.ply --save-overlay e.overlay', 0), ('mesh dem.st --max-error 5 -o f.glb', 0),
-                ('surface scan.st -o g.ply', 0), ('surface scan.st -o g.vtk --tetrahedra', 0), ('surface feet.st -o g.glb', 0), ('mesh feet.st -o f2.glb', 0),
+                ('surface scan.st -o g.ply --smooth taubin', 0), ('surface scan.st -o g2.ply --max-error 1', 0),
+                ('surface scan.st -o g.vtk --tetrahedra', 0), ('surface feet.st -o g.glb', 0), ('mesh feet.st -o f2.glb', 0),
                 ('tile dem.st --vertical ignore --zoom 0-10 -o h', 0), ('sample dem.st --points places.csv -o i.csv', 0),
                 ('raster dem.st -o j.tif', 0), ('profile dem.st --line 400100,5199900,401000,5199000 -o k.csv', 0),
-                ('contour dem.st --interval 20 -o l.geojson', 0), ('cluster scan.ply -o m.ply', 0), ('match scan.ply -o n.csv', 0),
+                ('contour dem.st --interval 20 -o l.geojson', 0), ('contour dem.st --interval 20 --max-error 2 -o l2.geojson', 0),
+                ('sample dem.st --points places.csv --max-error 2 -o i2.csv', 0), ('raster dem.st --max-error 2 -o j2.tif', 0),
+                ('profile dem.st --line 400100,5199900,401000,5199000 --max-error 2 -o k2.csv', 0),
+                ('cluster scan.ply -o m.ply', 0), ('match scan.ply -o n.csv', 0),
                 ('match body.ply -o o.csv --tree --entities triangles', 0), ('render dem.tif -o p.png --size 64x64', 0),
                 ('render line.geojson -o q.png --size 64x64', 0), ('render tree.csv -o r.png --size 64x64', 0),
                 ('render pairs.csv --points scan.ply -o s.png --size 64x64', 0), ('publish dem.st -o t', 0),

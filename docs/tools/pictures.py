@@ -53,7 +53,7 @@ PICTURES = {
         f'terrace build {ALPS} -o alps.store -q',
         "viewer_picture alps.store '#s=alps&q=2&v=20500,-44500,1000,15,40,20000&c=height' alps.jpg 1000x560"], 'alps.jpg'),
     'viewer.jpg': ('docs/guides/viewer.md', None, [
-        "viewer_picture dem.terrace '#s=dem&q=5&v=0,-3000,3000,20,50,22000&c=height' viewer.jpg 900x500"], 'viewer.jpg'),
+        "viewer_picture dem.terrace '#s=dem&q=1&v=0,-3000,3000,20,50,22000&c=height' viewer.jpg 900x500"], 'viewer.jpg'),
     'globe.jpg': ('docs/guides/web-globe.md', None, ['globe_picture . globe.jpg 1000x560'], 'globe.jpg'),
 }
 
