@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 
 #include "check_input.hpp"
 #include "free_slots.hpp"
@@ -18,13 +19,6 @@ struct Finite {
     return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
   }
 };
-
-/// The finalizer of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
-std::uint64_t mix(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
-  return x ^ (x >> 31);
-}
 
 }  // namespace
 
@@ -121,10 +115,11 @@ bool PointCloud::alive(VertexId vertex) const {
 }
 
 std::uint64_t PointCloud::hash() const {
-  std::uint64_t sum = mix(impl_->count);
+  std::uint64_t sum = base::mix64(impl_->count);
   for (const VertexId vertex : all_vertices()) {
     std::uint64_t one = 0;
-    for (const double c : point(vertex)) one = mix(one ^ base::bit_cast<std::uint64_t>(c + 0.0));
+    for (const double c : point(vertex))
+      one = base::mix64(one ^ base::bit_cast<std::uint64_t>(c + 0.0));
     sum += one;
   }
   return sum;

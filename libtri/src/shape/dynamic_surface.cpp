@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <cassert>
 #include <cstdint>
-#include <type_traits>
 #include <utility>
 
-#include <terrace/base/portable_math.hpp>
+#include <terrace/base/random.hpp>
 #include <terrace/base/stop_check.hpp>
 
 #include "delaunay3/access.hpp"
@@ -18,6 +17,7 @@
 #include "poles.hpp"
 #include "pool.hpp"
 #include "state.hpp"
+#include "triangle_hash.hpp"
 
 namespace terrace::tri {
 namespace {
@@ -28,22 +28,6 @@ using Corners3 = std::array<std::uint32_t, 3>;
 Corners3 rotate_to_smallest(Corners3 c) {
   std::rotate(c.begin(), std::min_element(c.begin(), c.end()), c.end());
   return c;
-}
-
-/// The finalizer of SplitMix64 (G. Steele, D. Lea, C. Flood, doi:10.1145/2660193.2660195).
-std::uint64_t mix(std::uint64_t x) {
-  x = (x ^ (x >> 30)) * 0xBF58476D1CE4E5B9;
-  x = (x ^ (x >> 27)) * 0x94D049BB133111EB;
-  return x ^ (x >> 31);
-}
-
-template <class Coord>
-std::uint64_t bit_pattern(Coord c) {
-  if constexpr (std::is_integral_v<Coord>) {
-    return static_cast<std::uint32_t>(c);
-  } else {
-    return base::bit_cast<std::uint64_t>(c + 0.0);  // merges -0.0 and 0.0
-  }
 }
 
 }  // namespace
@@ -405,15 +389,11 @@ const Delaunay3<Coord>& DynamicSurface<Coord>::tetrahedra() const {
 
 template <class Coord>
 std::uint64_t DynamicSurface<Coord>::hash() const {
-  std::uint64_t sum = mix(impl_->count);
+  std::uint64_t sum = base::mix64(impl_->count);
   for (const TriangleId triangle : all_triangles()) {
     std::array<Point, 3> p;
     for (std::size_t i = 0; i < 3; ++i) p[i] = point(vertices(triangle)[i]);
-    std::rotate(p.begin(), std::min_element(p.begin(), p.end()), p.end());
-    std::uint64_t one = 0;
-    for (const Point& corner : p)
-      for (const Coord c : corner) one = mix(one ^ bit_pattern(c)) + 1;
-    sum += one;
+    sum += shape::triangle_hash(p);
   }
   return sum;
 }
