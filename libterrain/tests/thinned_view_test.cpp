@@ -158,7 +158,10 @@ TEST_F(ThinnedViews, KeepAnErrorInMetresAtEverySample) {
   const stream::Store whole = build("whole", everywhere);
   const stream::Store gaps = build("gaps", coast);
   const stream::Store rotated = build("rotated", coast, {26, 15, 500000, 15, -26, 5200000});
-  for (const stream::Store* store : {&whole, &gaps, &rotated}) {
+  // All but one of the stores, and every other error, are left out under sanitizers.
+  const std::array stores{&rotated, &whole, &gaps};
+  for (std::size_t i = 0; i < stores.size(); i += TERRACE_TEST_SHARE) {
+    const stream::Store* const store = stores[i];
     const HasData has_data = store == &whole ? everywhere : coast;
     std::size_t before = store->points();
     for (const double error : {0.0, 2.0, 10.0, 40.0, 150.0}) {
@@ -192,7 +195,7 @@ TEST_F(ThinnedViews, EndInTheSameStateOnAnyPath) {
   const stream::Store store = build("gaps", coast);
   std::mt19937 random(3);
   View wanderer(store);
-  for (int stop = 0; stop < 5; ++stop) {
+  for (int stop = 0; stop < 4 / TERRACE_TEST_SHARE; ++stop) {
     // Not enough time to settle on the way.
     for (int frame = 0; frame < 30; ++frame) {
       wanderer.frame(

@@ -136,7 +136,7 @@ TYPED_TEST(Lids, MatchTheDefinition) {
     open += found.open;
     kept += !found.open && share > 0.0;
   };
-  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 30 / TERRACE_TEST_SHARE; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     ASSERT_NO_FATAL_FAILURE(check(dense_patches<Coord>(random)));
@@ -341,7 +341,7 @@ void expect_lids_to_follow(MemorySource& source, int steps, std::mt19937_64& ran
 
 TEST(LidsTest, FollowExpandedClusters) {
   std::array<std::size_t, 2> answers{};
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 4 / TERRACE_TEST_SHARE; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     std::mt19937_64 random(seed);
     std::vector<Point3> points = bumpy_ball(5000, random);

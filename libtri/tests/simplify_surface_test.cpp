@@ -130,7 +130,7 @@ TEST(TriangleDistanceTest, AgreesWithASearch) {
       c = random() % 3 == 0 ? static_cast<double>(random() % 3) : 3.0 * random_number(random);
     return p;
   };
-  for (int round = 0; round < 200; ++round) {
+  for (int round = 0; round < 200 / TERRACE_TEST_SHARE; ++round) {
     const Point3 a = point(), b = random() % 8 == 0 ? a : point();
     const Point3 c = random() % 8 == 0 ? b : point();
     const Point3 p = point();
@@ -145,7 +145,7 @@ TEST(SurfaceDistanceTest, FindsTheNearestFace) {
   std::mt19937_64 random(kSeed);
   const Surface surface = torus(23, 17, 0.3, false);
   const shape::SurfaceDistance distance(surface.points, surface.faces);
-  for (int round = 0; round < 300; ++round) {
+  for (int round = 0; round < 300 / TERRACE_TEST_SHARE; ++round) {
     const Point3 p{12.0 * random_number(random) - 6.0, 12.0 * random_number(random) - 6.0,
                    4.0 * random_number(random) - 2.0};
     const double expected = distance_from(surface, p);
@@ -272,7 +272,7 @@ TEST(SimplifySurfaceTest, DegenerateSurfaces) {
 }
 
 TEST(SimplifySurfaceTest, RandomSoups) {
-  for (unsigned seed = 0; seed < 60; ++seed) {
+  for (unsigned seed = 0; seed < 60 / TERRACE_TEST_SHARE; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
     Surface soup;
