@@ -74,13 +74,13 @@ struct View {
   /// A cluster in view is wanted if its error may appear as more than `pixel_error` pixels. The
   /// error in pixels is the error times camera.pixels divided by the distance from the eye to the
   /// nearest point of the cluster's box.
-  std::optional<Camera> camera;
+  std::optional<Camera> camera{};
   double pixel_error = 2.0;
   /// Applies everywhere, in ground units.
   double ground_error = std::numeric_limits<double>::infinity();
-  std::vector<ErrorRegion> regions;
+  std::vector<ErrorRegion> regions{};
   /// As in Detail.
-  std::vector<Focus> focuses;
+  std::vector<Focus> focuses{};
   bool operator==(const View&) const = default;
 };
 
@@ -133,11 +133,11 @@ struct ViewOptions {
   double silhouette = 1.0;
   /// Returns the normals of a cluster. Called once, when its parent is expanded. Empty:
   /// terrain_cone().
-  std::function<NormalCone(ClusterId, const ClusterRecord&)> cone;
+  std::function<NormalCone(ClusterId, const ClusterRecord&)> cone{};
   /// ThinnedDelaunay2 only: the raster's frame, and whether samples are missing inside it.
-  RasterFrame raster;
+  RasterFrame raster{};
   bool raster_has_gaps = false;
-  ModelOptions model;
+  ModelOptions model{};
 };
 
 /// Limits of a step. Whatever the budget, a step performs at least one operation if any is due.
@@ -149,7 +149,7 @@ struct StepBudget {
   /// previous ones, it would not be finished in time.
   double seconds = std::numeric_limits<double>::infinity();
   /// Seconds since any fixed moment. Required if `seconds` is finite.
-  std::function<double()> clock;
+  std::function<double()> clock{};
   /// Seconds that the caller needs after the step for each point added and for each point removed.
   /// The step leaves this time unused.
   std::array<double, 2> after{};
