@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -12,6 +13,7 @@
 
 #include "base/store_checks.hpp"
 #include "mesh/scan_surface_steps.hpp"
+#include "surface/numbered_points.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 
 namespace terrace::terrain {
@@ -25,22 +27,16 @@ TriangleMesh numbered_points(const stream::Store& store, const stream::ClusterOr
   TriangleMesh mesh;
   mesh.positions.resize(order.points());
   mesh.levels.resize(order.points());
-  std::vector<std::uint32_t> begins(store.levels()[0].clusters);
   for (const auto& cluster : order.clusters) {
-    const unsigned level = stream::level_of(cluster.id);
-    if (level == 0) begins[stream::ordinal_of(cluster.id)] = cluster.begin;
     // A representative has the highest level of the clusters that it is in, without heading them.
     if (cluster.representative == stream::kNoNumber) continue;
     std::uint8_t& highest = mesh.levels[cluster.representative];
-    highest = std::max(highest, static_cast<std::uint8_t>(level + 1));
+    highest = std::max(highest, static_cast<std::uint8_t>(stream::level_of(cluster.id) + 1));
   }
-  const stream::StoreSchema& schema = store.schema();
-  store.for_each(0, [&](stream::ClusterId id, const stream::ClusterRecord&,
-                        const stream::ClusterPoints& points) {
-    std::size_t at = begins[stream::ordinal_of(id)];
-    for (const stream::Point3& p : points.positions) mesh.positions[at++] = world_point(schema, p);
-    if (points.has_representative) mesh.positions[at] = world_point(schema, points.representative);
-  });
+  for_each_numbered_point(
+      store, order, [&](std::uint32_t number, const stream::Point3& p, std::span<const std::byte>) {
+        mesh.positions[number] = world_point(store.schema(), p);
+      });
   return mesh;
 }
 

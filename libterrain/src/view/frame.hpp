@@ -63,6 +63,9 @@ class ViewFrame {
   stream::Point3 middle_{};
 };
 
+/// The frame of the views of a store. Throws: stream::Error for latitudes beyond a pole.
+[[nodiscard]] ViewFrame view_frame(const stream::Store& store);
+
 /// Integer coordinates in the view frame, for exact predicates in space. Cells are a power of two
 /// metres, at most 2^29 of them along a side of the store's box.
 class ViewLattice {

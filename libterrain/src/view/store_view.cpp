@@ -3,24 +3,24 @@
 
 #include "earth/ground.hpp"
 #include "terrace/terrain/latitudes.hpp"
+#include "view/frame.hpp"
 #include "view/store_view_impl.hpp"
 
 namespace terrace::terrain {
-namespace {
 
-stream::LinearMap ground_of(const stream::Store& store) {
+ViewFrame view_frame(const stream::Store& store) {
   check_latitudes(store);
-  return Ground(store.schema()).map(store.bounds());
+  return {store, Ground(store.schema()).map(store.bounds())};
 }
-
-}  // namespace
 
 template <class Shown>
 StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& options,
                             Reader reader)
-    : impl_(std::make_unique<Impl>(store, ground_of(store), options, [&](FramedSource& source) {
-        return reader == Reader::thread ? make_reading_thread(source) : make_frame_reader(source);
-      })) {}
+    : impl_(std::make_unique<Impl>(store, view_frame(store).ground(), options,
+                                   [&](FramedSource& source) {
+                                     return reader == Reader::thread ? make_reading_thread(source)
+                                                                     : make_frame_reader(source);
+                                   })) {}
 
 template StoreView<tri::ThinnedDelaunay2>::StoreView(const stream::Store&, const tri::ViewOptions&,
                                                      Reader);

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <terrace/stream/store.hpp>
+#include <terrace/stream/stored_surface.hpp>
+
+namespace terrace::terrain {
+
+/// Reads all points of a store. visit(number, position, values) receives the number of each point
+/// in the order of the clusters, its stored coordinates and its attributes, a record of the schema.
+template <class Visit>
+void for_each_numbered_point(const stream::Store& store, const stream::ClusterOrder& order,
+                             const Visit& visit) {
+  std::vector<std::uint32_t> begins(store.levels()[0].clusters);
+  for (const auto& cluster : order.clusters) {
+    if (stream::level_of(cluster.id) == 0) begins[stream::ordinal_of(cluster.id)] = cluster.begin;
+  }
+  const std::size_t bytes = store.schema().payload_size();
+  store.for_each(0, [&](stream::ClusterId id, const stream::ClusterRecord&,
+                        const stream::ClusterPoints& points) {
+    std::uint32_t number = begins[stream::ordinal_of(id)];
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      visit(number++, points.positions[i], std::span(points.payload).subspan(i * bytes, bytes));
+    }
+    if (points.has_representative) {
+      visit(number, points.representative, std::span(points.representative_payload));
+    }
+  });
+}
+
+}  // namespace terrace::terrain
