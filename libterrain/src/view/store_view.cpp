@@ -2,7 +2,9 @@
 #include "terrace/terrain/store_view.hpp"
 
 #include "earth/ground.hpp"
+#include "mesh/scan_surface_steps.hpp"
 #include "terrace/terrain/latitudes.hpp"
+#include "terrace/terrain/surface_view.hpp"
 #include "view/frame.hpp"
 #include "view/store_view_impl.hpp"
 
@@ -21,6 +23,20 @@ StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& 
                                      return reader == Reader::thread ? make_reading_thread(source)
                                                                      : make_frame_reader(source);
                                    })) {}
+
+SurfaceView::SurfaceView(const stream::Store& store, const tri::ViewOptions& options,
+                         const Context& context)
+    : SurfaceView(
+          [&] {
+            const stream::Store source = store.with_stop(context.stop);
+            // While the store is read: the stored tree and triangles, and those of the view.
+            constexpr std::uint64_t kBytesPerPoint = 400;
+            check_surface_memory(source, source.points(),
+                                 kBytesPerPoint + source.schema().payload_size(),
+                                 context.memory_or(0));
+            return source;
+          }(),
+          view_frame(store).ground(), options) {}
 
 template StoreView<tri::ThinnedDelaunay2>::StoreView(const stream::Store&, const tri::ViewOptions&,
                                                      Reader);

@@ -2,29 +2,22 @@
 #include "terrace/terrain/surface_view.hpp"
 
 #include <algorithm>
-#include <limits>
+#include <iterator>
 #include <map>
 #include <utility>
 #include <vector>
 
 #include <terrace/stream/stored_surface.hpp>
 
-#include "mesh/scan_surface_steps.hpp"
 #include "surface/numbered_points.hpp"
 #include "view/cluster_reader.hpp"
 #include "view/frame.hpp"
 
 namespace terrace::terrain {
-namespace {
-
-/// While the store is read: the stored tree and triangles, and those of the view.
-constexpr std::uint64_t kBytesPerPoint = 400;
-
-}  // namespace
 
 struct SurfaceView::Impl {
   /// The vertices of the surface: points of the store that are on it.
-  struct Vertices {
+  struct Read {
     tri::Surface surface;  ///< in the view frame
     tri::VertexTree tree;
     std::vector<std::uint32_t> numbers;  ///< of the points
@@ -33,26 +26,57 @@ struct SurfaceView::Impl {
   };
 
   Impl(const stream::Store& store, const stream::ClusterOrder& order, const ViewFrame& view_frame,
-       Vertices&& vertices, const tri::ViewOptions& options)
+       Read&& read, const tri::ViewOptions& options)
       : frame(view_frame),
         clusters(order.clusters),
         record_bytes(store.schema().payload_size()),
-        stored(std::move(vertices.stored)),
-        values(std::move(vertices.values)),
-        levels(vertices.tree.levels),
-        numbers(std::move(vertices.numbers)),
-        control(vertices.surface, vertices.tree, options) {}
+        stored(std::move(read.stored)),
+        values(std::move(read.values)),
+        levels(read.tree.levels),
+        numbers(std::move(read.numbers)),
+        control(read.surface, read.tree, options) {
+    vertices.resize(numbers.size());
+    for (std::uint32_t v = 0; v < numbers.size(); ++v) {
+      vertices[control.front().input()[v]] = tri::VertexId{v};
+    }
+    for (std::uint32_t c = 0; c < clusters.size(); ++c) {
+      by_id.push_back(c);
+      if (tri::level_of(clusters[c].id) == 0) leaves.push_back(c);
+    }
+    std::sort(by_id.begin(), by_id.end(),
+              [this](std::uint32_t a, std::uint32_t b) { return clusters[a].id < clusters[b].id; });
+  }
 
-  static Vertices read(const stream::Store& store, const stream::ClusterOrder& order,
-                       const ViewFrame& frame);
+  static Read read(const stream::Store& store, const stream::ClusterOrder& order,
+                   const ViewFrame& frame);
   /// The index in the full surface.
   [[nodiscard]] std::size_t index(tri::VertexId vertex) const {
     return control.front().input()[slot(vertex)];
   }
+  /// Null if there is no such cluster.
+  [[nodiscard]] const stream::ClusterOrder::Cluster* find(tri::ClusterId id) const;
+  /// The cluster of level 0 that has a point.
+  [[nodiscard]] const stream::ClusterOrder::Cluster& leaf(std::uint32_t number) const {
+    const auto after = std::upper_bound(
+        leaves.begin(), leaves.end(), number,
+        [&](std::uint32_t wanted, std::uint32_t c) { return wanted < clusters[c].begin; });
+    return clusters[*std::prev(after)];
+  }
+  /// The cluster above one at a level.
+  [[nodiscard]] const stream::ClusterOrder::Cluster& above(
+      const stream::ClusterOrder::Cluster& cluster, unsigned level) const {
+    const auto* at = &cluster;
+    while (tri::level_of(at->id) < level) at = &clusters[at->parent];
+    return *at;
+  }
+  template <class Visit>
+  void for_each_vertex(const stream::ClusterOrder::Cluster& cluster, const Visit& visit) const;
   void apply_pins();
 
   ViewFrame frame;
   std::vector<stream::ClusterOrder::Cluster> clusters;
+  std::vector<std::uint32_t> by_id;   ///< all clusters
+  std::vector<std::uint32_t> leaves;  ///< those of level 0, by their points
   std::size_t record_bytes = 0;
   // By index in the full surface.
   std::vector<stream::Point3> stored;
@@ -60,17 +84,18 @@ struct SurfaceView::Impl {
   std::vector<std::uint8_t> levels;
   std::vector<std::uint32_t> numbers;  ///< ascending
   tri::SurfaceControl control;
+  std::vector<tri::VertexId> vertices;
   std::map<tri::ClusterId, tri::ViewPin> pins;
   bool settled = false;
 };
 
-SurfaceView::Impl::Vertices SurfaceView::Impl::read(const stream::Store& store,
-                                                    const stream::ClusterOrder& order,
-                                                    const ViewFrame& frame) {
+SurfaceView::Impl::Read SurfaceView::Impl::read(const stream::Store& store,
+                                                const stream::ClusterOrder& order,
+                                                const ViewFrame& frame) {
   stream::StoredSurface surface = store.read_surface(order);
   const std::vector<bool> on_surface = surface.on_surface();
   std::vector<std::uint32_t> vertex(order.points(), stream::kNoNumber);
-  Vertices out;
+  Read out;
   for (std::uint32_t number = 0; number < order.points(); ++number) {
     if (!on_surface[number]) continue;
     vertex[number] = static_cast<std::uint32_t>(out.numbers.size());
@@ -82,12 +107,12 @@ SurfaceView::Impl::Vertices SurfaceView::Impl::read(const stream::Store& store,
   out.values.resize(vertices * bytes);
   for_each_numbered_point(
       store, order,
-      [&](std::uint32_t number, const stream::Point3& p, std::span<const std::byte> values) {
+      [&](std::uint32_t number, const stream::Point3& p, std::span<const std::byte> record) {
         const std::uint32_t v = vertex[number];
         if (v == stream::kNoNumber) return;
         out.stored[v] = p;
         out.surface.points[v] = frame(p);
-        std::copy(values.begin(), values.end(),
+        std::copy(record.begin(), record.end(),
                   out.values.begin() + static_cast<std::ptrdiff_t>(v * bytes));
       });
   for (const std::uint32_t number : out.numbers) {
@@ -103,40 +128,48 @@ SurfaceView::Impl::Vertices SurfaceView::Impl::read(const stream::Store& store,
   return out;
 }
 
-// A cluster's vertices are those of its points that move when it is collapsed.
+const stream::ClusterOrder::Cluster* SurfaceView::Impl::find(tri::ClusterId id) const {
+  const auto found = std::lower_bound(
+      by_id.begin(), by_id.end(), id,
+      [&](std::uint32_t cluster, tri::ClusterId wanted) { return clusters[cluster].id < wanted; });
+  if (found == by_id.end() || clusters[*found].id != id) return nullptr;
+  return &clusters[*found];
+}
+
+/// Calls visit(index) for the vertices of the full surface that a cluster removes when it
+/// collapses.
+template <class Visit>
+void SurfaceView::Impl::for_each_vertex(const stream::ClusterOrder::Cluster& cluster,
+                                        const Visit& visit) const {
+  const auto begin = std::lower_bound(numbers.begin(), numbers.end(), cluster.begin);
+  const auto end = std::lower_bound(begin, numbers.end(), cluster.end);
+  for (auto at = begin; at != end; ++at) {
+    const auto index = static_cast<std::size_t>(at - numbers.begin());
+    if (levels[index] == tri::level_of(cluster.id)) visit(index);
+  }
+}
+
 void SurfaceView::Impl::apply_pins() {
   std::vector<tri::VertexId> active, inactive;
-  std::vector<tri::VertexId> vertex_of(numbers.size());
-  for (std::uint32_t v = 0; v < numbers.size(); ++v) {
-    vertex_of[control.front().input()[v]] = tri::VertexId{v};
-  }
   for (const auto& [id, kind] : pins) {
-    const auto cluster = std::find_if(clusters.begin(), clusters.end(),
-                                      [&](const auto& one) { return one.id == id; });
-    if (cluster == clusters.end()) continue;
-    const auto begin = std::lower_bound(numbers.begin(), numbers.end(), cluster->begin);
-    const auto end = std::lower_bound(begin, numbers.end(), cluster->end);
-    for (auto at = begin; at != end; ++at) {
-      const auto i = static_cast<std::size_t>(at - numbers.begin());
-      if (levels[i] > tri::level_of(id)) continue;
-      if (kind == tri::ViewPin::collapsed) {
-        inactive.push_back(vertex_of[i]);
-      } else if (levels[i] == tri::level_of(id)) {
-        active.push_back(vertex_of[i]);
-      }
+    const auto* const cluster = find(id);
+    if (cluster == nullptr) continue;
+    if (kind == tri::ViewPin::expanded) {
+      for_each_vertex(*cluster, [&](std::size_t index) { active.push_back(vertices[index]); });
+      continue;
+    }
+    for (auto* at = cluster; at != clusters.data() + cluster->next; ++at) {
+      for_each_vertex(*at, [&](std::size_t index) { inactive.push_back(vertices[index]); });
     }
   }
   control.pin(active, inactive);
 }
 
-SurfaceView::SurfaceView(const stream::Store& store, const tri::ViewOptions& options,
-                         const Context& context) {
-  const stream::Store source = store.with_stop(context.stop);
-  check_surface_memory(source, source.points(), kBytesPerPoint + source.schema().payload_size(),
-                       context.memory_or(0));
-  const stream::ClusterOrder order = stream::cluster_order(source);
-  const ViewFrame frame = view_frame(source);
-  impl_ = std::make_unique<Impl>(source, order, frame, Impl::read(source, order, frame), options);
+SurfaceView::SurfaceView(const stream::Store& store, const stream::LinearMap& ground,
+                         const tri::ViewOptions& options) {
+  const stream::ClusterOrder order = stream::cluster_order(store);
+  const ViewFrame frame(store, ground);
+  impl_ = std::make_unique<Impl>(store, order, frame, Impl::read(store, order, frame), options);
 }
 SurfaceView::~SurfaceView() = default;
 
@@ -156,6 +189,31 @@ void SurfaceView::pin(tri::ClusterId cluster, tri::ViewPin kind) {
 void SurfaceView::unpin(tri::ClusterId cluster) {
   impl_->pins.erase(cluster);
   impl_->apply_pins();
+}
+
+tri::ClusterId SurfaceView::cluster(tri::VertexId vertex) const {
+  const std::size_t index = impl_->index(vertex);
+  return impl_->above(impl_->leaf(impl_->numbers[index]), impl_->levels[index]).id;
+}
+
+std::optional<tri::ClusterId> SurfaceView::expandable(tri::VertexId vertex) const {
+  const std::size_t index = impl_->index(vertex);
+  const auto& leaf = impl_->leaf(impl_->numbers[index]);
+  for (unsigned level = impl_->levels[index]; level-- > 0;) {
+    const auto& cluster = impl_->above(leaf, level);
+    bool hides = false;
+    impl_->for_each_vertex(cluster, [&](std::size_t other) {
+      hides = hides || !surface().alive(impl_->vertices[other]);
+    });
+    if (hides) return cluster.id;
+  }
+  return std::nullopt;
+}
+
+bool SurfaceView::is_in(tri::ClusterId cluster, tri::VertexId vertex) const {
+  const auto* const found = impl_->find(cluster);
+  const std::uint32_t number = impl_->numbers[impl_->index(vertex)];
+  return found != nullptr && number >= found->begin && number < found->end;
 }
 
 const tri::SurfaceControl& SurfaceView::control() const { return impl_->control; }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include <terrace/stream/store.hpp>
@@ -20,7 +21,7 @@ namespace terrace::terrain {
 ///
 /// Cameras, regions and focuses are in the view frame of StoreView. Vertices are not rounded.
 ///
-/// Reads the whole store at once: about 270 bytes per vertex of the surface, and the attributes.
+/// Reads the whole store at once: about 220 bytes per vertex of the surface, and the attributes.
 /// StoreView<tri::DynamicSurface> serves scans that are too large for that or have no stored
 /// surface.
 ///
@@ -38,6 +39,10 @@ class SurfaceView {
   /// fit in memory; std::invalid_argument for options out of range; stream::Stopped.
   explicit SurfaceView(const stream::Store& store, const tri::ViewOptions& options = {},
                        const Context& context = {});
+  /// The same with the map from stored coordinates to metres that StoreView::ground() returns.
+  /// Needs no PROJ, and does not check whether memory suffices. Throws also: stream::MissingBytes.
+  SurfaceView(const stream::Store& store, const stream::LinearMap& ground,
+              const tri::ViewOptions& options);
   ~SurfaceView();
   SurfaceView(const SurfaceView&) = delete;
   SurfaceView& operator=(const SurfaceView&) = delete;
@@ -52,6 +57,18 @@ class SurfaceView {
   /// one that is pinned collapsed has none, nor do those below it. O(vertices).
   void pin(tri::ClusterId cluster, tri::ViewPin kind);
   void unpin(tri::ClusterId cluster);
+
+  // ---- Clusters of vertices --------------------------------------------------------------------
+
+  /// The cluster that removes a vertex when it collapses; the root for one that is always shown.
+  [[nodiscard]] tri::ClusterId cluster(tri::VertexId vertex) const;
+  /// The coarsest cluster below that one with the vertex, or the point at it, of which vertices are
+  /// hidden. O(points of the clusters).
+  [[nodiscard]] std::optional<tri::ClusterId> expandable(tri::VertexId vertex) const;
+  /// Whether the vertex is a point of the cluster or below it. O(log clusters).
+  [[nodiscard]] bool is_in(tri::ClusterId cluster, tri::VertexId vertex) const;
+
+  // ---- Vertices --------------------------------------------------------------------------------
 
   [[nodiscard]] const tri::SurfaceControl& control() const;
   [[nodiscard]] const tri::SurfaceFront& surface() const { return control().front(); }
