@@ -118,12 +118,14 @@ tri::SurfaceSmoothingOptions surface_smoothing(const SurfaceSmoothingArguments& 
 
 /// Returns the surface as arrays_of() does, or (vertices, tetrahedra inside it).
 py::tuple surface(const OpenStore& open, unsigned level, const py::object& region,
-                  const std::string& where, bool tetrahedra,
+                  const std::string& where,
+                  const std::optional<std::pair<unsigned, std::uint64_t>>& cluster, bool tetrahedra,
                   const std::optional<SurfaceSmoothingArguments>& smoothing,
                   std::optional<double> max_error, std::optional<std::size_t> max_points,
                   bool stored, const py::tuple& settings) {
   const stream::Store store = open.get(where);
-  const terrain::Detail detail = detail_of(store, level, region, py::list());
+  terrain::Detail detail = detail_of(store, level, region, py::list());
+  if (cluster) detail.cluster = cluster_of(store, cluster->first, cluster->second);
   terrain::ScanSurfaceOptions options;
   options.stored = stored;
   options.tetrahedra = tetrahedra;

@@ -555,18 +555,21 @@ class Store:
         return np.split(vertices, begins[1:-1]) if len(numbers) else [], numbers
 
     @overload
-    def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: Literal[False] = False,
+    def surface(self, level: int | None = None, region: Region | None = None, where: str | None = None, *,
+                cluster: ClusterId | None = None, tetrahedra: Literal[False] = False,
                 smoothing: SurfaceSmoothing | Mapping[str, Any] | None = None,
                 max_error: float | None = None, max_points: int | None = None, stored: bool = True,
                 progress: Progress | None = None, threads: int | None = None, memory: int | None = None) -> Mesh: ...
 
     @overload
-    def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: Literal[True],
+    def surface(self, level: int | None = None, region: Region | None = None, where: str | None = None, *,
+                cluster: ClusterId | None = None, tetrahedra: Literal[True],
                 max_error: None = None, max_points: None = None, stored: bool = True,
                 progress: Progress | None = None, threads: int | None = None,
                 memory: int | None = None) -> tuple[Float64Array, UInt32Array]: ...
 
-    def surface(self, level: int = 0, region: Region | None = None, where: str | None = None, *, tetrahedra: bool = False,
+    def surface(self, level: int | None = None, region: Region | None = None, where: str | None = None, *,
+                cluster: ClusterId | None = None, tetrahedra: bool = False,
                 smoothing: SurfaceSmoothing | Mapping[str, Any] | None = None,
                 max_error: float | None = None, max_points: int | None = None, stored: bool = True,
                 progress: Progress | None = None, threads: int | None = None,
@@ -576,6 +579,8 @@ class Store:
         The surface is open where the scan does not go all the way round. All points are held in memory.
 
         level, region, where: as in points().
+        cluster: a pair (level, number): uses only the points of ``level`` (by default the cluster's; 0 for all) that
+            this cluster represents. Not with a region.
         tetrahedra: whether to return the solid inside the closed surface instead.
         smoothing: removes noise: a method of Mesh.smoothed(), or a dict of ``method``, ``iterations`` and ``limit``,
             here in metres on the ground. Not with ``tetrahedra``.
@@ -583,15 +588,18 @@ class Store:
             all vertices of the full surface and from about as many places on the triangles. Parts, holes and handles
             stay.
         max_points: instead of bounding the error, simplifies to at most this many vertices, as far as that is possible.
-        stored: whether a surface that build(surface=True) has stored is used, without ``region``, ``where`` and
-            ``tetrahedra``. Coarse levels of it do not tear; max_error and max_points leave more vertices than without.
+        stored: whether a surface that build(surface=True) has stored is used, without ``region``, ``where``, ``cluster``
+            and ``tetrahedra``. Coarse levels of it do not tear; max_error and max_points leave more vertices than without.
 
         Returns: a Mesh with triangles counter-clockwise seen from outside; with ``tetrahedra`` (vertices, float64,
             shape (n, 3); tetrahedra, uint32, shape (m, 4)).
 
         Source: J. Skala, section 8.3.
         """
-        result = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', bool(tetrahedra),
+        cluster = self._cluster(cluster, region, [])
+        if level is None:
+            level = cluster[0] if cluster else 0
+        result = _core.surface(self._core, as_integer(level, 'level', bits=32), as_region(region), where or '', cluster, bool(tetrahedra),
                              _surface_smoothing(smoothing),
                              None if max_error is None else float(max_error),
                              None if max_points is None else as_integer(max_points, 'max_points'),

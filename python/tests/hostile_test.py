@@ -103,7 +103,7 @@ def calls(luck, terrace, shared, folder):
         (store.profile, [flat], ['step', 'method', 'level', 'max_edge']),
         (store.contours, [number], ['level', 'region', 'max_edge', 'lonlat']),
         (store.mesh, [lambda: 0], ['region', 'focus', 'where', 'metric', 'crs', 'max_points']),
-        (store.lines, [], ['level', 'region', 'where', 'focus']), (store.surface, [], ['level', 'region', 'where', 'tetrahedra']), (lambda a, k: terrace.cluster(a, count=k), [points, number], []),
+        (store.lines, [], ['level', 'region', 'where', 'focus']), (store.surface, [], ['level', 'region', 'where', 'cluster', 'tetrahedra']), (lambda a, k: terrace.cluster(a, count=k), [points, number], []),
         (store.bounded_mesh, [luck.random], ['max_points', 'quality', 'region', 'where', 'fill', 'duplicates']),
         (view.frame, [place, place, place], ['fov', 'size', 'matrix', 'pixel_error', 'ground_error']),
         (terrace.View, [lambda: store, lambda: 'points'], ['reader', 'max_points']),

@@ -172,6 +172,27 @@ class Meshes(StoreCase):
         self.assertGreater(volumes.min(), 0)
         self.assertAlmostEqual(volumes.sum(), 4 / 3 * np.pi * 100 ** 3, delta=2e4)
 
+    def test_surface_of_a_cluster_is_that_of_its_points(self):
+        random = np.random.default_rng(9).normal(size=(3000, 3))
+        store = terrace.build(100 * random / np.linalg.norm(random, axis=1)[:, None], self.path('parts'), block_points=500)
+
+        def cells(corners, points):
+            return {frozenset(map(tuple, points[row])) for row in corners}
+
+        for number in (0, store.info['levels'][1]['clusters'] - 1):
+            part = terrace.build(terrace.xyz(store.points(cluster=(1, number), level=0)), self.path('part'), replace=True)
+            ours, theirs = store.surface(0, cluster=(1, number)), part.surface()
+            self.assertEqual(cells(ours.triangles, ours.vertices), cells(theirs.triangles, theirs.vertices))
+            (points, inside), (same, again) = store.surface(0, cluster=(1, number), tetrahedra=True), part.surface(tetrahedra=True)
+            np.testing.assert_array_equal(sorted_rows(points), sorted_rows(same))
+            self.assertEqual(cells(inside, points), cells(again, same))
+            members, _ = store.surface(cluster=(1, number), tetrahedra=True)
+            np.testing.assert_array_equal(sorted_rows(members), sorted_rows(terrace.xyz(store.points(cluster=(1, number)))))
+        for wrong in ({'cluster': (1, 0), 'region': (0, 0, 1, 1)}, {'cluster': (9, 0)}, {'cluster': (1, 0), 'max_error': 1},
+                      {'cluster': (0, 0), 'level': 1}):
+            with self.assertRaises(ValueError):
+                store.surface(**wrong)
+
     @unittest.skipIf(Delaunay is None, 'SciPy is missing')
     def test_a_simplified_surface_is_within_its_bound(self):
         random = np.random.default_rng(5).normal(size=(4000, 3))

@@ -269,6 +269,51 @@ class SurfaceTest(unittest.TestCase):
         self.assertTrue(rest.startswith(f'\nCELL_TYPES {cells}\n'.encode()))
         self.assertIn(f'\nPOINT_DATA {count}\nSCALARS level unsigned_char 1\n'.encode(), rest)
 
+    def test_a_cluster_is_as_a_store_of_its_points(self):
+        levels = json.loads(terrace('info', self.store, '--json').stdout)['levels']
+        self.assertGreater(len(levels), 1)
+        part = self.path('part.terrace')
+        samples = 0
+        for number in range(levels[1]['clusters']):
+            cluster = f'1:{number}'
+            result = terrace('points', self.store, '--cluster', cluster, '--level', 0, '-o', self.path('part.ply'), '--json', '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            samples += json.loads(result.stdout)['vertices']
+            if number % 5 > 0:
+                continue
+            result = terrace('build', self.path('part.ply'), '-o', part, '--force')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            # A huge factor keeps all tetrahedra.
+            for options in (['--tetrahedra'], ['--tetrahedra', '--criterion', 'edge:1e9'], []):
+                ending = 'vtk' if options else 'obj'
+                summaries = []
+                for store, chosen in ((self.store, ['--cluster', cluster, '--level', 0]), (part, [])):
+                    result = terrace('surface', store, *chosen, '-o', self.path('part.' + ending), '--json', '--force', *options)
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                    summary = json.loads(result.stdout)
+                    summaries.append({key: summary[key] for key in ('vertices', 'tetrahedra', 'triangles', 'area', 'volume',
+                                                                    'components', 'samples_off') if key in summary})
+                for key, value in summaries[0].items():
+                    self.assertAlmostEqual(summaries[1][key], value, places=6, msg=f'{cluster} {options} {key}')
+        self.assertEqual(samples, 3000)
+
+    def test_a_cluster_excludes_what_it_replaces(self):
+        out = self.path('none.ply')
+        for code, message, options in (
+                (2, '--region', ['--region', '0,0,1,1']), (2, '--focus', ['--focus', '0,0,1,1:0']),
+                (2, 'give --level 0', ['--max-error', 0.1]),
+                (2, 'a cluster of level 0 has no points of level 1', ['--level', 1]),
+                (1, 'no point of the cluster meets the condition', ['--where', f'x < {-RADIUS} || x == 9.99 * y'])):
+            cluster = '0:0' if '--level' in options else '1:0'
+            result = terrace('surface', self.store, '-o', out, '--cluster', cluster, *options)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(message, result.stderr)
+            self.assertFalse(os.path.exists(out))
+        for cluster in ('0:99999', '9:0', '1'):
+            self.assertNotEqual(terrace('surface', self.store, '-o', out, '--cluster', cluster).returncode, 0)
+        light, _ = self.surface('light.ply', '--cluster', '1:0', '--level', 0, '--max-error', 1)
+        self.assertGreater(light['full_vertices'], light['vertices'])
+
     def write_metric(self, name, **region):
         with open(self.path(name), 'w') as file:
             json.dump({'regions': [region]}, file)

@@ -170,6 +170,11 @@ void check_options(const ScanSurfaceOptions& options, const Detail& detail) {
   if (options.max_points && *options.max_points < 4) {
     throw UsageError(stream::message("{max_points} must be at least 4"));
   }
+  if (simplifies(options) && detail.cluster && detail.level > 0) {
+    throw UsageError(
+        stream::message("{max_error} and {max_points} apply to the surface through all samples: "
+                        "with {cluster}, give {level} 0"));
+  }
   if (simplifies(options) && (detail.level > 0 || !detail.focuses.empty())) {
     throw UsageError(stream::message(
         "{max_error} and {max_points} apply to the surface through all samples: they exclude "
@@ -287,7 +292,11 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   check_surface_memory(source, wanted_points(source, detail), restoring_bytes_per_point(options),
                        context.memory_or(0));
   TriangleMesh points = detail_points(source, detail);
-  if (points.positions.empty()) throw_none_inside(store);
+  if (points.positions.empty()) {
+    if (!detail.cluster) throw_none_inside(store);
+    throw stream::Error(store.path().string(), "no point of the cluster meets the condition")
+        .remedy(stream::message("give another {where} or {cluster}"));
+  }
   const std::vector<stream::Point3> ground = on_ground(points.positions, source.schema());
   ScanSurface out;
   tri::RestoreOptions restore = options.restore;

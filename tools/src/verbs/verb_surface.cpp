@@ -32,6 +32,8 @@ class SurfaceCommand final : public Command {
  public:
   void define(CLI::App& app) override {
     part_.define(app, "only points inside");
+    part_.define_cluster(app,
+                         "the surface of the points of --level (default: L) that it represents");
     add_output(app, output_,
                fmt::format("the file to write: {} (GLB in metres); with --tetrahedra {}",
                            endings_of(outputs::kMeshFile), endings_of(outputs::kTetrahedraFile)));

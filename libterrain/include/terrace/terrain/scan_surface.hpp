@@ -92,7 +92,8 @@ struct ScanSurface {
 };
 
 /// Restores the surface of the points that `detail` wants, in metres on the ground. Degrees are
-/// converted about the middle of the points' box. Throws: stream::Error on a damaged store, and if
+/// converted about the middle of the points' box. With a cluster, uses only the points that it
+/// represents, as if the store had no others. Throws: stream::Error on a damaged store, and if
 /// the points do not fit in the context's memory (the message says how much they need); UsageError
 /// for options that exclude each other or are out of range; stream::Stopped; any exception of the
 /// method.
