@@ -2,37 +2,42 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <terrace/stream/point.hpp>
 #include <terrace/tri/multiresolution.hpp>
-#include <terrace/tri/point_cloud.hpp>
 
 #include "arrays.hpp"
 
 namespace terrace::python {
 
-/// Vertices and triangles added to and removed from a model of a store's points, as columns.
-struct MeshChange {
+/// Vertices and cells (triangles, or tetrahedra with 4 corners) added to and removed from a model
+/// of a store's points, as columns.
+template <std::size_t Corners>
+struct CellChange {
   std::vector<std::int32_t> added_vertices, removed_vertices, moved_vertices;
   std::vector<stream::Point3> added_positions, moved_positions;
-  std::vector<std::int32_t> added_triangles, removed_triangles;
-  std::vector<std::array<std::int32_t, 3>> added_corners;
+  std::vector<std::int32_t> added_cells, removed_cells;
+  std::vector<std::array<std::int32_t, Corners>> added_corners;
 };
+using MeshChange = CellChange<3>;
 
-inline py::dict dict_of(MeshChange&& change) {
+template <std::size_t Corners>
+py::dict dict_of(CellChange<Corners>&& change) {
   py::dict result;
   result["added_vertices"] = to_array(std::move(change.added_vertices));
   result["added_positions"] = to_array(std::move(change.added_positions));
   result["removed_vertices"] = to_array(std::move(change.removed_vertices));
   result["moved_vertices"] = to_array(std::move(change.moved_vertices));
   result["moved_positions"] = to_array(std::move(change.moved_positions));
-  result["added_triangles"] = to_array(std::move(change.added_triangles));
+  result[Corners == 3 ? "added_triangles" : "added_tetrahedra"] =
+      to_array(std::move(change.added_cells));
   result["added_corners"] = to_array(std::move(change.added_corners));
-  result["removed_triangles"] = to_array(std::move(change.removed_triangles));
+  result[Corners == 3 ? "removed_triangles" : "removed_tetrahedra"] =
+      to_array(std::move(change.removed_cells));
   return result;
 }
 
@@ -45,55 +50,65 @@ std::int32_t number_of(Id of) {
 template <class Shown, class Place>
 class MeshChanges {
  public:
-  static constexpr bool kTriangles = !std::is_same_v<Shown, tri::PointCloud>;
+  static constexpr bool kTriangles = requires(const Shown& shown) { shown.all_triangles(); };
+  static constexpr bool kTetrahedra = requires(const Shown& shown) { shown.all_tetrahedra(); };
   using Model = tri::MultiresolutionModel<Shown>;
+  using Change = CellChange<kTetrahedra ? 4 : 3>;
 
-  MeshChanges(const Model& model, Place place) : model_(model), place_(std::move(place)) {}
+  /// mirrored: place() turns triangles or tetrahedra over.
+  MeshChanges(const Model& model, bool mirrored, Place place)
+      : model_(model), mirrored_(mirrored), place_(std::move(place)) {}
 
-  [[nodiscard]] MeshChange of(const typename Model::Delta& delta) const {
-    MeshChange change;
-    for (const tri::VertexId v : delta.changes.removed_vertices) {
+  [[nodiscard]] Change of(const typename Model::Delta& delta) const {
+    const auto& changes = delta.changes;
+    Change change;
+    for (const tri::VertexId v : changes.removed_vertices) {
       change.removed_vertices.push_back(number_of(v));
     }
-    for (const tri::VertexId v : delta.changes.added_vertices) add(change, v);
+    for (const tri::VertexId v : changes.added_vertices) add_vertex(change, v);
     for (const tri::VertexId v : delta.reassigned) {
       change.moved_vertices.push_back(number_of(v));
       change.moved_positions.push_back(place_(v));
     }
     if constexpr (kTriangles) {
-      for (const auto t : delta.changes.removed_triangles) {
-        change.removed_triangles.push_back(number_of(t));
-      }
-      for (const auto t : delta.changes.added_triangles) add(change, t);
+      for (const auto t : changes.removed_triangles) change.removed_cells.push_back(number_of(t));
+      for (const auto t : changes.added_triangles) add_cell(change, t);
+    } else if constexpr (kTetrahedra) {
+      for (const auto t : changes.removed_tetrahedra) change.removed_cells.push_back(number_of(t));
+      for (const auto t : changes.added_tetrahedra) add_cell(change, t);
     }
     return change;
   }
 
   /// Returns the whole model as a change that adds it.
-  [[nodiscard]] MeshChange snapshot() const {
-    MeshChange change;
-    for (const tri::VertexId v : model_.triangulation().all_vertices()) add(change, v);
+  [[nodiscard]] Change snapshot() const {
+    const Shown& shown = model_.triangulation();
+    Change change;
+    for (const tri::VertexId v : shown.all_vertices()) add_vertex(change, v);
     if constexpr (kTriangles) {
-      for (const auto t : model_.triangulation().all_triangles()) add(change, t);
+      for (const auto t : shown.all_triangles()) add_cell(change, t);
+    } else if constexpr (kTetrahedra) {
+      for (const auto t : shown.all_tetrahedra()) add_cell(change, t);
     }
     return change;
   }
 
  private:
-  void add(MeshChange& change, tri::VertexId v) const {
+  void add_vertex(Change& change, tri::VertexId v) const {
     change.added_vertices.push_back(number_of(v));
     change.added_positions.push_back(place_(v));
   }
-  void add(MeshChange& change, tri::TriangleId t) const {
-    if constexpr (kTriangles) {
-      const auto corners = model_.triangulation().vertices(t);
-      change.added_triangles.push_back(number_of(t));
-      change.added_corners.push_back(
-          {number_of(corners[0]), number_of(corners[1]), number_of(corners[2])});
-    }
+  template <class Cell>
+  void add_cell(Change& change, Cell t) const {
+    const auto vertices = model_.triangulation().vertices(t);
+    auto& corners = change.added_corners.emplace_back();
+    for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = number_of(vertices[i]);
+    if (mirrored_) std::swap(corners[1], corners[2]);
+    change.added_cells.push_back(number_of(t));
   }
 
   const Model& model_;
+  bool mirrored_;
   Place place_;
 };
 

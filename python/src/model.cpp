@@ -102,8 +102,9 @@ class SharedModel {
 
  private:
   auto changes() const {
+    const std::array<double, 6>& m = store_.schema().world.xy;
     return MeshChanges<tri::Delaunay2<Coord>, std::function<stream::Point3(tri::VertexId)>>(
-        *model_, [this](tri::VertexId v) {
+        *model_, m[0] * m[4] - m[1] * m[3] < 0, [this](tri::VertexId v) {
           const auto xy = model_->triangulation().point(v);
           return world_point(store_.schema(), {static_cast<double>(xy[0]),
                                                static_cast<double>(xy[1]), model_->height(v)});

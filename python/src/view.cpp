@@ -101,9 +101,13 @@ class ViewOf final : public AnyView {
 
  private:
   auto changes() const {
+    // The vertices of a scan's surface are already in the view frame.
+    const stream::LinearMap& m = view_.ground();
+    constexpr bool kSurface = std::is_same_v<Shown, tri::DynamicSurface<std::int32_t>>;
+    const bool mirrored = !kSurface && m[0] * m[4] - m[1] * m[3] < 0;
     return MeshChanges<typename terrain::ViewTriangulation<Shown>::type,
                        std::function<stream::Point3(tri::VertexId)>>(
-        view_.model(), [this](tri::VertexId v) { return view_.in_view_frame(v); });
+        view_.model(), mirrored, [this](tri::VertexId v) { return view_.in_view_frame(v); });
   }
   ViewChange described(MeshChange&& result) const {
     ViewChange change{std::move(result)};

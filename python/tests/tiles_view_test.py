@@ -295,11 +295,21 @@ class Views(StoreCase):
         self.assertEqual(failures, [])
 
 
+    def test_triangles_are_counter_clockwise(self):
+        # The rows of a raster run from north to south.
+        for store in (self.raster, self.scan):
+            view = terrace.View(store, reader='frame')
+            view.frame(ground_error=1.0, seconds=0.1)
+            now = view.snapshot()
+            self.assertGreater(turns(now.added_positions, np.searchsorted(now.added_vertices, now.added_corners)).min(), 0)
+
+
 class Models(StoreCase):
     """Compares expanded and collapsed clusters with the triangulation of the current points."""
 
     def check(self, model):
         vertices, triangles = model.mesh
+        self.assertGreater(turns(vertices, triangles).min(), 0)
         expected = terrace.Delaunay2(self.flat(model, vertices))
         number = np.empty(len(expected.points), int)
         number[expected.ids] = np.arange(len(vertices))
@@ -409,6 +419,12 @@ class Models(StoreCase):
             thread.join()
         self.assertEqual(failures, [])
         self.assertEqual(corner_sets(*model.mesh), before)
+
+
+def turns(vertices, triangles):
+    """Returns twice the signed areas in x and y, positive for counter-clockwise triangles."""
+    a, b, c = (vertices[triangles[:, i], :2] for i in range(3))
+    return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
 
 
 def corner_sets(vertices, triangles):
