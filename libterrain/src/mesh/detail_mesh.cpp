@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -15,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/core.h>
 #include <terrace/stream/error.hpp>
 #include <terrace/stream/store_query.hpp>
 #include <terrace/tri/metric.hpp>
@@ -29,8 +27,10 @@
 #include "mesh/vertex_heights.hpp"
 #include "mesh/wanted_entities.hpp"
 #include "surface/box_tree.hpp"
+#include "surface/stored_box.hpp"
 #include "terrace/terrain/detail_lines.hpp"
 #include "terrace/terrain/error.hpp"
+#include "terrace/terrain/store_metric.hpp"
 #include "terrace/terrain/store_source.hpp"
 #include "view/raster_gap.hpp"
 
@@ -71,26 +71,6 @@ class ClusterTop final : public tri::ClusterSource {
 /// bookkeeping, and the resulting mesh (vertex, level, two triangles).
 constexpr std::uint64_t kBytesPerVertex = 66 + 20 + 32 + 24 + 4 + 1 + 2 * 12;
 
-/// Returns the box in stored coordinates around a box in the CRS. Heights stay unbounded where
-/// `world` is.
-tri::Box3 stored_box(const stream::Placement& placement, const stream::Box3& world) {
-  stream::Box3 stored;
-  for (unsigned corner = 0; corner < 4; ++corner) {
-    const Point2 place = stored_place(placement, {(corner & 1 ? world.max : world.min)[0],
-                                                  (corner & 2 ? world.max : world.min)[1]});
-    stored.include(stream::Point3{place[0], place[1], 0});
-  }
-  const stream::Channel& z = placement.coordinates[2];
-  double low = (world.min[2] - z.offset) / z.scale, high = (world.max[2] - z.offset) / z.scale;
-  if (low > high) std::swap(low, high);
-  // The division rounds, so move the box outward by one part in 2^40. Detail::wants() decides.
-  const auto outward = [](double value, double sign) {
-    return value + sign * (std::abs(value) * 0x1p-40 + 0x1p-40);
-  };
-  return {{outward(stored.min[0], -1), outward(stored.min[1], -1), outward(low, -1)},
-          {outward(stored.max[0], 1), outward(stored.max[1], 1), outward(high, 1)}};
-}
-
 tri::Detail in_stored_coordinates(const Detail& detail, const stream::Placement& placement) {
   tri::Detail stored;
   std::vector<Region> regions;
@@ -126,45 +106,6 @@ void check_memory(const stream::Store& store, const Detail& detail, std::uint64_
       stream::message("a mesh of {} needs {}M of memory, {memory_bytes} allows {}M",
                       counted(points, "point"), (needed >> 20) + 1, memory_bytes >> 20))
       .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
-}
-
-/// Returns the metric in the coordinates of the triangulation.
-tri::MetricField2 field_of(const MetricChoice& metric, const stream::Store& store,
-                           const stream::Placement& placement) {
-  const std::array<double, 6>& m = placement.world.xy;
-  const Ground ground(placement);
-  std::vector<tri::MetricField2::Region> regions;
-  for (const MetricChoice::Region& region : metric.regions) {
-    if (region.box && (m[1] != 0.0 || m[3] != 0.0)) {
-      throw UsageError(
-          stream::message("{metric}: the boxes of regions need a raster that is not rotated"));
-    }
-    constexpr double kEverywhere = std::numeric_limits<double>::infinity();
-    tri::Box3 box{{-kEverywhere, -kEverywhere, -kEverywhere},
-                  {kEverywhere, kEverywhere, kEverywhere}};
-    stream::Box3 around = store.bounds();
-    if (region.box) {
-      const tri::Box3 stored = stored_box(placement, *region.box);
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        box.min[axis] = around.min[axis] = stored.min[axis];
-        box.max[axis] = around.max[axis] = stored.max[axis];
-      }
-    }
-    // Composes the map from stored coordinates to the ground with the ellipse's map to the unit
-    // circle.
-    const GroundMap on_ground = ground.map(around);
-    const cluster::LinearMap& ellipse = region.metric.map();
-    std::array<double, 9> map{};
-    for (std::size_t row = 0; row < 3; ++row) {
-      for (std::size_t column = 0; column < 3; ++column) {
-        for (std::size_t k = 0; k < 3; ++k) {
-          map[3 * row + column] += ellipse[3 * row + k] * on_ground[3 * k + column];
-        }
-      }
-    }
-    regions.push_back({box, tri::plane_map(map)});
-  }
-  return tri::MetricField2(std::move(regions));
 }
 
 /// The clusters of a raster that stay collapsed in a mesh of this detail.
@@ -283,12 +224,9 @@ TriangleMesh mesh_of_model(const Model& model, const stream::Placement& placemen
 
 template <class Coord>
 TriangleMesh mesh_of(const stream::Store& store, const Detail& detail,
-                     const DetailMeshOptions& options) {
+                     const DetailMeshOptions& options,
+                     const std::optional<tri::MetricField2>& field) {
   const stream::Placement& placement = store.schema();
-  std::optional<tri::MetricField2> field;
-  if (options.metric.kind == MetricChoice::Kind::elliptical) {
-    field = field_of(options.metric, store, placement);
-  }
   std::optional<CollapsedClusters> collapsed;
   if (has_gaps(store)) collapsed.emplace(store, detail);
   const auto finish = [&](const auto& model) {
@@ -379,20 +317,17 @@ TriangleMesh detail_mesh(const stream::Store& input, const Detail& detail,
     }
     return detail_triangles(store, detail, context.memory_or(0));
   }
-  if (kind != MetricChoice::Kind::euclidean && kind != MetricChoice::Kind::elliptical) {
-    throw UsageError(fmt::format("a mesh has the metric euclidean or elliptical:FILE, not {}",
-                                 options.metric.text));
-  }
+  std::optional<tri::MetricField2> field;
+  if (kind != MetricChoice::Kind::euclidean) field = metric_field(options.metric, store);
   if (detail.cluster && options.heights.any()) {
     throw UsageError(stream::message("{cluster} excludes smoothing and overlays"));
   }
   const Detail wide = with_margin(store, detail);
   check_memory(store, wide, context.memory_or(0),
-               height_bytes_per_vertex(options.heights) +
-                   (kind == MetricChoice::Kind::elliptical ? kBytesToFlip : 0) +
+               height_bytes_per_vertex(options.heights) + (field ? kBytesToFlip : 0) +
                    (has_gaps(store) ? CollapsedClusters::bytes_per_vertex(detail) : 0));
-  return store.schema().grid ? mesh_of<std::int32_t>(store, wide, options)
-                             : mesh_of<double>(store, wide, options);
+  return store.schema().grid ? mesh_of<std::int32_t>(store, wide, options, field)
+                             : mesh_of<double>(store, wide, options, field);
 }
 
 TriangleMesh detail_points(const stream::Store& store, const Detail& detail) {
