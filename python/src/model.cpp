@@ -3,22 +3,26 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <pybind11/stl.h>
+#include <terrace/terrain/store_metric.hpp>
 #include <terrace/terrain/store_source.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
 #include "mesh_changes.hpp"
+#include "names.hpp"
 #include "store.hpp"
 
 namespace terrace::python {
 namespace {
 
 using ClusterPair = std::pair<unsigned, std::uint64_t>;
-using FlatBox = std::array<double, 4>;  ///< min x, min y, max x, max y in the CRS
+using FlatBox = std::array<double, 6>;  ///< minima, then maxima in the CRS
+using Focuses = std::vector<std::pair<FlatBox, unsigned>>;
 
 py::array_t<std::uint64_t> array_of(const std::vector<tri::ClusterId>& clusters) {
   std::vector<std::array<std::uint64_t, 2>> rows;
@@ -26,20 +30,23 @@ py::array_t<std::uint64_t> array_of(const std::vector<tri::ClusterId>& clusters)
   return to_array(std::move(rows));
 }
 
+using Tetrahedra = tri::Delaunay3<double, tri::EllipticalMetric3>;
+template <class Triangulation>
+inline constexpr bool kInSpace = std::is_same_v<Triangulation, Tetrahedra>;
+
 /// The triangulation of a store at mixed levels, which Python's threads may share.
-template <class Coord>
+template <class Triangulation>
 class SharedModel {
  public:
-  using Model = tri::Multiresolution2<Coord>;
+  using Model = tri::MultiresolutionModel<Triangulation>;
 
-  SharedModel(const OpenStore& open, unsigned level,
-              const std::vector<std::pair<FlatBox, unsigned>>& focuses)
+  SharedModel(const OpenStore& open, unsigned level, const Focuses& focuses)
       : store_(open.get_whole()) {
     const tri::Detail start = detail_of(level, focuses);
     // Ctrl-C ends only this call. Later ones keep the view and its check, which do nothing then.
     released([&](const std::stop_token& stop) {
       store_ = store_.with_stop(stop);
-      tri::Delaunay2<Coord> empty;
+      Triangulation empty = this->empty();
       empty.set_check_stop(stop_check(stop));
       model_ = std::make_unique<Model>(source_, start, tri::ModelOptions{}, std::move(empty));
     });
@@ -48,7 +55,7 @@ class SharedModel {
   /// Applies step(model), which returns its delta.
   template <class Step>
   py::dict change(Step&& step) {
-    MeshChange result;
+    typename Changes::Change result;
     released([&] {
       const std::lock_guard lock(mutex_);
       result = changes().of(step(*model_));
@@ -56,7 +63,7 @@ class SharedModel {
     return dict_of(std::move(result));
   }
   py::dict snapshot() {
-    MeshChange result;
+    typename Changes::Change result;
     released([&] {
       const std::lock_guard lock(mutex_);
       result = changes().snapshot();
@@ -73,16 +80,16 @@ class SharedModel {
   [[nodiscard]] tri::ClusterId cluster(const ClusterPair& pair) const {
     return cluster_of(store_, pair.first, pair.second);
   }
-  [[nodiscard]] tri::Detail detail_of(
-      unsigned level, const std::vector<std::pair<FlatBox, unsigned>>& focuses) const {
+  [[nodiscard]] tri::Detail detail_of(unsigned level, const Focuses& focuses) const {
     tri::Detail detail{.level = level, .focuses = {}};
     for (const auto& [box, fine] : focuses) detail.focuses.push_back({stored(box), fine});
     return detail;
   }
-  /// Returns the stored box around a box in the CRS.
+  /// Returns the stored box around a box in the CRS; triangles ignore its heights.
   [[nodiscard]] tri::Box3 stored(const FlatBox& box) const {
-    const stream::Box3 flat{{box[0], box[1], 0}, {box[2], box[3], 0}};
-    const stream::Box3 around = stored_box(store_.schema(), flat);
+    const tri::Box3 around =
+        stored_box(store_.schema(), {{box[0], box[1], box[2]}, {box[3], box[4], box[5]}});
+    if (kInSpace<Triangulation>) return around;
     return tri::box2(around.min[0], around.min[1], around.max[0], around.max[1]);
   }
   /// Returns (box, error, members).
@@ -101,14 +108,26 @@ class SharedModel {
   }
 
  private:
-  auto changes() const {
-    const std::array<double, 6>& m = store_.schema().world.xy;
-    return MeshChanges<tri::Delaunay2<Coord>, std::function<stream::Point3(tri::VertexId)>>(
-        *model_, m[0] * m[4] - m[1] * m[3] < 0, [this](tri::VertexId v) {
-          const auto xy = model_->triangulation().point(v);
-          return world_point(store_.schema(), {static_cast<double>(xy[0]),
-                                               static_cast<double>(xy[1]), model_->height(v)});
-        });
+  using Changes = MeshChanges<Triangulation, std::function<stream::Point3(tri::VertexId)>>;
+
+  /// Returns the triangulation to fill.
+  [[nodiscard]] Triangulation empty() const {
+    if constexpr (kInSpace<Triangulation>) {
+      return Triangulation(terrain::ground_map(store_));
+    } else {
+      return {};
+    }
+  }
+  [[nodiscard]] Changes changes() const {
+    const stream::Placement& placement = store_.schema();
+    const std::array<double, 6>& m = placement.world.xy;
+    bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
+    if (kInSpace<Triangulation>) mirrored ^= placement.coordinates[2].scale < 0;
+    return Changes(*model_, mirrored, [this](tri::VertexId v) {
+      const auto p = model_->triangulation().point(v);
+      return world_point(store_.schema(),
+                         {static_cast<double>(p[0]), static_cast<double>(p[1]), model_->height(v)});
+    });
   }
 
   stream::Store store_;
@@ -117,12 +136,11 @@ class SharedModel {
   std::unique_ptr<Model> model_;
 };
 
-template <class Coord>
+template <class Triangulation>
 void bind_kind(py::module_& module, const char* name) {
-  using Shared = SharedModel<Coord>;
+  using Shared = SharedModel<Triangulation>;
   using Model = typename Shared::Model;
   py::class_<Shared>(module, name)
-      .def(py::init<const OpenStore&, unsigned, const std::vector<std::pair<FlatBox, unsigned>>&>())
       .def("expand",
            [](Shared& shared, const ClusterPair& pair) {
              const tri::ClusterId id = shared.cluster(pair);
@@ -142,8 +160,7 @@ void bind_kind(py::module_& module, const char* name) {
              });
            })
       .def("set_detail",
-           [](Shared& shared, unsigned level,
-              const std::vector<std::pair<FlatBox, unsigned>>& focuses) {
+           [](Shared& shared, unsigned level, const Focuses& focuses) {
              const tri::Detail detail = shared.detail_of(level, focuses);
              return shared.change([&](Model & model) -> auto& { return model.set_detail(detail); });
            })
@@ -174,7 +191,12 @@ void bind_kind(py::module_& module, const char* name) {
            })
       .def("count", [](Shared& shared) {
         return shared.ask([](Model& model) {
-          return std::pair(model.point_count(), model.triangulation().triangle_count());
+          const auto& cells = model.triangulation();
+          if constexpr (kInSpace<Triangulation>) {
+            return std::pair(model.point_count(), cells.tetrahedron_count());
+          } else {
+            return std::pair(model.point_count(), cells.triangle_count());
+          }
         });
       });
 }
@@ -182,8 +204,18 @@ void bind_kind(py::module_& module, const char* name) {
 }  // namespace
 
 void bind_model(py::module_& module) {
-  bind_kind<std::int32_t>(module, "GridModel");
-  bind_kind<double>(module, "PointModel");
+  module.def("model", [](const OpenStore& open, unsigned level, const Focuses& focuses,
+                         const std::string& kind) {
+    const auto model = [&]<class Triangulation>(std::type_identity<Triangulation>) {
+      return py::cast(std::make_unique<SharedModel<Triangulation>>(open, level, focuses));
+    };
+    if (named<ModelKind>(kind) == ModelKind::volume) return model(std::type_identity<Tetrahedra>());
+    return open.get().schema().grid ? model(std::type_identity<tri::Delaunay2<std::int32_t>>())
+                                    : model(std::type_identity<tri::Delaunay2<double>>());
+  });
+  bind_kind<tri::Delaunay2<std::int32_t>>(module, "GridModel");
+  bind_kind<tri::Delaunay2<double>>(module, "PointModel");
+  bind_kind<Tetrahedra>(module, "VolumeModel");
 }
 
 }  // namespace terrace::python

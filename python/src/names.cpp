@@ -149,7 +149,9 @@ const auto& tables() {
           "kind",
           {{"mesh", ViewKind::mesh}, {"points", ViewKind::points}, {"surface", ViewKind::surface}}},
       NameTable<ViewReader>{
-          "ViewReader", "reader", {{"thread", ViewReader::thread}, {"frame", ViewReader::frame}}}};
+          "ViewReader", "reader", {{"thread", ViewReader::thread}, {"frame", ViewReader::frame}}},
+      NameTable<ModelKind>{
+          "ModelKind", "kind", {{"mesh", ModelKind::mesh}, {"volume", ModelKind::volume}}}};
   return all;
 }
 
@@ -203,6 +205,7 @@ template cluster::LinkageMethod named(const std::string& name);
 template matching::Halving named(const std::string& name);
 template ViewKind named(const std::string& name);
 template ViewReader named(const std::string& name);
+template ModelKind named(const std::string& name);
 template void take_named(const py::dict&, const char*, cluster::Effort&);
 template void take_named(const py::dict&, const char*, cluster::FacilityStrategy&);
 template void take_named(const py::dict&, const char*, stream::Order&);

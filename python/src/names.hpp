@@ -14,6 +14,7 @@ namespace terrace::python {
 
 enum class ViewKind : std::uint8_t { mesh, points, surface };
 enum class ViewReader : std::uint8_t { thread, frame };
+enum class ModelKind : std::uint8_t { mesh, volume };
 
 /// Returns the enumerator with a name. Defined for the enumerations in names.cpp.
 /// Throws: ValueError that names the parameter and lists the known names.

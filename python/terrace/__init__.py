@@ -44,7 +44,7 @@ from ._store import Store, build, xyz
 from ._tiles import verify_tiles
 from ._tin import bounded_mesh, interpolate, simplify_line
 from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree, rotate_tree
-from ._view import MeshDelta, Multiresolution, View, ViewDelta
+from ._view import MeshDelta, Multiresolution, View, ViewDelta, VolumeDelta
 
 open = Store.open
 __version__ = '0.1.0'
@@ -53,7 +53,7 @@ __all__ = [
     'Assignment', 'BoundedMesh', 'ClusterBlock', 'Clusters', 'Delaunay2', 'Delaunay3', 'DynamicSurface', 'Error',
     'FeatureCollection', 'HalvingMatching', 'KMeans', 'Matching', 'MatchingTree', 'Mesh', 'MeshChanges',
     'MeshDelta', 'Multiresolution', 'PointReader', 'PointTree', 'Raster', 'Shape', 'Store', 'Transformation',
-    'TriangleTree', 'View', 'ViewDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'clusters_of_size',
+    'TriangleTree', 'View', 'ViewDelta', 'VolumeDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'clusters_of_size',
     'edge_matching', 'ellipse', 'ellipsoid', 'entity_distances', 'facility_location', 'flat_clusters',
     'halving_matching', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree', 'point_batches',
     'read_points', 'rotate_tree', 'simplify_line', 'spanning_tree', 'stream_clusters', 'tree_linkage',

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Generic, Literal, TypeVar, overload
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from ._arrays import as_integer, as_numbered, as_numbers, as_rows
 from ._call import thread_count
 from ._geo import region as as_region
 from ._mesh import Mesh
-from ._names import ViewKind, ViewReader
+from ._names import ModelKind, ViewKind, ViewReader
 from ._store import Store
-from ._types import Array, ClusterId, Float64Array, Int32Array, Records, UInt64Array
+from ._types import Array, ClusterId, Float64Array, Int32Array, Records, UInt32Array, UInt64Array
 
 
 def _box(box: Array) -> list[float]:
@@ -43,6 +43,30 @@ class MeshDelta:
     def __repr__(self) -> str:
         return (f'<terrace.MeshDelta: {len(self.added_triangles)} triangles added, {len(self.removed_triangles)} removed, '
                 f'{len(self.added_vertices)} and {len(self.removed_vertices)} vertices>')
+
+
+@dataclass(frozen=True)
+class VolumeDelta:
+    """The changes of tetrahedra of mixed levels. Apply removals first: a reused number is in both lists.
+
+    Numbers are as in MeshDelta.
+    """
+
+    added_vertices: Int32Array  #: shape (n,)
+    added_positions: Float64Array  #: shape (n, 3)
+    removed_vertices: Int32Array
+    moved_vertices: Int32Array  #: now represent another point, at the same place
+    moved_positions: Float64Array
+    added_tetrahedra: Int32Array  #: shape (m,)
+    added_corners: Int32Array  #: shape (m, 4), vertex numbers a, b, c, d with (b - a) x (c - a) . (d - a) > 0
+    removed_tetrahedra: Int32Array
+
+    def __repr__(self) -> str:
+        return (f'<terrace.VolumeDelta: {len(self.added_tetrahedra)} tetrahedra added, {len(self.removed_tetrahedra)} removed, '
+                f'{len(self.added_vertices)} and {len(self.removed_vertices)} vertices>')
+
+
+Delta = TypeVar('Delta', MeshDelta, VolumeDelta)
 
 
 @dataclass(frozen=True)
@@ -180,7 +204,7 @@ class View:
         return f'<terrace.View: {self._points} points>'
 
 
-class Multiresolution:
+class Multiresolution(Generic[Delta]):
     """The triangulation of a store's points at mixed levels, controlled cluster by cluster.
 
     expand() adds the members of a cluster; collapse() removes them and restores exactly the triangles that were there
@@ -190,6 +214,9 @@ class Multiresolution:
 
     level: to start from, the top level by default.
     focus: as in set_detail().
+    kind: 'mesh', or 'volume' for the Delaunay tetrahedra of the points in space, in metres on the ground (as if all of
+        the store had the scale of its middle). Changes are then of the type VolumeDelta, and boxes of six numbers
+        limit heights too.
 
     Raises: ValueError; Error for a damaged store, and then nothing has changed.
 
@@ -202,61 +229,88 @@ class Multiresolution:
     >>> delta = model.expand(model.children()[0])
     >>> len(delta.added_vertices) > 0, len(model.expanded)
     (True, 1)
+    >>> volume = Multiresolution(store, kind='volume')
+    >>> delta = volume.expand(volume.children()[0])
+    >>> delta.added_corners.shape == (len(delta.added_tetrahedra), 4)
+    True
     """
 
-    def __init__(self, store: Store, level: int | None = None, *, focus: Iterable[tuple[Array, int]] = ()) -> None:
+    @overload
+    def __init__(self: Multiresolution[MeshDelta], store: Store, level: int | None = None, *,
+                 focus: Iterable[tuple[Array, int]] = (), kind: Literal['mesh'] = 'mesh') -> None: ...
+
+    @overload
+    def __init__(self: Multiresolution[VolumeDelta], store: Store, level: int | None = None, *,
+                 focus: Iterable[tuple[Array, int]] = (), kind: Literal['volume']) -> None: ...
+
+    def __init__(self, store: Store, level: int | None = None, *, focus: Iterable[tuple[Array, int]] = (),
+                 kind: ModelKind = 'mesh') -> None:
         if not isinstance(store, Store):
             raise TypeError(f'a model needs a terrace.Store, not {type(store).__name__}')
         self._top, self._units = store.top, _core.units(store._core)
-        kind = _core.GridModel if store.info['grid'] else _core.PointModel
-        self._core = kind(store._core, store.top if level is None else as_integer(level, 'level', bits=32), self._focuses(focus))
+        self._core = _core.model(store._core, store.top if level is None else as_integer(level, 'level', bits=32),
+                                 self._focuses(focus), kind)
+        self._cells = 'tetrahedra' if kind == 'volume' else 'triangles'
+        self._delta: Any = VolumeDelta if kind == 'volume' else MeshDelta
 
     @staticmethod
-    def _flat(box: Array) -> list[float]:
-        box = _box(box)
-        return box[:2] + box[3:5]
-
-    @classmethod
-    def _focuses(cls, focus: Iterable[tuple[Array, int]]) -> list[tuple[list[float], int]]:
-        return [(cls._flat(box), as_integer(level, 'level', bits=32)) for box, level in focus]
+    def _focuses(focus: Iterable[tuple[Array, int]]) -> list[tuple[list[float], int]]:
+        return [(_box(box), as_integer(level, 'level', bits=32)) for box, level in focus]
 
     @staticmethod
     def _cluster(cluster: ClusterId) -> tuple[int, int]:
         level, number = cluster
         return as_integer(level, 'cluster', bits=32), as_integer(number, 'cluster')
 
-    def expand(self, cluster: ClusterId) -> MeshDelta:
+    def expand(self, cluster: ClusterId) -> Delta:
         """Adds the members of a cluster whose parent is the root or an expanded cluster."""
-        return MeshDelta(**self._core.expand(self._cluster(cluster)))
+        return self._delta(**self._core.expand(self._cluster(cluster)))
 
-    def collapse(self, cluster: ClusterId) -> MeshDelta:
+    def collapse(self, cluster: ClusterId) -> Delta:
         """Removes the members of a cluster, after those of the expanded clusters below it."""
-        return MeshDelta(**self._core.collapse(self._cluster(cluster)))
+        return self._delta(**self._core.collapse(self._cluster(cluster)))
 
-    def refine(self, box: Array, level: int) -> MeshDelta:
+    def refine(self, box: Array, level: int) -> Delta:
         """Expands clusters until a box (min x, min y, max x, max y) has all its points of ``level`` and above."""
-        return MeshDelta(**self._core.set_region(self._flat(box), as_integer(level, 'level', bits=32), True, False))
+        return self._delta(**self._core.set_region(_box(box), as_integer(level, 'level', bits=32), True, False))
 
-    def coarsen(self, box: Array, level: int) -> MeshDelta:
+    def coarsen(self, box: Array, level: int) -> Delta:
         """Collapses the clusters below ``level`` that are inside a box."""
-        return MeshDelta(**self._core.set_region(self._flat(box), as_integer(level, 'level', bits=32), False, True))
+        return self._delta(**self._core.set_region(_box(box), as_integer(level, 'level', bits=32), False, True))
 
-    def set_detail(self, level: int, *, focus: Iterable[tuple[Array, int]] = ()) -> MeshDelta:
+    def set_detail(self, level: int, *, focus: Iterable[tuple[Array, int]] = ()) -> Delta:
         """Shows all points of ``level`` and above, and in each focus those of the focus's level and above.
 
         Other points are shown only if they share a cluster with these.
 
         focus: pairs (box, level).
         """
-        return MeshDelta(**self._core.set_detail(as_integer(level, 'level', bits=32), self._focuses(focus)))
+        return self._delta(**self._core.set_detail(as_integer(level, 'level', bits=32), self._focuses(focus)))
 
-    def snapshot(self) -> MeshDelta:
-        """Returns the whole current mesh as a MeshDelta that adds it."""
-        return MeshDelta(**self._core.snapshot())
+    def snapshot(self) -> Delta:
+        """Returns everything as a delta that adds it."""
+        return self._delta(**self._core.snapshot())
+
+    @property
+    def tetrahedra(self) -> tuple[Float64Array, UInt32Array]:
+        """The current vertices, float64, shape (n, 3), and tetrahedra, uint32, shape (m, 4).
+
+        Raises: ValueError for a mesh.
+        """
+        if self._cells != 'tetrahedra':
+            raise ValueError("a mesh has no tetrahedra: pass kind='volume'")
+        everything = self._core.snapshot()
+        corners = np.searchsorted(everything['added_vertices'], everything['added_corners'])
+        return everything['added_positions'], corners.astype(np.uint32)
 
     @property
     def mesh(self) -> Mesh:
-        """The current triangulation as a Mesh."""
+        """The current triangulation as a Mesh.
+
+        Raises: ValueError for a volume.
+        """
+        if self._cells != 'triangles':
+            raise ValueError('a volume has no mesh: read `tetrahedra`')
         everything = self._core.snapshot()
         corners = np.searchsorted(everything['added_vertices'], everything['added_corners'])
         return Mesh._of((everything['added_positions'], corners.astype(np.uint32), self._core.levels(), self._units))
@@ -282,8 +336,8 @@ class Multiresolution:
         return self._core.count()[0]
 
     def __repr__(self) -> str:
-        points, triangles = self._core.count()
-        return f'<terrace.Multiresolution: {points} points, {triangles} triangles, {len(self.expanded)} clusters expanded>'
+        points, cells = self._core.count()
+        return f'<terrace.Multiresolution: {points} points, {cells} {self._cells}, {len(self.expanded)} clusters expanded>'
 
-    def _repr_png_(self) -> bytes:
-        return self.mesh._repr_png_()
+    def _repr_png_(self) -> bytes | None:
+        return self.mesh._repr_png_() if self._cells == 'triangles' else None

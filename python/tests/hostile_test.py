@@ -192,7 +192,8 @@ def calls(luck, terrace, shared, folder):
         (model.refine, [box, lambda: luck.randrange(2)], []), (model.coarsen, [box, lambda: luck.randrange(2)], []),
         (model.set_detail, [lambda: luck.randrange(3)], ['focus']), (model.cluster_info, [lambda: (0, number())], []),
         (lambda: (repr(model), model.snapshot(), model.mesh, model.expanded, len(model)), [], []),
-        (terrace.Multiresolution, [lambda: store, lambda: 0], ['focus']),
+        (terrace.Multiresolution, [lambda: store, lambda: 0], ['focus', 'kind']),
+        (lambda a, **k: terrace.Multiresolution(a, kind='volume', **k).refine(box(), 0), [lambda: store], ['level', 'focus']),
         (terrace.verify_tiles, [lambda: os.path.join(folder, 'tiles')], ['store', 'max_error', 'vertical', 'geoid']),
         (lambda a, b: terrace.Mesh(a, b).save(os.path.join(folder, 'a.ply'), True), [solid, lambda: [[0, 0, 0]]], []),
     ]

@@ -25,7 +25,9 @@ delta = terrace.View(store).frame((0, 0, 1), pixel_error=1)
 points = terrace.read_points('scan.laz', where='class == 2')
 result = terrace.stream_clusters([points], lambda block: print(block.points.shape, block.level), effort='fast')
 model = terrace.Multiresolution(terrace.open('x'))
-model.expand(model.children()[0])
+print(model.expand(model.children()[0]).added_triangles)
+volume = terrace.Multiresolution(terrace.open('x'), kind='volume')
+print(volume.expand(volume.children()[0]).added_tetrahedra, volume.tetrahedra[1].shape)
 lonlat = terrace.Transformation('EPSG:32632', 4326).forward(terrace.xyz(points)[:, :2])
 clusters = terrace.cluster(lonlat, 0.1, method='kd-tree', start=terrace.cluster(lonlat, 0.1))
 tree = terrace.PointTree(lonlat, terrace.rotate_tree(terrace.linkage(lonlat), lonlat))
@@ -100,6 +102,7 @@ class Mypy(unittest.TestCase):
             for name, text, faults in (('right.py', SCRIPT, 0),
                                        ('wrong.py', SCRIPT.replace("'natural'", "'cubic'"), 1),
                                        ('also.py', SCRIPT.replace('max_error=', 'maximum='), 1),
+                                       ('solid.py', SCRIPT.replace("kind='volume'", ''), 1),
                                        ('other.py', SCRIPT.replace('error.args', 'error.place'), 1)):
                 with open(os.path.join(folder, name), 'w', encoding='utf-8') as file:
                     file.write(text)
