@@ -21,6 +21,7 @@
 #include "terrace/tri/interpolation.hpp"
 #include "terrace/tri/metric.hpp"
 #include "terrace/tri/point_tin.hpp"
+#include "terrace/tri/regional_delaunay2.hpp"
 #include "terrace/tri/shape.hpp"
 #include "terrace/tri/smoothing.hpp"
 
@@ -213,6 +214,21 @@ TEST(StopCheck, EndsSmoothingAndFlips) {
         static_cast<void>(metric_triangles(triangulation, field, TriangleFilter(), check));
       },
       200);
+}
+
+TEST(StopCheck, EndsTrianglesThatFollowMetrics) {
+  const auto points = some<2, double>(20000);
+  const MetricField2 field({{box2(-1, -1, 2e6, 2e6), ellipse_map(3.0, 1.0, 30.0)}});
+  const auto build = [&](const MetricField2& of, const base::StopCheck& check) {
+    RegionalDelaunay2<double> triangles(of);
+    triangles.set_check_stop(check);
+    triangles.build(points);
+  };
+  std::size_t calls = 0, flat_calls = 0;
+  build(field, [&] { ++calls; });
+  build(MetricField2(std::vector<MetricField2::Region>{}), [&] { ++flat_calls; });
+  EXPECT_GT(calls, flat_calls + 20);
+  expect_stops([&](const base::StopCheck& check) { build(field, check); }, 100);
 }
 
 TEST(StopCheck, EndsFlipsInSpace) {

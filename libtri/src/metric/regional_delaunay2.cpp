@@ -118,6 +118,7 @@ struct RegionalDelaunay2<Coord>::Impl {
   explicit Impl(MetricField2 field) : regions(std::move(field)) { plain.start_journal(); }
 
   Delaunay2<Coord> plain;
+  base::StopTicks ticks;
   RegionTable regions;
   FlipMesh mesh;  ///< each triangle starts with its smallest corner, except within follow()
   FreeSlots free;
@@ -402,6 +403,7 @@ struct RegionalDelaunay2<Coord>::Impl {
             return region[mesh.triangle[triangle_of(mate)].corner[planar::index_of(mate)]] == one;
           },
           [&](std::uint32_t t, std::uint32_t o) {
+            ticks(256);
             touch(t);
             touch(o);
           });
@@ -568,6 +570,12 @@ void RegionalDelaunay2<Coord>::reserve(std::size_t vertices) {
   impl_->marks.reserve(2 * vertices);
   impl_->to.reserve(2 * vertices);
   impl_->turn.reserve(2 * vertices);
+}
+
+template <class Coord>
+void RegionalDelaunay2<Coord>::set_check_stop(base::StopCheck check_stop) {
+  impl_->plain.set_check_stop(check_stop);
+  impl_->ticks = base::StopTicks(std::move(check_stop));
 }
 
 template <class Coord>

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <terrace/base/stop_check.hpp>
+
 #include "terrace/tri/metric.hpp"
 
 namespace terrace::tri {
@@ -56,6 +58,8 @@ class RegionalDelaunay2 {
               VertexId hint = kNoVertex);
   void remove(std::span<const VertexId> vertices);
   void reserve(std::size_t vertices);
+  /// As in Delaunay2; also called during flips.
+  void set_check_stop(base::StopCheck check_stop);
 
   /// Brings the triangles up to date. O(triangles around the change) plus the flips.
   void follow();
