@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/terrain/store_view.hpp"
 
+#include <utility>
+
 #include "earth/ground.hpp"
 #include "mesh/scan_surface_steps.hpp"
 #include "terrace/terrain/latitudes.hpp"
@@ -17,12 +19,14 @@ ViewFrame view_frame(const stream::Store& store) {
 
 template <class Shown>
 StoreView<Shown>::StoreView(const stream::Store& store, const tri::ViewOptions& options,
-                            Reader reader)
-    : impl_(std::make_unique<Impl>(store, view_frame(store).ground(), options,
-                                   [&](FramedSource& source) {
-                                     return reader == Reader::thread ? make_reading_thread(source)
-                                                                     : make_frame_reader(source);
-                                   })) {}
+                            Reader reader, ViewMetrics<Shown> metrics)
+    : impl_(std::make_unique<Impl>(
+          store, view_frame(store).ground(), options,
+          [&](FramedSource& source) {
+            return reader == Reader::thread ? make_reading_thread(source)
+                                            : make_frame_reader(source);
+          },
+          std::move(metrics))) {}
 
 SurfaceView::SurfaceView(const stream::Store& store, const tri::ViewOptions& options,
                          const Context& context)
@@ -39,12 +43,15 @@ SurfaceView::SurfaceView(const stream::Store& store, const tri::ViewOptions& opt
           view_frame(store).ground(), options) {}
 
 template StoreView<tri::ThinnedDelaunay2>::StoreView(const stream::Store&, const tri::ViewOptions&,
-                                                     Reader);
+                                                     Reader, ViewMetrics<tri::ThinnedDelaunay2>);
 template StoreView<tri::PointCloud>::StoreView(const stream::Store&, const tri::ViewOptions&,
-                                               Reader);
-template StoreView<tri::DynamicSurface<std::int32_t>>::StoreView(const stream::Store&,
-                                                                 const tri::ViewOptions&, Reader);
+                                               Reader, ViewMetrics<tri::PointCloud>);
+template StoreView<tri::DynamicSurface<std::int32_t>>::StoreView(
+    const stream::Store&, const tri::ViewOptions&, Reader,
+    ViewMetrics<tri::DynamicSurface<std::int32_t>>);
 template class StoreView<std::int32_t>;
 template class StoreView<double>;
+template class StoreView<tri::RegionalDelaunay2<std::int32_t>>;
+template class StoreView<tri::RegionalDelaunay2<double>>;
 
 }  // namespace terrace::terrain

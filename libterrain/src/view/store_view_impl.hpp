@@ -30,14 +30,17 @@ inline constexpr bool kThinned = std::is_same_v<Shown, tri::ThinnedDelaunay2>;
 /// Whether the vertices are samples of a raster.
 template <class Shown>
 inline constexpr bool kShowsRaster = std::is_integral_v<Shown> || kThinned<Shown>;
+template <class Coord>
+inline constexpr bool kShowsRaster<tri::RegionalDelaunay2<Coord>> = std::is_integral_v<Coord>;
 
 template <class Shown>
-struct StoreView<Shown>::Impl {
+struct StoreView<Shown>::Impl : ViewMetrics<Shown> {
   using MakeReader = std::function<std::unique_ptr<ClusterReader>(FramedSource&)>;
 
   Impl(const stream::Store& input, const stream::LinearMap& ground, const tri::ViewOptions& options,
-       const MakeReader& make_reader)
-      : store(input),
+       const MakeReader& make_reader, ViewMetrics<Shown> metrics = {})
+      : ViewMetrics<Shown>(std::move(metrics)),
+        store(input),
         frame(store, ground),
         lattice(store, frame),
         source(store, frame, shows_surface<Shown> ? &lattice : nullptr, options.silhouette == 1.0,
@@ -63,6 +66,8 @@ struct StoreView<Shown>::Impl {
       const stream::Point3& last = store.bounds().max;
       return Triangulation(
           {static_cast<std::int32_t>(last[0]), static_cast<std::int32_t>(last[1])});
+    } else if constexpr (requires { this->field; }) {
+      return Triangulation(this->field);
     } else {
       return Triangulation();
     }

@@ -7,10 +7,12 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include <terrace/stream/given_bytes.hpp>
 #include <terrace/stream/store.hpp>
 #include <terrace/stream/store_query.hpp>
+#include <terrace/tri/regional_delaunay2.hpp>
 #include <terrace/tri/view.hpp>
 
 namespace terrace::terrain {
@@ -37,6 +39,19 @@ template <class Coord>
 struct ViewTriangulation<tri::DynamicSurface<Coord>> {
   using type = tri::DynamicSurface<Coord>;
 };
+template <class Coord>
+struct ViewTriangulation<tri::RegionalDelaunay2<Coord>> {
+  using type = tri::RegionalDelaunay2<Coord>;
+};
+
+/// The metrics of a view's triangles. Only those of tri::RegionalDelaunay2 have any.
+template <class Shown>
+struct ViewMetrics {};
+template <class Coord>
+struct ViewMetrics<tri::RegionalDelaunay2<Coord>> {
+  /// In stored coordinates, see metric_field(). Euclidean by default.
+  tri::MetricField2 field{std::vector<tri::MetricField2::Region>{}};
+};
 
 /// Whether a store's points look like the scan of a body, to be shown by its surface. They do if
 /// they are points without a CRS and without the classes of laser clouds, and if they are steep: at
@@ -58,11 +73,12 @@ struct ViewTriangulation<tri::DynamicSurface<Coord>> {
 ///
 /// Shown selects the structure: tri::ThinnedDelaunay2 for rasters, with only the vertices that the
 /// error needs; std::int32_t for rasters with all samples of each expanded cluster; double for any
-/// store; tri::PointCloud for points without triangles; or
-/// tri::DynamicSurface<std::int32_t> for scans. The last one is the surface in space that the
-/// points are on, without lids for open scans. The surface takes part of a frame's budget. Its
-/// vertices are not in stored coordinates but rounded to a lattice in the view frame, with a
-/// spacing that is a power of two metres, 2^-29 to 2^-28 of the longest side of the store's box.
+/// store; tri::RegionalDelaunay2 of either for triangles that follow regions of elliptical metrics;
+/// tri::PointCloud for points without triangles; or tri::DynamicSurface<std::int32_t> for scans.
+/// The last one is the surface in space that the points are on, without lids for open scans. The
+/// surface takes part of a frame's budget. Its vertices are not in stored coordinates but rounded
+/// to a lattice in the view frame, with a spacing that is a power of two metres, 2^-29 to 2^-28 of
+/// the longest side of the store's box.
 ///
 /// With tri::ThinnedDelaunay2 an error is vertical. The surface of a window whose samples are all
 /// loaded (tri::ThinnedDelaunay2::Window::thinned) is within the error that the view asks for there
@@ -83,10 +99,10 @@ class StoreView {
     in_frame  ///< the calling thread, within the frame's time
   };
 
-  /// Requires a raster if Shown is std::int32_t or tri::ThinnedDelaunay2. Throws: stream::Error if
-  /// the root is damaged; std::invalid_argument for options out of range.
+  /// Requires a raster if Shown is std::int32_t (also with metrics) or tri::ThinnedDelaunay2.
+  /// Throws: stream::Error if the root is damaged; std::invalid_argument for options out of range.
   explicit StoreView(const stream::Store& store, const tri::ViewOptions& options = {},
-                     Reader reader = Reader::thread);
+                     Reader reader = Reader::thread, ViewMetrics<Shown> metrics = {});
   /// For stores with missing bytes (stream::GivenBytes), read by the calling thread within the
   /// frame's time. ground: the linear map from stored coordinates to metres, as the other
   /// constructor computes it and ground() returns it. has_bytes: as GivenBytes::has(); with it a
@@ -158,6 +174,8 @@ class StoreView {
 extern template class StoreView<tri::ThinnedDelaunay2>;
 extern template class StoreView<std::int32_t>;
 extern template class StoreView<double>;
+extern template class StoreView<tri::RegionalDelaunay2<std::int32_t>>;
+extern template class StoreView<tri::RegionalDelaunay2<double>>;
 extern template class StoreView<tri::PointCloud>;
 extern template class StoreView<tri::DynamicSurface<std::int32_t>>;
 
