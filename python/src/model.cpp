@@ -10,6 +10,7 @@
 #include <pybind11/stl.h>
 #include <terrace/terrain/store_metric.hpp>
 #include <terrace/terrain/store_source.hpp>
+#include <terrace/tri/regional_delaunay2.hpp>
 
 #include "arrays.hpp"
 #include "call.hpp"
@@ -40,13 +41,16 @@ class SharedModel {
  public:
   using Model = tri::MultiresolutionModel<Triangulation>;
 
-  SharedModel(const OpenStore& open, unsigned level, const Focuses& focuses)
-      : store_(open.get_whole()) {
+  /// make_empty: returns the triangulation to fill.
+  template <class MakeEmpty>
+  SharedModel(const stream::Store& store, unsigned level, const Focuses& focuses,
+              const MakeEmpty& make_empty)
+      : store_(store) {
     const tri::Detail start = detail_of(level, focuses);
     // Ctrl-C ends only this call. Later ones keep the view and its check, which do nothing then.
     released([&](const std::stop_token& stop) {
       store_ = store_.with_stop(stop);
-      Triangulation empty = this->empty();
+      Triangulation empty = make_empty();
       empty.set_check_stop(stop_check(stop));
       model_ = std::make_unique<Model>(source_, start, tri::ModelOptions{}, std::move(empty));
     });
@@ -110,14 +114,6 @@ class SharedModel {
  private:
   using Changes = MeshChanges<Triangulation, std::function<stream::Point3(tri::VertexId)>>;
 
-  /// Returns the triangulation to fill.
-  [[nodiscard]] Triangulation empty() const {
-    if constexpr (kInSpace<Triangulation>) {
-      return Triangulation(terrain::ground_map(store_));
-    } else {
-      return {};
-    }
-  }
   [[nodiscard]] Changes changes() const {
     const stream::Placement& placement = store_.schema();
     const std::array<double, 6>& m = placement.world.xy;
@@ -201,21 +197,41 @@ void bind_kind(py::module_& module, const char* name) {
       });
 }
 
+/// Returns a model; a metric other than euclidean excludes a volume.
+py::object model(const OpenStore& open, unsigned level, const Focuses& focuses,
+                 const std::string& kind_name, const std::string& metric_name) {
+  const stream::Store store = open.get_whole();
+  const auto make = [&]<class MakeEmpty>(const MakeEmpty& make_empty) -> py::object {
+    using Triangulation = decltype(make_empty());
+    return py::cast(
+        std::make_unique<SharedModel<Triangulation>>(store, level, focuses, make_empty));
+  };
+  const auto kind = named<ModelKind>(kind_name);
+  const auto metric = terrain::MetricChoice::parse(metric_name);
+  const bool regional = metric.kind != terrain::MetricChoice::Kind::euclidean;
+  if (kind == ModelKind::volume) {
+    if (regional) throw py::value_error("`metric` is for meshes, not for volumes");
+    return make([&] { return Tetrahedra(terrain::ground_map(store)); });
+  }
+  const bool raster = store.schema().grid;
+  if (!regional) {
+    return raster ? make([] { return tri::Delaunay2<std::int32_t>(); })
+                  : make([] { return tri::Delaunay2<double>(); });
+  }
+  const tri::MetricField2 field = metric_field(metric, store);
+  return raster ? make([&] { return tri::RegionalDelaunay2<std::int32_t>(field); })
+                : make([&] { return tri::RegionalDelaunay2<double>(field); });
+}
+
 }  // namespace
 
 void bind_model(py::module_& module) {
-  module.def("model", [](const OpenStore& open, unsigned level, const Focuses& focuses,
-                         const std::string& kind) {
-    const auto model = [&]<class Triangulation>(std::type_identity<Triangulation>) {
-      return py::cast(std::make_unique<SharedModel<Triangulation>>(open, level, focuses));
-    };
-    if (named<ModelKind>(kind) == ModelKind::volume) return model(std::type_identity<Tetrahedra>());
-    return open.get().schema().grid ? model(std::type_identity<tri::Delaunay2<std::int32_t>>())
-                                    : model(std::type_identity<tri::Delaunay2<double>>());
-  });
   bind_kind<tri::Delaunay2<std::int32_t>>(module, "GridModel");
   bind_kind<tri::Delaunay2<double>>(module, "PointModel");
+  bind_kind<tri::RegionalDelaunay2<std::int32_t>>(module, "GridMetricModel");
+  bind_kind<tri::RegionalDelaunay2<double>>(module, "PointMetricModel");
   bind_kind<Tetrahedra>(module, "VolumeModel");
+  module.def("model", &model);
 }
 
 }  // namespace terrace::python

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <pybind11/stl.h>
+#include <terrace/terrain/store_metric.hpp>
 #include <terrace/terrain/store_view.hpp>
 #include <unistd.h>
 
@@ -58,9 +59,11 @@ template <class Shown>
 class ViewOf final : public AnyView {
  public:
   using StoreView = terrain::StoreView<Shown>;
-  ViewOf(const stream::Store& store, const tri::ViewOptions& options, bool reads_in_frame)
+  ViewOf(const stream::Store& store, const tri::ViewOptions& options, bool reads_in_frame,
+         terrain::ViewMetrics<Shown> metrics = {})
       : view_(store, options,
-              reads_in_frame ? StoreView::Reader::in_frame : StoreView::Reader::thread) {}
+              reads_in_frame ? StoreView::Reader::in_frame : StoreView::Reader::thread,
+              std::move(metrics)) {}
 
   ViewChange frame(const tri::View& wish, double seconds) override {
     const auto& step = view_.frame(wish, seconds);
@@ -123,7 +126,7 @@ class ViewOf final : public AnyView {
 class SharedView {
  public:
   SharedView(const OpenStore& open, const std::string& kind_name, const std::string& reader_name,
-             const py::dict& arguments)
+             const std::string& metric_name, const py::dict& arguments)
       : process_(getpid()), store_(open.get_whole()) {
     tri::ViewOptions options;
     take_option(arguments, "max_points", options.max_points);
@@ -133,12 +136,22 @@ class SharedView {
     take_option(arguments, "silhouette", options.silhouette);
     const auto kind = named<ViewKind>(kind_name);
     const bool reads_in_frame = named<ViewReader>(reader_name) == ViewReader::frame;
+    const auto metric = terrain::MetricChoice::parse(metric_name);
+    const bool regional = metric.kind != terrain::MetricChoice::Kind::euclidean;
+    if (regional && kind != ViewKind::mesh) {
+      throw py::value_error(
+          "`metric` is for the kind mesh: points have no triangles, and those of "
+          "a surface are in space");
+    }
     const py::gil_scoped_release released;
     if (kind == ViewKind::points) {
       view_ = std::make_unique<ViewOf<tri::PointCloud>>(store_, options, reads_in_frame);
     } else if (kind == ViewKind::surface) {
       using Surface = tri::DynamicSurface<std::int32_t>;
       view_ = std::make_unique<ViewOf<Surface>>(store_, options, reads_in_frame);
+    } else if (regional) {
+      store_.schema().grid ? open_regional<std::int32_t>(options, reads_in_frame, metric)
+                           : open_regional<double>(options, reads_in_frame, metric);
     } else if (store_.schema().grid) {
       view_ = std::make_unique<ViewOf<tri::ThinnedDelaunay2>>(store_, options, reads_in_frame);
     } else {
@@ -153,6 +166,13 @@ class SharedView {
   SharedView& operator=(const SharedView&) = delete;
 
  private:
+  template <class Coord>
+  void open_regional(const tri::ViewOptions& options, bool reads_in_frame,
+                     const terrain::MetricChoice& metric) {
+    using Shown = tri::RegionalDelaunay2<Coord>;
+    view_ = std::make_unique<ViewOf<Shown>>(
+        store_, options, reads_in_frame, terrain::ViewMetrics<Shown>{metric_field(metric, store_)});
+  }
   template <class Work>
   auto locked(Work&& work) {
     if (getpid() != process_) {
@@ -252,7 +272,8 @@ tri::View view_of(const py::dict& arguments) {
 
 void bind_view(py::module_& module) {
   py::class_<SharedView>(module, "SharedView")
-      .def(py::init<const OpenStore&, const std::string&, const std::string&, const py::dict&>())
+      .def(py::init<const OpenStore&, const std::string&, const std::string&, const std::string&,
+                    const py::dict&>())
       .def("frame", [](SharedView& view, const py::dict& wish,
                        double seconds) { return view.frame(view_of(wish), seconds); })
       .def("snapshot", &SharedView::snapshot)

@@ -93,6 +93,8 @@ class View:
 
     kind: 'mesh'; 'points', a cloud without triangles; or 'surface', for scans: the surface in space through the
         points.
+    metric: 'elliptical:FILE' adapts the triangles of a mesh to a metric, as in Store.mesh(). A raster's mesh then shows
+        all samples of each expanded cluster.
     reader: 'thread' reads ahead in the background; 'frame' reads within the time of a frame.
     max_points: the largest number of points at a time.
     max_bytes: the size of the cache of clusters.
@@ -106,13 +108,13 @@ class View:
     """
 
     def __init__(self, store: Store, kind: ViewKind = 'mesh', *,
-                 reader: ViewReader = 'thread', max_points: int = 1 << 22, max_bytes: int = 1 << 28,
+                 metric: str = 'euclidean', reader: ViewReader = 'thread', max_points: int = 1 << 22, max_bytes: int = 1 << 28,
                  collapse_below: float = 0.75, guard: float = 0.05, silhouette: float = 1.0) -> None:
         if not isinstance(store, Store):
             raise TypeError(f'a view needs a terrace.Store, not {type(store).__name__}')
         options = {'max_points': as_integer(max_points, 'max_points'), 'max_bytes': as_integer(max_bytes, 'max_bytes'),
                    'collapse_below': float(collapse_below), 'guard': float(guard), 'silhouette': float(silhouette)}
-        self._core = _core.SharedView(store._core, kind, reader, options)
+        self._core = _core.SharedView(store._core, kind, reader, metric, options)
         self._first = True
         self._points = 0
 
@@ -134,7 +136,7 @@ class View:
         focus: pairs of a box (four or six numbers in metres, minima first) and the level required in it.
         regions: pairs of a box and the largest error in it, in metres.
 
-        Errors of a raster's mesh are vertical. Once the view has settled, ``ground_error`` and ``regions`` hold at every
+        Errors of a raster's mesh without a ``metric`` are vertical. Once the view has settled, ``ground_error`` and ``regions`` hold at every
         sample, for which all samples are read; ``pixel_error`` holds wherever the samples are read, and elsewhere the
         ranges of heights of clusters are estimates. Errors of other views are distances of the points left out from
         points that are shown.
@@ -217,6 +219,9 @@ class Multiresolution(Generic[Delta]):
     kind: 'mesh', or 'volume' for the Delaunay tetrahedra of the points in space, in metres on the ground (as if all of
         the store had the scale of its middle). Changes are then of the type VolumeDelta, and boxes of six numbers
         limit heights too.
+    metric: 'elliptical:FILE' adapts the triangles of a mesh to a metric, as in Store.mesh().
+
+    Triangles also cover areas of a raster without data, which those of Store.mesh() leave out.
 
     Raises: ValueError; Error for a damaged store, and then nothing has changed.
 
@@ -237,19 +242,20 @@ class Multiresolution(Generic[Delta]):
 
     @overload
     def __init__(self: Multiresolution[MeshDelta], store: Store, level: int | None = None, *,
-                 focus: Iterable[tuple[Array, int]] = (), kind: Literal['mesh'] = 'mesh') -> None: ...
+                 focus: Iterable[tuple[Array, int]] = (), kind: Literal['mesh'] = 'mesh',
+                 metric: str = 'euclidean') -> None: ...
 
     @overload
     def __init__(self: Multiresolution[VolumeDelta], store: Store, level: int | None = None, *,
                  focus: Iterable[tuple[Array, int]] = (), kind: Literal['volume']) -> None: ...
 
     def __init__(self, store: Store, level: int | None = None, *, focus: Iterable[tuple[Array, int]] = (),
-                 kind: ModelKind = 'mesh') -> None:
+                 kind: ModelKind = 'mesh', metric: str = 'euclidean') -> None:
         if not isinstance(store, Store):
             raise TypeError(f'a model needs a terrace.Store, not {type(store).__name__}')
         self._top, self._units = store.top, _core.units(store._core)
         self._core = _core.model(store._core, store.top if level is None else as_integer(level, 'level', bits=32),
-                                 self._focuses(focus), kind)
+                                 self._focuses(focus), kind, metric)
         self._cells = 'tetrahedra' if kind == 'volume' else 'triangles'
         self._delta: Any = VolumeDelta if kind == 'volume' else MeshDelta
 
