@@ -16,14 +16,18 @@ namespace terrace::terrain {
 template <class Visit>
 void for_each_numbered_point(const stream::Store& store, const stream::ClusterOrder& order,
                              const Visit& visit) {
-  std::vector<std::uint32_t> begins(store.levels()[0].clusters);
+  // By the ordinals of the clusters of level 0.
+  std::vector<std::uint32_t> begins(static_cast<std::size_t>(store.levels()[0].clusters));
+  const auto begin_of = [&](stream::ClusterId id) -> std::uint32_t& {
+    return begins[static_cast<std::size_t>(stream::ordinal_of(id))];
+  };
   for (const auto& cluster : order.clusters) {
-    if (stream::level_of(cluster.id) == 0) begins[stream::ordinal_of(cluster.id)] = cluster.begin;
+    if (stream::level_of(cluster.id) == 0) begin_of(cluster.id) = cluster.begin;
   }
   const std::size_t bytes = store.schema().payload_size();
   store.for_each(0, [&](stream::ClusterId id, const stream::ClusterRecord&,
                         const stream::ClusterPoints& points) {
-    std::uint32_t number = begins[stream::ordinal_of(id)];
+    std::uint32_t number = begin_of(id);
     for (std::size_t i = 0; i < points.size(); ++i) {
       visit(number++, points.positions[i], std::span(points.payload).subspan(i * bytes, bytes));
     }

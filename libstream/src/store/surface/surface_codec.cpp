@@ -342,7 +342,7 @@ class SurfaceCodec {
       std::uint64_t step = 0, length = 0;
       const Fan* fan = nullptr;
       if constexpr (!Coder::kDecoding) {
-        fan = &fans[f];
+        fan = &fans[static_cast<std::size_t>(f)];
         step = fan->apex - apex;
         length = fan->corners.size() - 2;
       }
@@ -358,7 +358,7 @@ class SurfaceCodec {
       for (std::uint64_t i = 0; i < length + 2; ++i) {
         std::uint64_t difference = 0;
         if constexpr (!Coder::kDecoding) {
-          difference = zigzag(std::int64_t{fan->corners[i]} - before);
+          difference = zigzag(std::int64_t{fan->corners[static_cast<std::size_t>(i)]} - before);
         }
         unsigned& corner = i == 0 ? corner_step : next_step;
         corner =
