@@ -46,30 +46,24 @@ std::int32_t number_of(Id of) {
   return static_cast<std::int32_t>(tri::slot(of));
 }
 
-/// Collects the changes of a model. place(vertex) returns the position of a vertex.
+/// Collects the changes of what is shown. place(vertex) returns the position of a vertex.
 template <class Shown, class Place>
 class MeshChanges {
  public:
   static constexpr bool kTriangles = requires(const Shown& shown) { shown.all_triangles(); };
   static constexpr bool kTetrahedra = requires(const Shown& shown) { shown.all_tetrahedra(); };
-  using Model = tri::MultiresolutionModel<Shown>;
   using Change = CellChange<kTetrahedra ? 4 : 3>;
 
   /// mirrored: place() turns triangles or tetrahedra over.
-  MeshChanges(const Model& model, bool mirrored, Place place)
-      : model_(model), mirrored_(mirrored), place_(std::move(place)) {}
+  MeshChanges(const Shown& shown, bool mirrored, Place place)
+      : shown_(shown), mirrored_(mirrored), place_(std::move(place)) {}
 
-  [[nodiscard]] Change of(const typename Model::Delta& delta) const {
-    const auto& changes = delta.changes;
+  [[nodiscard]] Change of(const typename Shown::Changes& changes) const {
     Change change;
     for (const tri::VertexId v : changes.removed_vertices) {
       change.removed_vertices.push_back(number_of(v));
     }
     for (const tri::VertexId v : changes.added_vertices) add_vertex(change, v);
-    for (const tri::VertexId v : delta.reassigned) {
-      change.moved_vertices.push_back(number_of(v));
-      change.moved_positions.push_back(place_(v));
-    }
     if constexpr (kTriangles) {
       for (const auto t : changes.removed_triangles) change.removed_cells.push_back(number_of(t));
       for (const auto t : changes.added_triangles) add_cell(change, t);
@@ -79,16 +73,24 @@ class MeshChanges {
     }
     return change;
   }
+  /// The same for a model, of which vertices may also change their points.
+  [[nodiscard]] Change of(const typename tri::MultiresolutionModel<Shown>::Delta& delta) const {
+    Change change = of(delta.changes);
+    for (const tri::VertexId v : delta.reassigned) {
+      change.moved_vertices.push_back(number_of(v));
+      change.moved_positions.push_back(place_(v));
+    }
+    return change;
+  }
 
-  /// Returns the whole model as a change that adds it.
+  /// Returns all that is shown as a change that adds it.
   [[nodiscard]] Change snapshot() const {
-    const Shown& shown = model_.triangulation();
     Change change;
-    for (const tri::VertexId v : shown.all_vertices()) add_vertex(change, v);
+    for (const tri::VertexId v : shown_.all_vertices()) add_vertex(change, v);
     if constexpr (kTriangles) {
-      for (const auto t : shown.all_triangles()) add_cell(change, t);
+      for (const auto t : shown_.all_triangles()) add_cell(change, t);
     } else if constexpr (kTetrahedra) {
-      for (const auto t : shown.all_tetrahedra()) add_cell(change, t);
+      for (const auto t : shown_.all_tetrahedra()) add_cell(change, t);
     }
     return change;
   }
@@ -100,14 +102,14 @@ class MeshChanges {
   }
   template <class Cell>
   void add_cell(Change& change, Cell t) const {
-    const auto vertices = model_.triangulation().vertices(t);
+    const auto vertices = shown_.vertices(t);
     auto& corners = change.added_corners.emplace_back();
     for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = number_of(vertices[i]);
     if (mirrored_) std::swap(corners[1], corners[2]);
     change.added_cells.push_back(number_of(t));
   }
 
-  const Model& model_;
+  const Shown& shown_;
   bool mirrored_;
   Place place_;
 };

@@ -119,7 +119,7 @@ class SharedModel {
     const std::array<double, 6>& m = placement.world.xy;
     bool mirrored = m[0] * m[4] - m[1] * m[3] < 0;
     if (kInSpace<Triangulation>) mirrored ^= placement.coordinates[2].scale < 0;
-    return Changes(*model_, mirrored, [this](tri::VertexId v) {
+    return Changes(model_->triangulation(), mirrored, [this](tri::VertexId v) {
       const auto p = model_->triangulation().point(v);
       return world_point(store_.schema(),
                          {static_cast<double>(p[0]), static_cast<double>(p[1]), model_->height(v)});

@@ -10,6 +10,7 @@
 #include <pybind11/stl.h>
 #include <terrace/terrain/store_metric.hpp>
 #include <terrace/terrain/store_view.hpp>
+#include <terrace/terrain/surface_view.hpp>
 #include <unistd.h>
 
 #include "arrays.hpp"
@@ -110,7 +111,8 @@ class ViewOf final : public AnyView {
     const bool mirrored = !kSurface && m[0] * m[4] - m[1] * m[3] < 0;
     return MeshChanges<typename terrain::ViewTriangulation<Shown>::type,
                        std::function<stream::Point3(tri::VertexId)>>(
-        view_.model(), mirrored, [this](tri::VertexId v) { return view_.in_view_frame(v); });
+        view_.model().triangulation(), mirrored,
+        [this](tri::VertexId v) { return view_.in_view_frame(v); });
   }
   ViewChange described(MeshChange&& result) const {
     ViewChange change{std::move(result)};
@@ -120,6 +122,69 @@ class ViewOf final : public AnyView {
   }
 
   StoreView view_;
+};
+
+/// A view of the surface that is stored with a scan.
+class ViewOfStoredSurface final : public AnyView {
+ public:
+  ViewOfStoredSurface(const stream::Store& store, const tri::ViewOptions& options)
+      : points_(store.points()),
+        bytes_(store.surface()->bytes),
+        clusters_(0),
+        view_(store, options) {
+    for (const stream::LevelInfo& level : store.levels()) {
+      clusters_ += level.clusters;
+      bytes_ += level.bytes;
+    }
+  }
+
+ private:
+  auto changes() const {
+    return MeshChanges<tri::SurfaceFront, std::function<stream::Point3(tri::VertexId)>>(
+        view_.surface(), false, [this](tri::VertexId v) { return view_.in_view_frame(v); });
+  }
+
+ public:
+  ViewChange frame(const tri::View& wish, double seconds) override {
+    const auto& step = view_.frame(wish, seconds);
+    ViewChange change = described(changes().of(*step.changes));
+    change.pending = step.pending;
+    return change;
+  }
+  ViewChange snapshot() override { return described(changes().snapshot()); }
+  /// All of the store, which was read at once.
+  terrain::ViewTraffic traffic() override { return {clusters_, points_, bytes_}; }
+  /// The surface is never updated only locally.
+  ViewChange restore(unsigned) override { return described({}); }
+  void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> pin) override {
+    pin ? view_.pin(cluster, *pin) : view_.unpin(cluster);
+  }
+  std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) override {
+    std::vector<std::byte> records;
+    for (const std::int32_t number : vertices) {
+      const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
+      if (number < 0 || !view_.surface().alive(vertex)) {
+        throw std::invalid_argument("there is no vertex " + std::to_string(number));
+      }
+      const auto record = view_.attributes(vertex);
+      records.insert(records.end(), record.begin(), record.end());
+    }
+    return records;
+  }
+  void to_metres(std::span<stream::Point3> points) override {
+    for (stream::Point3& p : points) p = view_.in_view_frame(p);
+  }
+
+ private:
+  ViewChange described(MeshChange&& result) const {
+    ViewChange change{std::move(result)};
+    change.settled = view_.settled();
+    change.points = view_.surface().vertex_count();
+    return change;
+  }
+
+  std::uint64_t points_, bytes_, clusters_;
+  terrain::SurfaceView view_;
 };
 
 /// A view that Python's threads may share, but a fork of the process may not use.
@@ -134,6 +199,8 @@ class SharedView {
     take_option(arguments, "collapse_below", options.collapse_below);
     take_option(arguments, "guard", options.guard);
     take_option(arguments, "silhouette", options.silhouette);
+    // Outlines are not told apart on a stored surface.
+    const bool stored = arguments["stored"].cast<bool>() && options.silhouette == 1.0;
     const auto kind = named<ViewKind>(kind_name);
     const bool reads_in_frame = named<ViewReader>(reader_name) == ViewReader::frame;
     const auto metric = terrain::MetricChoice::parse(metric_name);
@@ -146,6 +213,8 @@ class SharedView {
     const py::gil_scoped_release released;
     if (kind == ViewKind::points) {
       view_ = std::make_unique<ViewOf<tri::PointCloud>>(store_, options, reads_in_frame);
+    } else if (kind == ViewKind::surface && stored && terrain::SurfaceView::serves(store_)) {
+      view_ = std::make_unique<ViewOfStoredSurface>(store_, options);
     } else if (kind == ViewKind::surface) {
       using Surface = tri::DynamicSurface<std::int32_t>;
       view_ = std::make_unique<ViewOf<Surface>>(store_, options, reads_in_frame);

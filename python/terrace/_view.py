@@ -101,6 +101,10 @@ class View:
     collapse_below: a cluster collapses when its error is below this fraction of the error at which it expands.
     guard: how far outside the picture clusters are kept, as a fraction of their distance.
     silhouette: the fraction of the allowed error to which outlines are held.
+    stored: whether kind 'surface' shows the surface that is stored with the points (``build(surface=True)``), if there
+        is one and ``silhouette`` is 1. It has only the vertices that the error needs, and its errors are distances from
+        the full surface, exact for a ``ground_error`` with ``collapse_below=1``. The store is read at once, into about
+        220 bytes per vertex. False: the points of expanded clusters are triangulated in space.
 
     Threads may share a view, one at a time. After a fork it raises ValueError.
 
@@ -109,11 +113,13 @@ class View:
 
     def __init__(self, store: Store, kind: ViewKind = 'mesh', *,
                  metric: str = 'euclidean', reader: ViewReader = 'thread', max_points: int = 1 << 22, max_bytes: int = 1 << 28,
-                 collapse_below: float = 0.75, guard: float = 0.05, silhouette: float = 1.0) -> None:
+                 collapse_below: float = 0.75, guard: float = 0.05, silhouette: float = 1.0,
+                 stored: bool = True) -> None:
         if not isinstance(store, Store):
             raise TypeError(f'a view needs a terrace.Store, not {type(store).__name__}')
         options = {'max_points': as_integer(max_points, 'max_points'), 'max_bytes': as_integer(max_bytes, 'max_bytes'),
-                   'collapse_below': float(collapse_below), 'guard': float(guard), 'silhouette': float(silhouette)}
+                   'collapse_below': float(collapse_below), 'guard': float(guard), 'silhouette': float(silhouette),
+                   'stored': bool(stored)}
         self._core = _core.SharedView(store._core, kind, reader, metric, options)
         self._first = True
         self._points = 0

@@ -262,6 +262,43 @@ class Views(StoreCase):
             with self.assertRaises(ValueError):
                 terrace.View(self.scan, **wrong)
 
+    def test_view_of_a_stored_surface(self):
+        random = np.random.default_rng(4).normal(size=(1500, 3))
+        ball = 100 * random / np.linalg.norm(random, axis=1)[:, None]
+        store = terrace.build(ball, self.path('stored'), surface=True, block_points=500)
+        view = terrace.View(store, 'surface', collapse_below=1)
+        vertices, triangles = {}, {}
+
+        def settle(**wish):
+            settled = False
+            while not settled:
+                delta = view.frame(seconds=1, **wish)
+                for triangle in delta.removed_triangles:
+                    del triangles[triangle]
+                for vertex in delta.removed_vertices:
+                    del vertices[vertex]
+                vertices.update(zip(delta.added_vertices.tolist(), delta.added_positions))
+                triangles.update(zip(delta.added_triangles.tolist(), delta.added_corners.tolist()))
+                settled = delta.settled
+            self.assertEqual(delta.points, len(vertices))
+
+        for error in (1.0, 0.0, 5.0):
+            settle(ground_error=error)
+            cut = store.surface(max_error=error)
+            self.assertEqual(len(vertices), len(cut.vertices))
+            self.assertEqual(len(triangles), len(cut.triangles))
+            ours = np.array([[vertices[corner] for corner in corners] for corners in triangles.values()])
+            theirs = view.to_metres(cut.vertices)[cut.triangles]
+            np.testing.assert_allclose(sorted_rows(ours.mean(axis=1)), sorted_rows(theirs.mean(axis=1)), atol=1e-9)
+        view.pin((0, 0), True)
+        before = len(vertices)
+        settle(ground_error=5.0)
+        self.assertGreater(len(vertices), before)
+        self.assertEqual(len(view.restore().added_triangles), 0)
+        self.assertEqual(view.traffic['points'], len(ball))
+        tetrahedra = terrace.View(store, 'surface', stored=False)
+        self.assertLess(tetrahedra.frame(ground_error=5.0, seconds=1).points, len(ball))
+
     def test_rejects_use_after_a_fork(self):
         view = terrace.View(self.scan)
         view.frame((0, -3000, 1500))
