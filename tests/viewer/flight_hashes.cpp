@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // flight_hashes STORE MAX_POINTS [surface]: flies over a store. For each stop, prints the camera
 // and the hash of the settled view as a line of JSON. The same flight in the browser's core must
-// give the same hashes. surface: for a store taken for a scan, shows its surface, computed from
-// scratch at each stop.
+// give the same hashes. surface: for a store taken for a scan, shows the surface that is stored
+// with it or, without one, computed from scratch at each stop.
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
@@ -12,23 +13,32 @@
 
 #include <terrace/stream/store.hpp>
 #include <terrace/terrain/store_view.hpp>
+#include <terrace/terrain/surface_view.hpp>
 
 namespace {
 
 using namespace terrace;
 
-template <class Triangulation>
-bool is_open(const Triangulation& triangulation) {
-  if constexpr (requires { triangulation.open(); }) return triangulation.open();
-  return false;
+struct Shown {
+  std::size_t points = 0, expanded = 0;
+  bool open = false;
+  std::uint64_t hash = 0;
+};
+
+template <class Kind>
+Shown shown(terrain::StoreView<Kind>& view) {
+  view.restore();
+  const auto& mesh = view.model().triangulation();
+  Shown result{view.points(), view.model().expanded_count(), false, mesh.hash()};
+  if constexpr (requires { mesh.open(); }) result.open = mesh.open();
+  return result;
+}
+Shown shown(terrain::SurfaceView& view) {
+  return {view.surface().vertex_count(), 0, false, view.surface().hash()};
 }
 
-template <class Shown>
-int fly(const stream::Store& store, std::size_t max_points) {
-  using View = terrain::StoreView<Shown>;
-  tri::ViewOptions options;
-  options.max_points = max_points;
-  View view(store, options, View::Reader::in_frame);
+template <class View>
+int fly(const stream::Store& store, View&& view) {
   stream::Box3 box;
   box.include(view.in_view_frame(store.bounds().min));
   box.include(view.in_view_frame(store.bounds().max));
@@ -58,15 +68,20 @@ int fly(const stream::Store& store, std::size_t max_points) {
     do {
       view.frame(wish, 0.05);
     } while (!view.settled());
-    view.restore();
+    const Shown now = shown(view);
     std::printf(
         "{\"eye\":[%.17g,%.17g,%.17g],\"direction\":[%.17g,%.17g,%.17g],\"error\":%.17g,"
         "\"points\":%zu,\"expanded\":%zu,\"open\":%s,\"hash\":\"%016llx\"}\n",
-        eye[0], eye[1], eye[2], way[0], way[1], way[2], stop.error, view.points(),
-        view.model().expanded_count(), is_open(view.model().triangulation()) ? "true" : "false",
-        static_cast<unsigned long long>(view.model().triangulation().hash()));
+        eye[0], eye[1], eye[2], way[0], way[1], way[2], stop.error, now.points, now.expanded,
+        now.open ? "true" : "false", static_cast<unsigned long long>(now.hash));
   }
   return 0;
+}
+
+template <class Kind>
+int fly_store(const stream::Store& store, const tri::ViewOptions& options) {
+  using View = terrain::StoreView<Kind>;
+  return fly(store, View(store, options, View::Reader::in_frame));
 }
 
 }  // namespace
@@ -76,14 +91,18 @@ int main(int arguments, char** values) {
   if (arguments != 3 && !surface) return 2;
   try {
     const stream::Store store = stream::Store::open(std::filesystem::path(values[1]));
-    const std::size_t max_points = std::strtoull(values[2], nullptr, 10);
+    tri::ViewOptions options;
+    options.max_points = std::strtoull(values[2], nullptr, 10);
     if (surface) {
       const auto ground = terrain::StoreView<tri::PointCloud>(store).ground();
       if (!terrain::is_scan(store, ground)) throw std::invalid_argument("the store is not a scan");
-      return fly<tri::DynamicSurface<std::int32_t>>(store, max_points);
+      if (terrain::SurfaceView::serves(store)) {
+        return fly(store, terrain::SurfaceView(store, options));
+      }
+      return fly_store<tri::DynamicSurface<std::int32_t>>(store, options);
     }
-    return store.schema().grid ? fly<tri::ThinnedDelaunay2>(store, max_points)
-                               : fly<tri::PointCloud>(store, max_points);
+    return store.schema().grid ? fly_store<tri::ThinnedDelaunay2>(store, options)
+                               : fly_store<tri::PointCloud>(store, options);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "flight_hashes: %s\n", error.what());
     return 1;

@@ -78,6 +78,7 @@ export class Sites {
       writeFileSync(join(this.folder, `${name}.csv`), points);
       this.terrace('build', `${name}.csv`, '-o', `${name}.store`, '--block', '1000', '-q');
     }
+    this.terrace('build', 'ball.csv', '-o', 'kept.store', '--block', '1000', '--surface', '-q');
     this.terrace('surface', 'high.store', '-o', 'high.ply', '-q');
     this.terrace('build', 'high.ply', '--entities', 'triangles', '-o', 'corners.store', '-q');
     // Few points, and stores without triangles.
@@ -96,7 +97,7 @@ export class Sites {
       writeFileSync(join(this.folder, name), text);
       this.terrace('build', name, '-o', `${name.split('.')[0]}.store`, '-q');
     }
-    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'cloud.store', 'rare.store', 'ball.store', 'bowl.store', 'high.store', 'corners.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
+    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'cloud.store', 'rare.store', 'ball.store', 'bowl.store', 'high.store', 'kept.store', 'corners.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);

@@ -75,7 +75,7 @@ class Tested extends Flyer {
   }
 }
 
-const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', bowl: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
+const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', bowl: 'surface', kept: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
 for (const [name, kind] of Object.entries(FLIGHTS)) {
   test(`a flight over ${name} gives the hashes of the native run`, {skip: name === 'bunny' && !sites.real.bunny}, async () => {
     // Close to the bunny this takes a minute, so only nightly runs continue.
@@ -101,7 +101,7 @@ for (const [name, kind] of Object.entries(FLIGHTS)) {
         assert.match(path, /^\/((core|body)\.wasm|stores\/\w+\.start)$/);
         continue;
       }
-      assert.match(path, /^\/stores\/\w+\/level-\d+\.0\.(clusters|index)$/);
+      assert.match(path, /^\/stores\/\w+\/(level-\d+\.0\.(clusters|index)|surface\.0)$/);
       assert.ok(!seen.has(path + range), `${path} ${range} twice`);
       seen.add(path + range);
     }
@@ -163,47 +163,49 @@ class Arrays {
   }
 }
 
-test('a surface: changed arrays equal those of a new worker, closed and facing outward', async () => {
-  const flight = sites.flight('ball', {kind: 'surface'});
-  const arrays = new Arrays(32), fresh = new Arrays(32);
-  const flyer = new Tested('ball', {changed: message => arrays.apply(message)});
-  await flyer.opened();
-  for (const stop of flight) await flyer.settle(stop);
-  await flyer.hash();
-  const other = new Tested('ball', {changed: message => fresh.apply(message)});
-  await other.opened();
-  for (const stop of flight) await other.settle(stop);
-  await other.hash();
-  // One more view: both workers reach the same points, the second with restored surfaces in
-  // between.
-  const last = {...flight[0], error: 3};
-  for (const stop of flight.slice(2, 6)) {
-    await other.settle(stop);
+for (const name of ['ball', 'kept']) {
+  test(`${name}: changed arrays equal those of a new worker, closed and facing outward`, async () => {
+    const flight = sites.flight(name, {kind: 'surface'});
+    const arrays = new Arrays(32), fresh = new Arrays(32);
+    const flyer = new Tested(name, {changed: message => arrays.apply(message)});
+    await flyer.opened();
+    for (const stop of flight) await flyer.settle(stop);
+    await flyer.hash();
+    const other = new Tested(name, {changed: message => fresh.apply(message)});
+    await other.opened();
+    for (const stop of flight) await other.settle(stop);
     await other.hash();
-  }
-  for (const tested of [flyer, other]) {
-    await tested.settle({...last, error: 1e6});
-    await tested.settle(last);
-    await tested.hash();
-    await tested.rest();
-  }
-  const list = arrays.listed();
-  assert.ok(list.length > 1000);
-  assert.equal(list.length, flyer.last.state.triangles);
-  assert.deepEqual(list, fresh.listed());
-  // Each edge occurs equally often in both directions, and normals point away from the centre.
-  const edges = new Map(), view = new DataView(arrays.vertices.buffer);
-  for (const c of arrays.drawn()) {
-    for (let k = 0; k < 3; ++k) {
-      const [a, b] = [c[k], c[(k + 1) % 3]];
-      edges.set(`${Math.min(a, b)} ${Math.max(a, b)}`, (edges.get(`${Math.min(a, b)} ${Math.max(a, b)}`) ?? 0) + (a < b ? 1 : -1));
-      const at = [0, 4, 8].map(o => view.getFloat32(32 * a + o, true)), n = [12, 13, 14].map(o => view.getInt8(32 * a + o));
-      const size = Math.hypot(...at), steep = (at[0] * n[0] + at[1] * n[1] + at[2] * n[2]) / size / 127;
-      assert.ok(steep > 0.5, `normal ${n} at ${at}`);
+    // One more view: both workers reach the same points, the second with restored surfaces in
+    // between.
+    const last = {...flight[0], error: 3};
+    for (const stop of flight.slice(2, 6)) {
+      await other.settle(stop);
+      await other.hash();
     }
-  }
-  assert.ok([...edges.values()].every(n => n === 0));
-});
+    for (const tested of [flyer, other]) {
+      await tested.settle({...last, error: 1e6});
+      await tested.settle(last);
+      await tested.hash();
+      await tested.rest();
+    }
+    const list = arrays.listed();
+    assert.ok(list.length > 1000);
+    assert.equal(list.length, flyer.last.state.triangles);
+    assert.deepEqual(list, fresh.listed());
+    // Each edge occurs equally often in both directions, and normals point away from the centre.
+    const edges = new Map(), view = new DataView(arrays.vertices.buffer);
+    for (const c of arrays.drawn()) {
+      for (let k = 0; k < 3; ++k) {
+        const [a, b] = [c[k], c[(k + 1) % 3]];
+        edges.set(`${Math.min(a, b)} ${Math.max(a, b)}`, (edges.get(`${Math.min(a, b)} ${Math.max(a, b)}`) ?? 0) + (a < b ? 1 : -1));
+        const at = [0, 4, 8].map(o => view.getFloat32(32 * a + o, true)), n = [12, 13, 14].map(o => view.getInt8(32 * a + o));
+        const size = Math.hypot(...at), steep = (at[0] * n[0] + at[1] * n[1] + at[2] * n[2]) / size / 127;
+        assert.ok(steep > 0.5, `normal ${n} at ${at}`);
+      }
+    }
+    assert.ok([...edges.values()].every(n => n === 0));
+  });
+}
 
 /// The distance from p to a triangle: to its plane if the foot is inside, otherwise to its nearest
 /// edge.
@@ -227,33 +229,35 @@ function isNear(p, triangle, reach) {
   return !outside(0) && !outside(1) && !outside(2) && distanceTo(p, triangle) < reach;
 }
 
-test('a surface: new vertices start on the previous surface', async () => {
-  const arrays = new Arrays(32);
-  let came = 0, waited = false;
-  const flyer = new Tested('ball', {
-    changed: message => {
-      // After a wait, triangles are replaced at once, which changes the surface between vertices.
-      const skip = waited;
-      waited = message.state.waiting;
-      if (skip) return arrays.apply(message);
-      const before = [...arrays.drawn()].map(corners => [...corners].map(slot => arrays.place(slot)));
-      arrays.apply(message);
-      if (before.length === 0) return;
-      const slots = new Set([...arrays.drawn()].flatMap(corners => [...corners]));
-      for (const slot of slots) {
-        if (arrays.began(slot) !== Math.fround(message.time) || ++came % 60 !== 0) continue;
-        const start = arrays.place(slot, message.time);
-        assert.ok(before.some(triangle => isNear(start, triangle, 2e-4)), `${start} is not on the previous surface`);
+for (const name of ['ball', 'kept']) {
+  test(`${name}: new vertices start on the previous surface`, async () => {
+    const arrays = new Arrays(32);
+    let came = 0, waited = false;
+    const flyer = new Tested(name, {
+      changed: message => {
+        // After a wait, triangles are replaced at once, which changes the surface between vertices.
+        const skip = waited;
+        waited = message.state.waiting;
+        if (skip) return arrays.apply(message);
+        const before = [...arrays.drawn()].map(corners => [...corners].map(slot => arrays.place(slot)));
+        arrays.apply(message);
+        if (before.length === 0) return;
+        const slots = new Set([...arrays.drawn()].flatMap(corners => [...corners]));
+        for (const slot of slots) {
+          if (arrays.began(slot) !== Math.fround(message.time) || ++came % 60 !== 0) continue;
+          const start = arrays.place(slot, message.time);
+          assert.ok(before.some(triangle => isNear(start, triangle, 2e-4)), `${start} is not on the previous surface`);
+        }
       }
+    });
+    await flyer.opened();
+    for (const stop of sites.flight(name, {kind: 'surface'}).slice(0, 4)) {
+      await flyer.settle(stop);
+      await flyer.rest();
     }
+    assert.ok(came > (name === 'ball' ? 500 : 120), `${came} came`);
   });
-  await flyer.opened();
-  for (const stop of sites.flight('ball', {kind: 'surface'}).slice(0, 4)) {
-    await flyer.settle(stop);
-    await flyer.rest();
-  }
-  assert.ok(came > 500, `${came} came`);
-});
+}
 
 /// The triangles drawn at a time as a set, with corners rounded to a thousandth of `unit`.
 function pictureOf(arrays, time, unit) {
@@ -493,26 +497,28 @@ test('a region has at least its level, and the rest of the store keeps its own',
   assert.equal((await view()).state.points, coarse);
 });
 
-test('manual control: a cluster of a surface expands, collapses and is released; a point of it is picked', async () => {
-  const flyer = new Tested('ball');
-  await flyer.opened();
-  const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: 1e6};
-  const before = (await flyer.settle(camera)).points;
-  const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
-  assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));
-  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 1});
-  const more = (await flyer.settle(camera)).points;
-  assert.ok(more > before, `${before} ${more}`);
-  const {lines} = await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
-  assert.equal(lines.length % 2, 0);
-  // Both ways by the same name.
-  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 0});
-  assert.equal((await flyer.settle(camera)).points, before);
-  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 1});
-  assert.equal((await flyer.settle(camera)).points, more);
-  flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: -1});
-  assert.equal((await flyer.settle(camera)).points, before);
-});
+for (const name of ['ball', 'kept']) {
+  test(`manual control of ${name}: a cluster of a surface expands, collapses and is released; a point of it is picked`, async () => {
+    const flyer = new Tested(name);
+    await flyer.opened();
+    const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: 1e6};
+    const before = (await flyer.settle(camera)).points;
+    const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
+    assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));
+    flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 1});
+    const more = (await flyer.settle(camera)).points;
+    assert.ok(more > before, `${before} ${more}`);
+    const {lines} = await flyer.ask({type: 'outline', level: hit.clusterLevel, ordinal: hit.clusterOrdinal}, 'outlined');
+    assert.equal(lines.length % 2, 0);
+    // Both ways by the same name.
+    flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 0});
+    assert.equal((await flyer.settle(camera)).points, before);
+    flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: 1});
+    assert.equal((await flyer.settle(camera)).points, more);
+    flyer.worker.send({type: 'pin', cluster: hit.expandable, pin: -1});
+    assert.equal((await flyer.settle(camera)).points, before);
+  });
+}
 
 test('a cluster of points expands manually, and its outline lists its points', async () => {
   const flyer = new Tested('cloud');

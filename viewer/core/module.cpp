@@ -23,6 +23,7 @@
 #include "cloud_colours.hpp"
 #include "sample/store_probe.hpp"
 #include "scene.hpp"
+#include "stored_surface.hpp"
 
 namespace {
 
@@ -35,6 +36,7 @@ constexpr std::size_t kMostRanges = 1024;
 
 struct Module {
   std::vector<double> input;  // doubles, for their alignment
+  std::vector<stream::ByteRange> files;  // whole ones, of the store
   stream::GivenBytes given;
   std::optional<stream::Store> store;
   std::unique_ptr<viewer::Scene> scene;
@@ -107,6 +109,17 @@ bool is_body(const stream::Store& store, const stream::LinearMap& ground) {
 #endif
 }
 
+#ifdef TERRACE_VIEWER_BODY
+/// Throws stream::MissingBytes, unless all files of the store are there.
+void need_all_files() {
+  std::vector<stream::ByteRange> missing;
+  for (const stream::ByteRange& file : module().files) {
+    if (file.bytes > 0 && !module().given.has(file)) missing.push_back(file);
+  }
+  if (!missing.empty()) throw stream::MissingBytes(std::move(missing));
+}
+#endif
+
 stream::Point3 point_of(const double* at) { return {at[0], at[1], at[2]}; }
 
 }  // namespace
@@ -129,6 +142,7 @@ TERRACE_EXPORT(numbers) const double* terrace_numbers() { return module().number
 TERRACE_EXPORT(add_file) int terrace_add_file(std::size_t name, double bytes) {
   return guarded([&] {
     module().given.add_file({input_text(), name}, static_cast<std::uint64_t>(bytes));
+    module().files.push_back({{input_text(), name}, 0, static_cast<std::uint64_t>(bytes)});
     return kDone;
   });
 }
@@ -157,6 +171,9 @@ TERRACE_EXPORT(open) int terrace_open(double max_points) {
     stream::LinearMap ground{};
     std::memcpy(ground.data(), m.input.data(), sizeof ground);
     if (!m.store) m.store = stream::Store::open("store", m.given.open());
+#ifdef TERRACE_VIEWER_BODY
+    if (viewer::shows_stored_surface(*m.store)) need_all_files();
+#endif
     m.probe.emplace(*m.store, ground);
     m.scene.reset();  // first, because its memory serves the next one
     reserve_memory(kMemory + kPointMemory * static_cast<std::size_t>(max_points));

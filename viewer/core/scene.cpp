@@ -15,6 +15,9 @@
 
 #include "blocks.hpp"
 #include "body_normals.hpp"
+#include "picking.hpp"
+#include "slide.hpp"
+#include "stored_surface.hpp"
 #include "transitions.hpp"
 
 namespace terrace::viewer {
@@ -22,21 +25,11 @@ namespace {
 
 using stream::Point3;
 
-Point3 difference(const Point3& a, const Point3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-double dot(const Point3& a, const Point3& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Point3 cross(const Point3& a, const Point3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 template <class Shown>
 class SceneOf final : public Scene {
-  /// Bits of SceneBodyPoint::start without the sign; one is left for rounding.
-  static constexpr int kStartBits = 14;
-  /// Seconds that a slide takes on the page; seconds for which removed parts stay drawn, a little
-  /// longer; and the limit of the latter for parts that change repeatedly.
-  static constexpr double kSlide = 0.45, kRemovalDelay = 0.5, kLongestDelay = 3.0;
+  /// Seconds for which removed parts stay drawn, a little longer than kSlide, and the limit of it
+  /// for parts that change repeatedly.
+  static constexpr double kRemovalDelay = 0.5, kLongestDelay = 3.0;
 
  public:
   using View = terrain::StoreView<Shown>;
@@ -219,47 +212,14 @@ class SceneOf final : public Scene {
   /// SceneHit::expandable of a vertex that is a member of `cluster`.
   [[nodiscard]] std::optional<tri::ClusterId> cluster_to_expand(tri::VertexId vertex,
                                                                 tri::ClusterId cluster) const;
-  /// Returns where the page draws a vertex at a time.
-  [[nodiscard]] static Point3 position_at(const Vertex& v, double time) {
-    const double t = std::clamp((time - v.start_time) / kSlide, 0.0, 1.0);
-    const double remaining = 1 - t * t * (3 - 2 * t);
-    Point3 place{v.x, v.y, v.z};
-    if constexpr (kRaster) {
-      place[2] += remaining * (v.start_z - v.z);
-    } else {
-      for (std::size_t k = 0; k < 3; ++k)
-        place[k] += remaining * std::ldexp(v.start[k], v.start_exponent);
-    }
-    return place;
-  }
-  /// Starts a vertex's slide.
-  static void move(Vertex& v, const Point3& from, const Point3& to, double time) {
-    v.x = static_cast<float>(to[0]);
-    v.y = static_cast<float>(to[1]);
-    v.z = static_cast<float>(to[2]);
-    v.start_time = static_cast<float>(time);
-    if constexpr (kRaster) {
-      v.start_z = static_cast<float>(from[2]);
-    } else {
-      const Point3 offset = difference(from, to);
-      int exponent = 0;
-      std::frexp(std::max({std::abs(offset[0]), std::abs(offset[1]), std::abs(offset[2])}),
-                 &exponent);
-      exponent = std::clamp(exponent - kStartBits, -128, 127);
-      v.start_exponent = static_cast<std::int8_t>(exponent);
-      for (std::size_t k = 0; k < 3; ++k) {
-        v.start[k] = static_cast<std::int16_t>(std::lround(std::ldexp(offset[k], -exponent)));
-      }
-    }
-  }
   template <class Place>
   [[nodiscard]] Point3 to_draw(const Place& place) const {
     return difference(view_.model_in_view_frame(place), base_);
   }
   void slide(const tri::Slides& slides, double time) {
     for (std::size_t i = 0; i < slides.size(); ++i) {
-      move(vertices_.change(draw_slot(slides.vertices[i])), to_draw(slides.start[i]),
-           to_draw(slides.end[i]), time);
+      start_slide(vertices_.change(draw_slot(slides.vertices[i])), to_draw(slides.start[i]),
+                  to_draw(slides.end[i]), time);
     }
   }
   template <class Delta>
@@ -421,7 +381,7 @@ void SceneOf<Shown>::delay_removals(const Delta& delta, double time) {
     const tri::Anchor& anchor = transitions_.anchors()[i];
     if (!anchor.moved) continue;
     Vertex& v = vertices_.change(transitions_.slot_of_anchor(i));
-    move(v, position_at(v, time), to_draw(anchor.end), time);
+    start_slide(v, position_at(v, time), to_draw(anchor.end), time);
   }
   for (std::size_t i = 0; i < numbers.removed.size(); ++i) {
     const Part& part = parts_[numbers.removed[i]];
@@ -429,7 +389,7 @@ void SceneOf<Shown>::delay_removals(const Delta& delta, double time) {
     on = kNone;
     if (!part.delayed) continue;
     Vertex v = vertices_[draw_slot(morph_.removed.vertices[i])];
-    move(v, position_at(v, time), to_draw(morph_.removed.end[i]), time);
+    start_slide(v, position_at(v, time), to_draw(morph_.removed.end[i]), time);
     on = transitions_.keep(
         part.group, v,
         {morph_.removed.start[i], morph_.removed.end[i], morph_.removed_on[i], false});
@@ -568,41 +528,21 @@ std::optional<SceneHit> SceneOf<Shown>::pick(const Point3& origin, const Point3&
   if constexpr (kTriangles) {
     // Points on one line have no triangles and are drawn as points.
     if (mesh().triangle_count() > gaps_) {
-      // T. Möller, B. Trumbore, "Fast, minimum storage ray-triangle intersection",
-      // doi:10.1080/10867651.1997.10487468.
-      tri::TriangleId hit_triangle = tri::kNoTriangle;
-      std::array<double, 3> weights{};
-      for (const tri::TriangleId triangle : mesh().all_triangles()) {
-        const auto corners = mesh().vertices(triangle);
-        const Point3 a = position(corners[0]);
-        const Point3 ab = difference(position(corners[1]), a),
-                     ac = difference(position(corners[2]), a);
-        const Point3 p = cross(unit, ac);
-        const double determinant = dot(ab, p);
-        if (determinant == 0) continue;
-        const Point3 from = difference(origin, a);
-        const double u = dot(from, p) / determinant;
-        if (!(u >= 0 && u <= 1)) continue;
-        const Point3 q = cross(from, ab);
-        const double v = dot(unit, q) / determinant;
-        if (!(v >= 0 && u + v <= 1)) continue;
-        const double distance = dot(ac, q) / determinant;
-        if (!(distance > 0 && distance < best) || is_gap(triangle)) continue;
-        best = distance;
-        hit_triangle = triangle;
-        weights = {1 - u - v, u, v};
-      }
-      if (hit_triangle == tri::kNoTriangle) return {};
-      const auto vertices = mesh().vertices(hit_triangle);
+      const auto found = first_hit(
+          mesh(), origin, unit, [this](tri::VertexId v) { return position(v); },
+          [this](tri::TriangleId triangle) { return is_gap(triangle); });
+      if (!found) return {};
+      const auto vertices = mesh().vertices(found->triangle);
       Point3 stored{};
-      std::size_t nearest = 0;
       for (std::size_t i = 0; i < 3; ++i) {
         const Point3 corner = view_.stored(vertices[i]);
-        for (std::size_t k = 0; k < 3; ++k) stored[k] += weights[i] * corner[k];
-        if (weights[i] > weights[nearest]) nearest = i;
+        for (std::size_t k = 0; k < 3; ++k) stored[k] += found->weights[i] * corner[k];
       }
-      hit_at(vertices[nearest], stored,
-             {origin[0] + best * unit[0], origin[1] + best * unit[1], origin[2] + best * unit[2]});
+      const std::size_t nearest = found->nearest();
+      const double along = found->distance;
+      hit_at(
+          vertices[nearest], stored,
+          {origin[0] + along * unit[0], origin[1] + along * unit[1], origin[2] + along * unit[2]});
       const Point3 aside = difference(position(vertices[nearest]), hit->place);
       // Positions were rounded to floats.
       const Point3 size = difference(box().max, box().min);
@@ -675,12 +615,7 @@ std::vector<std::array<std::uint32_t, 2>> SceneOf<Shown>::outline(tri::ClusterId
       if (corners < (kRaster ? 1 : 3) || is_gap(triangle)) continue;
       for (std::size_t i = 0; i < 3; ++i) edges.push_back({c[i], c[(i + 1) % 3]});
     }
-    std::sort(edges.begin(), edges.end());
-    for (const auto& [a, b] : edges) {
-      if (!std::binary_search(edges.begin(), edges.end(), std::array<std::uint32_t, 2>{b, a})) {
-        lines.push_back({a, b});
-      }
-    }
+    return outline_of(edges);
   }
   return lines;
 }
@@ -696,6 +631,7 @@ std::unique_ptr<Scene> Scene::open(const stream::Store& store, const stream::Lin
   options.max_cached_bytes = std::size_t{128} << 20;
   options.model.reserve = max_points;
 #ifdef TERRACE_VIEWER_BODY
+  if (shows_stored_surface(store)) return open_stored_surface(store, ground, max_points);
   return std::make_unique<SceneOf<tri::DynamicSurface<std::int32_t>>>(store, ground, options,
                                                                       has_bytes);
 #else

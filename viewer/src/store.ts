@@ -41,6 +41,7 @@ export function parseManifest(bytes: Uint8Array): Manifest {
       for (const file of [segment.data, segment.index]) files.set(file.file, file.bytes);
     }
   }
+  if (json.surface) files.set(json.surface.data.file, json.surface.data.bytes);
   return {...json, files};
 }
 
