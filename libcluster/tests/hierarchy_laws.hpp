@@ -32,14 +32,20 @@ inline long double ground_distance(const GroundMap& m, const Point3& a, const Po
   return std::sqrt(sum);
 }
 
-/// Checks that the clusters of a block are a partition, grouped, and in ascending order.
-inline void check_partition(const RecordedBlock& block, std::size_t block_size) {
+/// Checks that the clusters of a block are a partition, grouped, and in ascending order. medians:
+/// if positive, their number; otherwise there are at most half as many clusters as points.
+inline void check_partition(const RecordedBlock& block, std::size_t block_size,
+                            std::size_t medians = 0) {
   const std::size_t n = block.positions.size();
   const std::size_t clusters = block.representatives.size();
   ASSERT_GE(n, 1u);
   ASSERT_LE(n, block_size);
   ASSERT_GE(clusters, 1u);
-  ASSERT_LE(clusters, (n + 1) / 2);
+  if (medians > 0) {
+    ASSERT_EQ(clusters, medians);
+  } else {
+    ASSERT_LE(clusters, (n + 1) / 2);
+  }
   ASSERT_EQ(block.summaries.size(), clusters);
   ASSERT_EQ(block.children.size(), n * block.level);
   ASSERT_EQ(block.payload.size(), n * sizeof(std::uint64_t));
@@ -100,10 +106,11 @@ inline void check_summary(const Expanded& cluster, std::span<const Point3> input
   EXPECT_LE(static_cast<long double>(summary.error), edges * (1.0L + 1e-12L));
 }
 
-/// Checks everything. `map` is the map of all blocks.
+/// Checks everything. `map` is the map of all blocks. medians: as in HierarchyOptions.
 inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& result,
                             std::span<const Point3> input, std::size_t block_size,
-                            const GroundMap& map = {1, 0, 0, 0, 1, 0, 0, 0, 1}) {
+                            const GroundMap& map = {1, 0, 0, 0, 1, 0, 0, 0, 1},
+                            std::size_t medians = 0) {
   ASSERT_TRUE(sink.has_root);
   ASSERT_EQ(result.points, input.size());
   ASSERT_EQ(result.top, sink.levels.size());
@@ -141,9 +148,10 @@ inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& re
     std::vector<Expanded> clusters;
     heads.emplace_back();
     std::uint64_t number = 0;
+    const bool last = medians > 0 && level + 1 == result.top && sink.levels[level].size() == 1;
     for (const RecordedBlock& block : sink.levels[level]) {
       SCOPED_TRACE(testing::Message() << "block " << block.block);
-      ASSERT_NO_FATAL_FAILURE(check_partition(block, block_size));
+      ASSERT_NO_FATAL_FAILURE(check_partition(block, block_size, last ? medians : 0));
       const std::uint64_t base = number;
       for (std::size_t i = 0; i < block.positions.size(); ++i) {
         ASSERT_NO_FATAL_FAILURE(check_point(block, i, number++));
@@ -166,7 +174,7 @@ inline void check_hierarchy(const RecordingSink& sink, const HierarchyResult& re
         clusters.push_back(std::move(cluster));
       }
     }
-    EXPECT_GT(number, block_size) << "this level fits one block and should be the root";
+    EXPECT_GT(number, last ? medians : block_size) << "this level should be the root";
     EXPECT_EQ(number, level == 0 ? input.size() : below.size());
     EXPECT_EQ(result.level_points[level], number);
     EXPECT_EQ(result.level_clusters[level], clusters.size());

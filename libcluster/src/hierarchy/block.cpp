@@ -13,6 +13,7 @@
 #include <terrace/base/random.hpp>
 
 #include "ground.hpp"
+#include "terrace/cluster/k_median.hpp"
 
 namespace terrace::cluster {
 namespace {
@@ -34,6 +35,45 @@ constexpr int kAttempts = 20;
 // Least cost after the first attempt. In a block of 10,000 points on a surface, it is too high for
 // every point to have its own facility.
 constexpr double kMinRaisedCost = 0x1p-8;
+// With medians: the first cost, at which about a third of 10,000 points on a surface become
+// facilities, and the number of attempts with a lower cost. Where points coincide, no cost gives
+// more facilities.
+constexpr double kCostForMedians = 0x1p-7;
+constexpr int kLowerCosts = 8;
+
+/// Searches for a facility cost at which a block has from `least` to `most` facilities.
+class CostSearch {
+ public:
+  CostSearch(double cost, std::size_t least, std::size_t most)
+      : cost_(cost), least_(least), most_(most) {}
+
+  [[nodiscard]] double cost() const { return cost_; }
+
+  /// Returns whether the number of facilities at cost() is acceptable. If not, changes cost().
+  [[nodiscard]] bool accepts(std::size_t count) {
+    if (count <= most_ && (count >= least_ || lowered_ == kLowerCosts)) return true;
+    if (count > most_) {
+      too_low_ = cost_;
+      cost_ = std::max(4.0 * cost_, kMinRaisedCost);
+    } else {
+      ++lowered_;
+      too_high_ = cost_;
+      // In the plane the number of clusters is proportional to cost^(-2/3).
+      const double share = static_cast<double>(count) / static_cast<double>(least_);
+      cost_ *= 0.5 * share * std::sqrt(share);
+    }
+    if (too_low_ > 0.0 && std::isfinite(too_high_)) {
+      cost_ = std::sqrt(too_low_) * std::sqrt(too_high_);
+    }
+    return false;
+  }
+
+ private:
+  double cost_;
+  std::size_t least_, most_;
+  double too_low_ = 0.0, too_high_ = std::numeric_limits<double>::infinity();
+  int lowered_ = 0;
+};
 
 // Sorts the points by cluster (counting sort). Within each cluster they are in ascending order.
 void group_by_cluster(const BlockClustering& clustering, std::vector<std::uint32_t>& first,
@@ -63,6 +103,7 @@ void HierarchyBlock::reset(unsigned new_level) {
   level = new_level;
   number = 0;
   outliers = 0;
+  medians = 0;
   positions.clear();
   payload.clear();
   children.clear();
@@ -189,10 +230,29 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
   weights_.clear();
   if (block.level > 0) set_normalised_weights(block.heads, weights_);
   read_channels(block);
-  BlockOptions options = options_.block;
-  options.seed = block_seed(options_.block.seed, block.level, block.number);
+  if (block.medians > 0) {
+    find_medians(block, ground);
+    return;
+  }
+  const bool for_medians = options_.medians > 0;
+  CostSearch search(for_medians ? kCostForMedians : options_.block.facility_cost,
+                    for_medians ? block.size() / 4 : 0, (block.size() + 1) / 2);
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    cluster_at(search.cost(), block, ground);
+    assert(block.clustering.assignment.size() == block.size());
+    if (search.accepts(block.clustering.facilities.size())) {
+      if (std::isfinite(options_.outlier_price)) place_outliers(block, ground);
+      return;
+    }
+  }
+  pair_up(block.size(), block.clustering);
+}
 
-  const std::size_t max_facilities = (block.size() + 1) / 2;
+void BlockProcessor::cluster_at(double facility_cost, HierarchyBlock& block,
+                                std::span<const Point3> ground) {
+  BlockOptions options = options_.block;
+  options.facility_cost = facility_cost;
+  options.seed = block_seed(options_.block.seed, block.level, block.number);
   const FacilityOptions search{
       .strategy = options_.strategy,
       .effort = options.effort,
@@ -200,29 +260,46 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
       .threads = options_.search_threads,
       .batch = options_.batch,
       .progress = [this](std::size_t, std::size_t) { return !options_.stop.stop_requested(); }};
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (options_.corners.count > 1) {
-      entity_cluster_.run(corners_, options_.corners.count, options_.corners.ordered, weights_,
-                          options.facility_cost, search, block.clustering);
-    } else if (metric_cluster_) {
-      metric_cluster_->run({.points = ground,
-                            .weights = weights_,
-                            .metric = metric_,
-                            .channels = {channels_, options_.channels.weights},
-                            .facility_cost = options.facility_cost,
-                            .outlier_price = outlier_price(block)},
-                           search, block.clustering);
-    } else {
-      cluster_(ground, weights_, options, block.clustering);
-    }
-    assert(block.clustering.assignment.size() == block.size());
-    if (block.clustering.facilities.size() <= max_facilities) {
-      if (std::isfinite(options_.outlier_price)) place_outliers(block, ground);
-      return;
-    }
-    options.facility_cost = std::max(4.0 * options.facility_cost, kMinRaisedCost);
+  if (options_.corners.count > 1) {
+    entity_cluster_.run(corners_, options_.corners.count, options_.corners.ordered, weights_,
+                        facility_cost, search, block.clustering);
+  } else if (metric_cluster_) {
+    metric_cluster_->run({.points = ground,
+                          .weights = weights_,
+                          .metric = metric_,
+                          .channels = {channels_, options_.channels.weights},
+                          .facility_cost = facility_cost,
+                          .outlier_price = outlier_price(block)},
+                         search, block.clustering);
+  } else {
+    cluster_(ground, weights_, options, block.clustering);
   }
-  pair_up(block.size(), block.clustering);
+}
+
+void BlockProcessor::find_medians(HierarchyBlock& block, std::span<const Point3> ground) {
+  struct Stopped {};
+  const auto check_stop = [this] {
+    if (options_.stop.stop_requested()) throw Stopped();
+  };
+  try {
+    FacilitySolution solution =
+        k_median({.points = ground,
+                  .weights = weights_,
+                  .metric = metric_,
+                  .channels = {channels_, options_.channels.weights}},
+                 block.medians,
+                 {.restarts = 1,
+                  .bound_steps = 0,
+                  .seed = block_seed(options_.block.seed, block.level, block.number),
+                  .threads = options_.threads,
+                  .check_stop = check_stop});
+    block.clustering.facilities = std::move(solution.facilities);
+    block.clustering.assignment = std::move(solution.assignment);
+  } catch (const Stopped&) {
+    // The work is abandoned, so any clusters will do.
+    block.clustering.assignment.resize(block.size());
+    pair_up(block.size(), block.clustering);
+  }
 }
 
 // Makes each outlier a marked member of the cluster with the nearest representative.

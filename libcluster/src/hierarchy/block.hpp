@@ -23,6 +23,8 @@ struct HierarchyBlock {
   unsigned level = 0;
   std::uint64_t number = 0;
   std::uint64_t outliers = 0;
+  /// If positive, the number of its clusters: this is the last block before the top.
+  std::size_t medians = 0;
   std::vector<Point3> positions;
   std::vector<std::byte> payload;
   std::vector<std::uint64_t> children;  ///< `level` ordinals per point
@@ -73,12 +75,16 @@ class BlockProcessor {
 
   /// Fills in clustering, first, order and summaries. At most half of the points, rounded up,
   /// become representatives, because otherwise the hierarchy might never end. If the facility cost
-  /// is too low for that, raises it for this block. Throws: std::invalid_argument as
-  /// check_ground_map() does.
+  /// is too low for that, raises it for this block. With medians, at least a quarter become
+  /// representatives, except in the block that states the number of its medians. Throws:
+  /// std::invalid_argument as check_ground_map() does.
   void process(HierarchyBlock& block);
 
  private:
   void cluster(HierarchyBlock& block, std::span<const Point3> ground);
+  /// Clusters once at this facility cost.
+  void cluster_at(double facility_cost, HierarchyBlock& block, std::span<const Point3> ground);
+  void find_medians(HierarchyBlock& block, std::span<const Point3> ground);
   void read_channels(const HierarchyBlock& block);
   /// Fills corners_ with the corners of all entities, on the ground.
   void read_corners(const HierarchyBlock& block, const Point3& origin, const GroundMap& map);

@@ -33,6 +33,18 @@ void check_corners(const HierarchyOptions& options) {
   }
 }
 
+void check_medians(const HierarchyOptions& options) {
+  if (options.medians == 0) return;
+  if (options.medians >= options.block_size) {
+    throw std::invalid_argument("medians is " + std::to_string(options.medians) +
+                                ": it must be below block_size, " +
+                                std::to_string(options.block_size));
+  }
+  if (options.corners.count > 1 || std::isfinite(options.outlier_price)) {
+    throw std::invalid_argument("medians are those of points, without outliers");
+  }
+}
+
 HierarchyOptions checked(HierarchyOptions options) {
   if (options.block_size < 2 || options.block_size >= (std::size_t{1} << 24)) {
     throw std::invalid_argument("block_size is " + std::to_string(options.block_size) +
@@ -59,6 +71,7 @@ HierarchyOptions checked(HierarchyOptions options) {
         "outlier_price is set, but there is no function that marks outliers");
   }
   check_corners(options);
+  check_medians(options);
   options.threads = std::clamp(options.threads, 1u, kMaxThreads);
   return options;
 }
@@ -160,6 +173,11 @@ HierarchyResult HierarchyEngine::finish() {
     pipeline_.wait_for_all();
   }
   pipeline_.wait_for_all();
+  if (options_.medians > 0 && levels_[top].points > options_.medians) {
+    levels_[top].open->medians = options_.medians;
+    submit(levels_[top++]);
+    pipeline_.wait_for_all();
+  }
   deliver_root(levels_[top]);
 
   HierarchyResult result;

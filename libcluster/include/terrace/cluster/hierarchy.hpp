@@ -25,7 +25,8 @@
 /// - blocks are clustered in parallel;
 /// - distances are ground distances, under any metric;
 /// - a level that fits one block becomes the top without being clustered;
-/// - a facility cost that is too low to reduce a block is raised.
+/// - a facility cost that is too low to reduce a block is raised;
+/// - k-median is an option, not the only result (see HierarchyOptions::medians).
 ///
 /// Points arrive at level 0. Each block of a level is clustered separately. The representative of
 /// each cluster, an input point, moves up to the level above, where it heads that cluster. So every
@@ -92,6 +93,20 @@ struct PayloadCorners {
 
 struct HierarchyOptions {
   std::size_t block_size = 10000;  ///< maximum number of points clustered together; 2 to 2^24 - 1
+  /// k-median over the stream: the top consists of this many points, the medians, whose clusters
+  /// are those of the level below. If there are no more points than that, all of them are the top.
+  /// 0: the top is the first level that fits one block.
+  ///
+  /// The first level that fits one block is clustered by k_median(), with the counts of level-0
+  /// points as weights. To keep that level fine, each block chooses its facility cost so that a
+  /// quarter to a half of its points become representatives (fewer if points coincide), and the
+  /// facility cost of `block` is not used. With a block_size of 100 medians or more, the cost of
+  /// connecting all points to their nearest medians is usually 1 to 2 % above that of k_median()
+  /// of all points in memory. The last step takes O(block_size^2) time per round of swaps. Must be
+  /// below block_size; without corners and outliers.
+  /// Source: L. O'Callaghan et al., Streaming-data algorithms for high-quality clustering, ICDE
+  /// 2002 (thesis 4.3, 7.1).
+  std::size_t medians = 0;
   /// Each block has its own seed, mixed from this seed, its level and its ordinal. At most half of
   /// a block's points, rounded up, become representatives; otherwise the levels might never end. If
   /// the facility cost is too low for that, it is raised for that block.
@@ -165,6 +180,7 @@ class HierarchyBuilder {
   ///   corners is out of range;
   /// - if channels, corners or outliers have no function;
   /// - if corners are combined with another metric, channels or outliers;
+  /// - if there are medians and corners or outliers, or as many medians as a block has points;
   /// - if the SIMD path is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);
   /// Stops without finishing. Waits for the blocks that are being clustered, after which the sink
