@@ -33,6 +33,9 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   set("vertical", request.vertical);
   set("block_points", request.block_points);
   set("facility_cost", request.facility_cost);
+  set("k", request.k);
+  set("batch", request.batch);
+  set("search_threads", request.search_threads);
   set("z_weight", request.z_weight);
   set("channels", request.channels);
   set("outlier_price", request.outlier_price);
@@ -56,6 +59,9 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
     throw py::value_error("`block_points` must be between 2 and 1000000");
   }
   if (!(request.facility_cost > 0)) throw py::value_error("`facility_cost` must be positive");
+  if (request.k > 0 && options.contains("facility_cost")) {
+    throw py::value_error("give either `k` or `facility_cost`");
+  }
   if (!(request.z_weight >= 0)) throw py::value_error("`z_weight` must not be negative");
   if (request.band < 1) throw py::value_error("`band` counts from 1");
   return request;

@@ -108,6 +108,9 @@ py::dict stream_clusters(const py::iterable& batches, const py::function& take,
   set("bytes", options.payload_size);
   set("block_points", options.block_size);
   set("facility_cost", options.block.facility_cost);
+  set("k", options.medians);
+  set("batch", options.batch);
+  set("search_threads", options.search_threads);
   set("seed", options.block.seed);
   set("threads", options.threads);
   options.threads = all_or(options.threads);

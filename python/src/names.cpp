@@ -156,7 +156,7 @@ const auto& tables() {
 }
 
 /// Parameters that have different names in the libraries (first) and in the module.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParameters{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kParameters{{
     {"channel", "channels"},
     {"format", "input_format"},
     {"memory_bytes", "memory"},
@@ -164,6 +164,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kParamete
     {"own_crs", "lonlat=False"},
     {"region_crs", "crs"},
     {"shift", "datum_shift"},
+    {"strategy", "method"},
     {"to_crs", "crs"},
     {"zoom", "zooms"},
 }};

@@ -371,8 +371,9 @@ class ClusterBlock:
 
 
 def stream_clusters(batches: Iterable[Array], sink: Callable[[ClusterBlock], object], *, block_points: int = 10000,
-                    facility_cost: float = 3.0, effort: Effort = 'default', method: ClusterMethod = 'automatic',
-                    metric: str = 'euclidean', seed: int = 1, threads: int | None = None) -> dict[str, Any]:
+                    facility_cost: float = 3.0, k: int = 0, effort: Effort = 'default', method: ClusterMethod = 'automatic',
+                    batch: int = 1, search_threads: int = 1, metric: str = 'euclidean', seed: int = 1,
+                    threads: int | None = None) -> dict[str, Any]:
     """Builds a hierarchy of clusters as in a store, and passes its blocks to a function.
 
     Reads the points in one pass and in constant memory.
@@ -383,6 +384,9 @@ def stream_clusters(batches: Iterable[Array], sink: Callable[[ClusterBlock], obj
     sink: called as sink(block) with each ClusterBlock as soon as it is finished. The blocks of a level arrive in
         order, and their clusters are numbered consecutively from 0. The points of the top level arrive last, as one
         cluster without a representative.
+
+    k: if positive, the top has that many points, the medians of all others, and facility_cost is not used. The cost is
+        near that of k-median in memory if block_points is at least 100 k.
 
     The other options are those of build(); distances are those of the coordinates. An exception from the iterable or
     the sink ends the work. The number of threads does not change the result.
@@ -438,4 +442,5 @@ def stream_clusters(batches: Iterable[Array], sink: Callable[[ClusterBlock], obj
 
     return _core.stream_clusters(pairs(), take, {
         'bytes': kind.itemsize, 'block_points': as_integer(block_points, 'block_points', 2), 'facility_cost': float(facility_cost),
-        'effort': effort, 'method': method, 'metric': metric, 'seed': as_integer(seed, 'seed'), 'threads': thread_count(threads)})
+        'k': as_integer(k, 'k', 0), 'batch': as_integer(batch, 'batch', 1),
+        'search_threads': as_integer(search_threads, 'search_threads', 1), 'effort': effort, 'method': method, 'metric': metric, 'seed': as_integer(seed, 'seed'), 'threads': thread_count(threads)})

@@ -27,7 +27,7 @@ from ._types import Array, ClusterId, Crs, Float64Array, Focuses, GeoInterface, 
 _BUILD_OPTIONS = {
     'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
     'outlier_price', 'band', 'cell', 'seed', 'datum_shift', 'where', 'keep', 'drop', 'resolution', 'metric',
-    'region', 'effort', 'order', 'entities', 'method', 'heights_of_colour', 'surface',
+    'region', 'effort', 'order', 'entities', 'method', 'heights_of_colour', 'surface', 'k', 'batch', 'search_threads',
 }
 _TILE_OPTIONS = {
     'name', 'max_error', 'geoid', 'flat_height', 'water', 'water_height', 'normals', 'metadata', 'gzip', 'resume',
@@ -120,6 +120,10 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
     - ``facility_cost`` (3.0, a multiple of a block's diagonal), ``effort`` ('fast', 'default', 'fine' or 'full'),
       ``z_weight`` (of heights), ``metric`` ('euclidean', 'squared', 'minkowski:P' or 'elliptical:FILE'), ``channels``
       (pairs of an attribute and metres per unit), ``outlier_price`` and ``method``: the clustering, as in cluster().
+    - ``k``, instead of facility_cost: k-median over the stream. The top level has k points (at most 10,000), the
+      medians, and the clusters of the level below are theirs. Other levels are finer, so the store is larger.
+    - ``batch`` and ``search_threads`` (1): for local searches (another method or metric, channels, entities), the
+      number of candidates evaluated at once, and of threads that share the work on one block.
     - ``order``: 'auto', 'stream' or 'spatial'.
     - ``vertical``: 'ellipsoidal' or 'orthometric'.
     - ``surface``: whether the surface of a scan is restored and stored with the points, for surface(). All points are

@@ -279,6 +279,26 @@ class Streams(unittest.TestCase):
             np.testing.assert_array_equal(one.points, other.points)
         self.assertIn('clusters of', repr(blocks[0]))
 
+    def test_medians_cost_little_more_than_those_in_memory(self):
+        random = np.random.default_rng(24)
+        points = random.normal(size=(3000, 3)) + random.integers(0, 4, (3000, 1)) * 5
+        blocks = self.check(np.split(points, 30), block_points=800, k=8)
+        cost = cdist(points, blocks[-1].points).min(axis=1).sum()
+        self.assertEqual(len(blocks[-1].points), 8)
+        self.assertLess(cost, 1.05 * terrace.cluster(points, count=8, restarts=1).cost)
+        with self.assertRaises(ValueError):
+            terrace.stream_clusters([points], lambda block: None, block_points=10, k=10)
+
+    def test_a_batch_is_another_search(self):
+        points = np.random.default_rng(25).random((900, 2))
+        tops = []
+        for options in ({}, {'search_threads': 3}, {'batch': 8}):
+            blocks = []
+            terrace.stream_clusters([points], blocks.append, block_points=300, method='facilities', **options)
+            tops.append(sorted(map(tuple, blocks[-1].points)))
+        self.assertEqual(tops[0], tops[1])
+        self.assertNotEqual(tops[0], tops[2])
+
     def test_fields_stay_with_their_points(self):
         records = np.zeros(3000, [('x', 'f8'), ('y', 'f4'), ('z', 'i4'), ('class', 'u1'), ('name', 'S3')])
         random = np.random.default_rng(21)

@@ -84,7 +84,7 @@ def calls(luck, terrace, shared, folder):
     targets = [  # (function, a valid value of each argument, names of options)
         (lambda a, **k: terrace.build(a, os.path.join(folder, str(luck.randrange(10 ** 9))), **k), [solid],
          ['transform', 'crs', 'nodata', 'attributes', 'progress', 'threads', 'memory', 'where', 'region', 'effort',
-          'block_points', 'facility_cost', 'channels', 'outlier_price', 'seed', 'keep', 'order', 'metric', 'entities']),
+          'block_points', 'facility_cost', 'channels', 'outlier_price', 'seed', 'keep', 'order', 'metric', 'entities', 'k', 'batch']),
         (terrace.build, [lambda: os.path.join(folder, luck.choice(['dem', 'a.ply', 'none'])), lambda: os.path.join(folder, 'new')],
          ['replace', 'input_format', 'skip_damaged', 'vertical', 'band', 'cell', 'resolution', 'datum_shift', 'drop', 'z_weight']),
         (store.where, [lambda: luck.choice(['class == 1', 'z >', 'x < -1e9', 3, None])], []), (store.points, [box], ['level', 'where', 'focus', 'crs']), (store.points, [], ['cluster', 'level', 'where', 'region']),

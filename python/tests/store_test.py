@@ -658,6 +658,18 @@ class Sources(StoreCase):
         self.assertEqual(len(terrace.build([text], self.path('text'))), 500)
 
 
+    def test_medians_are_the_top_level(self):
+        with self.built(self.points, k=6) as store:
+            self.assertEqual(len(store.points(level=store.top)), 6)
+        with self.built(self.points, method='facilities', batch=4, search_threads=2) as store:
+            self.assertEqual(len(store.points()), len(self.points))
+        for options, named in (({'k': 6, 'facility_cost': 1.0}, '`facility_cost`'), ({'k': 20000}, '`k` is at most 10,000'),
+                               ({'k': 6, 'outlier_price': 1.0}, 'either `k` or `outlier_price`'),
+                               ({'search_threads': 2}, '`batch` and `search_threads` are for local searches: choose one by `method`')):
+            with self.assertRaisesRegex(ValueError, named):
+                self.built(self.points, **options)
+
+
 class Paths(StoreCase):
     def test_empty_paths_raise_os_errors(self):
         with self.assertRaises((OSError, ValueError, terrace.Error)):

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""build --channel, --outlier-price and --strategy, checked with the decoder of FORMAT.md's test.
+"""build --channel, --outlier-price, --strategy and -k, checked with the decoder of FORMAT.md's test.
 
 TERRACE=path/to/terrace build_clustering_cli_test.py
 """
 
 import json
+import math
 import os
 import pathlib
 import random
@@ -131,6 +132,105 @@ class ClusteringOptionsTest(unittest.TestCase):
             self.assertEqual(levels[name], levels['full-scan'], name)
         self.assertNotEqual(levels['automatic'], levels['full-scan'])
         self.expect_error('best', 'build', self.file, '-o', self.path('no.st'), '--strategy', 'best')
+
+    def test_local_searches_take_a_batch_and_threads(self):
+        def top(name):
+            return [c.points for c in decode_store.Store(self.path(name)).levels[-1].clusters]
+        self.run_ok('build', self.file, '-o', self.path('one.st'), '--block', 2000, '--order', 'stream',
+                    '--strategy', 'facilities')
+        one = top('one.st')
+        self.run_ok('build', self.file, '-o', self.path('threads.st'), '--block', 2000, '--order', 'stream',
+                    '--strategy', 'facilities', '--search-threads', 3)
+        for level in os.listdir(self.path('one.st')):
+            with open(os.path.join(self.path('one.st'), level), 'rb') as a, \
+                    open(os.path.join(self.path('threads.st'), level), 'rb') as b:
+                self.assertTrue(a.read() == b.read(), level)
+        self.run_ok('build', self.file, '-o', self.path('batch.st'), '--block', 2000, '--order', 'stream',
+                    '--strategy', 'facilities', '--batch', 8)
+        self.assertNotEqual(top('batch.st'), one)
+        self.assertIn('batch 8', self.run_ok('info', self.path('batch.st')))
+        for option in ('--batch', '--search-threads'):
+            self.expect_error('are for local searches: choose one by --strategy', 'build', self.file, '-o',
+                              self.path('no.st'), option, 2)
+            self.expect_error(option, 'build', self.file, '-o', self.path('no.st'), option, 0)
+        self.expect_error('--batch', 'build', self.file, '-o', self.path('no.st'), '--batch', 'many')
+
+
+class MediansTest(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = folder.name
+
+    terrace = staticmethod(ClusteringOptionsTest.terrace)
+    run_ok = ClusteringOptionsTest.run_ok
+    expect_error = ClusteringOptionsTest.expect_error
+
+    def path(self, name):
+        return os.path.join(self.folder, name)
+
+    def write(self, points):
+        name = self.path('points.csv')
+        with open(name, 'w', encoding='ascii') as file:
+            file.write('x,y,z\n')
+            file.writelines('%r,%r,%r\n' % p for p in points)
+        return name
+
+    def inputs(self, rng, count):
+        centres = [(rng.uniform(0, 1e4), rng.uniform(0, 1e4), rng.uniform(0, 100)) for _ in range(5)]
+        yield 'uniform', [(rng.random(), rng.random(), rng.random()) for _ in range(count)]
+        yield 'clustered', [tuple(rng.gauss(c, 20) for c in rng.choice(centres)) for _ in range(count)]
+        yield 'collinear', [(t, 3 * t, -t) for t in (rng.uniform(0, 1e6) for _ in range(count))]
+        yield 'duplicates', [(rng.randrange(9) / 2, rng.randrange(12) / 2, 1.5) for _ in range(count)]
+
+    def test_cost_is_within_five_per_cent_of_that_in_memory(self):
+        seed = 23
+        print('seed', seed)
+        for name, points in self.inputs(random.Random(seed), 3000):
+            with self.subTest(name):
+                file, store = self.write(points), self.path(name + '.st')
+                summary = json.loads(self.run_ok('build', file, '-o', store, '--block', 800, '-k', 8, '--json'))
+                self.assertGreaterEqual(summary['levels'], 3)
+                self.run_ok('verify', store)
+                memory = json.loads(self.run_ok('cluster', file, '--method', 'k-median', '-k', 8, '--bound-iterations', 0,
+                                                '--labels', self.path('labels.txt'), '--json', '--force'))
+                medians = [p for c in decode_store.Store(store).levels[-1].clusters for p in c.points]
+                self.assertEqual(len(medians), 8)
+                self.assertTrue(set(medians) <= set(points))
+                cost = sum(min(math.dist(p, m) for m in medians) for p in points)
+                self.assertLess(cost, 1.05 * memory['cost'])
+
+    def test_medians_are_the_top_and_own_the_clusters_below(self):
+        rng = random.Random(29)
+        points = [(rng.uniform(0, 50) + 1000 * (i % 3), rng.uniform(0, 50), 0.0) for i in range(2100)]
+        store = self.path('three.st')
+        self.run_ok('build', self.write(points), '-o', store, '--block', 500, '-k', 3)
+        top = [line.split(',')[:2] for line in
+               self.run_ok('points', store, '--level', 'top', '-o', '-', '--format', 'csv').splitlines()[1:]]
+        self.assertEqual(sorted(round(float(x) / 1000 - 0.025) for x, _ in top), [0, 1, 2])
+        below = len(decode_store.Store(store).levels) - 2
+        for number in range(3):
+            xs = [float(line.split(',')[0]) // 1000 for line in
+                  self.run_ok('points', store, '--cluster', f'{below}:{number}', '-o', '-', '--format', 'csv').splitlines()[1:]]
+            self.assertEqual(len(set(xs)), 1)
+        self.assertIn('k 3', self.run_ok('info', store))
+
+    def test_few_points_and_many_medians(self):
+        points = [(float(i), 0.0, 0.0) for i in range(5)]
+        for k, expected in ((1, 1), (4, 4), (5, 5), (40, 5)):
+            store = self.path(f'{k}.st')
+            self.run_ok('build', self.write(points), '-o', store, '-k', k)
+            self.run_ok('verify', store)
+            self.assertEqual(len(decode_store.Store(store).levels[-1].clusters[0].points), expected)
+        self.assertEqual(decode_store.Store(self.path('1.st')).levels[-1].clusters[0].points, [(2.0, 0.0, 0.0)])
+        no = self.path('no.st')
+        file = self.write(points)
+        for options, reason in ((['--facility-cost', 1], 'give either -k or --facility-cost'),
+                                (['--outlier-price', 1], 'give either -k or --outlier-price')):
+            self.expect_error(reason, 'build', file, '-o', no, '-k', 2, *options)
+        for k in (0, 10001):
+            self.expect_error('-k', 'build', file, '-o', no, '-k', k)
+        self.expect_error('lower -k', 'build', file, '-o', no, '-k', 5000, '--memory', '64M')
 
 
 if __name__ == '__main__':

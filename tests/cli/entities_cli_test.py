@@ -191,6 +191,7 @@ class TrianglesTest(EntitiesCase):
         triangles = ['--entities', 'triangles', '-o', out]
         for options in (['--metric', 'squared'], ['--channel', 'x2:1'], ['--outlier-price', 1]):
             self.expect_error('--entities triangles', 'build', self.file, *triangles, *options)
+        self.expect_error('-k is for points: --entities triangles excludes it', 'build', self.file, *triangles, '-k', 5)
         self.expect_error('"z3"', 'build', self.file, *triangles, '--drop', 'z3')
         table = self.path('points.xyz')
         with open(table, 'w', encoding='ascii') as file:

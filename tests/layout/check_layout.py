@@ -392,7 +392,7 @@ def strings_of(line):
 def check_command(root):
     """The libraries know neither the command's options nor the signals of a process."""
     table = os.path.join('tools', 'src', 'cli', 'option_names.cpp')
-    known = set(re.findall(r'\{"([a-z_]+)", "--', read(root, table)) if os.path.isfile(os.path.join(root, table)) else [])
+    known = set(re.findall(r'\{"([a-z_]+)", "--?[a-z]', read(root, table)) if os.path.isfile(os.path.join(root, table)) else [])
     for folder in [f'lib{library}/{part}' for library in LIBRARIES for part in ('include', 'src')]:
         for path in files_below(root, folder):
             if not path.endswith(('.cpp', '.hpp', '.h', '.cu')):

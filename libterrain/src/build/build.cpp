@@ -70,7 +70,9 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   }
   schema.format = info.format;
   schema.parameters = {{"block", fmt::format("{}", request.block_points)},
-                       {"facility_cost", number_text(request.facility_cost)},
+                       request.k > 0
+                           ? std::pair("k", fmt::format("{}", request.k))
+                           : std::pair("facility_cost", number_text(request.facility_cost)),
                        {"effort", name_of(request.effort)},
                        {"z_weight", number_text(request.z_weight)},
                        {"seed", fmt::format("{}", request.seed)}};
@@ -79,6 +81,9 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
   }
   if (request.strategy != cluster::FacilityStrategy::automatic) {
     schema.parameters.emplace_back("strategy", cluster::name_of(request.strategy));
+  }
+  if (request.batch != 1) {
+    schema.parameters.emplace_back("batch", fmt::format("{}", request.batch));
   }
   if (request.entities != stream::Entities::points) {
     schema.parameters.emplace_back(kEntitiesParameter, stream::name_of(request.entities));
@@ -381,7 +386,8 @@ unsigned Build::threads_for(std::size_t payload_bytes) const {
       stream::message(
           "{memory_bytes} {}M is not enough: the build needs {}, {} of it to read the input",
           memory_bytes_ >> 20, in_mebibytes(needed(1)), in_mebibytes(source_bytes)))
-      .remedy(source_bytes > kSourceMemory && info_.grid
+      .remedy(request_.k > 0 ? stream::message("raise {memory_bytes}, or lower {k}")
+              : source_bytes > kSourceMemory && info_.grid
                   ? stream::message(
                         "raise {memory_bytes}, lower {block_points}, or rewrite large strips and "
                         "tiles as small tiles: gdal_translate -co TILED=YES")
@@ -517,7 +523,10 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
 
 }  // namespace
 
-BuildOutcome build_store(const BuildRequest& request, const Context& context) {
+BuildOutcome build_store(const BuildRequest& given, const Context& context) {
+  check_clustering(given);
+  BuildRequest request = given;
+  request.block_points = block_points_for(given);
   auto built = Build(request, context, std::nullopt).run();
   if (const auto* const joint = std::get_if<JoinedLongitudes::Joint>(&built)) {
     const bool beyond = joint->reason.ends_with("antimeridian");

@@ -13,6 +13,7 @@
 #include <terrace/stream/source.hpp>
 
 #include "base/stored_entities.hpp"
+#include "base/units.hpp"
 #include "terrace/terrain/error.hpp"
 
 namespace terrace::terrain {
@@ -142,7 +143,43 @@ void set_corners(const BuildRequest& request, const stream::Schema& schema,
   };
 }
 
+/// Returns whether no block needs a local search.
+bool never_searches(const BuildRequest& request) {
+  using Kind = MetricChoice::Kind;
+  return request.strategy == cluster::FacilityStrategy::automatic && request.channels.empty() &&
+         request.entities == stream::Entities::points &&
+         (request.metric.kind == Kind::euclidean || request.metric.kind == Kind::elliptical);
+}
+
 }  // namespace
+
+void check_clustering(const BuildRequest& request) {
+  if (request.k > kMaxMedians) {
+    throw UsageError(
+        stream::message("{k} is at most {}, not {}", with_commas(kMaxMedians), request.k));
+  }
+  if (request.k > 0 && request.entities != stream::Entities::points) {
+    throw UsageError(stream::message("{k} is for points: {entities} {} excludes it",
+                                     stream::name_of(request.entities)));
+  }
+  if (request.k > 0 && std::isfinite(request.outlier_price)) {
+    throw UsageError(stream::message("give either {k} or {outlier_price}"));
+  }
+  if (request.batch == 0 || request.search_threads == 0) {
+    throw UsageError(stream::message("{batch} and {search_threads} are at least 1"));
+  }
+  if ((request.batch > 1 || request.search_threads > 1) && never_searches(request)) {
+    throw UsageError(stream::message(
+        "{batch} and {search_threads} are for local searches: choose one by {strategy}, or leave "
+        "them out"));
+  }
+}
+
+std::size_t block_points_for(const BuildRequest& request) {
+  // With fewer points per median, the medians of a stream cost more: see the hierarchy's tests.
+  constexpr std::size_t kPointsPerMedian = 100;
+  return std::max(request.block_points, kPointsPerMedian * request.k);
+}
 
 void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>& attributes) {
   if (std::isinf(request.outlier_price)) return;
@@ -171,10 +208,13 @@ cluster::HierarchyOptions clustering_of(const BuildRequest& request, const strea
                                         const Ground& ground) {
   cluster::HierarchyOptions options;
   options.block_size = request.block_points;
+  options.medians = request.k;
   options.block.facility_cost = request.facility_cost;
   options.block.effort = request.effort;
   options.block.seed = request.seed;
   options.strategy = request.strategy;
+  options.batch = request.batch;
+  options.search_threads = request.search_threads;
   options.payload_size = schema.payload_size();
   options.ground = [&ground](const base::Box3& bounds) { return ground.map(bounds); };
   set_metric(request, schema, ground, options);

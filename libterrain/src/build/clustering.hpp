@@ -24,6 +24,12 @@ inline constexpr const char* kOutlierName = "outlier";
   return request.inputs.empty() ? "the source" : request.inputs.front();
 }
 
+/// Throws UsageError if options of the clustering exclude each other or are out of range.
+void check_clustering(const BuildRequest& request);
+
+/// Returns the points of a block: those of the request, or more if there are many medians.
+[[nodiscard]] std::size_t block_points_for(const BuildRequest& request);
+
 /// Adds the outlier mark to the attributes, if the request has an outlier price. Throws:
 /// stream::Error if the source has an attribute with that name.
 void add_outlier_mark(const BuildRequest& request, std::vector<stream::Channel>& attributes);

@@ -102,6 +102,10 @@ class BuildCommand final : public Command {
       throw UsageError(fmt::format("--block must be between 2 and 1000000, not {}", block_));
     }
     request_.block_points = block_;
+    if (facility_cost_) {
+      if (request_.k > 0) throw UsageError("give either -k or --facility-cost");
+      request_.facility_cost = *facility_cost_;
+    }
     request_.metric = MetricChoice::parse(metric_);
     request_.strategy = parse_strategy(strategy_);
     if (outlier_price_) request_.outlier_price = *outlier_price_;
@@ -129,8 +133,14 @@ class BuildCommand final : public Command {
   void define_clustering(CLI::App& app) {
     app.add_option("--block", block_, "maximum number of points clustered together")
         ->capture_default_str();
-    add_number(app, "--facility-cost", request_.facility_cost,
-               "times the diagonal of a block: larger makes larger clusters", kFactor);
+    add_number(app, "--facility-cost", facility_cost_,
+               "times the diagonal of a block: larger makes larger clusters", kFactor)
+        ->default_str("3");
+    app.add_option("-k", request_.k,
+                   "k-median: the top level is the K points with the least sum of distances to "
+                   "all others; levels are finer, and the store larger")
+        ->check(CLI::Range(std::size_t{1}, kMaxMedians))
+        ->type_name("K");
     app.add_option("--effort", effort_, "how long to search for good clusters")
         ->check(CLI::IsMember({"fast", "default", "fine", "full"}))
         ->capture_default_str();
@@ -152,6 +162,14 @@ class BuildCommand final : public Command {
     app.add_option("--strategy", strategy_,
                    "search for clusters: automatic, or one of the thesis's slower local searches")
         ->type_name("NAME")
+        ->capture_default_str();
+    app.add_option("--batch", request_.batch,
+                   "local searches: candidates evaluated at once, of which the best is used")
+        ->check(CLI::Range(1U, 4294967295U))
+        ->capture_default_str();
+    app.add_option("--search-threads", request_.search_threads,
+                   "local searches: threads that share the work on one block")
+        ->check(CLI::Range(1U, 1024U))
         ->capture_default_str();
   }
 
@@ -294,7 +312,7 @@ class BuildCommand final : public Command {
   std::string output_, crs_, shift_, effort_ = "default", metric_ = "euclidean", order_ = "auto",
                                      strategy_ = "automatic", entities_ = "points";
   std::vector<std::string> channels_;
-  std::optional<double> outlier_price_;
+  std::optional<double> outlier_price_, facility_cost_;
   std::uint64_t block_ = 10000;
   bool dry_run_ = false, surface_ = false;
 };

@@ -45,8 +45,15 @@ struct BuildRequest {
   std::optional<std::array<double, 7>> datum_shift{};
   std::string vertical{};  ///< "ellipsoidal", "orthometric" or empty
   std::size_t block_points = 10000;
-  /// Times the diagonal of a block. With 3, clusters hold about 160 points: docs/figures.
+  /// Times the diagonal of a block. With 3, clusters hold about 160 points: docs/figures. Not used
+  /// if k is positive.
   double facility_cost = 3.0;
+  /// k-median over the stream: the top level has k points, the medians, and the clusters of the
+  /// level below are theirs (see cluster::HierarchyOptions::medians). 0: the facility cost alone
+  /// decides. At most kMaxMedians. Blocks hold at least 100 k points, so memory and the last step,
+  /// which takes O((100 k)^2) time, grow with k. Clusters of other levels hold 2 to 4 points. For
+  /// points without outlier_price.
+  std::size_t k = 0;
   cluster::Effort effort = cluster::Effort::standard;
   double z_weight = 1.0;
   MetricChoice metric{};  ///< in ground coordinates
@@ -60,6 +67,12 @@ struct BuildRequest {
   double outlier_price = std::numeric_limits<double>::infinity();
   /// How to search for facilities: automatic, or a local search of the thesis (7.3.2).
   cluster::FacilityStrategy strategy = cluster::FacilityStrategy::automatic;
+  /// For a local search (another strategy, metric, channels or entities): the number of candidates
+  /// evaluated at once, of which the best is opened, and of threads that share the work on one
+  /// block (7.3.3). Threads do not change the store. More than 1 of either is an error if blocks
+  /// are not clustered by a local search.
+  std::size_t batch = 1;
+  unsigned search_threads = 1;
   int band = 1;
   stream::HeightsOfColour heights_of_colour = stream::HeightsOfColour::none;  ///< encoding of PNG
   std::optional<double> cell{};  ///< cell size of rasters without georeferencing
@@ -74,6 +87,9 @@ struct BuildRequest {
   /// points.
   std::uint64_t most_points = 0;
 };
+
+/// The largest BuildRequest::k.
+inline constexpr std::size_t kMaxMedians = 10'000;
 
 struct BuildOutcome {
   std::uint64_t points = 0;
@@ -97,8 +113,8 @@ struct BuildOutcome {
 /// blocks on the context's threads and appends them in order. The same input, options and seed give
 /// the same bytes. Uses 256 MiB of memory unless the context sets another bound. Reports "points",
 /// and at the end notes an unknown CRS and similar findings.
-/// Throws: stream::Error; stream::Stopped if the context requests a stop. Either leaves no new
-/// store, and a store to replace is left untouched.
+/// Throws: UsageError for options that exclude each other; stream::Error; stream::Stopped if the
+/// context requests a stop. None leaves a new store, and a store to replace is left untouched.
 BuildOutcome build_store(const BuildRequest& request, const Context& context = {});
 
 /// Convert "fast", "default", "fine" and "full" to an effort and back.
