@@ -91,6 +91,12 @@ struct BuiltEntities {
   HierarchyResult result;
 
   BuiltEntities(const Entities& entities, HierarchyOptions options) {
+    // The number of an entity modulo 7 is its channel, if there is one.
+    options.channels.read = [](std::span<const std::byte> payload, std::span<double> values) {
+      std::uint64_t id = 0;
+      std::memcpy(&id, payload.data(), sizeof id);
+      values[0] = static_cast<double>(id % 7);
+    };
     options.payload_size = sizeof(std::uint64_t);
     options.corners = entities.reader();
     HierarchyBuilder builder(std::move(options), sink);
@@ -113,6 +119,12 @@ TEST(HierarchyEntities, AreWithTheNearestRepresentative) {
       options.block_size = 500;
       options.block.facility_cost = 0.3;
       options.ground = [&](const Box3&) { return map; };
+      const double weight = run % 2 == 0 ? 4.0 : 0.0;
+      if (weight > 0.0) options.channels.weights = {weight};
+      const auto distance = [&](std::size_t i, std::size_t j) {
+        const double channel = weight * (static_cast<double>(i % 7) - static_cast<double>(j % 7));
+        return std::hypot(entities.distance(i, j, map), channel);
+      };
       const BuiltEntities built(entities, options);
       ASSERT_GE(built.result.top, 1u);
       laws::check_hierarchy(built.sink, built.result, entities.first_corners(), options.block_size,
@@ -121,10 +133,9 @@ TEST(HierarchyEntities, AreWithTheNearestRepresentative) {
         for (const RecordedBlock& block : level) {
           for (std::size_t c = 0; c < block.representatives.size(); ++c) {
             for (const std::uint32_t i : block.members(c)) {
-              const double own =
-                  entities.distance(block.id(i), block.id(block.representatives[c]), map);
+              const double own = distance(block.id(i), block.id(block.representatives[c]));
               for (const std::uint32_t other : block.representatives) {
-                ASSERT_LE(own, entities.distance(block.id(i), block.id(other), map) + 1e-9);
+                ASSERT_LE(own, distance(block.id(i), block.id(other)) + 1e-9);
               }
             }
           }
@@ -162,6 +173,27 @@ TEST(HierarchyEntities, ClusterByAllCorners) {
   }
 }
 
+// A channel that is worth more than the whole soup separates its values.
+TEST(HierarchyEntities, ChannelsSeparateClusters) {
+  std::mt19937_64 random(9);
+  const Entities entities = soup(700, 3, false, random);
+  for (const double weight : {1e5, 1e200}) {
+    HierarchyOptions options;
+    options.block_size = 500;
+    options.block.facility_cost = 0.2;
+    options.channels.weights = {weight};
+    const BuiltEntities built(entities, options);
+    for (const RecordedBlock& block : built.sink.levels[0]) {
+      EXPECT_GE(block.representatives.size(), 7u);
+      for (std::size_t c = 0; c < block.representatives.size(); ++c) {
+        for (const std::uint32_t i : block.members(c)) {
+          EXPECT_EQ(block.id(i) % 7, block.id(block.representatives[c]) % 7);
+        }
+      }
+    }
+  }
+}
+
 TEST(HierarchyEntities, HandlesEqualAndHugeEntities) {
   for (const double scale : {0.0, 1e-140, 1e140}) {
     SCOPED_TRACE(scale);
@@ -172,8 +204,11 @@ TEST(HierarchyEntities, HandlesEqualAndHugeEntities) {
     }
     HierarchyOptions options;
     options.block_size = 100;
-    const BuiltEntities built(entities, options);
-    laws::check_hierarchy(built.sink, built.result, entities.first_corners(), options.block_size);
+    for (const double weight : {0.0, 1e-150, 1.0, 1e150}) {
+      options.channels.weights.assign(weight > 0.0 ? 1 : 0, weight);
+      const BuiltEntities built(entities, options);
+      laws::check_hierarchy(built.sink, built.result, entities.first_corners(), options.block_size);
+    }
   }
 }
 
@@ -195,9 +230,6 @@ TEST(HierarchyEntities, RejectsUnsupportedOptionsAndBadCorners) {
   refused([](HierarchyOptions& o) { o.corners.read = nullptr; });
   refused([](HierarchyOptions& o) { o.metric = SquaredEuclidean{}; });
   refused([](HierarchyOptions& o) { o.metric_of = [](const Box3&) { return Euclidean{}; }; });
-  refused([](HierarchyOptions& o) {
-    o.channels = {{1.0}, [](std::span<const std::byte>, std::span<double>) {}};
-  });
   refused([](HierarchyOptions& o) {
     o.outlier_price = 1.0;
     o.mark_outlier = [](std::span<std::byte>) {};

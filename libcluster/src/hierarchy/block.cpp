@@ -261,8 +261,9 @@ void BlockProcessor::cluster_at(double facility_cost, HierarchyBlock& block,
       .batch = options_.batch,
       .progress = [this](std::size_t, std::size_t) { return !options_.stop.stop_requested(); }};
   if (options_.corners.count > 1) {
-    entity_cluster_.run(corners_, options_.corners.count, options_.corners.ordered, weights_,
-                        facility_cost, search, block.clustering);
+    entity_cluster_.run(corners_, options_.corners.count, options_.corners.ordered,
+                        {channels_, options_.channels.weights}, weights_, facility_cost, search,
+                        block.clustering);
   } else if (metric_cluster_) {
     metric_cluster_->run({.points = ground,
                           .weights = weights_,

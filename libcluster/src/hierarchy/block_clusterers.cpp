@@ -12,9 +12,11 @@
 #include <vector>
 
 #include <terrace/base/box.hpp>
+#include <terrace/base/portable_math.hpp>
 
 #include "block/linear_block.hpp"
 #include "facility/corner_distance.hpp"
+#include "facility/points/channel_axis.hpp"
 #include "facility/points/search_frame.hpp"
 #include "ground.hpp"
 #include "scaling.hpp"
@@ -170,29 +172,67 @@ void MetricBlockClusterer::run_once(const FacilityPoints& problem, const Facilit
   result.facility_cost = result.connection_cost = 0.0;
 }
 
-void EntityBlockClusterer::run(std::span<const Point3> corners, std::size_t count, bool ordered,
-                               std::span<const double> weights, double facility_cost,
-                               const FacilityOptions& options, BlockClustering& result) {
-  assert(count > 1 && corners.size() % count == 0);
+double EntityBlockClusterer::scale(std::span<const Point3> corners, const Channels& channels,
+                                   std::size_t entities) {
   const Scaling scaling(corners);
+  int greatest = scaling.diagonal > 0.0 ? scaling.exponent : std::numeric_limits<int>::min();
+  std::vector<ChannelAxis> axes;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    axes.emplace_back(channels, c, entities);
+    greatest = std::max(greatest, axes.back().exponent);
+  }
+  const int shift = scaling.diagonal > 0.0 ? scaling.exponent - greatest : 0;
   scaled_.resize(corners.size());
-  std::transform(corners.begin(), corners.end(), scaled_.begin(),
-                 [&](const Point3& p) { return scaling.scaled(p); });
+  std::transform(corners.begin(), corners.end(), scaled_.begin(), [&](const Point3& p) {
+    Point3 scaled = scaling.scaled(p);
+    if (shift != 0) {
+      for (double& x : scaled) x = std::ldexp(x, shift);
+    }
+    return scaled;
+  });
+  double diagonal = std::ldexp(scaling.diagonal, shift);
+  scaled_channels_.assign(entities * axes.size(), 0.0);
+  for (std::size_t c = 0; c < axes.size(); ++c) {
+    const ChannelAxis& axis = axes[c];
+    if (axis.weight == 0.0) continue;
+    diagonal = base::hypot(diagonal, std::ldexp(axis.range, axis.exponent - greatest));
+    for (std::size_t k = c; k < scaled_channels_.size(); k += axes.size()) {
+      scaled_channels_[k] = std::ldexp(axis.value(channels.values[k]), axis.exponent - greatest);
+    }
+  }
+  return diagonal;
+}
+
+void EntityBlockClusterer::run(std::span<const Point3> corners, std::size_t count, bool ordered,
+                               const Channels& channels, std::span<const double> weights,
+                               double facility_cost, const FacilityOptions& options,
+                               BlockClustering& result) {
+  assert(count > 1 && corners.size() % count == 0);
+  const double diagonal = scale(corners, channels, corners.size() / count);
+  const std::size_t axes = channels.size();
 
   FacilityEntities problem;
   problem.count = corners.size() / count;
-  problem.distance = [this, count, ordered](std::uint32_t facility, std::uint32_t client) {
+  problem.distance = [this, count, ordered, axes](std::uint32_t facility, std::uint32_t client) {
     const Point3* const a = scaled_.data() + facility * count;
     const Point3* const b = scaled_.data() + client * count;
-    return corner_distance(count, ordered, [a, b](std::size_t i, std::size_t j) {
+    const double moved = corner_distance(count, ordered, [a, b](std::size_t i, std::size_t j) {
       return squared_length(difference(a[i], b[j]));
     });
+    if (axes == 0) return moved;
+    // The Euclidean combination of metrics is a metric.
+    double squares = moved * moved;
+    for (std::size_t c = 0; c < axes; ++c) {
+      const double d = scaled_channels_[facility * axes + c] - scaled_channels_[client * axes + c];
+      squares += d * d;
+    }
+    return std::sqrt(squares);
   };
   problem.symmetric = problem.triangle_inequality = true;
   problem.weights = weights;
   // If all entities are equal any cost works, but it must be positive.
   problem.facility_cost =
-      std::clamp(facility_cost * scaling.diagonal, std::numeric_limits<double>::min(), 0x1p1000);
+      std::clamp(facility_cost * diagonal, std::numeric_limits<double>::min(), 0x1p1000);
   FacilityOptions search = options;
   search.assign_nearest = true;
   if (options.strategy == FacilityStrategy::automatic && problem.count < kFullSearchBelow) {

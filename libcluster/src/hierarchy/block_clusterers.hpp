@@ -55,17 +55,23 @@ class EntityBlockClusterer {
   /// Clusters entities.
   /// corners: in ground coordinates, `count` consecutive ones for each entity.
   /// ordered: as in PayloadCorners.
+  /// channels: further axes of the distance, in ground units.
   /// weights: one per entity.
-  /// facility_cost: a multiple of the diagonal of the bounding box of all corners.
+  /// facility_cost: a multiple of the diagonal of the bounding box of all corners, with channels as
+  /// further axes.
   /// The automatic strategy searches small blocks with at least Effort::fine. Sets the costs in
   /// `result` to 0.
   /// Throws: std::invalid_argument as solve(FacilityEntities) does.
   void run(std::span<const Point3> corners, std::size_t count, bool ordered,
-           std::span<const double> weights, double facility_cost, const FacilityOptions& options,
-           BlockClustering& result);
+           const Channels& channels, std::span<const double> weights, double facility_cost,
+           const FacilityOptions& options, BlockClustering& result);
 
  private:
+  /// Returns the diagonal of the scaled corners and channels.
+  double scale(std::span<const Point3> corners, const Channels& channels, std::size_t entities);
+
   std::vector<Point3> scaled_;
+  std::vector<double> scaled_channels_;
 };
 
 }  // namespace terrace::cluster

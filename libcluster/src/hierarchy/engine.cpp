@@ -26,10 +26,9 @@ void check_corners(const HierarchyOptions& options) {
   }
   if (!corners.read) throw std::invalid_argument("corners have no function that reads them");
   if (!std::holds_alternative<Euclidean>(options.metric) || options.metric_of ||
-      !options.channels.weights.empty() || std::isfinite(options.outlier_price)) {
+      std::isfinite(options.outlier_price)) {
     throw std::invalid_argument(
-        "entities of several corners are clustered by Euclidean distances, without channels and "
-        "outliers");
+        "entities of several corners are clustered by Euclidean distances, without outliers");
   }
 }
 

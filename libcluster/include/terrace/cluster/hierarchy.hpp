@@ -140,7 +140,9 @@ struct HierarchyOptions {
   PayloadChannels channels;  ///< empty: position only
   /// With more than one corner, blocks are clustered by the local search for entities (strategies
   /// automatic, full_scan, facilities), and the facility cost is a multiple of the diagonal of the
-  /// bounding box of all corners. The metric must be Euclidean, without channels and outliers.
+  /// bounding box of all corners. Channels are further axes: the distance is the root of the sum of
+  /// the squared distance of the corners and the squared differences of the channels. The metric
+  /// must be Euclidean, without outliers.
   /// Summaries cover only the positions, so the sink must keep the bounds of the other corners
   /// itself.
   PayloadCorners corners;
@@ -179,7 +181,7 @@ class HierarchyBuilder {
   /// - if block_size, facility_cost, outlier_price, the metric, a channel's weight or the number of
   ///   corners is out of range;
   /// - if channels, corners or outliers have no function;
-  /// - if corners are combined with another metric, channels or outliers;
+  /// - if corners are combined with another metric or outliers;
   /// - if there are medians and corners or outliers, or as many medians as a block has points;
   /// - if the SIMD path is not available.
   HierarchyBuilder(HierarchyOptions options, HierarchySink& sink);

@@ -8,18 +8,13 @@
 
 #include <terrace/base/portable_math.hpp>
 
+#include "facility/points/channel_axis.hpp"
 #include "facility/points/search_norms.hpp"
 #include "ground.hpp"
 #include "scaling.hpp"
 
 namespace terrace::cluster {
 namespace {
-
-int exponent_of(double value) {
-  int exponent = 0;
-  std::frexp(value, &exponent);
-  return exponent;
-}
 
 void multiply(std::vector<Point3>& points, int exponent) {
   if (exponent == 0) return;
@@ -47,36 +42,6 @@ double mapped_diagonal(const LinearMap& map, const Point3& extent) {
   return longest;
 }
 
-// A channel as an axis. Differences in ground units are value * 2^exponent.
-struct Channel {
-  double least = 0.0, weight = 0.0;  // weight in [0.5, 1) or 0
-  int shift = 0;                     // scales half differences to below 1
-  int exponent = std::numeric_limits<int>::min();
-  double range = 0.0;  // largest value()
-
-  Channel(const Channels& channels, std::size_t c, std::size_t count) {
-    double min_half = 0.0, max_half = 0.0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const double half = 0.5 * channels.values[i * channels.size() + c];
-      min_half = i == 0 ? half : std::min(min_half, half);
-      max_half = i == 0 ? half : std::max(max_half, half);
-    }
-    least = min_half;
-    int weight_exponent = 0;
-    weight = std::frexp(channels.weights[c], &weight_exponent);
-    if (weight == 0.0 || max_half == min_half) {
-      weight = 0.0;
-      return;
-    }
-    shift = exponent_of(max_half - min_half);
-    exponent = shift + 1 + weight_exponent;
-    range = value(2.0 * max_half);
-  }
-  [[nodiscard]] double value(double original) const {
-    return weight * std::ldexp(0.5 * original - least, -shift);
-  }
-};
-
 // Combines the positions' diagonal and the channels, as the metric measures the box.
 double combined_diagonal(const Metric& metric, const Point3& extent, double positions,
                          const std::vector<double>& ranges) {
@@ -98,7 +63,8 @@ double combined_diagonal(const Metric& metric, const Point3& extent, double posi
 // Brings weights and costs into range. unit_exponent is that of a distance of weight 1.
 void set_costs(SearchFrame& frame, double facility_cost, double outlier_price, int unit_exponent) {
   const double heaviest = *std::max_element(frame.weights.begin(), frame.weights.end());
-  const int weight_exponent = exponent_of(heaviest);
+  int weight_exponent = 0;
+  std::frexp(heaviest, &weight_exponent);
   for (double& w : frame.weights) w = std::ldexp(w, -weight_exponent);
   frame.true_facility_cost = std::ldexp(facility_cost, unit_exponent);
   // Any cost above all distances leads to one facility.
@@ -129,7 +95,9 @@ SearchFrame make_frame(const FacilityPoints& problem) {
       LinearMap map = *linear;
       int map_exponent = std::numeric_limits<int>::min();
       for (const double m : map) {
-        if (m != 0.0) map_exponent = std::max(map_exponent, exponent_of(m));
+        int exponent_of_m = 0;
+        std::frexp(m, &exponent_of_m);
+        if (m != 0.0) map_exponent = std::max(map_exponent, exponent_of_m);
       }
       for (double& m : map) m = std::ldexp(m, -map_exponent);
       for (Point3& p : frame.points) p = mapped(map, p);
@@ -145,7 +113,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
   }
 
   frame.channel_count = problem.channels.size();
-  std::vector<Channel> channels;
+  std::vector<ChannelAxis> channels;
   int greatest = scaling.diagonal > 0.0 ? exponent : std::numeric_limits<int>::min();
   for (std::size_t c = 0; c < frame.channel_count; ++c) {
     channels.emplace_back(problem.channels, c, count);
@@ -159,7 +127,7 @@ SearchFrame make_frame(const FacilityPoints& problem) {
   std::vector<double> ranges;
   frame.channels.resize(count * frame.channel_count);
   for (std::size_t c = 0; c < frame.channel_count; ++c) {
-    const Channel& channel = channels[c];
+    const ChannelAxis& channel = channels[c];
     if (channel.weight == 0.0) continue;  // all its values are zeros
     const int shift = channel.exponent - greatest;
     ranges.push_back(std::ldexp(channel.range, shift));
