@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <limits>
 #include <random>
 #include <span>
 #include <string>
@@ -292,6 +294,65 @@ TEST_F(GeoJson, NumbersLinesOfSeveralFilesConsecutively) {
     EXPECT_EQ(lines_of(files, entities).size(), 6u);
   }
   EXPECT_EQ(points_of(files).size(), 15u);
+}
+
+/// Returns the columns after those of the shape: names, and values row by row.
+std::pair<std::vector<std::string>, std::vector<double>> properties_of(PointSource& source) {
+  const SourceInfo& info = source.info();
+  std::vector<std::string> names;
+  std::vector<std::size_t> columns;
+  for (std::size_t a = 0; a < info.attributes.size(); ++a) {
+    if (is_shape_column(info.attributes[a].name, Entities::segments)) continue;
+    EXPECT_EQ(info.attributes[a].type, ScalarType::f64);
+    names.push_back(info.attributes[a].name);
+    columns.push_back(a);
+  }
+  std::vector<double> values;
+  for (PointBlock block; source.next(block);) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      for (const std::size_t a : columns) values.push_back(info.view<double>(block.payload, a)[i]);
+    }
+  }
+  return {names, values};
+}
+
+TEST_F(GeoJson, NumericPropertiesOfLinesAreColumns) {
+  const std::string geometry =
+      R"("geometry":{"type":"LineString","properties":{"no":1},"coordinates":[[0,0],[1,1],[2,2]]})";
+  const auto feature = [&](const std::string& properties) {
+    return R"({"type":"Feature","properties":)" + properties + "," + geometry + "}\n";
+  };
+  const std::string file = put(
+      "a.geojsonl",
+      feature(R"({"a":1,"text":"9","b":null,"c":[3],"d":{"e":4}})") +
+          feature(R"({"b":-2.5,"a":7,"a":8})") + feature("null") + feature("[5,6]") +
+          R"({"type":"Feature","properties":{"p":3},"geometry":{"type":"Point","coordinates":[1,1]}})" +
+          "\n" + R"({"type":"LineString","properties":{"q":2},"coordinates":[[0,0],[1,1]]})");
+  const auto source = open_source(std::vector{file}, options(Entities::segments));
+  const auto [names, values] = properties_of(*source);
+  EXPECT_EQ(names, (std::vector<std::string>{"a", "b"}));
+  ASSERT_EQ(values.size(), 18u);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<double> expected{1,   nan, 1,   nan, 8,   -2.5, 8,   -2.5, nan,
+                                     nan, nan, nan, nan, nan, nan,  nan, nan,  nan};
+  for (std::size_t i = 0; i < 18; ++i) {
+    EXPECT_TRUE(values[i] == expected[i] || (std::isnan(values[i]) && std::isnan(expected[i])))
+        << i;
+  }
+  EXPECT_EQ(source->progress().empty_values, 1u + 0u + 3u * 2u);
+  // Points have no properties.
+  EXPECT_EQ(points_of({file}).size(), 15u);
+}
+
+TEST_F(GeoJson, RefusesTooManyProperties) {
+  std::string properties = "{";
+  for (int i = 0; i < 257; ++i) properties += (i > 0 ? ",\"p" : "\"p") + std::to_string(i) + "\":1";
+  const std::string file = put("many.geojson", R"({"type":"Feature","properties":)" + properties +
+                                                   R"(},"geometry":{"type":"LineString",)" +
+                                                   R"("coordinates":[[0,0],[1,1]]}})");
+  EXPECT_THROW(static_cast<void>(open_source(std::vector{file}, options(Entities::segments))),
+               Error);
+  EXPECT_EQ(points_of({file}).size(), 2u);
 }
 
 TEST_F(GeoJson, ReadsTheCrs) {

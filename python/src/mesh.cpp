@@ -166,7 +166,8 @@ py::array vertex_normals(const Array<double>& vertices, const Array<std::uint32_
   return to_array(released([&] { return tri::vertex_normals(surface, threads); }));
 }
 
-/// Returns (vertices, the offset of each line and the total, the number of each line).
+/// Returns (vertices, the offset of each line and the total, the number of each line, the
+/// properties: a dict of names and arrays).
 py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
                 const py::list& focuses, const std::string& where, const py::tuple& settings) {
   const stream::Store store = open.get(where);
@@ -180,8 +181,17 @@ py::tuple lines(const OpenStore& open, unsigned level, const py::object& region,
     begins.push_back(static_cast<std::int64_t>(line.end));
     numbers.push_back(line.number);
   }
+  py::dict properties;
+  const std::size_t count = result.property_names.size();
+  for (std::size_t p = 0; p < count; ++p) {
+    std::vector<double> values;
+    for (std::size_t i = p; i < result.properties.size(); i += count) {
+      values.push_back(result.properties[i]);
+    }
+    properties[text_of(result.property_names[p])] = to_array(std::move(values));
+  }
   return py::make_tuple(to_array(std::move(result.vertices)), to_array(std::move(begins)),
-                        to_array(std::move(numbers)));
+                        to_array(std::move(numbers)), properties);
 }
 
 py::dict bounded_mesh(const OpenStore& open, const std::string& path, const py::dict& arguments,

@@ -541,22 +541,37 @@ class Store:
         return Mesh._of(_core.mesh(self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '',
                                    cluster, metric, heights, crs_text(crs) or '', call_settings(progress, threads, memory)))
 
+    @overload
     def lines(self, level: int = 0, region: Region | None = None, where: str | None = None, *,
-              focus: Focuses = (), progress: Progress | None = None, threads: int | None = None,
-              memory: int | None = None) -> tuple[list[Float64Array], Int64Array]:
+              properties: Literal[False] = False, focus: Focuses = (), progress: Progress | None = None,
+              threads: int | None = None, memory: int | None = None) -> tuple[list[Float64Array], Int64Array]: ...
+
+    @overload
+    def lines(self, level: int = 0, region: Region | None = None, where: str | None = None, *,
+              properties: Literal[True], focus: Focuses = (), progress: Progress | None = None,
+              threads: int | None = None, memory: int | None = None
+              ) -> tuple[list[Float64Array], Int64Array, dict[str, Float64Array]]: ...
+
+    def lines(self, level: int = 0, region: Region | None = None, where: str | None = None, *,
+              properties: bool = False, focus: Focuses = (), progress: Progress | None = None,
+              threads: int | None = None, memory: int | None = None) -> tuple[Any, ...]:
         """Returns the lines of a store built with ``entities`` 'segments' or 'polylines', at mixed levels of detail.
 
         All lines are held in memory. A line is divided where parts of it are left out.
 
         level, region, where, focus: as in points(). A piece belongs to the region that contains its first vertex.
 
+        properties: whether the numeric properties of the lines are returned too.
+
         Returns: (lines, a list of float64 arrays of shape (n, 3), n >= 2; numbers, int64, the position of each line
-            in the input).
+            in the input), followed by a dict of the properties' names and values (NaN if a line has none) if wanted.
         Raises: ValueError if the store has no lines.
         """
-        vertices, begins, numbers = _core.lines(self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus),
-                                                where or '', call_settings(progress, threads, memory))
-        return np.split(vertices, begins[1:-1]) if len(numbers) else [], numbers
+        vertices, begins, numbers, values = _core.lines(
+            self._core, as_integer(level, 'level', bits=32), as_region(region), self._focuses(focus), where or '',
+            call_settings(progress, threads, memory))
+        lines = np.split(vertices, begins[1:-1]) if len(numbers) else []
+        return (lines, numbers, values) if properties else (lines, numbers)
 
     @overload
     def surface(self, level: int | None = None, region: Region | None = None, where: str | None = None, *,

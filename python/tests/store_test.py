@@ -711,13 +711,17 @@ class Lines(StoreCase):
         given = [np.round(random.random((random.integers(2, 9), 3)).cumsum(axis=0) * 100, 2) for _ in range(60)]
         with open(self.path('lines.geojson'), 'w', encoding='ascii') as file:
             json.dump({'type': 'FeatureCollection', 'crs': None, 'features': [
-                {'type': 'Feature', 'properties': {}, 'geometry': {'type': 'LineString', 'coordinates': line.tolist()}}
-                for line in given]}, file)
+                {'type': 'Feature', 'properties': {'lanes': number} if number % 3 else {},
+                 'geometry': {'type': 'LineString', 'coordinates': line.tolist()}}
+                for number, line in enumerate(given)]}, file)
         store = terrace.build(self.path('lines.geojson'), self.path('lines'), entities='segments', block_points=60)
         lines, numbers = store.lines()
         np.testing.assert_array_equal(numbers, np.arange(60))
         for line, expected in zip(lines, given):
             np.testing.assert_array_equal(line, expected)
+        expected = [number if number % 3 else np.nan for number in range(60)]
+        np.testing.assert_array_equal(store.lines(properties=True)[2]['lanes'], expected)
+        self.assertEqual(store.points(where='lanes == 4')['line'].tolist(), [4] * (len(given[4]) - 1))
         half = np.median([line[0, 0] for line in given])
         pieces = [tuple(map(tuple, piece)) for line in store.lines(region=(-1, -1, half, 1e9))[0] for piece in zip(line, line[1:])]
         expected = [tuple(map(tuple, piece)) for line in given for piece in zip(line, line[1:]) if piece[0][0] <= half]

@@ -8,11 +8,16 @@ TERRACE=path/to/terrace entities_cli_test.py
 import collections
 import json
 import os
+import pathlib
 import random
 import struct
 import subprocess
+import sys
 import tempfile
 import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / 'libstream/tests'))
+import decode_store  # noqa: E402
 
 TERRACE = os.environ.get('TERRACE', 'terrace')
 
@@ -189,8 +194,10 @@ class TrianglesTest(EntitiesCase):
     def test_unusable_inputs_say_so(self):
         out = self.path('no.st')
         triangles = ['--entities', 'triangles', '-o', out]
-        for options in (['--metric', 'squared'], ['--channel', 'x2:1'], ['--outlier-price', 1]):
+        for options in (['--metric', 'squared'], ['--outlier-price', 1]):
             self.expect_error('--entities triangles', 'build', self.file, *triangles, *options)
+        self.expect_error('have no property "x2"; they have none: leave out --channel', 'build', self.file, *triangles,
+                          '--channel', 'x2:1')
         self.expect_error('-k is for points: --entities triangles excludes it', 'build', self.file, *triangles, '-k', 5)
         self.expect_error('"z3"', 'build', self.file, *triangles, '--drop', 'z3')
         table = self.path('points.xyz')
@@ -310,8 +317,8 @@ class LinesTest(EntitiesCase):
         self.expect_error('GeoJSON is for the lines', 'points', self.path('points.st'), '-o', self.path('x.geojson'))
         self.expect_error('has no lines', 'build', self.points_file(), '--entities', 'segments', '-o', self.path('no.st'))
         self.expect_error('has no triangles', 'build', self.file, '--entities', 'triangles', '-o', self.path('no.st'))
-        self.expect_error('--entities polylines', 'build', self.file, '--entities', 'polylines', '-o', self.path('no.st'),
-                          '--channel', 'part:1')
+        self.expect_error('its polylines have no property "part"', 'build', self.file, '--entities', 'polylines', '-o',
+                          self.path('no.st'), '--channel', 'part:1')
         self.expect_error('exists already', 'points', store, '-o', self.file)
 
     def points_file(self):
@@ -323,6 +330,155 @@ class LinesTest(EntitiesCase):
     def setUp(self):
         if not os.path.exists(self.path('points.st')):
             self.run_ok('build', self.points_file(), '-o', self.path('points.st'), '--crs', 'EPSG:2056')
+
+
+class PropertiesTest(EntitiesCase):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        seed = 31
+        print('seed', seed)
+        rng = random.Random(seed)
+        cls.features = []
+        for number in range(400):
+            x, y = rng.uniform(0, 1000), rng.uniform(0, 1000)
+            lines = [[[x + rng.uniform(-9, 9), y + rng.uniform(-9, 9)] for _ in range(rng.choice([2, 3, 6]))]
+                     for _ in range(rng.choice([1, 1, 2]))]
+            properties = {'name': 'road', 'tags': {'lanes': 9, 'list': [1, 2]}, 'lanes': number % 2 * 3 + 1,
+                          'width "m"': rng.uniform(2, 9), 'bridge': True, 'line': 1000 + number, 'x2': -number, '': 2 ** 40}
+            if number % 7 == 0:
+                properties['lanes'] = None
+            if number % 5 == 0:
+                del properties['width "m"']
+            cls.features.append({'type': 'Feature', 'properties': properties, 'geometry': {
+                'type': 'MultiLineString', 'coordinates': lines}})
+        cls.features.insert(3, {'type': 'Feature', 'properties': {'height': 8}, 'geometry': {
+            'type': 'Point', 'coordinates': [1, 2]}})
+        cls.file = cls.path('roads.geojson')
+        cls.write(cls.file, cls.features)
+
+    @staticmethod
+    def write(name, features):
+        with open(name, 'w', encoding='ascii') as file:
+            json.dump({'type': 'FeatureCollection', 'crs': {'type': 'name', 'properties': {'name': 'EPSG:2056'}},
+                       'features': features}, file)
+
+    @staticmethod
+    def expected(features):
+        """Coordinates and numeric properties of each line, as they are written."""
+        names = {'lanes': 'lanes', 'width "m"': 'width "m"', 'line': 'line_2', 'x2': 'x2_2', '': 'property'}
+        return [(line, {new: feature['properties'].get(old) for old, new in names.items()})
+                for feature in features if feature['geometry']['type'] != 'Point'
+                for line in feature['geometry']['coordinates']]
+
+    def written(self, store, *options):
+        features = json.loads(self.run_ok('points', store, '-o', '-', '--format', 'geojson', *options))['features']
+        lines = []
+        for feature in features:
+            del feature['properties']['line']
+            lines.append((feature['geometry']['coordinates'], feature['properties']))
+        return lines
+
+    def test_properties_of_lines_come_back(self):
+        for entities in ('segments', 'polylines'):
+            store = self.path(entities + '.st')
+            result = self.terrace('build', self.file, '--entities', entities, '-o', store, '--block', 200)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            # The missing values of a feature count once.
+            self.assertIn('138 attributes have no value', result.stderr)
+            self.run_ok('verify', store)
+            self.assertEqual(self.written(store), self.expected(self.features))
+            # Reading the output again gives the same store.
+            again = self.path(entities + '.geojson')
+            self.run_ok('points', store, '-o', again)
+            self.run_ok('build', again, '--entities', entities, '-o', self.path('again.st'), '--block', 200, '--force')
+            first, second = (self.content(s) for s in (store, self.path('again.st')))
+            self.assertTrue({k: v for k, v in first.items() if k != 'manifest.json'} ==
+                            {k: v for k, v in second.items() if k != 'manifest.json'})
+
+    def test_a_table_has_properties_as_columns(self):
+        store = self.path('table.st')
+        self.run_ok('build', self.file, '--entities', 'segments', '-o', store)
+        lines = self.run_ok('points', store, '--where', 'lanes > 3', '-o', '-', '--format', 'csv').splitlines()
+        self.assertEqual(lines[0].split(',')[:10], ['x', 'y', 'z', 'x2', 'y2', 'z2', 'line', 'part', 'vertices', 'dimensions'])
+        lanes = lines[0].split(',').index('lanes')
+        self.assertEqual({line.split(',')[lanes] for line in lines[1:]}, {'4'})
+        wide = [f for f in self.features if f['properties'].get('lanes') == 4]
+        self.assertEqual(len(lines) - 1, sum(len(line) - 1 for f in wide for line in f['geometry']['coordinates']))
+
+    def test_channels_separate_lines(self):
+        def mixed(name, weight):
+            self.run_ok('build', self.file, '--entities', 'segments', '--where', 'lanes >= 1', '-o', self.path(name),
+                        '--block', 300, '--facility-cost', 0.5, '--channel', f'lanes:{weight}')
+            store = decode_store.Store(self.path(name))
+            at = [a['name'] for a in store.manifest['attributes']].index('lanes')
+            return sum(len(set(c.attributes[at])) > 1 for c in store.levels[0].clusters if c)
+        self.assertEqual(mixed('apart.st', 1e6), 0)
+        self.assertGreater(mixed('together.st', 0), 5)
+        self.assertIn('channel lanes 1e+06', self.run_ok('info', self.path('apart.st')))
+        self.expect_error('"lanes" of a point is not finite', 'build', self.file, '--entities', 'segments', '-o',
+                          self.path('no.st'), '--channel', 'lanes:1', '--block', 300)
+
+    def test_files_share_their_properties(self):
+        other = self.path('other.geojson')
+        self.write(other, [{'type': 'Feature', 'properties': {'speed': 50}, 'geometry': {
+            'type': 'LineString', 'coordinates': [[0, 0], [1, 1]]}}])
+        store = self.path('both.st')
+        self.run_ok('build', self.file, other, '--entities', 'segments', '-o', store)
+        lines = self.written(store)
+        self.assertEqual(lines[-1][1], {'lanes': None, 'width "m"': None, 'line_2': None, 'x2_2': None, 'property': None,
+                                        'speed': 50})
+        self.assertEqual([p['speed'] for _, p in lines[:-1]], [None] * (len(lines) - 1))
+        self.run_ok('build', self.file, '--entities', 'segments', '-o', store, '--force', '--keep', 'lanes')
+        self.assertEqual(self.written(store), [(line, {'lanes': p['lanes']}) for line, p in self.expected(self.features)])
+
+    def test_a_property_that_begins_late_is_named_or_an_error(self):
+        # The head of the file is the first 2 MiB.
+        late = self.path('late.geojson')
+        features = [{'type': 'Feature', 'properties': {'a': 1, 'text': 'x' * 4000}, 'geometry': {
+            'type': 'LineString', 'coordinates': [[k, 0], [k, 1]]}} for k in range(600)]
+        features[-1]['properties']['b'] = 7
+        self.write(late, features)
+        build = ['build', late, '--entities', 'segments', '-o', self.path('late.st'), '--force']
+        self.expect_error("the number 'b' is not among the properties of the first features", *build)
+        self.run_ok(*build, '--keep', 'a,b')
+        values = [p for _, p in self.written(self.path('late.st'))]
+        self.assertEqual((values[-1], values[0]), ({'a': 1, 'b': 7}, {'a': 1, 'b': None}))
+        self.run_ok(*build, '--drop', 'b')
+        self.assertEqual([p for _, p in self.written(self.path('late.st'))], [{'a': 1}] * 600)
+
+    def test_properties_of_faces_come_back(self):
+        rng = random.Random(37)
+        vertices = [(rng.randrange(100) / 4, rng.randrange(100) / 4, rng.randrange(9) / 2) for _ in range(300)]
+        faces = [([rng.randrange(300) for _ in range(rng.choice([3, 3, 4]))], rng.randrange(256), rng.randrange(-9, 9) / 4,
+                  rng.randrange(-30000, 30000)) for _ in range(500)]
+        header = ('ply\nformat %s 1.0\nelement vertex 300\nproperty double x\nproperty double y\nproperty double z\n'
+                  'element face 500\nproperty uchar red\nproperty list uchar int vertex_indices\nproperty float x2\n'
+                  'property list uchar short other\nproperty short part\nend_header\n')
+        text, binary = self.path('text.ply'), self.path('binary.ply')
+        with open(text, 'w', encoding='ascii') as file:
+            file.write(header % 'ascii')
+            file.writelines('%r %r %r\n' % v for v in vertices)
+            file.writelines('%d %d %s %r 1 5 %d\n' % (red, len(f), ' '.join(map(str, f)), x, part) for f, red, x, part in faces)
+        with open(binary, 'wb') as file:
+            file.write((header % 'binary_big_endian').encode())
+            for v in vertices:
+                file.write(struct.pack('>3d', *v))
+            for f, red, x, part in faces:
+                file.write(struct.pack('>BB%difBhh' % len(f), red, len(f), *f, x, 1, 5, part))
+        expected = collections.Counter()
+        for f, red, x, part in faces:
+            for k in range(2, len(f)):
+                expected[(*vertices[f[0]], *vertices[f[k - 1]], *vertices[f[k]], red, x, part)] += 1
+        for number, source in enumerate((text, binary)):
+            store = self.path(f'faces{number}.st')
+            self.run_ok('build', source, '--entities', 'triangles', '-o', store, '--block', 200, '--channel', 'red:0.1')
+            self.assertIn('red uint8, x2_2 float32, part int16', self.run_ok('info', store))
+            rows = self.run_ok('points', store, '-o', '-', '--format', 'csv').splitlines()
+            self.assertEqual(rows[0].split(',')[9:], ['red', 'x2_2', 'part'])
+            self.assertTrue(collections.Counter(tuple(map(float, row.split(','))) for row in rows[1:]) == expected)
+        self.assertTrue({k: v for k, v in self.content(self.path('faces0.st')).items() if k != 'manifest.json'} ==
+                        {k: v for k, v in self.content(self.path('faces1.st')).items() if k != 'manifest.json'})
 
 
 if __name__ == '__main__':

@@ -97,7 +97,7 @@ SINGLE_USER_HEADERS = {
     'libcluster/src/cuda/device_dendrogram.hpp': ON_CPU,
     'libcluster/src/cuda/device_single.hpp': ON_CPU,
     'libstream/src/format/copc/octree_builder.hpp': 'sorts points into an octree; has its own tests',
-    'libstream/src/format/geojson/geometry.hpp': 'the parser of one geometry',
+    'libstream/src/format/geojson/properties.hpp': 'the properties of features as columns',
     'libstream/src/format/geojson/items.hpp': 'cuts a stream of JSON into features',
     'libstream/src/format/geotiff/blocks.hpp': 'decodes tiles and strips',
     'libstream/src/format/geotiff/directory.hpp': 'the bytes of TIFF directories',

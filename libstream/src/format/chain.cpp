@@ -192,7 +192,7 @@ class Chain final : public PointSource {
     selecting.selection.keep.reset();
     selecting.selection.drop.clear();
     source = selection_of(std::move(source), selecting);
-    const std::vector<std::string> needed = needed_attributes(source->info(), options_.selection);
+    const std::vector<std::string> needed = needed_attributes(source->info(), options_);
     std::vector<std::string> names;
     for (const Channel& attribute : info_.attributes) names.push_back(attribute.name);
     for (const std::string& name : needed) {
@@ -204,7 +204,7 @@ class Chain final : public PointSource {
   void drop_unneeded_attributes() {
     if (drops_attributes_) return;
     drops_attributes_ = true;
-    const std::vector<std::string> needed = needed_attributes(info_, options_.selection);
+    const std::vector<std::string> needed = needed_attributes(info_, options_);
     std::erase_if(info_.attributes, [&](const Channel& attribute) {
       return std::find(needed.begin(), needed.end(), attribute.name) == needed.end();
     });

@@ -20,11 +20,14 @@
 namespace terrace::stream {
 namespace {
 
-bool is_selected(const std::string& name, const Selection& selection) {
+bool is_selected(const std::string& name, const SourceOptions& options) {
+  const Selection& selection = options.selection;
   const auto among = [&](const std::vector<std::string>& names) {
     return std::find(names.begin(), names.end(), name) != names.end();
   };
-  return (!selection.keep || among(*selection.keep)) && !among(selection.drop);
+  const bool kept =
+      !selection.keep || among(*selection.keep) || is_shape_column(name, options.entities);
+  return kept && !among(selection.drop);
 }
 
 /// Delivers the selected points of a source, with the selected attributes.
@@ -176,13 +179,14 @@ std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source
                                           SourceOptions{.block_points = block_points}, selected);
 }
 
-std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& selection) {
+std::vector<std::string> needed_attributes(const SourceInfo& info, const SourceOptions& options) {
+  const Selection& selection = options.selection;
   std::optional<Where> where;
   if (!selection.where.empty()) where.emplace(selection.where, info);
   std::vector<std::string> names;
   for (std::size_t i = 0; i < info.attributes.size(); ++i) {
     const std::string& name = info.attributes[i].name;
-    if (is_selected(name, selection) || (where && where->uses(i))) names.push_back(name);
+    if (is_selected(name, options) || (where && where->uses(i))) names.push_back(name);
   }
   return names;
 }
@@ -216,7 +220,7 @@ std::unique_ptr<PointSource> selection_of(std::unique_ptr<PointSource> source,
   if (selection.keep) check_attributes(*selection.keep, source_info.attributes, file);
   std::vector<std::size_t> selected;
   for (std::size_t i = 0; i < source_info.attributes.size(); ++i) {
-    if (is_selected(source_info.attributes[i].name, selection)) selected.push_back(i);
+    if (is_selected(source_info.attributes[i].name, options)) selected.push_back(i);
   }
   return std::make_unique<SelectedSource>(std::move(source), options, selected);
 }

@@ -23,7 +23,7 @@ std::unique_ptr<PointSource> with_attributes(std::unique_ptr<PointSource> source
 
 /// Returns the attributes that are kept or named by the condition: no others need to be read.
 /// Throws: Error for an invalid condition.
-std::vector<std::string> needed_attributes(const SourceInfo& info, const Selection& selection);
+std::vector<std::string> needed_attributes(const SourceInfo& info, const SourceOptions& options);
 
 /// Throws: Error that names `file` if one of `names` is not an attribute.
 void check_attributes(const std::vector<std::string>& names, const std::vector<Channel>& attributes,

@@ -200,6 +200,19 @@ std::string_view name_of(Entities entities) {
   return kEntityNames[static_cast<std::size_t>(entities)];
 }
 
+bool is_shape_column(std::string_view name, Entities entities) {
+  if (entities == Entities::points) return false;
+  const bool lines = entities != Entities::triangles;
+  if (lines && (name == "line" || name == "part" || name == "vertices" || name == "dimensions")) {
+    return true;
+  }
+  const std::size_t corners = entities == Entities::triangles  ? 3
+                              : entities == Entities::segments ? 2
+                                                               : kPolylineVertices;
+  return name.size() == 2 && name[0] >= 'x' && name[0] <= 'z' && name[1] >= '2' &&
+         static_cast<std::size_t>(name[1] - '0') <= corners;
+}
+
 std::optional<Entities> entities_named(std::string_view name) {
   const auto entry = std::find(kEntityNames.begin(), kEntityNames.end(), name);
   if (entry == kEntityNames.end()) return std::nullopt;

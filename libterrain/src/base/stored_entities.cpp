@@ -12,7 +12,6 @@
 #include "base/units.hpp"
 
 namespace terrace::terrain {
-
 stream::Entities entities_of(const stream::StoreSchema& schema) {
   for (const auto& [name, value] : schema.parameters) {
     if (name != kEntitiesParameter) continue;

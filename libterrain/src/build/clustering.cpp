@@ -54,11 +54,15 @@ AttributeAxis axis_of(const std::string& name, const BuildRequest& request,
   std::string known;
   for (std::size_t i = 0; i < schema.attributes.size(); ++i) {
     const stream::Channel& attribute = schema.attributes[i];
+    if (stream::is_shape_column(attribute.name, request.entities)) continue;
     if (attribute.name == name) return {attribute, schema.attribute_offset(i)};
     known += (known.empty() ? "" : ", ") + attribute.name;
   }
-  throw stream::Error(input_name(request), fmt::format("its points have no attribute \"{}\"", name))
-      .remedy(known.empty() ? stream::message("they have no attributes: leave out {channel}")
+  const bool points = request.entities == stream::Entities::points;
+  throw stream::Error(input_name(request),
+                      fmt::format("its {} have no {} \"{}\"", stream::name_of(request.entities),
+                                  points ? "attribute" : "property", name))
+      .remedy(known.empty() ? stream::message("they have none: leave out {channel}")
                             : stream::message("{channel} takes one of these: {}", known));
 }
 
@@ -113,11 +117,11 @@ void set_corners(const BuildRequest& request, const stream::Schema& schema,
                  cluster::HierarchyOptions& options) {
   if (request.entities == stream::Entities::points) return;
   const std::string_view entities = stream::name_of(request.entities);
-  if (request.metric.kind != MetricChoice::Kind::euclidean || !request.channels.empty() ||
+  if (request.metric.kind != MetricChoice::Kind::euclidean ||
       std::isfinite(request.outlier_price)) {
     throw UsageError(
-        stream::message("{entities} {} are clustered by Euclidean distances: without {metric}, "
-                        "{channel} and {outlier_price}",
+        stream::message("{entities} {} are clustered by Euclidean distances: without {metric} and "
+                        "{outlier_price}",
                         entities));
   }
   using cluster::FacilityStrategy;

@@ -105,7 +105,7 @@ struct Selection {
   /// Points that do not meet this condition (see Where) are left out; empty: all points are kept.
   std::string where{};
   /// Names of the attributes to keep; nullopt: all. They keep the order of the file. Conditions may
-  /// use all attributes.
+  /// use all attributes. The columns of the shape of entities are always kept.
   std::optional<std::vector<std::string>> keep{};
   std::vector<std::string> drop{};  ///< names of attributes to leave out
   /// Points outside this box, in the source's CRS, are left out; its z are infinite if heights do
@@ -133,11 +133,12 @@ using OnDamage = std::function<void(const Error& damage, std::uint64_t points)>;
 
 /// The parts of a file that a source delivers. Entities of several corners are delivered as points:
 /// the position is the first corner, the attributes are the other corners, of the coordinates'
-/// type, bit for bit. Other attributes are left out.
+/// type, bit for bit. After them come the properties of the entities.
 enum class Entities : std::uint8_t {
   points,  ///< the points; of meshes and GeoJSON the vertices
   /// The triangles of a mesh (GLB, OBJ, OFF, PLY, STL), polygons cut into fans, in the order of the
-  /// file: "x2", "y2", "z2", "x3", "y3", "z3".
+  /// file: "x2", "y2", "z2", "x3", "y3", "z3". Scalar properties of the faces (PLY) keep their
+  /// names and types. Attributes of vertices are left out.
   triangles,
   /// The segments of lines (GeoJSON, including rings of polygons), in the order of the file. Points
   /// are left out and counted as excluded. The attributes are:
@@ -146,6 +147,10 @@ enum class Entities : std::uint8_t {
   /// - "part": the number of the segment in its line
   /// - "vertices": 2
   /// - "dimensions": 3 if the line has heights, otherwise 2
+  /// - the numeric properties of the features, as f64, NaN if a feature has none. They are those
+  /// that
+  ///   occur in the first 2 MiB of any file. A property that occurs only later is an error, unless
+  ///   Selection::keep or drop is set for it. An equal name gets a number.
   segments,
   /// Lines in pieces of at most kPolylineVertices vertices, where the last vertex of each piece is
   /// the first of the next: "x2" to "z4" and the other columns of segments. Missing corners of a
@@ -156,6 +161,9 @@ enum class Entities : std::uint8_t {
 inline constexpr std::size_t kPolylineVertices = 4;
 /// Returns "points", "triangles", "segments" or "polylines".
 std::string_view name_of(Entities entities);
+/// Returns whether an attribute of that name belongs to the shape of the entities: a coordinate of
+/// a corner, or the number of a line or piece. All others are properties.
+bool is_shape_column(std::string_view name, Entities entities);
 /// Returns the entities of that name; nullopt for other names.
 std::optional<Entities> entities_named(std::string_view name);
 

@@ -35,12 +35,16 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
       : file_(file), offset_(offset), geometry_(geometry) {}
 
   bool key(string_t& name) override {
-    if (ignored_depth_ > 0) return true;
+    if (ignored_depth_ > 0) {
+      if (is_property()) property_ = name;
+      return true;
+    }
     expected_ = name == "type"                               ? Expected::type
                 : name == "coordinates"                      ? Expected::coordinates
                 : name == "geometry"                         ? Expected::object
                 : name == "geometries" || name == "features" ? Expected::list
                                                              : Expected::other;
+    in_properties_ = objects_.size() == 1 && name == "properties";
     if (expected_ == Expected::coordinates &&
         std::exchange(objects_.back().has_coordinates, true)) {
       throw fault("a geometry has its coordinates twice");
@@ -67,6 +71,7 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
       return true;
     }
     finish(objects_.back());
+    if (objects_.size() == 1 && objects_.back().type != "Feature") geometry_.properties.clear();
     runs_.resize(objects_.back().first_run);
     objects_.pop_back();
     return true;
@@ -74,6 +79,7 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
 
   bool start_array(std::size_t) override {
     if (is_ignored()) {
+      if (ignored_depth_ == 0) in_properties_ = false;
       ++ignored_depth_;
     } else if (depth_ > 0 || expects(Expected::coordinates)) {
       open_bracket();
@@ -154,7 +160,11 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
     return ignored_depth_ > 0 || (depth_ == 0 && expects(Expected::other));
   }
 
+  /// Whether the next value is that of a property.
+  [[nodiscard]] bool is_property() const { return in_properties_ && ignored_depth_ == 1; }
+
   bool number(double value) {
+    if (is_property()) geometry_.properties.push_back({property_, value});
     if (is_ignored()) return true;
     if (depth_ == 0) throw misplaced_error("a number");
     Bracket& bracket = brackets_[depth_ - 1];
@@ -236,6 +246,8 @@ class GeometryParser final : public nlohmann::json_sax<nlohmann::json> {
   GeoJsonGeometry& geometry_;
   std::vector<Object> objects_;
   Expected expected_ = Expected::other;
+  bool in_properties_ = false;  ///< the last name of the outermost object is "properties"
+  std::string property_;
   std::size_t ignored_depth_ = 0;  ///< open brackets and braces of an ignored value
   std::size_t depth_ = 0;          ///< open brackets of coordinates
   std::array<Bracket, kMaxBrackets> brackets_{};

@@ -11,6 +11,12 @@
 
 namespace terrace::stream {
 
+/// A member of a feature's properties whose value is a number.
+struct GeoJsonProperty {
+  std::string name;
+  double value = 0;
+};
+
 /// The positions of some GeoJSON, in the order of the text.
 struct GeoJsonGeometry {
   /// Consecutive positions: a LineString, a part of a MultiLineString, a ring of a Polygon or
@@ -22,15 +28,19 @@ struct GeoJsonGeometry {
 
   std::vector<Point3> positions;  ///< missing heights are 0
   std::vector<Line> lines;        ///< positions outside lines are single points
+  /// The numeric properties, if the text is one feature. Of equal names the last one counts.
+  std::vector<GeoJsonProperty> properties;
 
   void clear() {
     positions.clear();
     lines.clear();
+    properties.clear();
   }
 };
 
-/// Appends the geometries of a GeoJSON object, including those in nested collections. Properties,
-/// and numbers beyond the third of a position, are ignored. item: the object's text, which begins
+/// Appends the geometries of a GeoJSON object, including those in nested collections, and its
+/// numeric properties. Other properties, and numbers beyond the third of a position, are ignored.
+/// item: the object's text, which begins
 /// at byte `offset` of `file`, for messages. Throws: Error.
 void append_geometry(std::string_view item, const std::string& file, std::uint64_t offset,
                      GeoJsonGeometry& geometry);

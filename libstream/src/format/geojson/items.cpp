@@ -135,6 +135,8 @@ void GeoJsonItems::take_members(std::string_view text, bool before) {
       *type != "GeometryCollection") {
     throw fault("has features but is not a FeatureCollection");
   }
+  const auto generator = members.find("generator");
+  if (before && generator != members.end()) numbers_lines_ = *generator == "terrace";
   const auto crs = members.find("crs");
   if (!wants_crs_ || crs == members.end()) return;
   const json::json_pointer name("/properties/name");

@@ -31,6 +31,8 @@ class GeoJsonItems {
   /// Returns the collection's member "crs" (GeoJSON of 2008), otherwise longitude and latitude of
   /// WGS 84. A different member after the features is an error, because it comes too late.
   [[nodiscard]] const Crs& crs() const { return crs_; }
+  /// Whether terrace wrote the lines of the collection, each with its number as "line".
+  [[nodiscard]] bool numbers_lines() const { return numbers_lines_; }
 
  private:
   /// Where a scan ended: at the end of an object, or after the bracket that opens its list.
@@ -53,6 +55,7 @@ class GeoJsonItems {
   bool wants_crs_;
   std::string_view window_;
   std::size_t found_ = 0;  ///< bytes of the object at the start of the window; 0 at the end
+  bool numbers_lines_ = false;
   bool started_ = false, in_list_ = false, first_of_list_ = false;
   Crs crs_;
 };

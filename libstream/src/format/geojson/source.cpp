@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -21,7 +22,9 @@
 #include "format/chain.hpp"
 #include "format/geojson/geometry.hpp"
 #include "format/geojson/items.hpp"
+#include "format/geojson/properties.hpp"
 #include "format/registry.hpp"
+#include "io/peek.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
 
@@ -38,7 +41,9 @@ Error too_many_lines(const std::string& file) {
 
 class GeoJsonSource final : public PointSource {
  public:
-  GeoJsonSource(const std::string& file, const SourceOptions& options)
+  /// properties: names of further numeric properties, of other files.
+  GeoJsonSource(const std::string& file, const SourceOptions& options,
+                std::span<const std::string> properties = {})
       : input_(file, options.stop),
         items_(input_, item_bytes(options), !options.crs),
         block_points_(options.block_points),
@@ -57,8 +62,18 @@ class GeoJsonSource final : public PointSource {
     info_.attributes.push_back({.name = "part", .type = ScalarType::u32});
     info_.attributes.push_back({.name = "vertices", .type = ScalarType::u8});
     info_.attributes.push_back({.name = "dimensions", .type = ScalarType::u8});
+    shape_bytes_ = info_.payload_size();
+    properties_ = PropertyColumns(file, options, items_.numbers_lines());
+    for (const std::string& name : properties) properties_.add(name);
+    const bool complete = read_head();
+    for (Channel& channel : properties_.finish(complete, info_.attributes)) {
+      info_.attributes.push_back(std::move(channel));
+    }
     record_.resize(info_.payload_size());
   }
+
+  /// The names of the numeric properties of lines.
+  [[nodiscard]] const std::vector<std::string>& properties() const { return properties_.names(); }
 
   const SourceInfo& info() const override { return info_; }
 
@@ -103,13 +118,35 @@ class GeoJsonSource final : public PointSource {
                               : line_ < geometry_.lines.size();
   }
 
+  /// Reads the first features and their properties. Returns whether they are all.
+  bool read_head() {
+    constexpr std::size_t kHeadBytes = std::size_t{2} << 20;
+    for (std::size_t bytes = 0; bytes < kHeadBytes;) {
+      const std::optional<std::string_view> item = items_.next();
+      if (!item) return true;
+      bytes += item->size();
+      GeoJsonGeometry& feature = head_.emplace_back();
+      append_geometry(*item, input_.name(), items_.offset(), feature);
+      if (!feature.lines.empty()) properties_.add(feature.properties);
+    }
+    return false;
+  }
+
   bool read_item() {
-    const std::optional<std::string_view> item = items_.next();
-    if (!item) return false;
-    geometry_.clear();
-    append_geometry(*item, input_.name(), items_.offset(), geometry_);
+    if (!head_.empty()) {
+      geometry_ = std::move(head_.front());
+      head_.pop_front();
+    } else {
+      const std::optional<std::string_view> item = items_.next();
+      if (!item) return false;
+      geometry_.clear();
+      append_geometry(*item, input_.name(), items_.offset(), geometry_);
+    }
     vertex_ = line_ = 0;
     if (max_vertices_ == 1) return true;
+    if (!geometry_.lines.empty()) {
+      progress_.empty_values += properties_.read(geometry_.properties, items_.offset(), values_);
+    }
     std::uint64_t single = geometry_.positions.size();
     for (const GeoJsonGeometry::Line& line : geometry_.lines) single -= line.end - line.begin;
     progress_.excluded += single;
@@ -144,6 +181,9 @@ class GeoJsonSource final : public PointSource {
     std::memcpy(numbers + sizeof lines_, &part_, sizeof part_);
     numbers[2 * sizeof lines_] = static_cast<std::byte>(count);
     numbers[2 * sizeof lines_ + 1] = static_cast<std::byte>(line.dimensions);
+    const auto values = std::as_bytes(std::span(values_));
+    std::copy(values.begin(), values.end(),
+              record_.begin() + static_cast<std::ptrdiff_t>(shape_bytes_));
     block.payload.insert(block.payload.end(), record_.begin(), record_.end());
     vertex_ += count - 1;
     ++part_;
@@ -157,7 +197,11 @@ class GeoJsonSource final : public PointSource {
   GeoJsonItems items_;
   std::size_t block_points_, max_vertices_;
   SourceInfo info_;
-  GeoJsonGeometry geometry_;  ///< of the feature being delivered
+  PropertyColumns properties_;
+  std::deque<GeoJsonGeometry> head_;  ///< features that were read before the first was delivered
+  GeoJsonGeometry geometry_;          ///< of the feature being delivered
+  std::vector<double> values_;        ///< its properties
+  std::size_t shape_bytes_ = 0;       ///< of a record, before the properties
   std::size_t line_ = 0, vertex_ = 0;
   std::uint32_t lines_ = 0, part_ = 0;  ///< lines finished so far; number of the next piece
   std::vector<std::byte> record_;
@@ -168,8 +212,7 @@ class GeoJsonSource final : public PointSource {
 class NumberedLines final : public PointSource {
  public:
   explicit NumberedLines(std::unique_ptr<PointSource> files)
-      : files_(std::move(files)),
-        line_at_(files_->info().attribute_offset(files_->info().attributes.size() - 4)) {}
+      : files_(std::move(files)), line_at_(offset_of_line(files_->info())) {}
 
   const SourceInfo& info() const override { return files_->info(); }
   Progress progress() const override { return files_->progress(); }
@@ -193,6 +236,12 @@ class NumberedLines final : public PointSource {
   }
 
  private:
+  static std::size_t offset_of_line(const SourceInfo& info) {
+    const auto line = std::find_if(info.attributes.begin(), info.attributes.end(),
+                                   [](const Channel& channel) { return channel.name == "line"; });
+    return info.attribute_offset(static_cast<std::size_t>(line - info.attributes.begin()));
+  }
+
   std::unique_ptr<PointSource> files_;
   std::size_t line_at_;
   std::uint64_t first_ = 0, next_ = 0;
@@ -219,9 +268,26 @@ std::unique_ptr<PointSource> open_one_geojson(const std::string& file,
 
 std::unique_ptr<PointSource> open_geojson(std::span<const std::string> files,
                                           const SourceOptions& options) {
-  auto source = open_in_sequence(files, options, &open_one_geojson);
-  if (files.size() == 1 || options.entities == Entities::points) return source;
-  return std::make_unique<NumberedLines>(std::move(source));
+  if (files.size() == 1 || options.entities == Entities::points) {
+    return open_in_sequence(files, options, &open_one_geojson);
+  }
+  // A property of one file is a column of all.
+  std::vector<std::string> properties;
+  for (const std::string& file : files) {
+    if (!is_rereadable(file)) continue;
+    const GeoJsonSource source(file, options);
+    for (const std::string& name : source.properties()) {
+      if (std::find(properties.begin(), properties.end(), name) == properties.end()) {
+        properties.push_back(name);
+      }
+    }
+  }
+  return std::make_unique<NumberedLines>(
+      open_in_sequence(files, options,
+                       [properties](const std::string& file,
+                                    const SourceOptions& own) -> std::unique_ptr<PointSource> {
+                         return std::make_unique<GeoJsonSource>(file, own, properties);
+                       }));
 }
 
 }  // namespace

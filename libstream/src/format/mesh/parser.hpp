@@ -46,6 +46,10 @@ class MeshParser {
   }
   /// Returns the type that coordinates have in the file; f64 for text and after transformations.
   [[nodiscard]] virtual ScalarType coordinate_type() const { return ScalarType::f64; }
+  /// Returns the scalar properties of faces, with the names in the file.
+  [[nodiscard]] virtual std::vector<Channel> face_properties() const { return {}; }
+  /// Returns the properties of the current face, packed.
+  [[nodiscard]] virtual std::span<const std::byte> face_record() const { return {}; }
   /// Returns the comments read so far.
   [[nodiscard]] const std::vector<std::string>& comments() const { return comments_; }
 

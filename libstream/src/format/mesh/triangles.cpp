@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "format/missing.hpp"
+#include "io/distinct_names.hpp"
 #include "io/spool.hpp"
 #include "terrace/stream/error.hpp"
 
@@ -91,6 +92,13 @@ class TriangleSource final : public PointSource {
         info_.attributes.push_back({.name = std::string(name) + corner, .type = type_});
       }
     }
+    DistinctNames distinct;
+    for (const Channel& coordinate : info_.coordinates) distinct.add(coordinate.name);
+    for (const Channel& corner : info_.attributes) distinct.add(corner.name);
+    for (Channel& property : mesh_.parser->face_properties()) {
+      property.name = distinct.add(property.name);
+      info_.attributes.push_back(std::move(property));
+    }
     if (options.crs) info_.crs = *options.crs;
   }
 
@@ -159,6 +167,8 @@ class TriangleSource final : public PointSource {
                              bytes.begin() + static_cast<std::ptrdiff_t>(size_of(type_)));
       }
     }
+    const std::span<const std::byte> properties = mesh_.parser->face_record();
+    block.payload.insert(block.payload.end(), properties.begin(), properties.end());
   }
 
   OpenMesh mesh_;

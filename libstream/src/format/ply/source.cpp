@@ -71,6 +71,7 @@ class PlySource final : public PointSource {
     info_.comments = header_.comments;
     if (options.crs) info_.crs = *options.crs;
     make_fields(*vertex);
+    find_face_properties();
     for (auto element = header_.elements.begin(); element != vertex; ++element) {
       skip_element(*element);
     }
@@ -119,6 +120,11 @@ class PlySource final : public PointSource {
 
   [[nodiscard]] const Input& input() const { return input_; }
 
+  /// Returns the scalar properties that all elements of faces and strips have, with the same type.
+  [[nodiscard]] const std::vector<Channel>& face_properties() const { return face_properties_; }
+  /// Returns those of the polygon or strip that next_triangles() read last, packed.
+  [[nodiscard]] std::span<const std::byte> face_record() const { return face_record_; }
+
   Progress progress() const override {
     return {
         .points = read_ - nodata_,
@@ -165,6 +171,40 @@ class PlySource final : public PointSource {
             .at("header")
             .remedy("name a PLY file of points or of a mesh");
       }
+    }
+  }
+
+  void find_face_properties() {
+    bool first = true;
+    for (const PlyElement& element : header_.elements) {
+      if (corners_of(element) == nullptr) continue;
+      std::vector<Channel> scalars;
+      for (const PlyProperty& property : element.properties) {
+        if (!property.list) scalars.push_back({.name = property.name, .type = property.type});
+      }
+      if (std::exchange(first, false)) {
+        face_properties_ = std::move(scalars);
+        continue;
+      }
+      std::erase_if(face_properties_, [&](const Channel& channel) {
+        return std::find(scalars.begin(), scalars.end(), channel) == scalars.end();
+      });
+    }
+    std::size_t bytes = 0;
+    for (const Channel& channel : face_properties_) bytes += size_of(channel.type);
+    face_record_.resize(bytes);
+  }
+
+  /// Stores the value of a property of a face, if all faces have it.
+  void store_face_value(const PlyProperty& property, const std::byte* raw) {
+    std::size_t offset = 0;
+    for (const Channel& channel : face_properties_) {
+      if (channel.name == property.name) {
+        std::copy_n(raw, size_of(channel.type),
+                    face_record_.begin() + static_cast<std::ptrdiff_t>(offset));
+        return;
+      }
+      offset += size_of(channel.type);
     }
   }
 
@@ -330,7 +370,10 @@ class PlySource final : public PointSource {
     };
     for (const PlyProperty& property : element.properties) {
       next(property.list ? property.count_type : property.type, property);
-      if (!property.list) continue;
+      if (!property.list) {
+        store_face_value(property, raw.data());
+        continue;
+      }
       const std::int64_t length = to_integer(raw.data(), property.count_type);
       if (length < 0) {
         throw fault(fmt::format("list {} has the length {}", in_quotes(property.name), length))
@@ -443,7 +486,9 @@ class PlySource final : public PointSource {
   std::size_t stride_ = 0, record_bytes_ = 0;
   bool has_lists_ = false, swap_ = false, keeps_missing_;
   std::vector<std::int64_t> corners_;  ///< of one face
-  std::size_t element_ = 0;            ///< the element read by next_triangles()
+  std::vector<Channel> face_properties_;
+  std::vector<std::byte> face_record_;  ///< of the same face
+  std::size_t element_ = 0;             ///< the element read by next_triangles()
   std::uint64_t item_ = 0;
   bool after_vertices_ = false;  ///< element_ follows the vertices
 };
@@ -464,6 +509,9 @@ class PlyParser final : public MeshParser {
                ? ScalarType::f32
                : ScalarType::f64;
   }
+
+  std::vector<Channel> face_properties() const override { return source_.face_properties(); }
+  std::span<const std::byte> face_record() const override { return source_.face_record(); }
 
   Item next() override {
     if (!vertices_done_) {

@@ -179,7 +179,7 @@ class XyzSource final : public PointSource {
     types_.assign(layout_.columns, ScalarType::f64);
     integer_columns_.resize(layout_.columns);
     info_.comments = layout_.comments;
-    const std::vector<std::string> needed = needed_attributes(info_, options.selection);
+    const std::vector<std::string> needed = needed_attributes(info_, options);
     is_ignored_.resize(layout_.columns);
     for (std::size_t i = 0; i < layout_.attributes.size(); ++i) {
       is_ignored_[layout_.attributes[i]] =

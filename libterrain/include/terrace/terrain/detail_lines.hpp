@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -27,6 +28,8 @@ struct LineSet {
   };
   std::vector<stream::Point3> vertices;
   std::vector<Line> lines;
+  std::vector<std::string> property_names;  ///< numeric properties that every line has
+  std::vector<double> properties;           ///< lines x property_names, row by row; NaN: no value
 };
 
 /// True for a store of segments or polylines (see stream::Entities).
@@ -43,11 +46,11 @@ struct LineSet {
 [[nodiscard]] LineSet detail_lines(const stream::Store& store, const Detail& detail,
                                    const Context& context = {});
 
-/// Writes lines as GeoJSON, each as a Feature with its number as the property "line". Numbers have
-/// enough digits to read back exactly. crs: the CRS of the lines. Unless it is longitude and
-/// latitude of WGS 84, the member "crs" (GeoJSON of 2008, which GDAL and others read) names it by
-/// its EPSG code; the member is null if the CRS is unknown. Throws: UsageError for a CRS without a
-/// code, and what `write` throws.
+/// Writes lines as GeoJSON, each as a Feature with its number as the property "line", followed by
+/// its other properties (null if NaN). Numbers have enough digits to read back exactly. crs: the
+/// CRS of the lines. Unless it is longitude and latitude of WGS 84, the member "crs" (GeoJSON of
+/// 2008, which GDAL and others read) names it by its EPSG code; the member is null if the CRS is
+/// unknown. Throws: UsageError for a CRS without a code, and what `write` throws.
 void write_geojson(const LineSet& lines, const stream::Crs& crs,
                    const std::function<void(std::string_view)>& write);
 
