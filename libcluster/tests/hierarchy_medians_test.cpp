@@ -104,7 +104,8 @@ TEST(HierarchyMedians, CostIsNearThatInMemory) {
   for (const std::uint64_t seed : {1u, 2u}) {
     std::mt19937_64 random(seed);
     for (const NamedPoints& input : named_points(2000 / TERRACE_TEST_SHARE, random)) {
-      const std::size_t block_size = 400 / TERRACE_TEST_SHARE, k = block_size / 100 + seed - 1;
+      const std::size_t block_size = 400 * seed / TERRACE_TEST_SHARE;
+      const std::size_t k = 4 / TERRACE_TEST_SHARE + seed - 1;
       SCOPED_TRACE(testing::Message() << input.name << ", seed " << seed << ", k " << k);
       MedianHierarchy built;
       build_medians(median_options(k, block_size), input.points, built);

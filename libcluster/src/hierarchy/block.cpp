@@ -35,10 +35,12 @@ constexpr int kAttempts = 20;
 // Least cost after the first attempt. In a block of 10,000 points on a surface, it is too high for
 // every point to have its own facility.
 constexpr double kMinRaisedCost = 0x1p-8;
-// With medians: the first cost, at which about a third of 10,000 points on a surface become
-// facilities, and the number of attempts with a lower cost. Where points coincide, no cost gives
-// more facilities.
-constexpr double kCostForMedians = 0x1p-7;
+// With medians: how many representatives a full block keeps for each, at least, unless that is more
+// than a quarter of its points. With fewer, the medians cost several per cent more.
+constexpr std::size_t kKeptPerMedian = 25;
+// The cost at which about a third of 10,000 points on a surface become facilities, and the number
+// of attempts with a lower cost. Where points coincide, no cost gives more facilities.
+constexpr double kCostOfAThird = 0x1p-7;
 constexpr int kLowerCosts = 8;
 
 /// Searches for a facility cost at which a block has from `least` to `most` facilities.
@@ -234,9 +236,16 @@ void BlockProcessor::cluster(HierarchyBlock& block, std::span<const Point3> grou
     find_medians(block, ground);
     return;
   }
-  const bool for_medians = options_.medians > 0;
-  CostSearch search(for_medians ? kCostForMedians : options_.block.facility_cost,
-                    for_medians ? block.size() / 4 : 0, (block.size() + 1) / 2);
+  double cost = options_.block.facility_cost;
+  std::size_t least = 0;
+  if (options_.medians > 0) {
+    const double share = std::min(0.25, static_cast<double>(kKeptPerMedian * options_.medians) /
+                                            static_cast<double>(options_.block_size));
+    least = static_cast<std::size_t>(share * static_cast<double>(block.size()));
+    const double thirds = 0.25 / share;
+    cost = kCostOfAThird * thirds * std::sqrt(thirds);
+  }
+  CostSearch search(cost, least, (block.size() + 1) / 2);
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
     cluster_at(search.cost(), block, ground);
     assert(block.clustering.assignment.size() == block.size());

@@ -127,20 +127,19 @@ constexpr unsigned kMaxPartsAhead = 4;
 std::uint64_t memory_without_source(const BuildRequest& request, std::size_t payload_size,
                                     std::uint64_t threads) {
   const std::uint64_t point = sizeof(stream::Point3) + payload_size;
-  if (request.k > 0) {
-    // Clusters of a few points: what the writer keeps for each counts too, several levels wait for
-    // their tables at once, each with a third of the blocks of the level below, and threads keep
-    // more freed memory. Measured with up to 9 million points.
-    return (std::uint64_t{32} << 20) + threads * request.block_points * (4800 + 8 * payload_size) +
-           96 * request.block_points * (point + 72);
-  }
   // Counts the blocks that are read ahead, clustered or waiting, and one per level that is being
   // filled, with temporary data per point. Also counts the blocks that the store writer holds back
   // to train its compression tables.
   const std::uint64_t blocks =
       (8 * threads + 8 + kBlocksAhead) * request.block_points * (point + 64) +
       64 * request.block_points * (point + 16);
-  return (std::uint64_t{32} << 20) + blocks;
+  // With many medians, clusters have a few points: what the writer keeps for each counts too,
+  // several levels wait for their tables at once, each with a third of the blocks of the level
+  // below, and threads keep more freed memory. Measured with up to 9 million points.
+  const std::uint64_t small_clusters =
+      std::min<std::uint64_t>(request.block_points, 100 * request.k) *
+      (threads * 4100 + 32 * point + 96 * 72);
+  return (std::uint64_t{32} << 20) + blocks + small_clusters;
 }
 
 /// Returns the ratio of a cell's height to its width on the ground, in the middle of the raster.

@@ -51,7 +51,8 @@ struct BuildRequest {
   /// k-median over the stream: the top level has k points, the medians, and the clusters of the
   /// level below are theirs (see cluster::HierarchyOptions::medians). 0: the facility cost alone
   /// decides. At most kMaxMedians. Blocks hold at least 100 k points, so memory and the last step,
-  /// which takes O((100 k)^2) time, grow with k. Clusters of other levels hold 2 to 4 points. For
+  /// which takes O((100 k)^2) time, grow with k. Other clusters are small,
+  /// of 2 to 4 points with 100 medians. For
   /// points without outlier_price.
   std::size_t k = 0;
   cluster::Effort effort = cluster::Effort::standard;
