@@ -167,7 +167,6 @@ SINGLE_USER_HEADERS = {
     'tools/src/synth/synth_cloud.hpp': TESTED,
     'tools/src/synth/synth_dem.hpp': 'a generator, apart from its verb',
     'tools/src/verbs/cluster_methods.hpp': 'the methods, apart from the options of their verb',
-    'viewer/core/body_normals.hpp': 'a part of the scene',
     'viewer/core/transitions.hpp': 'a part of the scene',
 }
 LICENCES = {

@@ -189,7 +189,7 @@ for (const name of ['ball', 'kept']) {
       await tested.rest();
     }
     const list = arrays.listed();
-    assert.ok(list.length > 1000);
+    assert.ok(list.length > (name === 'ball' ? 1000 : 300), `${list.length} triangles`);
     assert.equal(list.length, flyer.last.state.triangles);
     assert.deepEqual(list, fresh.listed());
     // Each edge occurs equally often in both directions, and normals point away from the centre.
@@ -239,7 +239,9 @@ for (const name of ['ball', 'kept']) {
         const skip = waited;
         waited = message.state.waiting;
         if (skip) return arrays.apply(message);
-        const before = [...arrays.drawn()].map(corners => [...corners].map(slot => arrays.place(slot)));
+        // A stored surface continues from where its vertices are on their way.
+        const when = name === 'kept' ? message.time : undefined;
+        const before = [...arrays.drawn()].map(corners => [...corners].map(slot => arrays.place(slot, when)));
         arrays.apply(message);
         if (before.length === 0) return;
         const slots = new Set([...arrays.drawn()].flatMap(corners => [...corners]));
@@ -501,7 +503,8 @@ for (const name of ['ball', 'kept']) {
   test(`manual control of ${name}: a cluster of a surface expands, collapses and is released; a point of it is picked`, async () => {
     const flyer = new Tested(name);
     await flyer.opened();
-    const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: 1e6};
+    // Without any detail a stored surface has only a few vertices.
+    const camera = {eye: [40, 0, 0], direction: [-1, 0, 0], error: name === 'kept' ? 30 : 1e6};
     const before = (await flyer.settle(camera)).points;
     const {hit} = await flyer.ask({type: 'pick', id: 1, origin: [40, 0.1, 0.2], direction: [-1, 0, 0], angle: 0.01}, 'picked');
     assert.ok(hit.place[0] > 6 && hit.place[0] < 11, JSON.stringify(hit));

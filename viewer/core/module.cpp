@@ -35,7 +35,7 @@ enum Status : int { kDone = 0, kMissing = 1, kFailed = 2 };
 constexpr std::size_t kMostRanges = 1024;
 
 struct Module {
-  std::vector<double> input;  // doubles, for their alignment
+  std::vector<double> input;             // doubles, for their alignment
   std::vector<stream::ByteRange> files;  // whole ones, of the store
   stream::GivenBytes given;
   std::optional<stream::Store> store;
@@ -110,7 +110,7 @@ bool is_body(const stream::Store& store, const stream::LinearMap& ground) {
 }
 
 #ifdef TERRACE_VIEWER_BODY
-/// Throws stream::MissingBytes, unless all files of the store are there.
+/// Throws stream::MissingBytes unless all files of the store were given.
 void need_all_files() {
   std::vector<stream::ByteRange> missing;
   for (const stream::ByteRange& file : module().files) {

@@ -13,7 +13,7 @@
 #include <terrace/stream/store.hpp>
 #include <terrace/tri/delaunay2.hpp>
 
-/// What a scene answers about the triangles that it draws.
+/// The triangle under the pointer, and outlines of triangles.
 
 namespace terrace::viewer {
 

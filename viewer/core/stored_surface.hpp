@@ -9,6 +9,8 @@
 
 #include "scene.hpp"
 
+/// Scenes of scans whose surface was stored with the points.
+
 namespace terrace::viewer {
 
 /// Returns whether the scene of a scan is the surface that is stored with it: there is one, and

@@ -51,6 +51,19 @@ void need_all_points(const stream::Store& store, unsigned level, std::uint64_t p
       .remedy("restore the files or rebuild the store");
 }
 
+void need_memory_for_surface(const stream::Store& store, std::uint64_t points,
+                             std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
+  // Of the program, and for reading the store.
+  constexpr std::uint64_t kOtherBytes = std::uint64_t{48} << 20;
+  const std::uint64_t needed = kOtherBytes + points * bytes_per_point;
+  if (needed <= memory_bytes) return;
+  throw stream::Error(store.path().string(),
+                      stream::message("a surface of {} needs {}, {memory_bytes} allows {}",
+                                      counted(points, "point"), readable_bytes(needed),
+                                      readable_bytes(memory_bytes)))
+      .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
+}
+
 std::string extent_text(const stream::Store& store) {
   const stream::Box3 box = world_box(store.schema(), store.bounds());
   std::string out;

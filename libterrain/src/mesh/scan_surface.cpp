@@ -25,8 +25,6 @@ constexpr std::uint64_t kSurfaceBytesPerPoint = 300 + 60 + 48 + 2 * 60;
 /// The poles rule needs the tetrahedra in another order, spheres and their labels, but not the
 /// surface.
 constexpr std::uint64_t kPolesBytesPerPoint = 660;
-/// Memory of the program and for reading the store.
-constexpr std::uint64_t kSurfaceBytesBeside = std::uint64_t{48} << 20;
 
 /// Returns the linear map from positions in the CRS to metres on the ground.
 GroundMap map_of(const stream::Box3& box, const stream::StoreSchema& schema) {
@@ -197,17 +195,6 @@ std::uint64_t restoring_bytes_per_point(const ScanSurfaceOptions& options) {
                    simplifies(options) ? kSimplificationBytesPerPoint : 0});
 }
 
-void check_surface_memory(const stream::Store& store, std::uint64_t points,
-                          std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
-  const std::uint64_t needed = kSurfaceBytesBeside + points * bytes_per_point;
-  if (needed <= memory_bytes) return;
-  throw stream::Error(store.path().string(),
-                      stream::message("a surface of {} needs {}, {memory_bytes} allows {}",
-                                      counted(points, "point"), readable_bytes(needed),
-                                      readable_bytes(memory_bytes)))
-      .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
-}
-
 std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positions,
                                       const stream::StoreSchema& schema) {
   stream::Box3 box;
@@ -289,8 +276,8 @@ ScanSurface scan_surface(const stream::Store& store, const Detail& detail,
   if (uses_stored_surface(source, detail, options)) {
     return stored_scan_surface(source, detail, options, context);
   }
-  check_surface_memory(source, wanted_points(source, detail), restoring_bytes_per_point(options),
-                       context.memory_or(0));
+  need_memory_for_surface(source, wanted_points(source, detail), restoring_bytes_per_point(options),
+                          context.memory_or(0));
   TriangleMesh points = detail_points(source, detail);
   if (points.positions.empty()) {
     if (!detail.cluster) throw_none_inside(store);

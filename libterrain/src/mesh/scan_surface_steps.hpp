@@ -27,9 +27,6 @@ inline constexpr std::uint64_t kSimplificationBytesPerPoint = 110 + 400;
 bool simplifies(const ScanSurfaceOptions& options);
 /// Peak memory in bytes per point if the surface is restored.
 std::uint64_t restoring_bytes_per_point(const ScanSurfaceOptions& options);
-/// Throws: stream::Error if a surface of that many points does not fit in memory.
-void check_surface_memory(const stream::Store& store, std::uint64_t points,
-                          std::uint64_t bytes_per_point, std::uint64_t memory_bytes);
 /// Returns metres about the middle of the positions, which are in the CRS.
 std::vector<stream::Point3> on_ground(const std::vector<stream::Point3>& positions,
                                       const stream::StoreSchema& schema);

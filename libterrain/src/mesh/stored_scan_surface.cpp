@@ -11,9 +11,9 @@
 #include <terrace/stream/stored_surface.hpp>
 #include <terrace/tri/vertex_tree.hpp>
 
+#include "base/numbered_points.hpp"
 #include "base/store_checks.hpp"
 #include "mesh/scan_surface_steps.hpp"
-#include "surface/numbered_points.hpp"
 #include "terrace/terrain/detail_mesh.hpp"
 
 namespace terrace::terrain {
@@ -111,7 +111,7 @@ bool uses_stored_surface(const stream::Store& store, const Detail& detail,
 
 ScanSurface stored_scan_surface(const stream::Store& source, const Detail& detail,
                                 const ScanSurfaceOptions& options, const Context& context) {
-  check_surface_memory(
+  need_memory_for_surface(
       source, source.points(),
       std::max({kStoredBytesPerPoint, options.smoothing ? kSmoothingBytesPerPoint : 0,
                 options.smoothing && simplifies(options) ? kSimplificationBytesPerPoint : 0}),
@@ -170,9 +170,9 @@ stream::StoredSurface surface_to_store(const stream::Store& store,
                                        const stream::ClusterOrder& order, const Context& context) {
   need_points(store, "a surface");
   const stream::Store source = store.with_stop(context.stop);
-  check_surface_memory(source, source.points(),
-                       std::max(restoring_bytes_per_point({}), kSimplificationBytesPerPoint),
-                       context.memory_or(0));
+  need_memory_for_surface(source, source.points(),
+                          std::max(restoring_bytes_per_point({}), kSimplificationBytesPerPoint),
+                          context.memory_or(0));
   tri::RestoreOptions options;
   options.threads = context.threads;
   options.check_stop = [&] { context.check_stop(); };

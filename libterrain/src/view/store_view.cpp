@@ -3,8 +3,8 @@
 
 #include <utility>
 
+#include "base/store_checks.hpp"
 #include "earth/ground.hpp"
-#include "mesh/scan_surface_steps.hpp"
 #include "terrace/terrain/latitudes.hpp"
 #include "terrace/terrain/surface_view.hpp"
 #include "view/frame.hpp"
@@ -35,9 +35,9 @@ SurfaceView::SurfaceView(const stream::Store& store, const tri::ViewOptions& opt
             const stream::Store source = store.with_stop(context.stop);
             // While the store is read: the stored tree and triangles, and those of the view.
             constexpr std::uint64_t kBytesPerPoint = 400;
-            check_surface_memory(source, source.points(),
-                                 kBytesPerPoint + source.schema().payload_size(),
-                                 context.memory_or(0));
+            need_memory_for_surface(source, source.points(),
+                                    kBytesPerPoint + source.schema().payload_size(),
+                                    context.memory_or(0));
             return source;
           }(),
           view_frame(store).ground(), options) {}

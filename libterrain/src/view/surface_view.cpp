@@ -9,7 +9,7 @@
 
 #include <terrace/stream/stored_surface.hpp>
 
-#include "surface/numbered_points.hpp"
+#include "base/numbered_points.hpp"
 #include "view/cluster_reader.hpp"
 #include "view/frame.hpp"
 

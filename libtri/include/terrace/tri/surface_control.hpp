@@ -29,7 +29,7 @@ namespace terrace::tri {
 /// still without tears, but distances were measured for uniform cuts only.
 ///
 /// Cost of a step: O(blocks of 128 vertices + vertices of the blocks in which any is active or
-/// wanted + changes). Memory besides the front: 70 bytes per vertex.
+/// wanted + changes). Memory besides the front: 90 bytes per vertex.
 class SurfaceControl {
  public:
   /// The result of a step, valid until the next.

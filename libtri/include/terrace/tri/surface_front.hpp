@@ -26,7 +26,7 @@ namespace terrace::tri {
 /// Vertices are numbered so that each comes before its descendants, which are consecutive; handles
 /// are these numbers. A triangle keeps its handle while it exists, even if its corners change.
 ///
-/// Memory: about 110 bytes per vertex of the full surface and 55 per triangle that exists.
+/// Memory: about 90 bytes per vertex of the full surface and 50 per triangle that exists.
 class SurfaceFront {
  public:
   using Point = Point3;
