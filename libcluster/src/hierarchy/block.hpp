@@ -75,10 +75,9 @@ class BlockProcessor {
 
   /// Fills in clustering, first, order and summaries. At most half of the points, rounded up,
   /// become representatives, because otherwise the hierarchy might never end. If the facility cost
-  /// is too low for that, raises it for this block. With medians, enough become
-  /// representatives (see HierarchyOptions::medians), except in the block that states the number of
-  /// its medians. Throws:
-  /// std::invalid_argument as check_ground_map() does.
+  /// is too low for that, raises it for this block. With medians, enough become representatives
+  /// (see HierarchyOptions::medians), except in the block that states the number of its medians.
+  /// Throws: std::invalid_argument as check_ground_map() does.
   void process(HierarchyBlock& block);
 
  private:

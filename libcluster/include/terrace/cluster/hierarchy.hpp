@@ -98,13 +98,13 @@ struct HierarchyOptions {
   /// 0: the top is the first level that fits one block.
   ///
   /// The first level that fits one block is clustered by k_median(), with the counts of level-0
-  /// points as weights. To keep that level fine, each block chooses its
-  /// facility cost so that at least 25 representatives per median of a full block remain, but no
-  /// more than a quarter of the points need to (fewer remain if points coincide). The facility cost
-  /// of `block` is not used. With a block_size of 100 medians or more, the cost of
-  /// connecting all points to their nearest medians is usually 1 to 2 % above that of k_median()
-  /// of all points in memory. The last step takes O(block_size^2) time per round of swaps. Must be
-  /// below block_size; without corners and outliers.
+  /// points as weights. To keep that level fine, each block chooses its facility cost so that at
+  /// least 25 representatives per median of a full block remain, but no more than a quarter of the
+  /// points need to (fewer remain if points coincide). The facility cost of `block` is not used.
+  /// With a block_size of 100 medians or more, the cost of connecting all points to their nearest
+  /// medians is usually 1 to 2 % above that of k_median() of all points in memory. The last step
+  /// takes O(block_size^2) time per round of swaps. Must be below block_size; without corners and
+  /// outliers.
   /// Source: L. O'Callaghan et al., Streaming-data algorithms for high-quality clustering, ICDE
   /// 2002 (thesis 4.3, 7.1).
   std::size_t medians = 0;
