@@ -52,7 +52,8 @@ void need_all_points(const stream::Store& store, unsigned level, std::uint64_t p
 }
 
 void need_memory_for_surface(const stream::Store& store, std::uint64_t points,
-                             std::uint64_t bytes_per_point, std::uint64_t memory_bytes) {
+                             std::uint64_t bytes_per_point, std::uint64_t memory_bytes,
+                             const stream::Message& remedy) {
   // Of the program, and for reading the store.
   constexpr std::uint64_t kOtherBytes = std::uint64_t{48} << 20;
   const std::uint64_t needed = kOtherBytes + points * bytes_per_point;
@@ -61,7 +62,7 @@ void need_memory_for_surface(const stream::Store& store, std::uint64_t points,
                       stream::message("a surface of {} needs {}, {memory_bytes} allows {}",
                                       counted(points, "point"), readable_bytes(needed),
                                       readable_bytes(memory_bytes)))
-      .remedy(stream::message("choose a coarser {level} or a smaller {region}"));
+      .remedy(remedy);
 }
 
 std::string extent_text(const stream::Store& store) {

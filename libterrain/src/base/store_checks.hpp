@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include <terrace/stream/message.hpp>
 #include <terrace/stream/store.hpp>
 
 /// Requirements of requests on a store, checked before any work.
@@ -22,9 +23,11 @@ void need_level(const stream::Store& store, unsigned level);
 /// Throws: stream::Error if the clusters of a level and of those above do not have as many points
 /// as the manifest says. Call it before reading them without Store::for_each().
 void need_all_points(const stream::Store& store, unsigned level, std::uint64_t points);
-/// Throws: stream::Error if a surface of that many points does not fit in memory.
+/// Throws: stream::Error with this remedy if a surface of that many points does not fit in memory.
 void need_memory_for_surface(const stream::Store& store, std::uint64_t points,
-                             std::uint64_t bytes_per_point, std::uint64_t memory_bytes);
+                             std::uint64_t bytes_per_point, std::uint64_t memory_bytes,
+                             const stream::Message& remedy =
+                                 stream::message("choose a coarser {level} or a smaller {region}"));
 /// Returns the extent of the points as text: "x from 0 to 10, y from 0 to 5, z from -1 to 1". In a
 /// view, only points that meet the condition count. Throws: stream::Error if no point does.
 std::string extent_text(const stream::Store& store);

@@ -35,9 +35,9 @@ SurfaceView::SurfaceView(const stream::Store& store, const tri::ViewOptions& opt
             const stream::Store source = store.with_stop(context.stop);
             // While the store is read: the stored tree and triangles, and those of the view.
             constexpr std::uint64_t kBytesPerPoint = 400;
-            need_memory_for_surface(source, source.points(),
-                                    kBytesPerPoint + source.schema().payload_size(),
-                                    context.memory_or(0));
+            need_memory_for_surface(
+                source, source.points(), kBytesPerPoint + source.schema().payload_size(),
+                context.memory_or(0), stream::message("view it without its stored surface"));
             return source;
           }(),
           view_frame(store).ground(), options) {}
