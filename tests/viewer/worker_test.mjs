@@ -165,7 +165,7 @@ class Arrays {
 
 for (const name of ['ball', 'kept']) {
   test(`${name}: changed arrays equal those of a new worker, closed and facing outward`, async () => {
-    const flight = sites.flight(name, {kind: 'surface'});
+    const flight = sites.flight(name, {kind: 'surface'}).slice(0, 6);
     const arrays = new Arrays(32), fresh = new Arrays(32);
     const flyer = new Tested(name, {changed: message => arrays.apply(message)});
     await flyer.opened();
