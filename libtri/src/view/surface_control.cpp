@@ -209,6 +209,8 @@ void SurfaceControl::Impl::apply_pins(std::size_t block) {
 // Finds the demand above which there are at most as many vertices as there is room for.
 void SurfaceControl::Impl::find_limit() {
   limit = {};
+  const std::size_t room = options.max_points - std::min(options.max_points, always);
+  if (vertices.size() <= room) return;
   keeps.clear();
   for (std::size_t b = 0; b < bounds.size(); ++b) {
     if (!measured[b]) continue;
@@ -217,7 +219,6 @@ void SurfaceControl::Impl::find_limit() {
       keeps.emplace_back(demand.keep[i], columns.error(i));
     }
   }
-  const std::size_t room = options.max_points - std::min(options.max_points, always);
   if (keeps.size() <= room) return;
   const auto first_without = keeps.begin() + static_cast<std::ptrdiff_t>(room);
   std::nth_element(keeps.begin(), first_without, keeps.end(), std::greater<>());
