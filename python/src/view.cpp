@@ -56,6 +56,26 @@ class AnyView {
   virtual void to_metres(std::span<stream::Point3> points) = 0;
 };
 
+/// Implements AnyView::attributes(). shown: what has the vertices.
+template <class View, class Shown>
+std::vector<std::byte> records_of(const View& view, const Shown& shown,
+                                  std::span<const std::int32_t> vertices) {
+  std::vector<std::byte> records;
+  for (const std::int32_t number : vertices) {
+    const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
+    if (number < 0 || !shown.alive(vertex)) {
+      throw std::invalid_argument("there is no vertex " + std::to_string(number));
+    }
+    const auto record = view.attributes(vertex);
+    if (record.empty()) {
+      throw std::invalid_argument("the attributes of vertex " + std::to_string(number) +
+                                  " are no longer kept: read them after the frame that adds it");
+    }
+    records.insert(records.end(), record.begin(), record.end());
+  }
+  return records;
+}
+
 template <class Shown>
 class ViewOf final : public AnyView {
  public:
@@ -84,20 +104,7 @@ class ViewOf final : public AnyView {
     pin ? view_.pin(cluster, *pin) : view_.unpin(cluster);
   }
   std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) override {
-    std::vector<std::byte> records;
-    for (const std::int32_t number : vertices) {
-      const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
-      if (number < 0 || !view_.model().triangulation().alive(vertex)) {
-        throw std::invalid_argument("there is no vertex " + std::to_string(number));
-      }
-      const auto record = view_.attributes(vertex);
-      if (record.empty()) {
-        throw std::invalid_argument("the attributes of vertex " + std::to_string(number) +
-                                    " are no longer kept: read them after the frame that adds it");
-      }
-      records.insert(records.end(), record.begin(), record.end());
-    }
-    return records;
+    return records_of(view_, view_.model().triangulation(), vertices);
   }
   void to_metres(std::span<stream::Point3> points) override {
     for (stream::Point3& p : points) p = view_.in_view_frame(p);
@@ -160,16 +167,7 @@ class ViewOfStoredSurface final : public AnyView {
     pin ? view_.pin(cluster, *pin) : view_.unpin(cluster);
   }
   std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) override {
-    std::vector<std::byte> records;
-    for (const std::int32_t number : vertices) {
-      const tri::VertexId vertex{static_cast<std::uint32_t>(number)};
-      if (number < 0 || !view_.surface().alive(vertex)) {
-        throw std::invalid_argument("there is no vertex " + std::to_string(number));
-      }
-      const auto record = view_.attributes(vertex);
-      records.insert(records.end(), record.begin(), record.end());
-    }
-    return records;
+    return records_of(view_, view_.surface(), vertices);
   }
   void to_metres(std::span<stream::Point3> points) override {
     for (stream::Point3& p : points) p = view_.in_view_frame(p);

@@ -40,8 +40,7 @@ struct GeoJsonGeometry {
 
 /// Appends the geometries of a GeoJSON object, including those in nested collections, and its
 /// numeric properties. Other properties, and numbers beyond the third of a position, are ignored.
-/// item: the object's text, which begins
-/// at byte `offset` of `file`, for messages. Throws: Error.
+/// item: the object's text, which begins at byte `offset` of `file`, for messages. Throws: Error.
 void append_geometry(std::string_view item, const std::string& file, std::uint64_t offset,
                      GeoJsonGeometry& geometry);
 
