@@ -31,6 +31,8 @@ void HierarchyBuilder::push(std::span<const Point3> positions, std::span<const s
   impl_->engine.push(positions, payload);
 }
 
+void HierarchyBuilder::push_heads(const ClusterHeads& heads) { impl_->engine.push_heads(heads); }
+
 HierarchyResult HierarchyBuilder::finish() { return impl_->engine.finish(); }
 
 }  // namespace terrace::cluster

@@ -98,6 +98,31 @@ Elliptical::Elliptical(const Point3& semi_axes, const LinearMap& axes) : map_{},
   least_scale_ = 1.0 / std::max({semi_axes[0], semi_axes[1], semi_axes[2]});
 }
 
+Elliptical::Elliptical(const LinearMap& map) : map_(map), least_scale_(0.0) {
+  const auto minor = [&map](std::size_t i, std::size_t j) {
+    const std::size_t r1 = (i + 1) % 3, r2 = (i + 2) % 3, c1 = (j + 1) % 3, c2 = (j + 2) % 3;
+    return map[3 * r1 + c1] * map[3 * r2 + c2] - map[3 * r1 + c2] * map[3 * r2 + c1];
+  };
+  const double plane = map[0] * map[4] - map[1] * map[3];
+  const double determinant = map[0] * minor(0, 0) + map[1] * minor(0, 1) + map[2] * minor(0, 2);
+  const bool is_symmetric = map[1] == map[3] && map[2] == map[6] && map[5] == map[7];
+  const bool is_finite =
+      std::all_of(map.begin(), map.end(), [](double m) { return std::isfinite(m); });
+  if (!is_finite || !is_symmetric || !(map[0] > 0.0 && plane > 0.0 && determinant > 0.0)) {
+    throw std::invalid_argument(
+        "the matrix of an ellipsoid is not finite, symmetric and positive definite");
+  }
+  // The norm of the inverse is at most the root of the sum of its squares.
+  double squares = 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      const double inverse = minor(i, j) / determinant;
+      squares += inverse * inverse;
+    }
+  }
+  least_scale_ = 1.0 / std::sqrt(squares);
+}
+
 EllipticalField::EllipticalField(std::vector<Region> regions, const std::optional<Frame>& frame)
     : regions_(std::move(regions)), frame_(frame) {
   for (std::size_t r = 0; r < regions_.size(); ++r) {

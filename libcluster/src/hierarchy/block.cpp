@@ -126,6 +126,17 @@ void HierarchyBlock::append_representative(const HierarchyBlock& below, std::siz
   heads.push_back(below.summaries[c]);
 }
 
+void HierarchyBlock::append_head(const ClusterHeads& from, std::size_t point,
+                                 std::size_t payload_size) {
+  assert(level == from.level);
+  positions.push_back(from.positions[point]);
+  const auto bytes = from.payload.subspan(point * payload_size, payload_size);
+  payload.insert(payload.end(), bytes.begin(), bytes.end());
+  const auto below = from.children.subspan(point * level, level);
+  children.insert(children.end(), below.begin(), below.end());
+  heads.push_back(from.summaries[point]);
+}
+
 ClusteredBlock HierarchyBlock::finished() const {
   return {level,    number, positions, payload, children, first, order, clustering.facilities,
           summaries};

@@ -44,6 +44,8 @@ struct HierarchyBlock {
   /// cluster, on its level.
   void append_representative(const HierarchyBlock& below, std::size_t c, std::uint64_t ordinal,
                              std::size_t payload_size);
+  /// Appends a point that heads existing clusters.
+  void append_head(const ClusterHeads& from, std::size_t point, std::size_t payload_size);
   /// Returns the processed block as the sink receives it.
   [[nodiscard]] ClusteredBlock finished() const;
 };

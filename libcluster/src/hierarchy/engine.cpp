@@ -81,8 +81,7 @@ HierarchyEngine::HierarchyEngine(HierarchyOptions options, HierarchySink& sink,
                                  const std::function<ClusterFunction()>& make_cluster)
     : options_(checked(std::move(options))),
       sink_(sink),
-      levels_(1),
-      base_(levels_.front()),
+      base_(level_at(0)),
       pipeline_(options_.threads,
                 {[this](HierarchyBlock& block, unsigned thread) { process(block, thread); },
                  [this](HierarchyBlock& block) { commit(block); }, options_.on_failure}) {
@@ -135,6 +134,45 @@ void HierarchyEngine::append(std::span<const Point3> positions,
   base_.points += positions.size();
 }
 
+/// Returns a level; adds it and those below if necessary.
+auto HierarchyEngine::level_at(unsigned number) -> Level& {
+  const std::vector<std::uint64_t>& existing = options_.existing_clusters;
+  while (levels_.size() <= number) {
+    const std::size_t added = levels_.size();
+    Level& level = levels_.emplace_back();
+    level.level = static_cast<unsigned>(added);
+    if (added < existing.size()) level.clusters = existing[added];
+  }
+  return levels_[number];
+}
+
+void HierarchyEngine::push_heads(const ClusterHeads& heads) {
+  check_open();
+  const std::size_t count = heads.positions.size();
+  if (heads.payload.size() != count * options_.payload_size ||
+      heads.children.size() != count * heads.level || heads.summaries.size() != count) {
+    throw std::invalid_argument("the payload, children and summaries are not those of " +
+                                std::to_string(count) + " points");
+  }
+  if (heads.level == 0) throw std::invalid_argument("points of level 0 head no clusters");
+  if (const std::size_t bad = first_not_finite(heads.positions); bad < count) {
+    throw std::invalid_argument("point " + std::to_string(bad) +
+                                " of the batch has a coordinate that is not finite");
+  }
+  ended_ = true;             // in case anything below throws
+  pipeline_.wait_for_all();  // upper levels belong to the committing thread
+  lowest_top_ = std::max(lowest_top_, heads.level);
+  Level& level = level_at(heads.level);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (level.open && level.open->size() == options_.block_size) submit(level);
+    if (!level.open) level.open = pipeline_.take(heads.level);
+    level.open->append_head(heads, i, options_.payload_size);
+    ++level.points;
+  }
+  pipeline_.wait_for_all();
+  ended_ = false;
+}
+
 void HierarchyEngine::submit(Level& level) {
   level.open->number = level.blocks++;
   pipeline_.submit(std::move(level.open));
@@ -147,12 +185,9 @@ void HierarchyEngine::process(HierarchyBlock& block, unsigned thread) {
 
 void HierarchyEngine::commit(HierarchyBlock& block) {
   sink_.commit(block.level, std::move(block.prepared));
-  if (levels_.size() <= block.level + 1) {
-    levels_.emplace_back().level = block.level + 1;
-  }
+  Level& upper = level_at(block.level + 1);
   outliers_ += block.outliers;
   Level& level = levels_[block.level];
-  Level& upper = levels_[block.level + 1];
   for (std::size_t c = 0; c < block.summaries.size(); ++c) {
     if (upper.open && upper.open->size() == options_.block_size) submit(upper);
     if (!upper.open) upper.open = pipeline_.take(upper.level);
@@ -167,8 +202,8 @@ HierarchyResult HierarchyEngine::finish() {
   // A level that has submitted a block also has an open one. wait_for_all() completes the level
   // above, which exists by then.
   unsigned top = 0;
-  for (; levels_[top].blocks > 0; ++top) {
-    submit(levels_[top]);
+  for (; levels_[top].blocks > 0 || top < lowest_top_; ++top) {
+    if (levels_[top].open) submit(levels_[top]);
     pipeline_.wait_for_all();
   }
   pipeline_.wait_for_all();

@@ -27,6 +27,7 @@ class HierarchyEngine {
 
   /// See HierarchyBuilder.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload);
+  void push_heads(const ClusterHeads& heads);
   HierarchyResult finish();
 
  private:
@@ -40,10 +41,11 @@ class HierarchyEngine {
     BlockPtr open;
     std::uint64_t points = 0;
     std::uint64_t blocks = 0;    // blocks submitted
-    std::uint64_t clusters = 0;  // clusters committed
+    std::uint64_t clusters = 0;  // clusters committed, and those that existed before
   };
 
   void append(std::span<const Point3> positions, std::span<const std::byte> payload);
+  Level& level_at(unsigned number);
   void submit(Level& level);
   void process(HierarchyBlock& block, unsigned thread);
   void commit(HierarchyBlock& block);
@@ -57,6 +59,7 @@ class HierarchyEngine {
   // belong to the committing thread. This is a deque, so that adding a level does not move `base_`.
   std::deque<Level> levels_;
   Level& base_;
+  unsigned lowest_top_ = 0;     // the top is at least this level
   std::uint64_t outliers_ = 0;  // outliers in committed blocks
   bool ended_ = false;
   BlockPipeline pipeline_;  // last, because its threads use all members above

@@ -148,6 +148,9 @@ struct HierarchyOptions {
   /// itself.
   PayloadCorners corners;
   std::size_t payload_size = 0;  ///< bytes that travel with each point
+  /// The number of clusters that each level, from 0, has already: new clusters are numbered from
+  /// there. Levels beyond the list have none. See HierarchyBuilder::push_heads().
+  std::vector<std::uint64_t> existing_clusters;
   /// Number of working threads, including the caller's, which clusters blocks instead of waiting.
   /// Does not change the hierarchy. With 1 (or 0) everything runs on the caller's thread.
   unsigned threads = 1;
@@ -164,11 +167,22 @@ struct HierarchyOptions {
   std::function<void()> on_failure;
 };
 
+/// Points above level 0 with the existing clusters that they head.
+struct ClusterHeads {
+  unsigned level = 0;  ///< of the points; at least 1
+  std::span<const Point3> positions;
+  std::span<const std::byte> payload;         ///< HierarchyOptions::payload_size bytes per point
+  std::span<const std::uint64_t> children;    ///< `level` ordinals per point, level 0 first
+  std::span<const ClusterSummary> summaries;  ///< of the cluster of level - 1 that each point heads
+};
+
 struct HierarchyResult {
+  /// Points passed to push().
   std::uint64_t points = 0;
   unsigned top = 0;
   /// For each level from 0 to the top: the number of points whose highest level is this one or
-  /// above, and the number of clusters. The root counts as one cluster.
+  /// above, and the number of clusters. The root counts as one cluster. Points of existing
+  /// hierarchies count only on the levels where they were passed, and those above.
   std::vector<std::uint64_t> level_points, level_clusters;
   std::uint64_t outliers = 0;
 };
@@ -206,6 +220,14 @@ class HierarchyBuilder {
   ///   1e150; for a channel or corner that is not finite; for a custom distance that is negative or
   ///   not finite; and for a strategy that a block does not admit.
   void push(std::span<const Point3> positions, std::span<const std::byte> payload = {});
+
+  /// Joins existing hierarchies: appends the points of their top levels, each on its own level,
+  /// where they are clustered with the other points of that level. So many hierarchies become one
+  /// in the time that their tops take. The new top is on the same level as the highest of theirs,
+  /// or above. The options' `existing_clusters` are those of all joined hierarchies below their
+  /// tops, and children are numbered among them. Waits for the blocks before, so joins are cheap
+  /// only in few calls. Throws: as push(); std::invalid_argument for sizes that do not match.
+  void push_heads(const ClusterHeads& heads);
 
   /// Clusters the remaining points, from level 0 upward. The top is the first level that fits one
   /// block. Weights go up as counts of level-0 points and are scaled to mean 1 in each block's

@@ -50,12 +50,15 @@ class Elliptical {
   /// Creates an ellipsoid whose semi-axis i points along row i of `axes`, an orthonormal matrix.
   /// Throws: std::invalid_argument as above, and if the rows are not orthonormal to 1e-9.
   Elliptical(const Point3& semi_axes, const LinearMap& axes);
+  /// Creates an ellipsoid from its matrix, as map() returns it. Throws: std::invalid_argument if it
+  /// is not finite, symmetric and positive definite.
+  explicit Elliptical(const LinearMap& map);
 
   /// Returns M, which is symmetric and positive definite. For the Euclidean metric M is the
   /// identity.
   [[nodiscard]] const LinearMap& map() const { return map_; }
-  /// Returns the reciprocal of the longest semi-axis. For every vector v, |M v| is at least this
-  /// number times |v|.
+  /// Returns the reciprocal of the longest semi-axis; of a metric that was created from its matrix,
+  /// at least 0.57 times that. For every vector v, |M v| is at least this number times |v|.
   [[nodiscard]] double least_scale() const { return least_scale_; }
 
  private:
