@@ -451,6 +451,10 @@ next), and the position of the representative (None in the root)."""
         require(place < count and (not root or place == 0), "representative")
         self.representative = None if root else count // 2 + unzigzag(place)
 
+    def move(self, base, shift):
+        self.points = [tuple(c + by for c, by in zip(p, shift)) for p in self.points]
+        self.children = [[below + by for below in level] for level, by in zip(self.children, reversed(base))]
+
     def members(self):
         return [k for k in range(len(self.points)) if k != self.representative]
 
@@ -458,18 +462,23 @@ next), and the position of the representative (None in the root)."""
 class Level:
     def __init__(self, folder, number, levels, manifest):
         schema, grid = manifest["attributes"], manifest["kind"] == "grid"
-        segment, = levels[number]["segments"]
-        self.entries, files = [], {}
+        self.entries, self.clusters = [], []
+        for segment in levels[number]["segments"]:
+            self.segment(folder, number, levels, manifest, segment, schema, grid)
+        require(len(self.clusters) == levels[number]["clusters"], "clusters of the segments")
+
+    def segment(self, folder, number, levels, manifest, segment, schema, grid):
+        files = {}
         for part in ("data", "index"):
             files[part] = (folder / segment[part]["file"]).read_bytes()
             require(len(files[part]) == segment[part]["bytes"], "file size")
             require("%08x" % zlib.crc32(files[part]) == segment[part]["crc32"], "file checksum")
         index, data = files["index"], files["data"]
         directory = Bytes(index[-segment["directory_bytes"]:], "directory checksum")
-        clusters = segment["clusters"]
+        total, entries = segment["clusters"], []
         each = 4 if number > 0 else 16 if grid else 64
-        pages = (clusters + each - 1) // each
-        offsets, boxes, at = self.chapters(index, directory, pages, manifest["bounds"])
+        pages = (total + each - 1) // each
+        offsets, boxes, at = self.chapters(index, directory, pages, segment.get("bounds", manifest["bounds"]))
         sets = []
         for _ in range(directory.varint()):
             first, size = directory.varint(), directory.varint()
@@ -478,21 +487,24 @@ class Level:
         require(at == len(index) - segment["directory_bytes"], "tables")
         directory.done()
         for page in range(pages):
-            data_of, count = index[offsets[page]:offsets[page + 1]], min(each, clusters - each * page)
+            data_of, count = index[offsets[page]:offsets[page + 1]], min(each, total - each * page)
             tables = [tables for first, tables in sets if first <= each * page][-1]
-            self.entries += self.page(data_of, count, tables, len(schema), grid and number == 0)
-        self.clusters = []
-        for ordinal, entry in enumerate(self.entries):
+            entries += self.page(data_of, count, tables, len(schema), grid and number == 0)
+        clusters = []
+        for ordinal, entry in enumerate(entries):
             tables = [each for first, each in sets if first <= ordinal]
             body = data[entry["offset"]:entry["offset"] + entry["bytes"]]
             root = number == len(levels) - 1
-            self.clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
+            clusters.append(Cluster(body, entry, tables[-1], schema, number, root, grid) if entry["points"] else None)
 
-        for ordinal, cluster in enumerate(self.clusters):
+        for ordinal, cluster in enumerate(clusters):
             if cluster:
                 for box in boxes[ordinal // each]:
                     require(all(low <= place <= high for point in cluster.points
                                 for place, low, high in zip(point, *box)), "a page's box")
+                cluster.move(segment.get("base", [0] * number), segment.get("shift", [0] * 3))
+        self.entries += entries
+        self.clusters += clusters
 
     @staticmethod
     def chapters(index, directory, pages, bounds):

@@ -22,6 +22,13 @@ struct ManifestCase {
   std::function<void(ordered_json&)> edit;
 };
 
+/// Returns the segment of level 0, with separate bounds.
+ordered_json& segment_of(ordered_json& manifest) {
+  ordered_json& segment = manifest["levels"][0]["segments"][0];
+  if (!segment.contains("bounds")) segment["bounds"] = manifest["bounds"];
+  return segment;
+}
+
 TEST(StoreInvariants, RefusesManifestsWithInvalidCounts) {
   const auto level = [](ordered_json& m, std::size_t l) -> ordered_json& { return m["levels"][l]; };
   const std::vector<ManifestCase> cases{
@@ -34,14 +41,30 @@ TEST(StoreInvariants, RefusesManifestsWithInvalidCounts) {
       {"the levels are not numbered", [&](auto& m) { level(m, 1)["level"] = 2; }},
       {"the members of level 0", [&](auto& m) { level(m, 0)["members"] = 5; }},
       {"the members of level 0", [&](auto& m) { level(m, 1)["points"] = 100000; }},
-      {"does not have the level's clusters", [&](auto& m) { level(m, 0)["clusters"] = 5; }},
+      {"do not have the level's clusters", [&](auto& m) { level(m, 0)["clusters"] = 5; }},
       {"the clusters of level 0",
        [&](auto& m) {
          level(m, 0)["clusters"] = 5;
          level(m, 0)["segments"][0]["clusters"] = 5;
        }},
-      {"does not have one segment",
+      {"do not have the level's clusters",
        [&](auto& m) { level(m, 0)["segments"].push_back(level(m, 0)["segments"][0]); }},
+      {"do not have the level's clusters",
+       [&](auto& m) { level(m, 0)["segments"] = ordered_json::array(); }},
+      {"do not have the level's clusters",
+       [&](auto& m) {
+         level(m, 0)["segments"].push_back(level(m, 0)["segments"][0]);
+         level(m, 0)["segments"][1]["clusters"] = 0;
+       }},
+      {"does not have a base",
+       [&](auto& m) {
+         level(m, 1)["segments"][0]["base"] = {0, 0};
+       }},
+      {"an impossible base",
+       [&](auto& m) {
+         level(m, 1)["segments"][0]["base"] = {
+             level(m, 0)["clusters"].template get<std::uint64_t>() + 1};
+       }},
       // A number of clusters that is only possible if products wrap.
       {"more points than possible",
        [&](auto& m) {
@@ -108,12 +131,37 @@ TEST(StoreInvariants, RefusesManifestsWithInvalidPlaces) {
       {"a count", [](auto& m) { m["crs"]["epsg"] = 1e300; }},
       {"a count", [](auto& m) { m["crs"]["vertical_epsg"] = -5; }},
       {"an unknown type", [](auto& m) { m["coordinates"][0]["type"] = "int3"; }},
+      {"exceeds the bounds", [](auto& m) { segment_of(m)["bounds"]["max"][2] = 1e9; }},
+      {"exceeds the bounds", [](auto& m) { segment_of(m)["bounds"]["min"][0] = "nan"; }},
+      {"exceeds the bounds",
+       [](auto& m) {
+         segment_of(m)["shift"] = {1, 0, 0};
+       }},
+      {"an impossible shift",
+       [](auto& m) {
+         segment_of(m)["shift"] = {0, 0.5, 0};
+       }},
+      {"an impossible shift",
+       [](auto& m) {
+         segment_of(m)["shift"] = {0, 0, 1e300};
+       }},
+      {"three numbers",
+       [](auto& m) {
+         segment_of(m)["shift"] = {0, 0};
+       }},
   };
   for (const ManifestCase& c : cases) {
     StoreFiles files = testing::grid_files();
     testing::edit_manifest(files, c.edit);
     testing::expect_refused(files, c.expected);
   }
+}
+
+TEST(StoreInvariants, ChecksTheChildrenOfSegmentsWithABase) {
+  StoreFiles files = testing::grid_files();
+  testing::edit_manifest(files,
+                         [](ordered_json& m) { m["levels"][1]["segments"][0]["base"] = {1}; });
+  testing::expect_unreadable(files, "heads a cluster that does not exist");
 }
 
 TEST(StoreInvariants, RefusesManifestsWithUnknownWords) {

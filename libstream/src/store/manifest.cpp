@@ -63,6 +63,8 @@ Point3 point_of(const JsonValue& json) {
   return {number(xyz[0]), number(xyz[1]), number(xyz[2])};
 }
 
+Box3 box_of(const JsonValue& json) { return {point_of(json.at("min")), point_of(json.at("max"))}; }
+
 FileEntry file_of(const JsonValue& json) {
   FileEntry file{json.at("file").string(), json.at("bytes").count(),
                  from_hexadecimal(json.at("crc32").string())};
@@ -85,6 +87,33 @@ Crs crs_of(const JsonValue& json) {
   return crs;
 }
 
+/// manifest: with its bounds and the levels below.
+SegmentEntry segment_of(const JsonValue& json, const Manifest& manifest) {
+  SegmentEntry segment;
+  segment.clusters = json.at("clusters").count();
+  segment.data = file_of(json.at("data"));
+  segment.index = file_of(json.at("index"));
+  segment.directory_bytes = json.at("directory_bytes").count();
+  segment.bounds = json.has("bounds") ? box_of(json.at("bounds")) : manifest.bounds;
+  segment.base.assign(manifest.levels.size(), 0);
+  if (json.has("base")) {
+    const auto& base = items(json.at("base"), manifest.levels.size(),
+                             "a segment does not have a base for each level below");
+    for (std::size_t l = 0; l < base.size(); ++l) segment.base[l] = base[l].count();
+  }
+  if (json.has("shift")) {
+    const auto& shift = items(json.at("shift"), 3, "a shift does not have three numbers");
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double by = shift[axis].number();
+      if (!(std::abs(by) <= static_cast<double>(kMaxShift)) || by != std::floor(by)) {
+        throw Damage("a segment has an impossible shift");
+      }
+      segment.shift[axis] = static_cast<std::int64_t>(by);
+    }
+  }
+  return segment;
+}
+
 Manifest from_json(const JsonValue& json) {
   Manifest m;
   m.version = static_cast<int>(json.at("version").count());
@@ -97,7 +126,7 @@ Manifest from_json(const JsonValue& json) {
   m.schema.columns = json.at("columns").count();
   m.schema.rows = json.at("rows").count();
   if (const JsonValue& bounds = json.at("bounds"); bounds.kind() != JsonValue::Kind::null) {
-    m.bounds = {point_of(bounds.at("min")), point_of(bounds.at("max"))};
+    m.bounds = box_of(bounds);
   }
   m.mean_height = number(json.at("mean_height"));
   const auto& coordinates = items(json.at("coordinates"), 3, "there are not three coordinates");
@@ -114,8 +143,6 @@ Manifest from_json(const JsonValue& json) {
     m.schema.parameters.emplace_back(parameter.at("name").string(), parameter.at("value").string());
   }
   for (const JsonValue& level : json.at("levels").items()) {
-    const JsonValue& segment =
-        items(level.at("segments"), 1, "a level does not have one segment").front();
     if (level.at("level").count() != m.levels.size()) {
       throw Damage("the levels are not numbered from 0 up");
     }
@@ -123,12 +150,9 @@ Manifest from_json(const JsonValue& json) {
     entry.points = level.at("points").count();
     entry.members = level.at("members").count();
     entry.clusters = level.at("clusters").count();
-    if (segment.at("clusters").count() != entry.clusters) {
-      throw Damage("a level's segment does not have the level's clusters");
+    for (const JsonValue& segment : level.at("segments").items()) {
+      entry.segments.push_back(segment_of(segment, m));
     }
-    entry.data = file_of(segment.at("data"));
-    entry.index = file_of(segment.at("index"));
-    entry.directory_bytes = segment.at("directory_bytes").count();
     m.levels.push_back(std::move(entry));
   }
   if (json.has("surface")) {
@@ -149,7 +173,7 @@ void check_counts(const Manifest& m) {
   if (m.points > kMaxStorePoints || m.schema.nodata > kMaxStorePoints) {
     throw Damage("the store has more points than possible");
   }
-  if (m.points == 0 && (m.levels.size() > 1 || m.levels[0].data.bytes > 0)) {
+  if (m.points == 0 && (m.levels.size() > 1 || m.levels[0].data_bytes() > 0)) {
     throw Damage("a store without points has clusters");
   }
   for (std::size_t l = 0; l < m.levels.size(); ++l) {
@@ -163,13 +187,38 @@ void check_counts(const Manifest& m) {
     if (level.clusters != (top ? 1 : above)) {
       throw Damage("the clusters of level " + std::to_string(l) + " do not add up");
     }
-    if (level.clusters / kMaxPageClusters > level.index.bytes / kMinPageBytes) {
-      throw Damage("level " + std::to_string(l) + " has more clusters than its index can hold");
-    }
     if (level.points / kMaxPoints > level.clusters) {
       throw Damage("level " + std::to_string(l) + " has more points than its clusters can hold");
     }
   }
+}
+
+void check_segments(const Manifest& m) {
+  std::size_t segments = 0;
+  for (std::size_t l = 0; l < m.levels.size(); ++l) {
+    const LevelEntry& level = m.levels[l];
+    const std::string name = "level " + std::to_string(l);
+    std::uint64_t clusters = 0;
+    for (const SegmentEntry& segment : level.segments) {
+      if (segment.clusters == 0 || segment.clusters > level.clusters - clusters) {
+        throw Damage("the segments of " + name + " do not have the level's clusters");
+      }
+      clusters += segment.clusters;
+      if (segment.clusters / kMaxPageClusters > segment.index.bytes / kMinPageBytes) {
+        throw Damage(name + " has more clusters than its index can hold");
+      }
+      for (std::size_t below = 0; below < l; ++below) {
+        if (segment.base[below] > m.levels[below].clusters) {
+          throw Damage("a segment of " + name + " has an impossible base");
+        }
+      }
+    }
+    if (clusters != level.clusters) {
+      throw Damage("the segments of " + name + " do not have the level's clusters");
+    }
+    segments += level.segments.size();
+  }
+  if (segments > kMaxSegments) throw Damage("there are too many segments");
 }
 
 void check_surface(const Manifest& m) {
@@ -203,6 +252,14 @@ void check_coordinates(const Manifest& m) {
   }
   if (m.points > 0 && !is_finite_in_crs(m.schema, m.bounds)) {
     throw Damage("the bounds are not finite in the CRS");
+  }
+  for (const LevelEntry& level : m.levels) {
+    for (const SegmentEntry& segment : level.segments) {
+      const Box3 box = shifted(segment.bounds, segment.shift);
+      if (m.points > 0 && !(m.bounds.contains(box.min) && m.bounds.contains(box.max))) {
+        throw Damage("a segment exceeds the bounds of the store");
+      }
+    }
   }
   if (!m.schema.grid) {
     if (m.schema.columns != 0 || m.schema.rows != 0) throw Damage("a cloud has columns or rows");
@@ -241,6 +298,26 @@ Error damaged(const std::string& file, const std::string& cause) {
 }
 
 }  // namespace
+
+std::uint64_t LevelEntry::data_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const SegmentEntry& segment : segments) bytes += segment.data.bytes;
+  return bytes;
+}
+
+std::uint64_t LevelEntry::index_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const SegmentEntry& segment : segments) bytes += segment.index.bytes;
+  return bytes;
+}
+
+Box3 shifted(Box3 box, const std::array<std::int64_t, 3>& shift) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    box.min[axis] += static_cast<double>(shift[axis]);
+    box.max[axis] += static_cast<double>(shift[axis]);
+  }
+  return box;
+}
 
 bool is_finite_in_crs(const Placement& placement, const Box3& stored) {
   const Box3 box = world_box(placement, stored);
@@ -296,6 +373,7 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
       throw damaged(file, "its checksum is wrong");
     }
     Manifest manifest = from_json(json);
+    check_segments(manifest);
     check_counts(manifest);
     check_surface(manifest);
     check_coordinates(manifest);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -41,11 +42,27 @@ struct FileEntry {
   std::uint32_t checksum = 0;
 };
 
-/// A level as the manifest lists it, with its one segment.
-struct LevelEntry {
-  std::uint64_t points = 0, members = 0, clusters = 0;
+/// The clusters that one run wrote to a level, with consecutive ordinals. Its files never change,
+/// so what differs between the run's store and this one is added when they are read.
+struct SegmentEntry {
+  std::uint64_t clusters = 0;
   FileEntry data, index;
   std::uint64_t directory_bytes = 0;  ///< at the end of the index file
+  /// Contains all points of the clusters and below them, in the segment's coordinates.
+  Box3 bounds;
+  /// To be added to the ordinals of clusters that its points head, by level.
+  std::vector<std::uint64_t> base;
+  /// To be added to stored coordinates.
+  std::array<std::int64_t, 3> shift{};
+};
+
+/// A level as the manifest lists it.
+struct LevelEntry {
+  std::uint64_t points = 0, members = 0, clusters = 0;
+  std::vector<SegmentEntry> segments;  ///< in the order of their clusters
+
+  [[nodiscard]] std::uint64_t data_bytes() const;
+  [[nodiscard]] std::uint64_t index_bytes() const;
 };
 
 /// The surface as the manifest lists it.
@@ -65,6 +82,13 @@ struct Manifest {
   std::optional<SurfaceEntry> surface;
   std::uint32_t checksum = 0;  ///< checksum of the text; set by parse_manifest()
 };
+
+/// The limit of segments of all levels, and of a segment's shift.
+inline constexpr std::size_t kMaxSegments = std::size_t{1} << 20;
+inline constexpr std::int64_t kMaxShift = std::int64_t{1} << 52;
+
+/// Returns the box moved by a segment's shift.
+[[nodiscard]] Box3 shifted(Box3 box, const std::array<std::int64_t, 3>& shift);
 
 /// True if the corners of the box in the CRS are finite.
 bool is_finite_in_crs(const Placement& placement, const Box3& stored);

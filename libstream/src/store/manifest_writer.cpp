@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -32,6 +33,25 @@ Json file_json(const FileEntry& file) {
   return {{"file", file.name}, {"bytes", file.bytes}, {"crc32", hexadecimal(file.checksum)}};
 }
 
+Json box_json(const Box3& box) {
+  return {{"min", point_json(box.min)}, {"max", point_json(box.max)}};
+}
+
+/// Leaves out what a segment shares with its store.
+Json segment_json(const SegmentEntry& segment, const Box3& bounds) {
+  Json json = {{"clusters", segment.clusters},
+               {"data", file_json(segment.data)},
+               {"index", file_json(segment.index)},
+               {"directory_bytes", segment.directory_bytes}};
+  if (segment.bounds != bounds) json["bounds"] = box_json(segment.bounds);
+  const auto is_zero = [](auto number) { return number == 0; };
+  if (!std::all_of(segment.base.begin(), segment.base.end(), is_zero)) json["base"] = segment.base;
+  if (!std::all_of(segment.shift.begin(), segment.shift.end(), is_zero)) {
+    json["shift"] = segment.shift;
+  }
+  return json;
+}
+
 Json crs_json(const Crs& crs) {
   return {{"epsg", crs.epsg},
           {"vertical_epsg", crs.vertical_epsg},
@@ -52,9 +72,7 @@ Json to_json(const Manifest& m) {
   json["nodata"] = m.schema.nodata;
   json["columns"] = m.schema.columns;
   json["rows"] = m.schema.rows;
-  json["bounds"] = m.bounds.empty()
-                       ? Json(nullptr)
-                       : Json{{"min", point_json(m.bounds.min)}, {"max", point_json(m.bounds.max)}};
+  json["bounds"] = m.bounds.empty() ? Json(nullptr) : box_json(m.bounds);
   json["mean_height"] = number(m.mean_height);
   json["coordinates"] = Json::array();
   for (const Channel& channel : m.schema.coordinates) {
@@ -75,15 +93,15 @@ Json to_json(const Manifest& m) {
   json["levels"] = Json::array();
   for (std::size_t l = 0; l < m.levels.size(); ++l) {
     const LevelEntry& level = m.levels[l];
-    const Json segment = {{"clusters", level.clusters},
-                          {"data", file_json(level.data)},
-                          {"index", file_json(level.index)},
-                          {"directory_bytes", level.directory_bytes}};
+    Json segments = Json::array();
+    for (const SegmentEntry& segment : level.segments) {
+      segments.push_back(segment_json(segment, m.bounds));
+    }
     json["levels"].push_back({{"level", l},
                               {"points", level.points},
                               {"members", level.members},
                               {"clusters", level.clusters},
-                              {"segments", Json::array({segment})}});
+                              {"segments", std::move(segments)}});
   }
   if (m.surface) {
     json["surface"] = {{"vertices", m.surface->vertices},

@@ -11,6 +11,7 @@
 
 #include "store/codec/bytes.hpp"
 #include "store/read/level_reader.hpp"
+#include "store/read/segment_reader.hpp"
 #include "store/read/store_impl.hpp"
 #include "terrace/stream/stored_surface.hpp"
 #include "with_type.hpp"
@@ -107,7 +108,7 @@ class Verification {
   };
   /// State of a thread that reads clusters.
   struct ReaderState {
-    explicit ReaderState(const LevelReader& level) : ahead(level.data()) {}
+    explicit ReaderState(const SegmentReader& segment) : ahead(segment.data()) {}
 
     SequentialBytes ahead;
     ClusterDecoder decoder;
@@ -141,14 +142,29 @@ class Verification {
   }
 
   void check_files() {
-    std::vector<std::vector<Problem>> problems(2 * levels_.size());
+    struct File {
+      std::size_t level = 0, segment = 0;
+      bool is_index = false;
+    };
+    std::vector<File> files;
+    for (std::size_t l = 0; l < levels_.size(); ++l) {
+      for (std::size_t s = 0; s < levels_[l]->segments(); ++s) {
+        files.push_back({l, s, false});
+        files.push_back({l, s, true});
+      }
+    }
+    std::vector<std::vector<Problem>> problems(files.size());
     team_.run(problems.size(), [&](std::size_t i, std::size_t) {
-      const LevelReader& level = *levels_[i / 2];
-      const auto& expected = manifest_.levels[i / 2];
-      if (i % 2 == 0) {
-        check_file(level.data(), expected.data.checksum, problems[i]);
-      } else {
-        check_file(level.index(), expected.index.checksum, problems[i]);
+      const auto& [l, s, is_index] = files[i];
+      const SegmentEntry& expected = manifest_.levels[l].segments[s];
+      try {
+        const LevelReader::Handle segment = levels_[l]->segment(s);
+        check_file(is_index ? segment->index() : segment->data(),
+                   (is_index ? expected.index : expected.data).checksum, problems[i]);
+      } catch (const Error& error) {
+        problems[i].push_back({.file = (is_index ? expected.index : expected.data).name,
+                               .offset = 0,
+                               .what = error.what()});
       }
     });
     for (const std::vector<Problem>& found : problems) {
@@ -189,21 +205,12 @@ class Verification {
   /// Those of other levels, which determine the heads of clusters below, are checked one after
   /// another.
   void check_level(unsigned l) {
-    const LevelReader& level = *levels_[l];
-    std::vector<ReaderState> readers;
-    for (unsigned worker = 0; worker < team_.threads(); ++worker) readers.emplace_back(level);
-    std::vector<Page> pages(l == 0 ? std::size_t{kPagesPerThread} * team_.threads() : 1);
-    std::uint64_t data_end = 0;
-    for (std::uint64_t first = 0; first < level.pages(); first += pages.size()) {
-      const std::uint64_t count = std::min<std::uint64_t>(pages.size(), level.pages() - first);
-      team_.run(static_cast<std::size_t>(count), [&](std::size_t i, std::size_t worker) {
-        pages[i] = {};
-        check_page(l, first + i, readers[worker], pages[i]);
-      });
-      for (std::uint64_t i = 0; i < count; ++i) add_page(l, first + i, pages[i], data_end);
-    }
-    if (data_end != level.data().size()) {
-      problem(level.data().name(), data_end, "the clusters do not end where the file does");
+    for (std::size_t s = 0; s < levels_[l]->segments(); ++s) {
+      try {
+        check_segment(l, *levels_[l]->segment(s));
+      } catch (const Error& error) {
+        problem(manifest_.levels[l].segments[s].index.name, 0, error.what());
+      }
     }
     if (sums_[l].members != manifest_.levels[l].members) {
       problem(manifest_file_.name(), 0,
@@ -212,16 +219,34 @@ class Verification {
     }
   }
 
-  void add_page(unsigned l, std::uint64_t number, const Page& page, std::uint64_t& data_end) {
-    const LevelReader& level = *levels_[l];
+  void check_segment(unsigned l, const SegmentReader& segment) {
+    std::vector<ReaderState> readers;
+    for (unsigned worker = 0; worker < team_.threads(); ++worker) readers.emplace_back(segment);
+    std::vector<Page> pages(l == 0 ? std::size_t{kPagesPerThread} * team_.threads() : 1);
+    std::uint64_t data_end = 0;
+    for (std::uint64_t first = 0; first < segment.pages(); first += pages.size()) {
+      const std::uint64_t count = std::min<std::uint64_t>(pages.size(), segment.pages() - first);
+      team_.run(static_cast<std::size_t>(count), [&](std::size_t i, std::size_t worker) {
+        pages[i] = {};
+        check_page(l, segment, first + i, readers[worker], pages[i]);
+      });
+      for (std::uint64_t i = 0; i < count; ++i) add_page(l, segment, first + i, pages[i], data_end);
+    }
+    if (data_end != segment.data().size()) {
+      problem(segment.data().name(), data_end, "the clusters do not end where the file does");
+    }
+  }
+
+  void add_page(unsigned l, const SegmentReader& segment, std::uint64_t number, const Page& page,
+                std::uint64_t& data_end) {
     if (page.index) {
       for (std::uint32_t i = 0; i < page.index->clusters(); ++i) {
         // A cluster may have bytes of earlier clusters; otherwise clusters are contiguous.
         const std::uint64_t offset = page.index->offset(i), end = page.index->end(i);
-        if (offset != data_end && !(level.layout().small() && end <= data_end)) {
-          problem(level.data().name(), offset,
-                  about_cluster(l, number * level.layout().page_clusters() + i,
-                                "its bytes are not contiguous"));
+        if (offset != data_end && !(segment.layout().small() && end <= data_end)) {
+          const std::uint64_t ordinal = number * segment.layout().page_clusters() + i;
+          problem(segment.data().name(), offset,
+                  about_cluster(l, segment.first() + ordinal, "its bytes are not contiguous"));
         }
         data_end = std::max(data_end, end);
       }
@@ -233,41 +258,40 @@ class Verification {
     height_sum_ += page.height_sum;
   }
 
-  void check_page(unsigned l, std::uint64_t number, ReaderState& reader, Page& page) {
+  void check_page(unsigned l, const SegmentReader& segment, std::uint64_t number,
+                  ReaderState& reader, Page& page) {
     check_stop();
-    const LevelReader& level = *levels_[l];
     std::uint64_t page_offset = 0;
     try {
-      page_offset = level.page_offset(number);
-      page.index = level.page(number);
+      page_offset = segment.page_offset(number);
+      page.index = segment.page(number);
     } catch (const Error& error) {
-      return page.problem(level.index().name(), page_offset, error.what());
+      return page.problem(segment.index().name(), page_offset, error.what());
     } catch (const Damage& damage) {
-      return page.problem(level.index().name(), page_offset, damage.what());
+      return page.problem(segment.index().name(), page_offset, damage.what());
     }
     for (std::uint32_t i = 0; i < page.index->clusters(); ++i) {
-      const std::uint64_t ordinal = number * level.layout().page_clusters() + i;
+      const std::uint64_t ordinal = number * segment.layout().page_clusters() + i;
       const std::uint64_t offset = page.index->offset(i);
       try {
-        const Entry entry = level.entry(*page.index, ordinal);
-        level.read(ordinal, entry, offset, reader.ahead, reader.decoder, reader.points);
-        check_cluster(l, ordinal, record_of(entry, l, offset, level.top()), reader.points, page);
-        check_ranges(l, ordinal, offset, reader, page);
+        const Entry entry = segment.entry(*page.index, ordinal);
+        segment.read(ordinal, entry, offset, reader.ahead, reader.decoder, reader.points);
+        check_cluster(l, segment, ordinal, segment.record(entry, offset), reader.points, page);
+        check_ranges(l, segment, ordinal, offset, reader, page);
       } catch (const Error& error) {
-        page.problem(level.data().name(), offset, error.what());
+        page.problem(segment.data().name(), offset, error.what());
       }
     }
   }
 
-  void check_ranges(unsigned l, std::uint64_t ordinal, std::uint64_t offset, ReaderState& reader,
-                    Page& page) const {
-    const LevelReader& level = *levels_[l];
+  void check_ranges(unsigned l, const SegmentReader& segment, std::uint64_t ordinal,
+                    std::uint64_t offset, ReaderState& reader, Page& page) const {
     const ClusterPoints& points = reader.points;
-    level.ranges(ordinal, reader.ranges);
-    const std::size_t stride = level.layout().payload_size;
+    segment.ranges(ordinal, reader.ranges);
+    const std::size_t stride = segment.layout().payload_size;
     std::size_t at = 0;
     for (std::size_t a = 0; a < reader.ranges.size(); ++a) {
-      const ScalarType type = level.layout().attributes[a];
+      const ScalarType type = segment.layout().attributes[a];
       const auto inside = [&](const std::byte* record) {
         const std::uint64_t key = key_of(type, record + at);
         return reader.ranges[a].low <= key && key <= reader.ranges[a].high;
@@ -278,18 +302,19 @@ class Verification {
       }
       if (!all_inside) {
         page.problem(
-            level.data().name(), offset,
-            about_cluster(l, ordinal,
+            segment.data().name(), offset,
+            about_cluster(l, segment.first() + ordinal,
                           fmt::format("values of attribute {} are outside their range", a)));
       }
       at += size_of(type);
     }
   }
 
-  void check_cluster(unsigned l, std::uint64_t ordinal, const ClusterRecord& record,
-                     const ClusterPoints& points, Page& page) {
+  void check_cluster(unsigned l, const SegmentReader& segment, std::uint64_t number,
+                     const ClusterRecord& record, const ClusterPoints& points, Page& page) {
+    const std::uint64_t ordinal = segment.first() + number;
     const auto problem = [&](const std::string& what) {
-      page.problem(levels_[l]->data().name(), record.offset, about_cluster(l, ordinal, what));
+      page.problem(segment.data().name(), record.offset, about_cluster(l, ordinal, what));
     };
     page.members += points.size();
     const ClusterSummary& summary = record.summary;
@@ -298,12 +323,13 @@ class Verification {
     if (points.has_representative) inside &= summary.box.contains(points.representative);
     if (!inside) problem("a point is outside its box");
     Box3 clipped = summary.box;
+    const Box3 bounds = segment.bounds();
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      clipped.min[axis] = std::max(clipped.min[axis], manifest_.bounds.min[axis]);
-      clipped.max[axis] = std::min(clipped.max[axis], manifest_.bounds.max[axis]);
+      clipped.min[axis] = std::max(clipped.min[axis], bounds.min[axis]);
+      clipped.max[axis] = std::min(clipped.max[axis], bounds.max[axis]);
     }
     if (points.size() + points.has_representative > 0 &&
-        !holds(levels_[l]->page_box(ordinal), clipped)) {
+        !holds(segment.page_box(number), clipped)) {
       problem("the box exceeds its page's");
     }
     if (!(summary.error >= 0)) {
@@ -382,14 +408,19 @@ class Verification {
     const LevelSums& sums = sums_[l];
     const auto orphan = std::find(sums.headed.begin(), sums.headed.end(), false);
     if (orphan != sums.headed.end()) {
-      problem(levels_[l]->data().name(), 0,
+      problem(name_of(l), 0,
               about_cluster(static_cast<unsigned>(l),
                             static_cast<std::uint64_t>(orphan - sums.headed.begin()),
                             "has no parent point"));
     } else if (sums.heads != sums.representatives) {
-      problem(levels_[l]->data().name(), 0,
+      problem(name_of(l), 0,
               fmt::format("the representatives of level {} differ from their parent points", l));
     }
+  }
+
+  /// Returns the name of the file of a level's first clusters.
+  [[nodiscard]] std::string name_of(std::size_t level) const {
+    return levels_[level]->segment(0)->data().name();
   }
 
   void check_totals() {

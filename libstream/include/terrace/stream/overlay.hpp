@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/store.hpp"
@@ -25,6 +26,9 @@ struct OverlayValue {
 
   friend bool operator==(const OverlayValue&, const OverlayValue&) = default;
 };
+
+/// Returns the names of the overlays in a folder, in ascending order.
+[[nodiscard]] std::vector<std::string> overlays_in(const std::filesystem::path& folder);
 
 /// Writes an overlay. It appears under its name, complete and synced, when finish() returns.
 /// Memory: about 4096 values, the values of one cluster, and 20 bytes per 4096 values written.

@@ -52,6 +52,7 @@ struct StoreSchema : Schema {
 };
 
 class Store;
+struct StorePart;
 
 /// Writes a store. It appears under its name, complete and synced, when finish() returns; a writer
 /// that dies or throws before that leaves nothing that can be opened.
@@ -70,6 +71,19 @@ class StoreWriter {
   /// files, see Store::ownership_of()) or cannot be written.
   StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace = false,
               unsigned threads = 1);
+  /// Writes a store of the clusters of other stores and of those that are appended. On each level
+  /// the clusters of the parts come first, in the order of the parts, without those of their roots:
+  /// the caller appends the points of the roots on the roots' levels, with the new ordinals of the
+  /// clusters that they head. Clusters are not decoded: files are linked, or copied from another
+  /// file system. Surfaces are left out.
+  ///
+  /// One of the parts may be at `path`. The new store then replaces it in one step, unless another
+  /// process has changed it meanwhile, which is an Error of finish(). The ordinals of the clusters
+  /// of the first part stay the same.
+  /// schema: fits all parts once they are shifted; includes their `nodata`. Throws: Error, also for
+  /// a damaged copy; Stopped.
+  StoreWriter(const std::filesystem::path& path, StoreSchema schema,
+              std::span<const StorePart> parts, bool replace = false, unsigned threads = 1);
   ~StoreWriter();
   StoreWriter(const StoreWriter&) = delete;
   StoreWriter& operator=(const StoreWriter&) = delete;
@@ -82,7 +96,7 @@ class StoreWriter {
   /// The ordered half: one thread at a time. The order of a level's blocks defines the ordinals.
   /// Returns the ordinal of the block's first cluster; the others follow it.
   std::uint64_t append(EncodedPtr block);
-  /// Number of clusters appended to `level` so far.
+  /// Number of clusters of `level` so far.
   [[nodiscard]] std::uint64_t clusters(unsigned level) const;
 
   [[nodiscard]] const StoreSchema& schema() const;
@@ -141,6 +155,7 @@ struct LevelInfo {
   std::uint64_t clusters = 0;  ///< stored at this level
   std::uint64_t bytes = 0;     ///< clusters and index
   std::uint64_t index_bytes = 0;
+  std::size_t segments = 1;  ///< runs that wrote its clusters
 };
 
 /// The size of a store's surface, as the manifest states it.
@@ -171,7 +186,7 @@ class Store {
   static Store open(const std::filesystem::path& path);
   /// Opens a store whose files are not in a folder but in memory, in an archive or on a server.
   /// `name` replaces the folder in messages and in path(). `files` is kept if the store has a
-  /// surface. Throws as above, and what `files` throws.
+  /// surface or several segments. Throws as above, and what `files` throws.
   static Store open(const std::string& name, const OpenByName& files);
   /// Whether `path` is a store. If a writer moved the store aside in order to replace it and then
   /// died, this gives the store its name back. open() calls this.
@@ -259,6 +274,7 @@ class Store {
   bool verify(const std::function<void(const Problem&)>& report, unsigned threads = 1) const;
 
  private:
+  friend class StoreWriter;
   struct Impl;
   class View;
   class ConditionView;
@@ -268,6 +284,13 @@ class Store {
   std::shared_ptr<Impl> impl_;
   std::shared_ptr<const View> view_;
   std::stop_token stop_;
+};
+
+/// A store whose clusters become those of another one.
+struct StorePart {
+  Store store;
+  /// Added to its stored coordinates. Zero on axes whose coordinates are not integers.
+  std::array<std::int64_t, 3> shift{};
 };
 
 /// Writes a store of the same clusters, with those of each level in the order of a Hilbert curve

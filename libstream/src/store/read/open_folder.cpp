@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <vector>
 
 #include "io/temporary.hpp"
 #include "store/json.hpp"
@@ -13,6 +15,7 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/overlay.hpp"
 #include "terrace/stream/store.hpp"
 
 /// Opens a store in a folder, where a writer that died may have left it under another name.
@@ -60,6 +63,19 @@ bool is_overlay(const fs::path& path) {
 }
 
 }  // namespace
+
+std::vector<std::string> overlays_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code error, ignored;
+  fs::directory_iterator entry(folder, error);
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (entry->is_regular_file(ignored) && is_overlay(entry->path())) {
+      names.push_back(entry->path().filename().string());
+    }
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
 
 Ownership Store::ownership_of(const fs::path& folder) {
   const std::set<std::string> ours = files_of_store(folder);

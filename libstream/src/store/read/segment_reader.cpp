@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "store/read/level_reader.hpp"
+#include "store/read/segment_reader.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -47,30 +47,38 @@ std::unique_ptr<ByteSource> open_listed(const OpenByName& files, const FileEntry
 }
 
 template <class Read>
-auto LevelReader::from_directory(Read&& read) const {
+auto SegmentReader::from_directory(Read&& read) const {
   return translate_damage(read, [&](const char* cause) { return damaged_file(*index_, 0, cause); });
 }
 
-LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level)
+SegmentReader::SegmentReader(const OpenByName& files, const Manifest& manifest, unsigned level,
+                             const SegmentEntry& segment, std::uint64_t first)
     : layout_(manifest.schema, level),
-      clusters_(manifest.levels[level].clusters),
+      clusters_(segment.clusters),
+      first_(first),
       max_points_(std::min(layout_.max_points(), manifest.levels[level].points)),
       top_(level + 1 == manifest.levels.size()),
       store_points_(manifest.points),
-      bounds_(manifest.bounds),
-      data_(open_listed(files, manifest.levels[level].data)),
-      index_(open_listed(files, manifest.levels[level].index)),
+      bounds_(segment.bounds),
+      shift_{static_cast<double>(segment.shift[0]), static_cast<double>(segment.shift[1]),
+             static_cast<double>(segment.shift[2])},
+      is_shifted_(segment.shift != SegmentEntry{}.shift),
+      base_(segment.base),
+      data_(open_listed(files, segment.data)),
+      index_(open_listed(files, segment.index)),
       page_cache_(1),
       range_cache_(1),
       tables_cache_(1) {
   for (unsigned below = 0; below < level; ++below) {
     clusters_below_.push_back(manifest.levels[below].clusters);
+    is_based_ = is_based_ || base_[below] > 0;
   }
-  const std::uint64_t size = manifest.levels[level].directory_bytes;
-  if (size > index_->size())
+  if (segment.directory_bytes > index_->size()) {
     throw damaged_file(*index_, 0, "the index is smaller than its directory");
+  }
   directory_ = from_directory([&] {
-    return std::make_unique<const Directory>(*index_, size, clusters_, layout_, bounds_);
+    return std::make_unique<const Directory>(*index_, segment.directory_bytes, clusters_, layout_,
+                                             bounds_);
   });
   const auto slots = [](std::uint64_t wanted, std::uint64_t limit) {
     return static_cast<std::size_t>(
@@ -84,16 +92,17 @@ LevelReader::LevelReader(const OpenByName& files, const Manifest& manifest, unsi
       directory_->tables().size(), std::min(kCachedTables, kCachedContexts / layout_.contexts())));
 }
 
-std::uint64_t LevelReader::page_offset(std::uint64_t page) const {
+std::uint64_t SegmentReader::page_offset(std::uint64_t page) const {
   return from_directory([&] { return directory_->page_range(page).begin; });
 }
 
-Box3 LevelReader::page_box(std::uint64_t ordinal) const {
-  return from_directory([&] { return directory_->page_box(ordinal / layout_.page_clusters()); });
+Box3 SegmentReader::page_box(std::uint64_t ordinal) const {
+  return in_store(
+      from_directory([&] { return directory_->page_box(ordinal / layout_.page_clusters()); }));
 }
 
-std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
-                                                        SequentialBytes* ahead) const {
+std::shared_ptr<const IndexPage> SegmentReader::read_page(std::uint64_t number,
+                                                          SequentialBytes* ahead) const {
   const Directory::Range range = from_directory([&] { return directory_->page_range(number); });
   const std::uint64_t start = range.begin;
   const auto size = static_cast<std::size_t>(range.end - start);
@@ -116,22 +125,17 @@ std::shared_ptr<const IndexPage> LevelReader::read_page(std::uint64_t number,
       [&](const char* cause) { return damaged_file(*index_, start, cause); });
 }
 
-std::shared_ptr<const IndexPage> LevelReader::page(std::uint64_t number) const {
+std::shared_ptr<const IndexPage> SegmentReader::page(std::uint64_t number) const {
   return page_cache_.get(number, [&] { return read_page(number); });
 }
 
-Entry LevelReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
-  if (ordinal >= clusters_) {
-    throw Error(index_->name(), "there is no cluster " + std::to_string(layout_.level) + "/" +
-                                    std::to_string(ordinal) + ", the level has " +
-                                    std::to_string(clusters_));
-  }
+Entry SegmentReader::entry(std::uint64_t ordinal, std::uint64_t& offset) const {
   const auto page = this->page(ordinal / layout_.page_clusters());
   offset = page->offset(static_cast<std::uint32_t>(ordinal % layout_.page_clusters()));
   return entry(*page, ordinal);
 }
 
-Entry LevelReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
+Entry SegmentReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
   const std::uint64_t page_clusters = layout_.page_clusters();
   return translate_damage(
       [&] {
@@ -144,7 +148,7 @@ Entry LevelReader::entry(const IndexPage& page, std::uint64_t ordinal) const {
       });
 }
 
-void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
+void SegmentReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const {
   out.clear();
   if (layout_.attributes.empty()) return;
   const std::uint64_t number = ordinal / layout_.page_clusters();
@@ -162,7 +166,7 @@ void LevelReader::ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) cons
   }
 }
 
-void LevelReader::check_entry(const Entry& entry) const {
+void SegmentReader::check_entry(const Entry& entry) const {
   if (entry.points == 0) {
     if (store_points_ > 0) throw Damage("an index entry has no points");
     return;
@@ -189,7 +193,7 @@ void LevelReader::check_entry(const Entry& entry) const {
   }
 }
 
-std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal) const {
+std::shared_ptr<const DecodingTables> SegmentReader::tables(std::uint64_t ordinal) const {
   const std::vector<Directory::TablesPosition>& positions = directory_->tables();
   const auto after =
       std::upper_bound(positions.begin(), positions.end(), ordinal,
@@ -205,21 +209,21 @@ std::shared_ptr<const DecodingTables> LevelReader::tables(std::uint64_t ordinal)
   });
 }
 
-void LevelReader::check_range(std::uint64_t ordinal, std::uint64_t offset,
-                              std::uint64_t size) const {
+void SegmentReader::check_range(std::uint64_t ordinal, std::uint64_t offset,
+                                std::uint64_t size) const {
   if (offset > data_->size() || size > data_->size() - offset) {
     throw damaged(ordinal, "its bytes are beyond the end of the file");
   }
 }
 
-Error LevelReader::damaged(std::uint64_t ordinal, const std::string& cause) const {
+Error SegmentReader::damaged(std::uint64_t ordinal, const std::string& cause) const {
   return Error(data_->name(), cause)
-      .at("cluster " + std::to_string(layout_.level) + "/" + std::to_string(ordinal))
+      .at("cluster " + std::to_string(layout_.level) + "/" + std::to_string(first_ + ordinal))
       .remedy(kRestoreStore);
 }
 
-void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
-                         ByteView bytes, ClusterDecoder& decoder, ClusterPoints& out) const {
+void SegmentReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
+                           ByteView bytes, ClusterDecoder& decoder, ClusterPoints& out) const {
   translate_damage(
       [&] {
         if (layout_.checksum(bytes) != entry.checksum) {
@@ -227,11 +231,12 @@ void LevelReader::decode(std::uint64_t ordinal, const Entry& entry, std::uint64_
         }
         decoder.decode(layout_, *tables(ordinal), entry, bytes, top_, out);
         check_points(entry, out);
+        if (is_shifted_ || is_based_) move_into_store(out);
       },
       [&](const char* cause) { return damaged(ordinal, cause); });
 }
 
-void LevelReader::check_points(const Entry& entry, const ClusterPoints& points) const {
+void SegmentReader::check_points(const Entry& entry, const ClusterPoints& points) const {
   if (entry.points == 0) return;
   // The decoder ensures that all points are in the entry's box. If the box is inside the store's
   // bounds, as for most clusters, points need not be checked.
@@ -245,7 +250,8 @@ void LevelReader::check_points(const Entry& entry, const ClusterPoints& points) 
     bool good = true;
     for (std::size_t i = 0; i < children.size(); i += layout_.level) {
       for (std::size_t below = 0; below < layout_.level; ++below) {
-        good &= children[i + below] < clusters_below_[below];
+        // The base is not above the number of clusters.
+        good &= children[i + below] < clusters_below_[below] - base_[below];
       }
     }
     return good;
@@ -255,7 +261,26 @@ void LevelReader::check_points(const Entry& entry, const ClusterPoints& points) 
   }
 }
 
-void LevelReader::read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const {
+/// Converts checked points from the segment's coordinates and ordinals to the store's.
+void SegmentReader::move_into_store(ClusterPoints& points) const {
+  const auto move = [this](Point3& p) {
+    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] += shift_[axis];
+  };
+  for (Point3& p : points.positions) move(p);
+  if (points.has_representative) move(points.representative);
+  const auto number = [this](std::vector<std::uint64_t>& children) {
+    for (std::size_t i = 0; i < children.size(); i += layout_.level) {
+      for (std::size_t below = 0; below < layout_.level; ++below) {
+        children[i + below] += base_[below];
+      }
+    }
+  };
+  if (layout_.level == 0) return;
+  number(points.children);
+  number(points.representative_children);
+}
+
+void SegmentReader::read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const {
   std::uint64_t offset = 0;
   const Entry entry = this->entry(ordinal, offset);
   check_range(ordinal, offset, entry.bytes);
@@ -266,8 +291,9 @@ void LevelReader::read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& o
          space.decoder, out);
 }
 
-void LevelReader::read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
-                       SequentialBytes& ahead, ClusterDecoder& decoder, ClusterPoints& out) const {
+void SegmentReader::read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset,
+                         SequentialBytes& ahead, ClusterDecoder& decoder,
+                         ClusterPoints& out) const {
   check_range(ordinal, offset, entry.bytes);
   decode(ordinal, entry, offset, ahead.at(offset, entry.bytes), decoder, out);
 }

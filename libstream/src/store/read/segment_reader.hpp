@@ -100,14 +100,21 @@ struct ReadSpace {
   Bytes bytes;
 };
 
-/// The two files of a level, open for reading. Thread-safe.
-class LevelReader {
+/// The two files of a segment, open for reading. Clusters are numbered from 0 within the segment.
+/// Positions and the numbers of children are those of the store. Thread-safe.
+class SegmentReader {
  public:
-  /// Reads directory and tables. Throws: Error.
-  LevelReader(const OpenByName& files, const Manifest& manifest, unsigned level);
+  /// Reads directory and tables. first: the ordinal in the level of the segment's first cluster.
+  /// Throws: Error.
+  SegmentReader(const OpenByName& files, const Manifest& manifest, unsigned level,
+                const SegmentEntry& segment, std::uint64_t first);
 
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::uint64_t clusters() const { return clusters_; }
+  /// The ordinal in the level of the first cluster.
+  [[nodiscard]] std::uint64_t first() const { return first_; }
+  /// Contains all points of the clusters and below them.
+  [[nodiscard]] Box3 bounds() const { return in_store(bounds_); }
   [[nodiscard]] bool top() const { return top_; }
   [[nodiscard]] const ByteSource& data() const { return *data_; }
   [[nodiscard]] const ByteSource& index() const { return *index_; }
@@ -117,23 +124,29 @@ class LevelReader {
 
   /// See Store::coarse_box(). Requires that the cluster exists.
   [[nodiscard]] Box3 coarse_box(std::uint64_t ordinal) const {
-    return directory_->coarse_box(ordinal / layout_.page_clusters());
+    return in_store(directory_->coarse_box(ordinal / layout_.page_clusters()));
   }
   /// See Store::page_box(). Throws: Error.
   [[nodiscard]] Box3 page_box(std::uint64_t ordinal) const;
   /// Reads a page, or returns it from the cache. Throws: Error.
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
-  /// Returns the entry of a cluster, and where its bytes begin. Throws: Error.
+  /// Returns the entry of a cluster that exists, and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
   /// Returns the entry of a cluster in `page`, checked against the manifest. Throws: Error.
   [[nodiscard]] Entry entry(const IndexPage& page, std::uint64_t ordinal) const;
+  /// Returns the record of a cluster with that entry, whose bytes begin at `offset`.
+  [[nodiscard]] ClusterRecord record(const Entry& entry, std::uint64_t offset) const {
+    ClusterRecord record = record_of(entry, layout_.level, offset, top_);
+    if (entry.points > 0) record.summary.box = in_store(record.summary.box);
+    return record;
+  }
   /// Reads the ranges of a cluster that exists. Throws: Error.
   void ranges(std::uint64_t ordinal, std::vector<KeyRange>& out) const;
-  /// Reads a cluster. Throws: Error.
+  /// Reads a cluster that exists. Throws: Error.
   void read(std::uint64_t ordinal, ReadSpace& space, ClusterPoints& out) const;
   /// Reads a cluster whose entry and offset are known. ahead: reads data(). The points are in the
-  /// entry's box and in the bounds of the store, and the clusters that they head exist. Throws:
-  /// Error.
+  /// entry's box and in the bounds of segment and store, and the clusters that they head exist.
+  /// Throws: Error.
   void read(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, SequentialBytes& ahead,
             ClusterDecoder& decoder, ClusterPoints& out) const;
   /// Calls visit(page, first, end) for each page of the index that has clusters in [first, end),
@@ -150,7 +163,7 @@ class LevelReader {
     }
   }
 
-  /// Returns an Error about a cluster of this level.
+  /// Returns an Error about a cluster.
   [[nodiscard]] Error damaged(std::uint64_t ordinal, const std::string& cause) const;
 
  private:
@@ -166,13 +179,26 @@ class LevelReader {
   void decode(std::uint64_t ordinal, const Entry& entry, std::uint64_t offset, ByteView bytes,
               ClusterDecoder& decoder, ClusterPoints& out) const;
   void check_points(const Entry& entry, const ClusterPoints& points) const;
+  /// Moves a box by the segment's shift.
+  [[nodiscard]] Box3 in_store(Box3 box) const {
+    if (!is_shifted_) return box;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      box.min[axis] += shift_[axis];
+      box.max[axis] += shift_[axis];
+    }
+    return box;
+  }
+  void move_into_store(ClusterPoints& points) const;
 
   Layout layout_;
-  std::uint64_t clusters_;
+  std::uint64_t clusters_, first_;
   std::uint64_t max_points_;  ///< maximum number of points of a cluster
   bool top_;
   std::uint64_t store_points_;
-  Box3 bounds_;                                ///< bounds of the store
+  Box3 bounds_;   ///< of the segment, before its shift
+  Point3 shift_;  ///< from the segment's coordinates to the store's
+  bool is_shifted_, is_based_ = false;
+  std::vector<std::uint64_t> base_;            ///< see SegmentEntry
   std::vector<std::uint64_t> clusters_below_;  ///< number of clusters of each level below
   std::unique_ptr<ByteSource> data_, index_;
   std::unique_ptr<const Directory> directory_;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "terrace/stream/store.hpp"
 
-#include <cassert>
 #include <utility>
 
+#include "store/read/segment_reader.hpp"
 #include "store/read/store_impl.hpp"
 #include "store/read/view.hpp"
 #include "terrace/stream/byte_source.hpp"
@@ -48,9 +48,10 @@ Store Store::open(const std::string& name, const OpenByName& files) {
                            .points = level.points,
                            .members = level.members,
                            .clusters = level.clusters,
-                           .bytes = level.data.bytes + level.index.bytes,
-                           .index_bytes = level.index.bytes});
-    impl->bytes += level.data.bytes + level.index.bytes;
+                           .bytes = level.data_bytes() + level.index_bytes(),
+                           .index_bytes = level.index_bytes(),
+                           .segments = level.segments.size()});
+    impl->bytes += impl->infos.back().bytes;
     impl->levels.push_back(std::make_unique<LevelReader>(files, impl->manifest, l));
   }
   if (impl->manifest.surface) {
@@ -79,27 +80,29 @@ ClusterId Store::root() const { return cluster_id(top(), 0); }
 
 ClusterRecord Store::record(ClusterId id) const {
   check_stop();
-  const LevelReader& level = impl_->level(level_of(id));
+  const auto [segment, ordinal] = impl_->level(level_of(id)).find(ordinal_of(id));
   std::uint64_t offset = 0;
-  const Entry entry = level.entry(ordinal_of(id), offset);
-  return record_of(entry, level_of(id), offset, level.top());
+  const Entry entry = segment->entry(ordinal, offset);
+  return segment->record(entry, offset);
 }
 
 Box3 Store::coarse_box(ClusterId id) const {
-  return impl_->level(level_of(id)).coarse_box(ordinal_of(id));
+  const auto [segment, ordinal] = impl_->level(level_of(id)).find(ordinal_of(id));
+  return segment->coarse_box(ordinal);
 }
 
 Box3 Store::page_box(ClusterId id) const {
-  return impl_->level(level_of(id)).page_box(ordinal_of(id));
+  const auto [segment, ordinal] = impl_->level(level_of(id)).find(ordinal_of(id));
+  return segment->page_box(ordinal);
 }
 
 std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
   check_stop();
-  const LevelReader& level = impl_->level(level_of(id));
+  const auto [segment, ordinal] = impl_->level(level_of(id)).find(ordinal_of(id));
   std::uint64_t offset = 0;
-  static_cast<void>(level.entry(ordinal_of(id), offset));
+  static_cast<void>(segment->entry(ordinal, offset));
   std::vector<KeyRange> keys;
-  level.ranges(ordinal_of(id), keys);
+  segment->ranges(ordinal, keys);
   std::vector<ValueRange> ranges;
   for (std::size_t a = 0; a < keys.size(); ++a) {
     ranges.push_back(value_range(schema().attributes[a], keys[a]));
@@ -109,9 +112,9 @@ std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
 
 void Store::read(ClusterId id, ClusterPoints& out) const {
   check_stop();
-  const LevelReader& level = impl_->level(level_of(id));
+  const auto [segment, ordinal] = impl_->level(level_of(id)).find(ordinal_of(id));
   auto space = impl_->spaces.take();
-  level.read(ordinal_of(id), *space, out);
+  segment->read(ordinal, *space, out);
   impl_->spaces.put(std::move(space));
   mark(out);
 }
@@ -136,35 +139,39 @@ void Store::for_each(unsigned number, const VisitCluster& visit) const {
 
 std::uint64_t Store::for_each(unsigned number, std::uint64_t first, std::uint64_t end,
                               const VisitCluster& visit) const {
-  const LevelReader& level = impl_->level(number);
-  SequentialBytes ahead(level.data());
   auto space = impl_->spaces.take();
   ClusterPoints points;
   std::uint64_t members = 0;
-  level.for_each_page(
-      first, end, [&](const IndexPage& page, std::uint64_t page_first, std::uint64_t page_end) {
-        for (std::uint64_t ordinal = page_first; ordinal < page_end; ++ordinal) {
-          check_stop();
-          const auto index = static_cast<std::uint32_t>(ordinal % level.layout().page_clusters());
-          const std::uint64_t offset = page.offset(index);
-          const ClusterId id = cluster_id(number, ordinal);
-          const Entry entry = level.entry(page, ordinal);
-          const ClusterRecord record = record_of(entry, number, offset, level.top());
-          members += record.points;
-          if (number == 0 && !may_match(id)) continue;
-          level.read(ordinal, entry, offset, ahead, space->decoder, points);
-          mark(points);
-          visit(id, record, points);
-        }
+  impl_->level(number).for_each_segment(
+      first, end,
+      [&](const SegmentReader& segment, std::uint64_t segment_first, std::uint64_t segment_end) {
+        SequentialBytes ahead(segment.data());
+        const auto visit_page = [&](const IndexPage& page, std::uint64_t page_first,
+                                    std::uint64_t page_end) {
+          for (std::uint64_t ordinal = page_first; ordinal < page_end; ++ordinal) {
+            check_stop();
+            const std::uint64_t offset =
+                page.offset(static_cast<std::uint32_t>(ordinal % segment.layout().page_clusters()));
+            const ClusterId id = cluster_id(number, segment.first() + ordinal);
+            const Entry entry = segment.entry(page, ordinal);
+            const ClusterRecord record = segment.record(entry, offset);
+            members += record.points;
+            if (number == 0 && !may_match(id)) continue;
+            segment.read(ordinal, entry, offset, ahead, space->decoder, points);
+            mark(points);
+            visit(id, record, points);
+          }
+        };
+        segment.for_each_page(segment_first, segment_end, visit_page);
       });
   impl_->spaces.put(std::move(space));
   return members;
 }
 
 Error Store::miscounted(unsigned level) const {
-  return Error(impl_->level(level).data().name(), "the clusters do not have the " +
-                                                      std::to_string(impl_->infos[level].members) +
-                                                      " members that the manifest lists")
+  return Error(impl_->level(level).segment(0)->data().name(),
+               "the clusters do not have the " + std::to_string(impl_->infos[level].members) +
+                   " members that the manifest lists")
       .remedy("restore the file or rebuild the store");
 }
 

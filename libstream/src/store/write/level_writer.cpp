@@ -30,7 +30,7 @@ Error errno_error(const std::filesystem::path& path, const char* cause) {
   return system_error(path.string(), cause, number, remedy_for(number));
 }
 
-/// Blocks up to this size in bytes are deduplicated against earlier blocks of the segment.
+/// Blocks up to this size in bytes are deduplicated against earlier blocks with the same tables.
 constexpr std::size_t kMaxSharedBytes = 1024;
 /// Maximum number of training blocks that are used to choose how columns are coded. Rasters have
 /// columns only above level 0, where the choice matters little.
@@ -53,8 +53,8 @@ void put_box(Bytes& out, const Box& box) {
   }
 }
 
-std::string file_name(unsigned level, const char* what) {
-  return fmt::format("level-{}.0.{}", level, what);
+std::string file_name(unsigned level, const char* kind) {
+  return fmt::format("level-{}.0.{}", level, kind);
 }
 
 void add_to(Counts& total, const Counts& counts) {
@@ -121,26 +121,27 @@ void OutputFile::finish() {
 }
 
 LevelWriter::LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
-                         Layout layout, base::ThreadTeam& team)
+                         Layout layout, base::ThreadTeam& team, std::uint64_t first)
     : layout_(std::move(layout)),
+      first_(first),
       data_(folder / file_name(layout_.level, "clusters"), shown),
       index_(folder / file_name(layout_.level, "index"), shown),
       team_(team),
       encoders_(1) {}
 
 std::uint64_t LevelWriter::append(PreparedBlock block, bool root) {
-  if (at_segment_start()) {
+  if (needs_new_tables()) {
     if (!training_blocks_.empty()) train();
     tables_.reset();
     small_blocks_.clear();
-    segment_start_ = clusters_;
+    tables_start_ = clusters_;
   }
   ++blocks_;
-  const std::uint64_t first_cluster = clusters_;
+  const std::uint64_t first_cluster = first_ + clusters_;
   clusters_ += block.clusters;
 
   if (block.raw == nullptr && block.tables != tables_) {
-    // Encoded with the tables of the previous segment: decode it.
+    // Encoded with the previous tables: decode it.
     block.raw =
         std::make_unique<RawBlock>(decoded_block(layout_, block.tables->tables, block.bytes,
                                                  block.entries, std::move(block.summaries), root));
@@ -355,7 +356,7 @@ void LevelWriter::train() {
     tables.frequencies[c] = normalised(counts[c], minimum);
   }
 
-  sets_.push_back({.first = segment_start_, .bytes = {}});
+  sets_.push_back({.first = tables_start_, .bytes = {}});
   tables.write(sets_.back().bytes);
   tables_ = std::make_shared<const SharedTables>(std::move(tables), *sequence_);
   for (const PreparedBlock& block : prepared) write(block);
@@ -465,20 +466,28 @@ std::uint64_t LevelWriter::write_directory(const Box3& bounds) {
   return directory.size();
 }
 
-LevelEntry LevelWriter::finish(bool root, const Box3& bounds) {
+LevelWriter::Written LevelWriter::finish(bool root, const Box3& bounds) {
   if (!training_blocks_.empty()) train();
   if (!page_.empty()) write_page();
   const std::uint64_t directory_bytes = write_directory(bounds);
   data_.finish();
   index_.finish();
 
-  LevelEntry entry;
-  entry.clusters = clusters_;
-  entry.members = root ? points_ : points_ - clusters_;
-  entry.data = {data_.path().filename().string(), data_.size(), data_.checksum()};
-  entry.index = {index_.path().filename().string(), index_.size(), index_.checksum()};
-  entry.directory_bytes = directory_bytes;
-  return entry;
+  Written written;
+  written.members = root ? points_ : points_ - clusters_;
+  SegmentEntry& segment = written.segment;
+  segment.clusters = clusters_;
+  segment.data = {data_.path().filename().string(), data_.size(), data_.checksum()};
+  segment.index = {index_.path().filename().string(), index_.size(), index_.checksum()};
+  segment.directory_bytes = directory_bytes;
+  segment.bounds = bounds;
+  segment.base.assign(layout_.level, 0);
+  return written;
+}
+
+std::string segment_file_name(unsigned level, const SegmentEntry& segment, const char* kind) {
+  return fmt::format("level-{}.{:08x}{:08x}.{}", level, segment.data.checksum,
+                     segment.index.checksum, kind);
 }
 
 }  // namespace terrace::stream::store

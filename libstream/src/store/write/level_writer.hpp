@@ -63,13 +63,12 @@ class OutputFile {
   std::uint32_t checksum_ = 0;
 };
 
-/// Number of blocks of a level that share tables, and of those, from the first, that are held until
-/// the tables are made from them.
-inline constexpr std::uint64_t kSegmentBlocks = 1024;
+/// Number of consecutive blocks of a level that share tables, and of those, from the first, that
+/// are held until the tables are made from them.
+inline constexpr std::uint64_t kBlocksPerTables = 1024;
 inline constexpr std::size_t kTrainingBlocks = 64;
 
-/// Tables for encoding and decoding. A block that was encoded with those of an earlier segment must
-/// be decoded.
+/// Tables for encoding and decoding. A block that was encoded with earlier ones must be decoded.
 struct SharedTables {
   SharedTables(Tables trained, bool keeps_order)
       : tables(std::move(trained)), encoding(tables), sequence(keeps_order) {}
@@ -91,29 +90,36 @@ struct PreparedBlock {
   std::vector<ClusterSummary> summaries;
 };
 
-/// Writes the two files of a level. Not thread-safe; training uses the team, because all further
+/// Returns the name of a file of a segment, named after its contents. kind: "clusters" or "index".
+std::string segment_file_name(unsigned level, const SegmentEntry& segment, const char* kind);
+
+/// Writes the two files of a segment. Not thread-safe; training uses the team, because all further
 /// blocks wait for it. The bytes depend only on the blocks and their order, not on which of them
 /// were passed encoded.
 class LevelWriter {
  public:
-  /// shown: the name of the store in messages.
+  /// shown: the name of the store in messages. first: the number of the level's clusters in other
+  /// segments, which come before this one.
   LevelWriter(const std::filesystem::path& folder, const std::filesystem::path& shown,
-              Layout layout, base::ThreadTeam& team);
+              Layout layout, base::ThreadTeam& team, std::uint64_t first = 0);
 
   /// Returns the tables to encode blocks with now; null if there are none.
   [[nodiscard]] const SharedTablesPtr& tables() const { return tables_; }
   [[nodiscard]] const Layout& layout() const { return layout_; }
   [[nodiscard]] std::uint64_t clusters() const { return clusters_; }
 
-  /// Appends a block. Returns the ordinal of its first cluster.
+  /// Appends a block. Returns the ordinal in the level of its first cluster.
   std::uint64_t append(PreparedBlock block, bool root);
-  /// Writes the remaining blocks, the directory and the tables; syncs and closes the files.
-  /// `members` of the result are the points of all clusters without representatives; `points` is
-  /// not set. bounds: the store's.
-  LevelEntry finish(bool root, const Box3& bounds);
+  struct Written {
+    std::uint64_t members = 0;  ///< points of all clusters without representatives
+    SegmentEntry segment;
+  };
+  /// Writes the remaining blocks, the directory and the tables; syncs and closes the files. bounds:
+  /// the store's.
+  Written finish(bool root, const Box3& bounds);
 
-  /// Whether the next block starts a segment, which gets new tables.
-  [[nodiscard]] bool at_segment_start() const { return blocks_ % kSegmentBlocks == 0; }
+  /// Whether the next block gets new tables.
+  [[nodiscard]] bool needs_new_tables() const { return blocks_ % kBlocksPerTables == 0; }
 
  private:
   /// The counts of the training blocks, as if encoded.
@@ -144,18 +150,18 @@ class LevelWriter {
   std::uint64_t write_directory(const Box3& bounds);
 
   Layout layout_;
+  std::uint64_t first_;
   OutputFile data_, index_;
   std::vector<RawBlock> training_blocks_;
   /// Whether points are coded in the order in which they were passed. One choice for the whole
-  /// level, because a block that was encoded with the tables of the previous segment has lost any
-  /// other order.
+  /// level, because a block that was encoded with the previous tables has lost any other order.
   std::optional<bool> sequence_;
   SharedTablesPtr tables_;
   base::ThreadTeam& team_;
   std::vector<BlockEncoder> encoders_;  ///< one; in training one per thread
   std::uint64_t blocks_ = 0, clusters_ = 0, points_ = 0;
-  std::uint64_t segment_start_ = 0;  ///< ordinal of the current segment's first cluster
-  SharedTablesPtr page_tables_;      ///< tables of the page's first cluster
+  std::uint64_t tables_start_ = 0;  ///< number of the first cluster that uses the tables
+  SharedTablesPtr page_tables_;     ///< tables of the page's first cluster
   std::vector<Entry> page_;
   std::vector<KeyRange> page_ranges_;
   struct PageAt {
@@ -165,11 +171,11 @@ class LevelWriter {
   std::vector<PageAt> pages_;
   std::uint64_t page_offset_ = 0;  ///< offset of the page's first cluster in the data
   std::uint64_t last_end_ = 0;     ///< end of the last cluster in the data
-  /// Offsets in the data of the segment's blocks of few bytes. Blocks of still water, for example,
-  /// are equal.
+  /// Offsets in the data of the blocks of few bytes that share tables. Blocks of still water, for
+  /// example, are equal.
   std::map<std::string, std::uint64_t> small_blocks_;
   struct Set {
-    std::uint64_t first = 0;  ///< ordinal of the first cluster that uses it
+    std::uint64_t first = 0;  ///< number of the first cluster that uses it
     Bytes bytes;
   };
   std::vector<Set> sets_;  ///< sets of tables

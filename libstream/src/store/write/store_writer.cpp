@@ -2,11 +2,13 @@
 #include <algorithm>
 #include <cassert>
 #include <mutex>
+#include <tuple>
 #include <utility>
 
 #include <terrace/base/thread_team.hpp>
 
 #include "spares.hpp"
+#include "store/read/store_impl.hpp"
 #include "store/write/block_encoder.hpp"
 #include "store/write/level_writer.hpp"
 #include "terrace/stream/atomic_file.hpp"
@@ -53,14 +55,58 @@ Naming naming_of(bool replace) {
   return {Store::ownership_of};
 }
 
+/// Returns how a store takes the name of the part that it extends. Sets `changed` if that is not
+/// the part any more.
+Naming naming_after(const Store& part, const std::shared_ptr<bool>& changed) {
+  return {[checksum = part.checksum(), changed](const std::filesystem::path& path) -> Ownership {
+    const Ownership ownership = Store::ownership_of(path);
+    *changed = ownership.ours && Store::open(path).checksum() != checksum;
+    return *changed ? Ownership(false) : ownership;
+  }};
+}
+
+/// Throws: Error if the name is taken by what may not be replaced.
+void check_target(const std::filesystem::path& path, bool replace) {
+  std::error_code error;
+  if (!std::filesystem::exists(std::filesystem::status(path, error))) return;
+  if (!replace) {
+    throw Error(path.string(), "exists already").remedy("choose another name or remove it");
+  }
+  if (const Ownership ownership = Store::ownership_of(path); !ownership.ours) {
+    throw not_replaced(path.string(), ownership);
+  }
+}
+
 }  // namespace
 
 struct StoreWriter::Impl {
-  Impl(const std::filesystem::path& path, StoreSchema store_schema, bool replace_old,
-       unsigned threads)
+  Impl(const std::filesystem::path& path, StoreSchema store_schema, Naming naming, unsigned threads)
       : schema(std::move(store_schema)),
         team(threads),
-        staging(path, kManifestName, naming_of(replace_old)) {}
+        staging(path, kManifestName, std::move(naming)) {
+    if (schema.attributes.size() > kMaxAttributes) {
+      throw Error(path.string(), "there are too many attributes");
+    }
+  }
+
+  void publish() {
+    try {
+      staging.commit();
+    } catch (const Error&) {
+      if (!*changed) throw;
+      throw Error(staging.target().string(), "another process changed the store meanwhile")
+          .remedy("run this again");
+    }
+  }
+
+  /// Takes over the clusters of a store below its root.
+  void adopt(const StorePart& part);
+  /// Creates a file of the new store with the contents of one of the part's.
+  void adopt_file(const Store& store, const ByteSource& from, const FileEntry& entry,
+                  const std::string& name) const;
+  [[nodiscard]] std::uint64_t adopted_clusters(std::size_t level) const {
+    return level < adopted.size() ? adopted[level].clusters : 0;
+  }
 
   SharedTablesPtr tables(unsigned level) {
     const std::lock_guard lock(mutex);
@@ -74,11 +120,16 @@ struct StoreWriter::Impl {
   StoreSchema schema;
   base::ThreadTeam team;  ///< for training
   AtomicFolder staging;
+  /// By level: what was taken over from other stores, and the writer, null if no block was
+  /// appended.
+  std::vector<LevelEntry> adopted;
   std::vector<std::unique_ptr<LevelWriter>> levels;
   std::uint64_t points = 0;
   double height_sum = 0.0;
   Box3 bounds;
   bool broken = false;  ///< whether append() or finish() has thrown
+  /// Whether the part that the store extends is not what it was.
+  std::shared_ptr<bool> changed = std::make_shared<bool>(false);
 
   // Shared between threads.
   Spares<BlockEncoder> encoders;
@@ -117,10 +168,10 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   }
   broken = true;  // until this call succeeds
   const unsigned level = encoded->level;
-  while (levels.size() <= level) {
-    levels.push_back(
-        std::make_unique<LevelWriter>(staging.folder(), staging.target(),
-                                      Layout(schema, static_cast<unsigned>(levels.size())), team));
+  if (levels.size() <= level) levels.resize(level + 1);
+  if (levels[level] == nullptr) {
+    levels[level] = std::make_unique<LevelWriter>(
+        staging.folder(), staging.target(), Layout(schema, level), team, adopted_clusters(level));
   }
   if (level == 0) {
     points += encoded->points;
@@ -132,12 +183,68 @@ std::uint64_t StoreWriter::Impl::append(EncodedPtr encoded, bool root) {
   {
     const std::lock_guard lock(mutex);
     if (tables_by_level.size() < levels.size()) tables_by_level.resize(levels.size());
-    // At the end of a segment its tables are about to be replaced, so blocks are not encoded with
-    // them.
-    tables_by_level[level] = writer.at_segment_start() ? nullptr : writer.tables();
+    // Tables that are about to be replaced are not used any more.
+    tables_by_level[level] = writer.needs_new_tables() ? nullptr : writer.tables();
   }
   broken = false;
   return ordinal;
+}
+
+void StoreWriter::Impl::adopt(const StorePart& part) {
+  const Manifest& manifest = part.store.impl_->manifest;
+  const unsigned top = part.store.top();
+  if (top == 0) return;
+  std::vector<std::uint64_t> offsets;  // of the part's ordinals in those of the new store
+  for (unsigned l = 0; l < top; ++l) offsets.push_back(adopted_clusters(l));
+  if (adopted.size() < top) adopted.resize(top);
+  for (unsigned l = 0; l < top; ++l) {
+    const LevelEntry& level = manifest.levels[l];
+    for (std::size_t s = 0; s < level.segments.size(); ++s) {
+      SegmentEntry segment = level.segments[s];
+      const LevelReader::Handle open = part.store.impl_->levels[l]->segment(s);
+      for (auto [file, from, kind] : {std::tuple(&segment.data, &open->data(), "clusters"),
+                                      std::tuple(&segment.index, &open->index(), "index")}) {
+        const std::string name = segment_file_name(l, segment, kind);
+        adopt_file(part.store, *from, *file, name);
+        file->name = name;
+      }
+      for (unsigned below = 0; below < l; ++below) segment.base[below] += offsets[below];
+      for (std::size_t axis = 0; axis < 3; ++axis) segment.shift[axis] += part.shift[axis];
+      adopted[l].segments.push_back(std::move(segment));
+    }
+    adopted[l].members += level.members;
+    adopted[l].clusters += level.clusters;
+  }
+  points += manifest.points;
+  height_sum += (manifest.mean_height + static_cast<double>(part.shift[2])) *
+                static_cast<double>(manifest.points);
+  bounds.include(shifted(manifest.bounds, part.shift));
+}
+
+void StoreWriter::Impl::adopt_file(const Store& store, const ByteSource& from,
+                                   const FileEntry& entry, const std::string& name) const {
+  namespace fs = std::filesystem;
+  const fs::path path = staging.folder() / name;
+  std::error_code error;
+  if (fs::exists(path, error)) return;  // another part has the same file
+  const fs::path original = fs::canonical(store.path() / entry.name, error);
+  if (!error) fs::create_hard_link(original, path, error);
+  if (!error) return;
+  // The part is on another file system, or not in a folder.
+  OutputFile file(path, staging.target());
+  Bytes bytes(std::size_t{1} << 20);
+  for (std::uint64_t offset = 0; offset < from.size(); offset += bytes.size()) {
+    store.check_stop();
+    bytes.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(bytes.size(), from.size() - offset)));
+    from.read(offset, std::as_writable_bytes(std::span(bytes)));
+    file.write(bytes);
+  }
+  file.finish();
+  if (file.checksum() != entry.checksum) {
+    throw Error(from.name(), "the checksum of the file is wrong")
+        .remedy("restore the file or rebuild the store");
+  }
 }
 
 SurfaceEntry StoreWriter::Impl::write_surface(const std::string& manifest,
@@ -162,23 +269,27 @@ SurfaceEntry StoreWriter::Impl::write_surface(const std::string& manifest,
   return entry;
 }
 
-StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace,
-                         unsigned threads) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (std::filesystem::exists(status)) {
-    if (!replace) {
-      throw Error(path.string(), "exists already").remedy("choose another name or remove it");
-    }
-    if (const Ownership ownership = Store::ownership_of(path); !ownership.ours) {
-      throw not_replaced(path.string(), ownership);
-    }
+StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema,
+                         std::span<const StorePart> parts, bool replace, unsigned threads) {
+  const auto extended = std::find_if(parts.begin(), parts.end(), [&](const StorePart& part) {
+    std::error_code ignored;
+    return std::filesystem::equivalent(part.store.path(), path, ignored);
+  });
+  if (extended == parts.end()) {
+    check_target(path, replace);
+    impl_ = std::make_unique<Impl>(path, std::move(schema), naming_of(replace), threads);
+  } else {
+    const auto changed = std::make_shared<bool>(false);
+    impl_ = std::make_unique<Impl>(path, std::move(schema), naming_after(extended->store, changed),
+                                   threads);
+    impl_->changed = changed;
   }
-  if (schema.attributes.size() > kMaxAttributes) {
-    throw Error(path.string(), "there are too many attributes");
-  }
-  impl_ = std::make_unique<Impl>(path, std::move(schema), replace, threads);
+  for (const StorePart& part : parts) impl_->adopt(part);
 }
+
+StoreWriter::StoreWriter(const std::filesystem::path& path, StoreSchema schema, bool replace,
+                         unsigned threads)
+    : StoreWriter(path, std::move(schema), {}, replace, threads) {}
 
 StoreWriter::~StoreWriter() = default;
 
@@ -191,7 +302,8 @@ std::uint64_t StoreWriter::append(EncodedPtr block) {
 }
 
 std::uint64_t StoreWriter::clusters(unsigned level) const {
-  return level < impl_->levels.size() ? impl_->levels[level]->clusters() : 0;
+  const bool is_open = level < impl_->levels.size() && impl_->levels[level] != nullptr;
+  return impl_->adopted_clusters(level) + (is_open ? impl_->levels[level]->clusters() : 0);
 }
 
 const StoreSchema& StoreWriter::schema() const { return impl_->schema; }
@@ -202,7 +314,8 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish,
                                   const MakeSurface& surface) {
   Impl& w = *impl_;
   assert(root.representatives.size() == 1 && root.representatives[0] == kNoRepresentative);
-  assert(w.levels.size() == root.level && "all levels below the top have clusters, no other has");
+  assert(std::max(w.levels.size(), w.adopted.size()) == root.level &&
+         "all levels below the top have clusters, no other has");
   if (w.points > 0 && !is_finite_in_crs(w.schema, w.bounds)) {
     throw Error(
         w.staging.target().string(),
@@ -225,8 +338,15 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish,
   std::uint64_t bytes = 0;
   for (std::size_t l = 0; l < w.levels.size(); ++l) {
     const bool top = l == root.level;
-    manifest.levels.push_back(w.levels[l]->finish(top, w.bounds));
-    bytes += manifest.levels[l].data.bytes + manifest.levels[l].index.bytes;
+    LevelEntry level = l < w.adopted.size() ? w.adopted[l] : LevelEntry();
+    if (w.levels[l] != nullptr) {
+      LevelWriter::Written written = w.levels[l]->finish(top, w.bounds);
+      level.members += written.members;
+      level.clusters += written.segment.clusters;
+      level.segments.push_back(std::move(written.segment));
+    }
+    bytes += level.data_bytes() + level.index_bytes();
+    manifest.levels.push_back(std::move(level));
   }
   for (std::size_t l = manifest.levels.size(); l-- > 0;) {
     manifest.levels[l].points =
@@ -249,7 +369,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish,
   OutputFile file(path, w.staging.target());
   file.write({reinterpret_cast<const std::uint8_t*>(text.data()), text.size()});
   file.finish();
-  if (publish) w.staging.commit();
+  if (publish) w.publish();
   return bytes + text.size();
 }
 
