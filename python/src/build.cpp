@@ -5,6 +5,7 @@
 #include <pybind11/stl.h>
 #include <terrace/terrain/build.hpp>
 #include <terrace/terrain/crs.hpp>
+#include <terrace/terrain/merge.hpp>
 #include <terrace/terrain/output_kinds.hpp>
 #include <terrace/terrain/scan_surface.hpp>
 
@@ -28,6 +29,7 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
   request.store = path;
   const auto set = [&](const char* name, auto& to) { take_option(options, name, to); };
   set("replace", request.replace);
+  set("append", request.append);
   set("input_format", request.input_format);
   set("skip_damaged", request.skip_damaged);
   set("vertical", request.vertical);
@@ -89,6 +91,7 @@ void bind_build(py::module_& module) {
     });
     py::dict result;
     result["points"] = outcome.points;
+    result["store_points"] = outcome.store_points;
     result["nodata"] = outcome.nodata;
     result["excluded"] = outcome.excluded;
     result["lost"] = outcome.lost;
@@ -98,6 +101,16 @@ void bind_build(py::module_& module) {
     result["bytes"] = outcome.store_bytes;
     result["reordered"] = outcome.order.reordered;
     return result;
+  });
+  module.def("merge", [](const std::vector<std::string>& stores, const std::string& path,
+                         bool replace, const py::tuple& settings) {
+    check_output_name(terrain::outputs::kStore, path);
+    terrain::MergeRequest request;
+    request.stores.assign(stores.begin(), stores.end());
+    request.store = path;
+    request.replace = replace;
+    Call(settings).run(
+        [&](const terrain::Context& context) { return terrain::merge_stores(request, context); });
   });
 }
 

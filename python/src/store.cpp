@@ -80,6 +80,7 @@ py::dict info_of(const OpenStore& open) {
     level["points"] = statistics.points[of.level];
     level["clusters"] = of.clusters;
     level["bytes"] = of.bytes;
+    level["segments"] = of.segments;
     levels.append(level);
   }
   info["levels"] = levels;

@@ -40,7 +40,7 @@ from ._matching import Assignment, HalvingMatching, Matching, assignment, edge_m
 from ._mesh import BoundedMesh, Mesh
 from ._points import PointReader, point_batches, read_points, write_points
 from ._raster import Raster
-from ._store import Store, build, xyz
+from ._store import Store, build, merge, xyz
 from ._tiles import verify_tiles
 from ._tin import bounded_mesh, interpolate, simplify_line
 from ._trees import MatchingTree, PointTree, TriangleTree, matching_tree, rotate_tree
@@ -55,7 +55,7 @@ __all__ = [
     'MeshDelta', 'Multiresolution', 'PointReader', 'PointTree', 'Raster', 'Shape', 'Store', 'Transformation',
     'TriangleTree', 'View', 'ViewDelta', 'VolumeDelta', 'assignment', 'bounded_mesh', 'build', 'cluster', 'clusters_of_size',
     'edge_matching', 'ellipse', 'ellipsoid', 'entity_distances', 'facility_location', 'flat_clusters',
-    'halving_matching', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree', 'point_batches',
+    'halving_matching', 'interpolate', 'kmeans', 'linkage', 'matching', 'matching_tree', 'merge', 'point_batches',
     'read_points', 'rotate_tree', 'simplify_line', 'spanning_tree', 'stream_clusters', 'tree_linkage',
     'verify_tiles', 'write_points', 'xyz',
 ]

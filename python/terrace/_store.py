@@ -25,7 +25,7 @@ from ._sources import crs_text, source_of
 from ._types import Array, ClusterId, Crs, Float64Array, Focuses, GeoInterface, Int64Array, Path, Progress, Records, Region, UInt32Array
 
 _BUILD_OPTIONS = {
-    'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
+    'append', 'replace', 'input_format', 'skip_damaged', 'vertical', 'block_points', 'facility_cost', 'z_weight', 'channels',
     'outlier_price', 'band', 'cell', 'seed', 'datum_shift', 'where', 'keep', 'drop', 'resolution', 'metric',
     'region', 'effort', 'order', 'entities', 'method', 'heights_of_colour', 'surface', 'k', 'batch', 'search_threads',
 }
@@ -114,6 +114,8 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
     Options for all sources:
 
     - ``replace``: overwrite an existing store.
+    - ``append``: add the points to the store, which exists. It keeps its clusters, except the root, and its options of
+      clustering. The points must match it as in merge(); samples that it has with the same value are left out.
     - ``where`` (such as 'classification == 2'), ``region`` (a box or polygons), ``keep`` and ``drop`` (names of
       attributes): the part of the source to read.
     - ``block_points`` (10000): the number of points that are clustered together.
@@ -156,9 +158,52 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
     if text is not None:
         arguments['crs'] = text
     path = os.fspath(store)
-    if os.path.lexists(path) and not arguments.get('replace'):
+    if arguments.get('append'):
+        if not os.path.lexists(path):
+            raise FileNotFoundError(errno.ENOENT, 'there is no store here', path)
+    elif os.path.lexists(path) and not arguments.get('replace'):
         raise FileExistsError(errno.EEXIST, 'already exists; pass another name or replace=True', path)
     _core.build(source, os.fsencode(path), arguments, call_settings(progress, threads, memory))
+    return Store(path)
+
+
+def merge(stores: Iterable[Path], store: Path, *, replace: bool = False, progress: Progress | None = None,
+          threads: int | None = None, memory: int | None = None) -> Store:
+    """Joins stores into one that holds the points of all, without building them again, and opens it.
+
+    Only the points of their top levels are read and clustered again. All other clusters are taken over as they are, by
+    links to their files, or by copies on another file system, so the stores may be removed afterwards.
+
+    stores: at least two folders, in any order, with the same kind of points, attributes, CRS and options (except the
+        seed), and coordinates on one lattice. Rasters must not have values for the same cell.
+    store: the folder to create. It appears only when complete.
+    replace: overwrite an existing store.
+    progress, threads, memory: as for build().
+
+    The surface of a scan is left out.
+
+    Returns: the opened Store.
+    Raises: Error, naming both stores, if they do not fit together or are damaged; FileNotFoundError,
+        FileExistsError; ValueError for fewer than two stores.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     parts = [folder + '/west', folder + '/east']
+    ...     for x, part in enumerate(parts):
+    ...         build(np.random.default_rng(1).random((2000, 3)) + [x, 0, 0], part).close()
+    ...     with merge(parts, folder + '/all') as store:
+    ...         print(store)
+    <terrace.Store 'all': 4000 points, 1 level>
+    """
+    paths = [os.fspath(path) for path in stores]
+    for path in paths:
+        if not os.path.lexists(path):
+            raise FileNotFoundError(errno.ENOENT, 'there is no store here', path)
+    path = os.fspath(store)
+    if os.path.lexists(path) and not replace:
+        raise FileExistsError(errno.EEXIST, 'already exists; pass another name or replace=True', path)
+    _core.merge([os.fsencode(part) for part in paths], os.fsencode(path), replace,
+                call_settings(progress, threads, memory))
     return Store(path)
 
 

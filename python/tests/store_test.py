@@ -33,6 +33,57 @@ class Stores(StoreCase):
             with self.assertRaises(ValueError):
                 terrace.xyz(wrong)
 
+    def test_merges_parts_into_the_whole(self):
+        options = {'crs': 'EPSG:32632', 'block_points': 500}
+        a, _, c, d, e, f = TRANSFORM
+        parts = []
+        for begin, end in ((0, 60), (60, 61), (61, 150)):
+            part = self.path(f'columns{begin}')
+            moved = (a, 0, c + a * begin, d, e, f)
+            terrace.build(self.samples[:, begin:end].copy(), part, transform=moved, **options).close()
+            parts.append(part)
+        with terrace.build(self.samples, self.path('columns'), transform=TRANSFORM, **options) as whole:
+            with terrace.merge(reversed(parts), self.path('columns-merged'), threads=2) as merged:
+                self.assertEqual(merged.verify(), [])
+                self.assertEqual([level['segments'] for level in merged.info['levels']][0], 3)
+                np.testing.assert_array_equal(sorted_rows(terrace.xyz(merged.points())),
+                                              sorted_rows(terrace.xyz(whole.points())))
+                places = np.random.default_rng(3).random((500, 2)) * [a * 149, e * 119] + [c + a / 2, f + e / 2]
+                np.testing.assert_array_equal(merged.heights(places), whole.heights(places))
+                bounded = [store.bounded_mesh(max_error=2.0) for store in (merged, whole)]
+                np.testing.assert_array_equal(*(mesh.triangles for mesh in bounded))
+        with self.assertRaises(FileExistsError):
+            terrace.merge(parts, self.path('columns-merged'))
+        terrace.merge(parts[:2], self.path('columns-merged'), replace=True).close()
+        with self.assertRaises(FileNotFoundError):
+            terrace.merge([parts[0], self.path('nowhere')], self.path('other'))
+        with self.assertRaises(ValueError):
+            terrace.merge(parts[:1], self.path('other'))
+        with self.assertRaisesRegex(terrace.Error, 'both have a value for the cell'):
+            terrace.merge([parts[0], self.path('columns')], self.path('other'))
+        self.assertFalse(os.path.exists(self.path('other')))
+
+    def test_appends_to_a_store(self):
+        first, second = cloud(3000, seed=5), cloud(3000, seed=6)
+        path = self.path('grows')
+        terrace.build(first[0], path, attributes={'class': first[1]}, block_points=500).close()
+        before = terrace.open(path)
+        with terrace.build(second[0], path, attributes={'class': second[1]}, append=True) as store:
+            self.assertEqual(store.verify(), [])
+            np.testing.assert_array_equal(sorted_rows(terrace.xyz(store.points())),
+                                          sorted_rows(np.concatenate((first[0], second[0]))))
+            self.assertEqual(store.info['parameters'], before.info['parameters'])
+        # A reader keeps the store that it has opened.
+        np.testing.assert_array_equal(sorted_rows(terrace.xyz(before.points())), sorted_rows(first[0]))
+        with self.assertRaisesRegex(terrace.Error, 'attributes'):
+            terrace.build(second[0], path, append=True)
+        with self.assertRaises(ValueError):
+            terrace.build(second[0], path, attributes={'class': second[1]}, append=True, facility_cost=9)
+        with self.assertRaises(ValueError):
+            terrace.build(second[0], path, attributes={'class': second[1]}, append=True, replace=True)
+        with self.assertRaises(FileNotFoundError):
+            terrace.build(second[0], self.path('nowhere'), append=True)
+
     def test_returns_every_sample_at_its_cell_centre(self):
         got = terrace.xyz(self.raster.points())
         expected = np.column_stack((cell_centres(*self.samples.shape).reshape(-1, 2), self.samples.ravel()))

@@ -548,7 +548,7 @@ class OptionTest(ProcessTest):
 
 
     def test_planned_features_are_not_available_yet(self):
-        for args in (['merge', 'a.terrace', 'b.terrace', '-o', 'c.terrace'], ['build', 'a.xyz', '--append'],
+        for args in (['compact', 'a.terrace'], ['build', 'a.xyz', '-o', 'b', '--plan', 'c.json'],
                      ['build', 'a.xyz', '-o', 'b', '--part=1/2'], ['build', 'a.xyz', '-o', 'b', '--resume'],
                      ['mesh', 'a.terrace', '--base', '-o', 'b.ply'],
                      ['points', 'a.terrace', '--max-points', '5', '-o', 'b.ply']):

@@ -30,6 +30,7 @@
 #include "build/clustering.hpp"
 #include "build/damage_report.hpp"
 #include "build/joined_longitudes.hpp"
+#include "build/store_extension.hpp"
 #include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
 #include "earth/source_crs.hpp"
@@ -40,12 +41,6 @@
 
 namespace terrace::terrain {
 namespace {
-
-constexpr std::array<std::pair<const char*, cluster::Effort>, 4> kEfforts{
-    {{"fast", cluster::Effort::fast},
-     {"default", cluster::Effort::standard},
-     {"fine", cluster::Effort::fine},
-     {"full", cluster::Effort::full}}};
 
 stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& crs,
                               const BuildRequest& request) {
@@ -69,31 +64,7 @@ stream::StoreSchema schema_of(const stream::SourceInfo& info, const SourceCrs& c
     }
   }
   schema.format = info.format;
-  schema.parameters = {{"block", fmt::format("{}", request.block_points)},
-                       request.k > 0
-                           ? std::pair("k", fmt::format("{}", request.k))
-                           : std::pair("facility_cost", number_text(request.facility_cost)),
-                       {"effort", name_of(request.effort)},
-                       {"z_weight", number_text(request.z_weight)},
-                       {"seed", fmt::format("{}", request.seed)}};
-  if (request.metric.kind != MetricChoice::Kind::euclidean) {
-    schema.parameters.emplace_back("metric", request.metric.canonical());
-  }
-  if (request.strategy != cluster::FacilityStrategy::automatic) {
-    schema.parameters.emplace_back("strategy", cluster::name_of(request.strategy));
-  }
-  if (request.batch != 1) {
-    schema.parameters.emplace_back("batch", fmt::format("{}", request.batch));
-  }
-  if (request.entities != stream::Entities::points) {
-    schema.parameters.emplace_back(kEntitiesParameter, stream::name_of(request.entities));
-  }
-  for (const auto& [name, weight] : request.channels) {
-    schema.parameters.emplace_back("channel " + name, number_text(weight));
-  }
-  if (std::isfinite(request.outlier_price)) {
-    schema.parameters.emplace_back("outlier_price", number_text(request.outlier_price));
-  }
+  schema.parameters = recorded_parameters(request);
   return schema;
 }
 
@@ -282,9 +253,11 @@ std::optional<JoinedLongitudes::Joint> needed_joint(const BuildRequest& request,
 /// threads cluster.
 class Build {
  public:
-  /// middle: for joining points across the antimeridian; see JoinedLongitudes.
-  Build(const BuildRequest& request, const Context& context, std::optional<double> middle)
-      : request_(request), context_(context), middle_(middle) {}
+  /// extension: the store to append to, or null. middle: for joining points across the
+  /// antimeridian; see JoinedLongitudes.
+  Build(const BuildRequest& request, const Context& context, StoreExtension* extension,
+        std::optional<double> middle)
+      : request_(request), context_(context), extension_(extension), middle_(middle) {}
 
   /// Returns the outcome. If a middle is needed and was not given, returns the joint to build again
   /// with. Call it only once.
@@ -304,6 +277,7 @@ class Build {
   [[nodiscard]] BuildOutcome outcome_of(const stream::Progress& read,
                                         const cluster::HierarchyResult& result,
                                         std::uint64_t store_bytes) const;
+  void describe_extension(const stream::Progress& read, BuildOutcome& outcome) const;
   /// Notes what a user should know about the input.
   void note(const BuildOutcome& outcome, const UndeclaredVoids& voids) const;
 
@@ -313,6 +287,7 @@ class Build {
 
   const BuildRequest& request_;
   const Context& context_;
+  StoreExtension* extension_;
   std::optional<double> middle_;
   std::uint64_t memory_bytes_ = context_.memory_or(kMemory);
 
@@ -417,8 +392,9 @@ void Build::read_all(cluster::HierarchyBuilder& builder, const stream::StoreSche
   stream::PointBlock block;
   std::vector<std::byte> marked;
   while (next(builder, block)) {
-    check_latitude(block.positions);
     voids.add(block);
+    if (extension_ != nullptr) extension_->place(block);
+    check_latitude(block.positions);
     if (!info_.grid) longitudes(block.positions);
     if (schema.payload_size() > info_.payload_size()) {  // room for the mark
       append_zero_byte(block.payload, info_.payload_size(), block.positions.size(), marked);
@@ -437,7 +413,7 @@ void Build::read_all(cluster::HierarchyBuilder& builder, const stream::StoreSche
 BuildOutcome Build::outcome_of(const stream::Progress& read, const cluster::HierarchyResult& result,
                                std::uint64_t store_bytes) const {
   BuildOutcome outcome;
-  outcome.points = result.points;
+  outcome.points = outcome.store_points = result.points;
   outcome.nodata = read.nodata;
   outcome.raster = info_.grid;
   outcome.excluded = read.excluded;
@@ -451,6 +427,21 @@ BuildOutcome Build::outcome_of(const stream::Progress& read, const cluster::Hier
   outcome.level_points = result.level_points;
   outcome.level_clusters = result.level_clusters;
   return outcome;
+}
+
+/// Counts the added points alone, and the levels of the whole store.
+void Build::describe_extension(const stream::Progress& read, BuildOutcome& outcome) const {
+  const stream::Store store = stream::Store::open(request_.store);
+  outcome.known = extension_->known_cells();
+  outcome.points = read.points - outcome.known;
+  outcome.store_points = store.points();
+  outcome.top = store.top();
+  outcome.level_points.clear();
+  outcome.level_clusters.clear();
+  for (const stream::LevelInfo& level : store.levels()) {
+    outcome.level_points.push_back(level.points);
+    outcome.level_clusters.push_back(level.clusters);
+  }
 }
 
 void Build::note(const BuildOutcome& outcome, const UndeclaredVoids& voids) const {
@@ -489,7 +480,7 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   // Reads ahead from now on, except for rasters, which need their cell size first (see below).
   points_ = stream::read_ahead(std::move(points_), kBlocksAhead, reading_, reading_.get_token());
   const auto& [crs, ground] = located_.get();
-  const stream::StoreSchema schema = schema_of(info_, crs, request_);
+  stream::StoreSchema schema = schema_of(info_, crs, request_);
   const unsigned threads = threads_for(schema.payload_size());
   if (info_.grid) {
     // Tiles should be square on the ground, and the size of a cell there is known only now.
@@ -498,11 +489,19 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
         memory_bytes_ - memory_without_source(request_, schema.payload_size(), threads));
   }
 
-  stream::StoreWriter writer(request_.store, schema, request_.replace, threads);
+  std::span<const stream::StorePart> parts;
+  if (extension_ != nullptr) {
+    extension_->set_source(info_, schema);
+    schema = extension_->schema();
+    parts = extension_->parts();
+  }
+  const Ground ground_of_store(schema, request_.z_weight);
+  stream::StoreWriter writer(request_.store, schema, parts, request_.replace, threads);
   const bool trial = request_.most_points > 0;
   StoreSink sink(writer, !trial, context_.stop,
                  trial ? stream::StoreWriter::MakeSurface{} : request_.surface);
-  cluster::HierarchyOptions options = clustering_of(request_, schema, ground);
+  cluster::HierarchyOptions options = clustering_of(request_, schema, ground_of_store);
+  if (extension_ != nullptr) options.existing_clusters = extension_->clusters();
   options.threads = threads;
   options.stop = context_.stop;
   // Reports a full disk at once, even if the producer of the input is idle.
@@ -517,14 +516,29 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   if (!middle_) {
     if (auto joint = needed_joint(request_, longitudes, context_)) return *std::move(joint);
   }
-  writer.set_nodata(read.nodata);
+  writer.set_nodata(schema.nodata + read.nodata);
+  if (extension_ != nullptr) extension_->push_root(builder);
   const cluster::HierarchyResult result = builder.finish();
   BuildOutcome outcome = outcome_of(read, result, sink.store_bytes());
+  if (extension_ != nullptr) describe_extension(read, outcome);
   if (request_.surface && !trial) {
     outcome.surface = stream::Store::open(request_.store).surface();
   }
   note(outcome, voids);
+  if (extension_ != nullptr && extension_->parts().front().store.surface()) {
+    context_.say("the surface of the store is left out: it lacks the new points");
+  }
   return outcome;
+}
+
+void check_append(const BuildRequest& request) {
+  if (request.replace) throw UsageError(stream::message("give either {append} or {replace}"));
+  if (request.most_points > 0) {
+    throw UsageError(stream::message("{append} excludes a trial run"));
+  }
+  if (request.surface) {
+    throw UsageError(stream::message("{append} excludes a surface: build the store again with it"));
+  }
 }
 
 }  // namespace
@@ -532,26 +546,22 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
 BuildOutcome build_store(const BuildRequest& given, const Context& context) {
   check_clustering(given);
   BuildRequest request = given;
-  request.block_points = block_points_for(given);
-  auto built = Build(request, context, std::nullopt).run();
+  std::optional<StoreExtension> extension;
+  if (given.append) {
+    check_append(given);
+    extension.emplace(given);
+    request = extension->clustering_as_before(given);
+  }
+  StoreExtension* const extended = extension ? &*extension : nullptr;
+  request.block_points = block_points_for(request);
+  auto built = Build(request, context, extended, std::nullopt).run();
   if (const auto* const joint = std::get_if<JoinedLongitudes::Joint>(&built)) {
     const bool beyond = joint->reason.ends_with("antimeridian");
     context.say("the points " + joint->reason + ": they are read again and joined" +
                 (beyond ? ", with longitudes that continue beyond 180 degrees" : ""));
-    built = Build(request, context, joint->middle).run();
+    built = Build(request, context, extended, joint->middle).run();
   }
   return std::get<BuildOutcome>(std::move(built));
-}
-
-std::optional<cluster::Effort> effort_of(const std::string& name) {
-  for (const auto& [text, effort] : kEfforts) {
-    if (name == text) return effort;
-  }
-  return std::nullopt;
-}
-
-std::string name_of(cluster::Effort effort) {
-  return kEfforts[static_cast<std::size_t>(effort)].first;
 }
 
 }  // namespace terrace::terrain

@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <terrace/cluster/hierarchy.hpp>
 #include <terrace/stream/schema.hpp>
+#include <terrace/stream/store.hpp>
 
 #include "earth/ground.hpp"
 #include "terrace/terrain/build.hpp"
@@ -43,5 +45,14 @@ void append_zero_byte(std::span<const std::byte> records, std::size_t record_byt
 /// ones.
 cluster::HierarchyOptions clustering_of(const BuildRequest& request, const stream::Schema& schema,
                                         const Ground& ground);
+
+/// Returns the options of the clustering as the manifest of a store records them: names and values,
+/// in the order of the manifest.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> recorded_parameters(
+    const BuildRequest& request);
+/// Returns a request with the options that recorded_parameters() gave, and otherwise defaults.
+/// file: the store, for messages. Throws: stream::Error for a name or value that it does not write.
+[[nodiscard]] BuildRequest recorded_request(const stream::StoreSchema& schema,
+                                            const std::string& file);
 
 }  // namespace terrace::terrain

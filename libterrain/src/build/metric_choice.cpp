@@ -163,6 +163,37 @@ MetricChoice MetricChoice::parse(const std::string& text) {
   return choice;
 }
 
+MetricChoice MetricChoice::recorded(const std::string& text) {
+  constexpr std::string_view kElliptical = "elliptical:";
+  if (!text.starts_with(kElliptical)) return parse(text);
+  MetricChoice choice;
+  choice.text = text;
+  choice.kind = Kind::elliptical;
+  try {
+    for (const auto& json : nlohmann::json::parse(text.substr(kElliptical.size()))) {
+      Region region{std::nullopt, cluster::Elliptical(json.at("map").get<cluster::LinearMap>())};
+      if (json.contains("box")) {
+        const auto ends = json["box"].get<std::vector<double>>();
+        if (ends.size() != 4 && ends.size() != 6) throw std::invalid_argument("a box");
+        const std::size_t axes = ends.size() / 2;
+        stream::Box3 box{{0, 0, -kUnbounded}, {0, 0, kUnbounded}};
+        for (std::size_t axis = 0; axis < axes; ++axis) {
+          box.min[axis] = ends[axis];
+          box.max[axis] = ends[axes + axis];
+        }
+        region.box = box;
+      }
+      choice.regions.push_back(std::move(region));
+    }
+  } catch (const std::exception&) {  // of the JSON library, or for an impossible ellipsoid
+    choice.regions.clear();
+  }
+  if (choice.regions.empty()) {
+    throw UsageError(stream::message("{metric} is not as a store records it: {}", text));
+  }
+  return choice;
+}
+
 bool MetricChoice::has_boxes() const {
   // Regions after one without a box are never reached.
   return kind == Kind::elliptical && regions.front().box.has_value();

@@ -59,9 +59,10 @@ std::string version_text() {
 }
 
 /// Planned verbs and options. Naming them here keeps users from taking them for typing errors.
-constexpr std::string_view kPlannedVerb = "merge";
+constexpr std::array<std::string_view, 5> kPlannedVerbs{"plan", "remove", "compact", "vacuum",
+                                                        "ground"};
 constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kPlannedOptions{
-    {{"build", "--append"},
+    {{"build", "--plan"},
      {"build", "--part"},
      {"build", "--resume"},
      {"mesh", "--base"},
@@ -160,7 +161,7 @@ void check_memory(const Verb& verb, const CommonOptions& common) {
 }
 
 const Verb& find_verb(const std::string& name) {
-  if (name == kPlannedVerb)
+  if (std::find(kPlannedVerbs.begin(), kPlannedVerbs.end(), name) != kPlannedVerbs.end())
     throw UsageError(fmt::format("the verb '{}' is not available yet", name));
   for (const Verb& verb : verbs()) {
     if (verb.name == name) return verb;

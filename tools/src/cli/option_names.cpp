@@ -13,6 +13,7 @@ namespace {
 /// name in messages is listed.
 constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_view>>({
     {"align", "--align"},
+    {"append", "--append"},
     {"band", "--band"},
     {"batch", "--batch"},
     {"block_points", "--block"},

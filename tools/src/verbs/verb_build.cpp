@@ -86,6 +86,8 @@ class BuildCommand final : public Command {
                  "also restore the surface that the points were scanned from and store it, so that "
                  "'terrace surface' needs not, and surfaces of any detail do not tear; all points "
                  "are held in memory");
+    app.add_flag("--append", request_.append,
+                 "add the points to the store, which exists; clusters as the store records");
     app.add_flag("--dry-run", dry_run_,
                  "only estimate points, disk space and time from a trial run");
   }
@@ -120,8 +122,9 @@ class BuildCommand final : public Command {
     if (surface_ && request_.entities != stream::Entities::points) {
       throw UsageError("--surface is for points: --entities " + entities_ + " excludes it");
     }
+    if (request_.append && dry_run_) throw UsageError("--append excludes --dry-run");
     std::error_code ignored;
-    if (!common.force && std::filesystem::exists(request_.store, ignored)) {
+    if (!common.force && !request_.append && std::filesystem::exists(request_.store, ignored)) {
       throw stream::Error(output_, "exists already")
           .remedy("name another output, or give --force to replace it");
     }
@@ -200,6 +203,7 @@ class BuildCommand final : public Command {
                     {"seconds", seconds},
                     {"points_per_second", rate},
                     {"peak_rss_bytes", peak_rss_bytes()},
+                    {"store_points", outcome.store_points},
                     {"store_bytes", outcome.store_bytes},
                     {"levels", outcome.top + 1},
                     {"reordered", outcome.order.reordered},
@@ -219,12 +223,18 @@ class BuildCommand final : public Command {
       exclusions += (exclusions.empty() ? "" : " and ") +
                     counted(outcome.excluded, "point", "that was", "that were") + " not selected";
     }
+    if (outcome.known > 0) {
+      summary.json["known"] = outcome.known;
+      exclusions += (exclusions.empty() ? "" : " and ") +
+                    counted(outcome.known, "cell", "that the store has", "that the store has");
+    }
     if (!exclusions.empty()) exclusions = fmt::format(" ({} left out)", exclusions);
-    summary.text =
-        fmt::format("{}{} in {}, {}\n{}{}: {}, {}, peak memory {}\n",
-                    counted(outcome.points, entity()), exclusions, readable_seconds(seconds),
-                    readable_rate(rate), outliers, output_, counted(outcome.top + 1, "level"),
-                    readable_bytes(outcome.store_bytes), readable_bytes(peak_rss_bytes()));
+    summary.text = fmt::format(
+        "{}{} in {}, {}\n{}{}: {}{}, {}, peak memory {}\n", counted(outcome.points, entity()),
+        exclusions, readable_seconds(seconds), readable_rate(rate), outliers, output_,
+        request_.append ? counted(outcome.store_points, entity()) + ", " : std::string(),
+        counted(outcome.top + 1, "level"), readable_bytes(outcome.store_bytes),
+        readable_bytes(peak_rss_bytes()));
     if (outcome.surface) {
       summary.json["surface"] = {{"vertices", outcome.surface->vertices},
                                  {"triangles", outcome.surface->triangles},

@@ -414,6 +414,7 @@ void add_levels(const stream::Store& store, Json& json, std::string& text) {
                     {"bytes", level.bytes},
                     {"members", level.members},
                     {"index_bytes", level.index_bytes},
+                    {"segments", level.segments},
                     {"cluster_sizes",
                      {{"min", sizes.min},
                       {"p5", sizes.p5},

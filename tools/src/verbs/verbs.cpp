@@ -6,9 +6,11 @@
 namespace terrace::tools {
 
 std::span<const Verb> verbs() {
-  static const std::array<Verb, 18> kVerbs{{
+  static const std::array<Verb, 19> kVerbs{{
       {"build", "stream the inputs once and write a store", "terrace build dem.tif -o dem.terrace",
        make_build},
+      {"merge", "join stores without building them again",
+       "terrace merge north.terrace south.terrace -o all.terrace", make_merge},
       {"info", "describe a store or a file", "terrace info dem.tif --json", make_info},
       {"verify", "check every checksum and invariant", "terrace verify dem.terrace", make_verify},
       {"points", "write the points of a level, a region, or mixed levels",

@@ -13,6 +13,7 @@ std::unique_ptr<Command> make_contour();
 std::unique_ptr<Command> make_convert();
 std::unique_ptr<Command> make_info();
 std::unique_ptr<Command> make_match();
+std::unique_ptr<Command> make_merge();
 std::unique_ptr<Command> make_mesh();
 std::unique_ptr<Command> make_points();
 std::unique_ptr<Command> make_profile();

@@ -32,6 +32,13 @@ struct BuildRequest {
   std::function<std::unique_ptr<stream::PointSource>(const stream::SourceOptions&)> open{};
   std::filesystem::path store{};  ///< the folder to create
   bool replace = false;
+  /// Adds the points to the store, which exists. It keeps its clusters with their ids, except the
+  /// root, and its options of clustering: those of this request must be the same or defaults. The
+  /// points must match it as in a merge (merge.hpp); cells of a raster that the store has with the
+  /// same value are left out. The extended store takes the place of the old one in one step. Cost:
+  /// that of building the new points alone, and of links to the files. A surface is not kept.
+  /// Without `replace`, `surface` and `most_points`.
+  bool append = false;
   std::string input_format{};  ///< empty: detected from the content
   /// What a point of the store represents. Triangles are clustered by how far corners must move
   /// (see cluster::triangle_distance). A triangle is located at its first corner, and detail_mesh()
@@ -93,7 +100,9 @@ struct BuildRequest {
 inline constexpr std::size_t kMaxMedians = 10'000;
 
 struct BuildOutcome {
-  std::uint64_t points = 0;
+  std::uint64_t points = 0;        ///< added to the store
+  std::uint64_t store_points = 0;  ///< in the store; more than `points` after an append
+  std::uint64_t known = 0;         ///< cells that the store to append to had already
   std::uint64_t nodata = 0;        ///< cells without data; points with a NaN coordinate
   bool raster = false;             ///< the points are cells
   std::uint64_t excluded = 0;      ///< points that the selection left out

@@ -35,8 +35,10 @@ struct MetricChoice {
   /// region and member.
   static MetricChoice parse(const std::string& text);
 
-  /// Returns the regions as one line of JSON without file names, for the record in a store.
+  /// Returns the metric as one line without file names, for the record in a store.
   [[nodiscard]] std::string canonical() const;
+  /// Returns the metric that canonical() recorded. Throws: UsageError for any other text.
+  static MetricChoice recorded(const std::string& text);
   /// Whether the metric depends on the place, because regions have boxes.
   [[nodiscard]] bool has_boxes() const;
 

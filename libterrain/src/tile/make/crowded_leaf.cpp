@@ -17,7 +17,7 @@ namespace {
 constexpr double kPartsOfUnit = 4.0;
 constexpr unsigned kRounds = 8;
 
-struct Places {
+struct PlacesInUnits {
   std::vector<double> u, v, height;
 
   void add(double u_at, double v_at, double h) {
@@ -27,8 +27,8 @@ struct Places {
   }
 };
 
-Places on_units(const SurfaceSamples& samples, const LeafPlaces& units) {
-  Places places;
+PlacesInUnits on_units(const SurfaceSamples& samples, const LeafPlaces& units) {
+  PlacesInUnits places;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     places.add(units.u(samples.longitude[i]), units.v(samples.latitude[i]), samples.height[i]);
   }
@@ -45,7 +45,7 @@ class Extremes {
     highest_.resize(columns_ * rows);
   }
 
-  void add(const Places& places) {
+  void add(const PlacesInUnits& places) {
     for (std::size_t i = 0; i < places.u.size(); ++i) {
       const auto column = static_cast<std::size_t>((places.u[i] - units_.west()) * kPartsOfUnit);
       const auto row = static_cast<std::size_t>((places.v[i] - units_.south()) * kPartsOfUnit);
@@ -61,8 +61,8 @@ class Extremes {
     }
   }
 
-  [[nodiscard]] Places places() const {
-    Places places;
+  [[nodiscard]] PlacesInUnits places() const {
+    PlacesInUnits places;
     for (std::size_t i = 0; i < lowest_.size(); ++i) {
       const Sample &low = lowest_[i], &high = highest_[i];
       if (std::isnan(low.height)) continue;
@@ -88,7 +88,7 @@ tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
                                 const tri::PointTinOptions& options, TileSurface& surface) {
   const LeafPlaces units(tile, leaf);
   const GeographicBox box = box_of(tile, leaf);
-  Places chosen;
+  PlacesInUnits chosen;
   {
     Extremes extremes(units);
     for_each_part(box, surface,
@@ -102,7 +102,7 @@ tri::PointTin mesh_crowded_leaf(const TileAddress& tile, const TileLeaf& leaf,
     tri::TinErrors all;
     double squares = 0.0;
     for_each_part(box, surface, [&](const SurfaceSamples& samples) {
-      const Places places = on_units(samples, units);
+      const PlacesInUnits places = on_units(samples, units);
       const tri::TinErrors errors =
           tri::measure_surface(places.u, places.v, places.height, tin.vertices, tin.triangles);
       all.covered += errors.covered;
