@@ -34,7 +34,7 @@ std::optional<CollapseOrder::Step> CollapseOrder::next() {
     set_wait(vertex, Wait::nothing);
     const auto [target, cost] = cheapest(vertex);
     if (target == kNone) continue;
-    const double error = shrinking_.error_after(vertex, target, limit_);
+    const double error = shrinking_.error_after(vertex, target, limit_, largest_);
     if (!std::isfinite(error)) continue;
     // An error that is not the largest so far costs nothing.
     if (error > std::max(kSameError * expected_error, largest_) && !queue_.empty() &&

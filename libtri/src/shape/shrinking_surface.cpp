@@ -235,7 +235,8 @@ double ShrinkingSurface::distance_of(std::uint32_t sample, double limit) {
   return distance <= limit ? distance : std::numeric_limits<double>::infinity();
 }
 
-double ShrinkingSurface::error_after(std::uint32_t vertex, std::uint32_t target, double limit) {
+double ShrinkingSurface::error_after(std::uint32_t vertex, std::uint32_t target, double limit,
+                                     double enough) {
   after_.clear();
   measures_.clear();
   moves_.clear();
@@ -259,18 +260,21 @@ double ShrinkingSurface::error_after(std::uint32_t vertex, std::uint32_t target,
       largest = std::max(largest, distance_of(s, limit));
     }
   });
-  if (largest <= limit) largest = std::max(largest, bulge_after(vertex, target, limit));
+  if (largest <= limit) {
+    largest = bulge_after(vertex, target, limit, std::max(largest, std::min(enough, limit)));
+  }
   return largest <= limit ? largest : std::numeric_limits<double>::infinity();
 }
 
-double ShrinkingSurface::bulge_after(std::uint32_t vertex, std::uint32_t target, double limit) {
-  if (after_.empty()) return 0.0;
+double ShrinkingSurface::bulge_after(std::uint32_t vertex, std::uint32_t target, double limit,
+                                     double distance) {
+  if (after_.empty()) return distance;
   // About as many places as the triangles stand for vertices.
   const double vertices_per_triangle =
       static_cast<double>(moves_.size()) / static_cast<double>(after_.size());
   const auto parts = std::max(
       kLeastParts, static_cast<std::uint32_t>(std::ceil(std::sqrt(2.0 * vertices_per_triangle))));
-  double largest = 0.0;
+  double largest = distance;
   for_each_corner(vertex, [&](std::uint32_t corner) {
     if (has(corner / 3, target) || largest > limit) return;
     const Vector3& a = points_[target];
@@ -285,9 +289,9 @@ double ShrinkingSurface::bulge_after(std::uint32_t vertex, std::uint32_t target,
         const Vector3 offset{b * to_b[0] + c * to_c[0], b * to_b[1] + c * to_c[1],
                              b * to_b[2] + c * to_c[2]};
         // The target is on the full surface.
-        largest = std::max(
-            largest, std::sqrt(full_.square({a[0] + offset[0], a[1] + offset[1], a[2] + offset[2]},
-                                            dot(offset, offset))));
+        const double square = full_.square({a[0] + offset[0], a[1] + offset[1], a[2] + offset[2]},
+                                           dot(offset, offset), largest * largest, near_);
+        largest = std::max(largest, std::sqrt(square));
         if (largest > limit) return;
       }
     }

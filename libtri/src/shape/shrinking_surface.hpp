@@ -78,8 +78,10 @@ class ShrinkingSurface {
   /// The error of a collapse: the largest distance between the full surface and the triangles after
   /// it. Measured from the vertex and the removed ones that are nearest to its triangles, and from
   /// about as many places on the changed triangles, nine or more on each. Infinity if that exceeds
-  /// `limit` or no triangle remains at the target.
-  [[nodiscard]] double error_after(std::uint32_t vertex, std::uint32_t target, double limit);
+  /// `limit` or no triangle remains at the target. If it is at most `enough`, any number from it to
+  /// `enough` may be returned, which is much faster.
+  [[nodiscard]] double error_after(std::uint32_t vertex, std::uint32_t target, double limit,
+                                   double enough);
   /// Performs the collapse that error_after() measured last. Replaces `around` with the
   /// vertices whose triangles changed.
   void collapse(std::uint32_t vertex, std::uint32_t target, std::vector<std::uint32_t>& around);
@@ -111,7 +113,10 @@ class ShrinkingSurface {
   }
   void add_planes();
   void add_border_planes();
-  [[nodiscard]] double bulge_after(std::uint32_t vertex, std::uint32_t target, double limit);
+  /// Returns the larger of a distance and the distances of the changed triangles from the full
+  /// surface.
+  [[nodiscard]] double bulge_after(std::uint32_t vertex, std::uint32_t target, double limit,
+                                   double distance);
   [[nodiscard]] double distance_of(std::uint32_t sample, double limit);
 
   std::vector<Vector3> points_;
@@ -125,6 +130,7 @@ class ShrinkingSurface {
   SurfaceDistance full_;
 
   // Scratch.
+  std::uint32_t near_ = 0;  ///< a face near the last place whose distance was measured
   std::vector<Neighbour> around_, around_target_;
   std::vector<std::pair<double, std::size_t>> costs_;
   std::vector<std::uint32_t> shared_;       ///< vertices opposite to the edge that collapses
