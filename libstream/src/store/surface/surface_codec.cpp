@@ -117,11 +117,17 @@ class SurfaceCodec {
       }
     }
     on_surface_ = surface_.on_surface();
+    leaves_.resize(points);
+    for (std::uint32_t c = 0; c < order_.clusters.size(); ++c) {
+      const auto& cluster = order_.clusters[c];
+      if (level_of(cluster.id) > 0) continue;
+      std::fill(leaves_.begin() + cluster.begin, leaves_.begin() + cluster.end, c);
+    }
     for (std::uint32_t v = 0; v < points; ++v) {
       if (!on_surface_[v]) continue;
       ++vertices_;
       const bool moves = surface_.parents[v] != kNoNumber;
-      for (std::uint32_t c = leaf_of(v); c != kNoNumber; c = order_.clusters[c].parent) {
+      for (std::uint32_t c = leaves_[v]; c != kNoNumber; c = order_.clusters[c].parent) {
         if (moves && level_of(order_.clusters[c].id) >= surface_.levels[v]) break;
         remaining_[c].push_back(v);
       }
@@ -190,21 +196,12 @@ class SurfaceCodec {
   [[nodiscard]] bool contains(std::uint32_t c, std::uint32_t v) const {
     return v >= order_.clusters[c].begin && v < order_.clusters[c].end;
   }
-  [[nodiscard]] std::uint32_t leaf_of(std::uint32_t v) const {
-    std::uint32_t c = 0;
-    while (level_of(order_.clusters[c].id) > 0) {
-      std::uint32_t below = c + 1;
-      while (!contains(below, v)) below = order_.clusters[below].next;
-      c = below;
-    }
-    return c;
-  }
   /// The lowest cluster with two corners.
   [[nodiscard]] std::uint32_t home_of(const Triangle& t) const {
     std::uint32_t c = kNoNumber;
     std::uint32_t size = kNoNumber;
     for (std::size_t k = 0; k < 3; ++k) {
-      std::uint32_t at = leaf_of(t[k]);
+      std::uint32_t at = leaves_[t[k]];
       while (!contains(at, t[(k + 1) % 3])) at = order_.clusters[at].parent;
       // Of two with the same points the lower one is after the other.
       const std::uint32_t points = order_.clusters[at].end - order_.clusters[at].begin;
@@ -388,6 +385,7 @@ class SurfaceCodec {
   std::vector<std::vector<std::uint32_t>> remaining_;  ///< of each cluster
   std::vector<std::vector<Triangle>> triangles_;       ///< when encoding, of each cluster
   std::vector<bool> on_surface_;
+  std::vector<std::uint32_t> leaves_;  ///< the cluster of level 0 of each point; for encoding
   std::uint32_t vertices_ = 0;
   std::uint64_t triangles_left_ = 0;
   std::vector<std::uint32_t> participants_;  ///< of the cluster being coded, ascending
