@@ -97,6 +97,34 @@ class MeshTriangles : public ::testing::Test {
   TempFolder folder_;
 };
 
+TEST_F(MeshTriangles, PointsReportWhetherThereMayBeFaces) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"
+      "property float y\nproperty float z\n";
+  const std::string vertices = "end_header\n0 0 0\n1 0 0\n0 1 0\n";
+  const std::string faces = "element face 1\nproperty list uchar int vertex_indices\n";
+  const std::string cloud = put("cloud.ply", header + vertices);
+  const std::string mesh = put("mesh.ply", header + faces + vertices + "3 0 1 2\n");
+  const std::string text = put("text.xyz", "0 0 0\n");
+  const std::string obj = put("cloud.obj", "v 0 0 0\n");
+  const auto may_have_faces = [](const std::vector<std::string>& files) {
+    return open_source(files)->info().faces;
+  };
+  EXPECT_FALSE(may_have_faces({cloud}));
+  EXPECT_TRUE(may_have_faces({mesh}));
+  EXPECT_TRUE(may_have_faces({cloud, mesh}));
+  EXPECT_FALSE(may_have_faces({text}));
+  EXPECT_TRUE(may_have_faces({obj}));  // known only at its end
+  SourceOptions optional = options();
+  optional.needs_faces = false;
+  PointBlock block;
+  EXPECT_FALSE(open_source(std::vector{obj}, optional)->next(block));
+  EXPECT_THROW((void)open_source(std::vector{obj}, options())->next(block), Error);
+  const auto both = open_source(std::vector{cloud, mesh}, optional);
+  ASSERT_TRUE(both->next(block));
+  EXPECT_EQ(block.size(), 1u);
+}
+
 TEST_F(MeshTriangles, MatchTheMesh) {
   const std::string obj =
       "v 0 0 0\nv 1 0 -0.0\nv 1 1 0.1\nf 1 2 3\nv 0 1 0\nv -0.5 0.5 1e-300\nf 1 2 3 4 5\nf -1 -2 "

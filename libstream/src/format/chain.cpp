@@ -91,6 +91,7 @@ class Chain final : public PointSource {
       } else {
         check_agreement(info_, info, *crs_);
         info_.files.push_back(part.file);
+        info_.faces |= info.faces;
         const std::size_t room =
             kMaxComments - std::min<std::size_t>(kMaxComments, info_.comments.size());
         info_.comments.insert(info_.comments.end(), info.comments.begin(),

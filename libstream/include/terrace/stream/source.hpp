@@ -36,6 +36,9 @@ struct SourceInfo : Schema {
   std::optional<std::uint64_t> points;
   std::optional<double> nodata;      ///< of the (first) raster, in raw units
   std::optional<OctreeInfo> octree;  ///< of a single input organised as an octree
+  /// True for points from meshes that may have faces, so that opening the files again as
+  /// Entities::triangles may deliver some.
+  bool faces = false;
   std::vector<std::string> comments;
   /// For users: how several files were brought together; empty if they were used as they are.
   std::string note;
@@ -174,6 +177,8 @@ using SameCrs = std::function<bool(const Crs&, const Crs&)>;
 struct SourceOptions {
   std::string format{};  ///< name of a format; empty: determined by content, then ending
   Entities entities = Entities::points;
+  /// With Entities::triangles, a mesh without faces is an error; otherwise it delivers nothing.
+  bool needs_faces = true;
   std::size_t block_points = 10000;        ///< maximum number of points per block
   std::uint64_t memory_bytes = 64u << 20;  ///< approximate memory limit of the source
   int band = 1;                            ///< of rasters, counted from 1

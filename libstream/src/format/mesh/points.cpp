@@ -33,6 +33,7 @@ class MeshPoints final : public PointSource {
     info_.format = parser_->format();
     info_.files = {file};
     info_.points = parser_->stated_vertices();
+    info_.faces = true;  // known only at the end
     constexpr std::array kNames{"x", "y", "z"};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       info_.coordinates[axis] = {.name = kNames[axis], .type = parser_->coordinate_type()};

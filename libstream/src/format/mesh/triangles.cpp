@@ -76,6 +76,7 @@ class TriangleSource final : public PointSource {
   TriangleSource(OpenMesh mesh, const SourceOptions& options)
       : mesh_(std::move(mesh)),
         block_points_(options.block_points),
+        needs_faces_(options.needs_faces),
         type_(mesh_.parser->coordinate_type()),
         vertices_(mesh_.parser->input().name()) {
     info_.format = mesh_.parser->format();
@@ -126,7 +127,7 @@ class TriangleSource final : public PointSource {
       }
     }
     delivered_ += block.size();
-    if (delivered_ + nodata_ == 0) {
+    if (needs_faces_ && delivered_ + nodata_ == 0) {
       throw Error(info_.files.front(), "has no faces, so it has no triangles")
           .remedy(message("read it as points: leave {entities} out"));
     }
@@ -173,6 +174,7 @@ class TriangleSource final : public PointSource {
 
   OpenMesh mesh_;
   std::size_t block_points_;
+  bool needs_faces_;
   ScalarType type_;
   SourceInfo info_;
   VertexTable vertices_;

@@ -68,6 +68,7 @@ class PlySource final : public PointSource {
     info_.format = "ply";
     info_.files = {file};
     info_.points = count_;
+    info_.faces = has_faces();
     info_.comments = header_.comments;
     if (options.crs) info_.crs = *options.crs;
     make_fields(*vertex);
