@@ -59,7 +59,8 @@ class ScanSurfaceTest : public ::testing::Test {
     request.store = folder_.path() / name;
     request.block_points = 500;
     if (context != nullptr) {
-      request.surface = [context](const stream::Store& store, const stream::ClusterOrder& order) {
+      request.surface = [context](const stream::Store& store, const stream::ClusterOrder& order,
+                                  const InputTriangles&) {
         return surface_to_store(store, order, *context);
       };
     }
@@ -195,9 +196,8 @@ TEST_F(ScanSurfaceTest, StoringASurfaceNeedsOneAndMemory) {
   BuildRequest request;
   request.inputs = {text.string()};
   request.store = folder_.path() / "flat";
-  request.surface = [](const stream::Store& store, const stream::ClusterOrder& order) {
-    return surface_to_store(store, order);
-  };
+  request.surface = [](const stream::Store& store, const stream::ClusterOrder& order,
+                       const InputTriangles&) { return surface_to_store(store, order); };
   EXPECT_THROW(build_store(request), stream::Error);
   EXPECT_FALSE(std::filesystem::exists(request.store));
 }

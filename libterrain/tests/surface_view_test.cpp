@@ -56,9 +56,8 @@ class SurfaceViewTest : public testing::Test {
     request.inputs = {text.string()};
     request.store = folder_->path() / "store";
     request.block_points = 400;
-    request.surface = [](const stream::Store& points, const stream::ClusterOrder& order) {
-      return surface_to_store(points, order);
-    };
+    request.surface = [](const stream::Store& points, const stream::ClusterOrder& order,
+                         const InputTriangles&) { return surface_to_store(points, order); };
     build_store(request);
   }
   static void TearDownTestSuite() { folder_.reset(); }

@@ -24,6 +24,9 @@ terrain::BuildRequest request_of(const py::object& source, const std::string& pa
     request.inputs = source.cast<std::vector<std::string>>();
   } else {
     request.open = opener_of(source);
+    if (const auto arrays = source.cast<py::dict>(); arrays.contains("triangles")) {
+      request.open_triangles = opener_of(arrays["triangles"]);
+    }
   }
   check_output_name(terrain::outputs::kStore, path);
   request.store = path;
@@ -75,16 +78,20 @@ void bind_build(py::module_& module) {
   module.def("build", [](const py::object& source, const std::string& path, const py::dict& options,
                          const py::tuple& settings) {
     terrain::BuildRequest request = request_of(source, path, options);
-    bool surface = false;
-    take_option(options, "surface", surface);
+    bool surface = options.contains("surface") && py::isinstance<py::str>(options["surface"]);
+    if (surface) {
+      take_named(options, "surface", request.surface_origin);
+    } else {
+      take_option(options, "surface", surface);
+    }
     if (surface && request.entities != stream::Entities::points) {
       throw py::value_error("`surface` is for points, not for other `entities`");
     }
     const terrain::BuildOutcome outcome = Call(settings).run([&](const terrain::Context& context) {
       if (surface) {
-        request.surface = [&context](const stream::Store& store,
-                                     const stream::ClusterOrder& order) {
-          return terrain::surface_to_store(store, order, context);
+        request.surface = [&context](const stream::Store& store, const stream::ClusterOrder& order,
+                                     const terrain::InputTriangles& triangles) {
+          return terrain::surface_to_store(store, order, context, triangles);
         };
       }
       return terrain::build_store(request, context);
@@ -99,6 +106,7 @@ void bind_build(py::module_& module) {
     result["withheld"] = outcome.withheld;
     result["outliers"] = outcome.outliers;
     result["bytes"] = outcome.store_bytes;
+    result["input_triangles"] = outcome.input_triangles;
     result["reordered"] = outcome.order.reordered;
     return result;
   });

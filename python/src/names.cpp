@@ -15,6 +15,7 @@
 #include <terrace/stream/spatial_order.hpp>
 #include <terrace/terrain/fill.hpp>
 #include <terrace/terrain/height_reference.hpp>
+#include <terrace/terrain/input_triangles.hpp>
 #include <terrace/terrain/raster.hpp>
 #include <terrace/tri/grid_tin.hpp>
 #include <terrace/tri/interpolation.hpp>
@@ -39,7 +40,7 @@ struct NameTable {
 const auto& tables() {
   using cluster::Effort, cluster::FacilityStrategy, cluster::LinkageMethod, matching::Halving;
   using stream::Entities, stream::HeightsOfColour, stream::Order;
-  using terrain::Fill, terrain::HeightReference, terrain::RasterValue;
+  using terrain::Fill, terrain::HeightReference, terrain::RasterValue, terrain::SurfaceOrigin;
   using tri::GradientFrom, tri::Interpolation, tri::PointDuplicates, tri::ShapeCriterion;
   using tri::ShapeRule, tri::Smoothing, tri::SurfaceSmoothing, tri::TinQuality;
   static const std::tuple all{
@@ -130,6 +131,11 @@ const auto& tables() {
                            {"triangles", Entities::triangles},
                            {"segments", Entities::segments},
                            {"polylines", Entities::polylines}}},
+      NameTable<SurfaceOrigin>{"SurfaceOrigin",
+                               "surface",
+                               {{"auto", SurfaceOrigin::automatic},
+                                {"input", SurfaceOrigin::input},
+                                {"restored", SurfaceOrigin::restored}}},
       NameTable<HeightsOfColour>{"HeightsOfColour",
                                  "heights_of_colour",
                                  {{"none", HeightsOfColour::none},
@@ -156,7 +162,7 @@ const auto& tables() {
 }
 
 /// Parameters that have different names in the libraries (first) and in the module.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kParameters{{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kParameters{{
     {"channel", "channels"},
     {"format", "input_format"},
     {"memory_bytes", "memory"},
@@ -165,6 +171,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kParamet
     {"region_crs", "crs"},
     {"shift", "datum_shift"},
     {"strategy", "method"},
+    {"surface_from", "surface"},
     {"to_crs", "crs"},
     {"zoom", "zooms"},
 }};
@@ -214,6 +221,7 @@ template void take_named(const py::dict&, const char*, stream::Entities&);
 template void take_named(const py::dict&, const char*, stream::HeightsOfColour&);
 template void take_named(const py::dict&, const char*, terrain::Fill&);
 template void take_named(const py::dict&, const char*, terrain::HeightReference&);
+template void take_named(const py::dict&, const char*, terrain::SurfaceOrigin&);
 template void take_named(const py::dict&, const char*, tri::TinQuality&);
 template void take_named(const py::dict&, const char*, tri::PointDuplicates&);
 

@@ -19,7 +19,9 @@ using OpenSource =
 /// Returns a function that opens a source: a list of file names, or a dict of arrays, which must
 /// outlive the source. Points are {"name", "columns": 3 coordinates, "attributes"}, with columns as
 /// dicts of array, name, scale and offset. A raster is {"name", "samples": 2D, "transform": six
-/// numbers to a sample's place, "nodata", "scale", "offset"}.
+/// numbers to a sample's place, "nodata", "scale", "offset"}. Points of a mesh also have
+/// "triangles", points of the same form with the other corners as attributes, which this function
+/// ignores.
 OpenSource opener_of(const py::object& source);
 
 /// Returns the options for reading `source`, with the region moved to the data's range of

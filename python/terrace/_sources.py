@@ -88,6 +88,25 @@ def _records(array: Any, fields: Sequence[str], name: str, scales: Sequence[floa
     return _points(columns, attributes, name)
 
 
+def _mesh(source: Any, attributes: list[dict[str, Any]], name: str) -> dict[str, Any]:
+    """Returns a source for the vertices of a mesh, with its triangles as {'triangles': a source of their corners}."""
+    vertices = as_array(filled(source.vertices), 'the vertices')
+    triangles = np.asarray(source.triangles if hasattr(source, 'triangles') else source.faces)
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ValueError(f'the vertices of a mesh must have the shape (n, 3), not {vertices.shape}')
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in 'iu':
+        raise ValueError('the triangles of a mesh must be integers of the shape (m, 3)')
+    if triangles.size and not (triangles.min() >= 0 and triangles.max() < len(vertices)):
+        raise ValueError(f'a triangle of the mesh has a corner that is not one of its {len(vertices)} vertices')
+    out = _points([_column(axis, vertices[:, i]) for i, axis in enumerate('xyz')], attributes, name)
+    if len(triangles):
+        corners = vertices[triangles]
+        out['triangles'] = _points([_column(axis, corners[:, 0, i]) for i, axis in enumerate('xyz')],
+                                   [_column(f'{axis}{k + 1}', corners[:, k, i]) for k in (1, 2) for i, axis in enumerate('xyz')],
+                                   name)
+    return out
+
+
 def _laspy_crs(data: Any) -> Any:
     """Returns the CRS of a laspy.LasData, which laspy reads with pyproj, or None."""
     try:
@@ -179,6 +198,12 @@ def source_of(source: Any, transform: Iterable[float] | None = None, crs: Any = 
         return (_raster(as_array(filled(samples), 'the raster'), source.transform if transform is None else transform, nodata,
                         '<raster>', scale, offset),
                 crs_text(crs or getattr(source, 'crs', None)))
+    if hasattr(source, 'vertices') and (hasattr(source, 'triangles') or hasattr(source, 'faces')):
+        if transform is not None or nodata is not None:
+            raise ValueError('meshes do not support `transform` and `nodata`')
+        more = [] if attributes is None else [
+            _column(column_name, as_array(column, f'"{column_name}"')) for column_name, column in attributes.items()]
+        return _mesh(source, more, '<mesh>'), crs_text(crs)
     if hasattr(source, 'columns') and all(axis in source.columns for axis in 'xyz'):  # a pandas.DataFrame, or another frame
         source = {name: source[name] for name in source.columns}
     if isinstance(source, dict):

@@ -98,6 +98,8 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
       a raster if ``transform`` is given;
     - an ``xarray.DataArray`` with rioxarray's accessor or attributes, a dataset of rasterio or GDAL, a Raster, any
       array with a ``transform`` (and ``crs``, ``nodata``);
+    - a Mesh, or another object with ``vertices`` and ``triangles`` (or ``faces``): its vertices as points, and its
+      triangles for ``surface``;
     - any other object with numpy's array interface, the buffer protocol or DLPack.
 
     Arrays are read in place. Points with a NaN or masked coordinate, and samples that are not finite, are left out
@@ -128,8 +130,9 @@ def build(sources: Any, store: Path, *, transform: Iterable[float] | None = None
       number of candidates evaluated at once, and of threads that share the work on one block.
     - ``order``: 'auto', 'stream' or 'spatial'.
     - ``vertical``: 'ellipsoidal' or 'orthometric'.
-    - ``surface``: whether the surface of a scan is restored and stored with the points, for surface(). All points are
-      then held in memory.
+    - ``surface``: whether a surface is stored with the points, for surface(): True for the triangles of a mesh, whose
+      file is read twice, or, without faces, the surface that surface() restores. 'input' demands triangles, 'restored'
+      ignores them. All points are then held in memory.
     - ``seed``: of random choices.
 
     Options for files: ``input_format``, ``entities``, ``skip_damaged``, ``band``, ``cell``, ``heights_of_colour``

@@ -236,6 +236,30 @@ class Meshes(StoreCase):
             terrace.build(ball, self.path('no'), surface=True, entities='triangles')
         self.assertIsNone(terrace.build(ball, self.path('without')).info['surface'])
 
+    def test_a_stored_surface_has_the_triangles_of_a_mesh(self):
+        from scipy.spatial import ConvexHull
+        points = np.random.default_rng(8).normal(size=(500, 3))
+        faces = ConvexHull(points).simplices[:-40]  # open, and oriented at random
+
+        def triangles(mesh):
+            vertices, corners = mesh
+            corners = np.array([np.roll(t, -np.lexsort(vertices[t].T[::-1])[0]) for t in corners])
+            return sorted(map(tuple, vertices[corners].reshape(-1, 9)))
+
+        mesh = terrace.Mesh(points, faces)
+        mesh.save(self.path('hull.ply'))
+        for number, (source, surface) in enumerate(((mesh, True), (self.path('hull.ply'), True), (mesh, 'input'))):
+            store = terrace.build(source, self.path(f'hull{number}'), surface=surface, block_points=100)
+            self.assertEqual(triangles(store.surface()), triangles(mesh))
+            self.assertEqual(len(store), 500)
+        restored = terrace.build(mesh, self.path('restored'), surface='restored')
+        self.assertGreater(len(restored.surface().vertices), len(store.surface().vertices))
+        for wrong, error in (((points, 'input'), terrace.Error), ((mesh, 'faces'), ValueError),
+                             ((terrace.Mesh(points, faces + 500), True), ValueError),
+                             ((terrace.Mesh(points[:, :2], faces), True), ValueError)):
+            with self.assertRaises(error):
+                terrace.build(wrong[0], self.path('wrong'), surface=wrong[1])
+
     def test_files(self):
         mesh = self.raster.bounded_mesh(4, path=self.path('hills.ply'))
         from terrace import _core

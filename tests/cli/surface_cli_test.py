@@ -504,6 +504,7 @@ class SurfaceTest(unittest.TestCase):
         built = json.loads(result.stdout)['surface']
         self.assertEqual((built['vertices'], built['triangles']), (3000, 5996))
         self.assertLess(built['bytes'], 8 * 3000)
+        self.assertEqual(built.pop('input_triangles'), 0)
         self.assertEqual(json.loads(terrace('info', store, '--json').stdout)['surface'], built)
         self.assertIn('surface:   3,000 vertices', terrace('info', store).stdout)
         self.assertEqual(terrace('verify', store).returncode, 0)
@@ -541,6 +542,58 @@ class SurfaceTest(unittest.TestCase):
             self.assertTrue(summary['stored'])
             for key in ('vertices', 'triangles', 'area', 'volume', 'max_error'):
                 self.assertAlmostEqual(summary[key], summaries['near'][key], 9, key)
+
+    def test_stored_surface_of_a_mesh_has_its_triangles(self):
+        # A cube without one side, of quadrilaterals, with a vertex given twice and a degenerate face.
+        corners = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+        sides = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (9, 5, 7, 3)]
+        with open(self.path('cube.obj'), 'w') as file:
+            file.writelines('v {} {} {}\n'.format(*corner) for corner in corners + [corners[0]])
+            file.writelines('f {} {} {} {}\n'.format(*side) for side in sides)
+            file.write('f 1 9 2\n')
+
+        def triangles(vertices, faces):
+            out = []
+            for face in faces:
+                places = [tuple(map(float, vertices[corner])) for corner in face]
+                least = places.index(min(places))
+                out.append(tuple(places[least:] + places[:least]))
+            return sorted(out)
+
+        fans = [(side[0] - 1, side[k - 1] - 1, side[k] - 1) for side in sides for k in (2, 3)]
+        expected = triangles(corners + [corners[0]], fans)
+        store = self.path('cube.terrace')
+        result = terrace('build', self.path('cube.obj'), '-o', store, '--surface', '--json')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn('1 triangle has two corners at one place', result.stderr)
+        built = json.loads(result.stdout)['surface']
+        self.assertEqual((built['vertices'], built['triangles'], built['input_triangles']), (8, 10, 11))
+        result = terrace('surface', store, '-o', self.path('cube-out.obj'), '--json')
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(triangles(*self.read_obj(self.path('cube-out.obj'))), expected)
+        summary = json.loads(result.stdout)
+        self.assertEqual((summary['stored'], summary['closed'], summary['samples_off']), (True, False, 0))
+        self.assertEqual(terrace('verify', store).returncode, 0)
+        # The same triangles on request, restored ones, or a clear error.
+        for name, triangle_count in (('input', 10), ('restored', 12)):
+            result = terrace('build', self.path('cube.obj'), '-o', store, '--surface', '--surface-from', name, '--force', '--json')
+            self.assertEqual(result.returncode, 0, result.stderr)
+            self.assertEqual(json.loads(result.stdout)['surface']['triangles'], triangle_count)
+        for code, message, options in (
+                (1, 'has no faces', [self.path('ball.xyz'), '--surface', '--surface-from', 'input']),
+                (2, '--surface', [self.path('cube.obj'), '--surface-from', 'input']),
+                (2, '--surface-from', [self.path('cube.obj'), '--surface', '--surface-from', 'points']),
+                (1, 'not selected', [self.path('cube.obj'), '--surface', '--region', '0,0,0.5,0.5'])):
+            out = self.path('none.terrace')
+            result = terrace('build', *options, '-o', out)
+            self.assertEqual(result.returncode, code, result.stderr)
+            self.assertIn(message, result.stderr)
+            self.assertFalse(os.path.exists(out))
+        with open(self.path('cube.obj')) as file:
+            result = subprocess.run([TERRACE, 'build', '-', '--input-format', 'obj', '-o', self.path('none.terrace'), '--surface'],
+                                    stdin=file, capture_output=True, text=True)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        self.assertIn('pass a file', result.stderr)
 
     def test_stored_surface_needs_a_body(self):
         with open(self.path('flat.xyz'), 'w') as file:

@@ -114,6 +114,7 @@ SINGLE_USER_HEADERS = {
     'libmatching/src/windows/discs.hpp': 'the lower bound, apart from the matching',
     'libterrain/src/base/region_grid.hpp': SEARCH,
     'libterrain/src/build/joined_longitudes.hpp': BUILD,
+    'libterrain/src/build/mesh_input.hpp': BUILD,
     'libterrain/src/contour/lines.hpp': TESTED,
     'libterrain/src/contour/text.hpp': 'the output, apart from the lines',
     'libterrain/src/earth/line_distance.hpp': TESTED,

@@ -30,6 +30,7 @@
 #include "build/clustering.hpp"
 #include "build/damage_report.hpp"
 #include "build/joined_longitudes.hpp"
+#include "build/mesh_input.hpp"
 #include "build/store_extension.hpp"
 #include "earth/crs/definition.hpp"
 #include "earth/ground.hpp"
@@ -498,8 +499,14 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   const Ground ground_of_store(schema, request_.z_weight);
   stream::StoreWriter writer(request_.store, schema, parts, request_.replace, threads);
   const bool trial = request_.most_points > 0;
-  StoreSink sink(writer, !trial, context_.stop,
-                 trial ? stream::StoreWriter::MakeSurface{} : request_.surface);
+  MeshInput mesh(request_, info_, schema, middle_, context_);
+  stream::StoreWriter::MakeSurface make_surface;
+  if (request_.surface && !trial) {
+    make_surface = [&](const stream::Store& store, const stream::ClusterOrder& order) {
+      return request_.surface(store, order, mesh.triangles());
+    };
+  }
+  StoreSink sink(writer, !trial, context_.stop, make_surface);
   cluster::HierarchyOptions options = clustering_of(request_, schema, ground_of_store);
   if (extension_ != nullptr) options.existing_clusters = extension_->clusters();
   options.threads = threads;
@@ -523,6 +530,7 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   if (extension_ != nullptr) describe_extension(read, outcome);
   if (request_.surface && !trial) {
     outcome.surface = stream::Store::open(request_.store).surface();
+    outcome.input_triangles = mesh.read();
   }
   note(outcome, voids);
   if (extension_ != nullptr && extension_->parts().front().store.surface()) {

@@ -44,6 +44,18 @@ void simplify_scan(const ScanSurfaceOptions& options, const base::StopCheck& che
 std::vector<tri::Point3> smooth_scan(const ScanSurfaceOptions& options, const Context& context,
                                      tri::RestoredSurface& surface, ScanSurface& out);
 
+/// Peak memory in bytes per point of input_surface() and the tree of its vertices, if there are at
+/// most two triangles for each point.
+inline constexpr std::uint64_t kInputSurfaceBytesPerPoint = 110 + 40 + 400;
+/// Returns the triangles of the input over the points of a store, in metres on the ground;
+/// `parts`, `lids` and the like are not set. points: by their numbers, in the CRS, which are those
+/// of RestoredSurface::input. Of several points at one place it uses one of the highest level.
+/// Notes the triangles that are left out: those with two corners at one place, and those with a
+/// corner that was not selected. O(n log n). Throws: stream::Error if all are left out, the input
+/// differs from the store, or the triangles need too much memory.
+tri::RestoredSurface input_surface(const stream::Store& store, const TriangleMesh& points,
+                                   const InputTriangles& triangles, const Context& context);
+
 /// Whether the store has a surface that serves the request; see ScanSurfaceOptions::stored.
 bool uses_stored_surface(const stream::Store& store, const Detail& detail,
                          const ScanSurfaceOptions& options);

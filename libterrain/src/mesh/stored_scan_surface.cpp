@@ -167,17 +167,31 @@ ScanSurface stored_scan_surface(const stream::Store& source, const Detail& detai
 }
 
 stream::StoredSurface surface_to_store(const stream::Store& store,
-                                       const stream::ClusterOrder& order, const Context& context) {
+                                       const stream::ClusterOrder& order, const Context& context,
+                                       const InputTriangles& triangles) {
   need_points(store, "a surface");
   const stream::Store source = store.with_stop(context.stop);
-  need_memory_for_surface(source, source.points(),
-                          std::max(restoring_bytes_per_point({}), kSimplificationBytesPerPoint),
-                          context.memory_or(0));
-  tri::RestoreOptions options;
-  options.threads = context.threads;
-  options.check_stop = [&] { context.check_stop(); };
-  tri::RestoredSurface surface = tri::restore_surface(
-      on_ground(numbered_points(source, order).positions, source.schema()), options);
+  const auto need_memory = [&](std::uint64_t bytes_per_point) {
+    need_memory_for_surface(source, source.points(), bytes_per_point, context.memory_or(0),
+                            stream::message("raise {memory_bytes}, or leave the surface out"));
+  };
+  need_memory(kInputSurfaceBytesPerPoint);
+  const TriangleMesh points = numbered_points(source, order);
+  const base::StopCheck check_stop = [&] { context.check_stop(); };
+  tri::RestoredSurface surface;
+  if (triangles.next) surface = input_surface(source, points, triangles, context);
+  if (surface.surface.faces.empty()) {
+    if (triangles.required) {
+      throw stream::Error(store.path().string(), "the input has no triangles for a surface")
+          .remedy(stream::message(
+              "to restore a surface from the points, pass {surface_from} restored"));
+    }
+    need_memory(restoring_bytes_per_point({}));
+    tri::RestoreOptions options;
+    options.threads = context.threads;
+    options.check_stop = check_stop;
+    surface = tri::restore_surface(on_ground(points.positions, source.schema()), options);
+  }
   if (surface.surface.faces.empty()) {
     throw stream::Error(store.path().string(),
                         "the points enclose no volume, so they have no surface")
@@ -185,7 +199,7 @@ stream::StoredSurface surface_to_store(const stream::Store& store,
   }
   context.check_stop();
   tri::VertexTree tree =
-      tri::vertex_tree(surface.surface, clusters_of(order, surface.input), options.check_stop);
+      tri::vertex_tree(surface.surface, clusters_of(order, surface.input), check_stop);
   stream::StoredSurface out(order.points());
   const auto number = [&](std::uint32_t v) { return static_cast<std::uint32_t>(surface.input[v]); };
   for (std::uint32_t v = 0; v < tree.parents.size(); ++v) {

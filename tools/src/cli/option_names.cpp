@@ -55,6 +55,7 @@ constexpr auto kOptions = std::to_array<std::pair<std::string_view, std::string_
     {"shift", "--towgs84"},
     {"step", "--step"},
     {"strategy", "--strategy"},
+    {"surface_from", "--surface-from"},
     {"threads", "--threads"},
     {"to_crs", "--to-crs"},
     {"vertical", "--vertical"},

@@ -83,9 +83,12 @@ class BuildCommand final : public Command {
         ->check(CLI::IsMember({"auto", "stream", "spatial"}))
         ->capture_default_str();
     app.add_flag("--surface", surface_,
-                 "also restore the surface that the points were scanned from and store it, so that "
-                 "'terrace surface' needs not, and surfaces of any detail do not tear; all points "
-                 "are held in memory");
+                 "also store a surface, so that surfaces of any detail do not tear: the triangles "
+                 "of the input or, without faces, the surface that 'terrace surface' restores; all "
+                 "points are held in memory");
+    app.add_option("--surface-from", surface_from_,
+                   "with --surface: input demands its triangles, restored ignores them")
+        ->check(CLI::IsMember({"input", "restored"}));
     app.add_flag("--append", request_.append,
                  "add the points to the store, which exists; clusters as the store records");
     app.add_flag("--dry-run", dry_run_,
@@ -123,6 +126,9 @@ class BuildCommand final : public Command {
       throw UsageError("--surface is for points: --entities " + entities_ + " excludes it");
     }
     if (request_.append && dry_run_) throw UsageError("--append excludes --dry-run");
+    if (!surface_from_.empty() && !surface_) {
+      throw UsageError("--surface-from is for --surface");
+    }
     std::error_code ignored;
     if (!common.force && !request_.append && std::filesystem::exists(request_.store, ignored)) {
       throw stream::Error(output_, "exists already")
@@ -185,9 +191,13 @@ class BuildCommand final : public Command {
     return_freed_memory();
     if (surface_) {
       request_.surface = [context = common.context()](const stream::Store& store,
-                                                      const stream::ClusterOrder& order) {
-        return surface_to_store(store, order, context);
+                                                      const stream::ClusterOrder& order,
+                                                      const InputTriangles& triangles) {
+        return surface_to_store(store, order, context, triangles);
       };
+      request_.surface_origin = surface_from_ == "input"      ? SurfaceOrigin::input
+                                : surface_from_ == "restored" ? SurfaceOrigin::restored
+                                                              : SurfaceOrigin::automatic;
     }
     const BuildOutcome outcome = build_store(request_, common.context());
     const double seconds = watch.seconds();
@@ -238,10 +248,13 @@ class BuildCommand final : public Command {
     if (outcome.surface) {
       summary.json["surface"] = {{"vertices", outcome.surface->vertices},
                                  {"triangles", outcome.surface->triangles},
-                                 {"bytes", outcome.surface->bytes}};
-      summary.text += fmt::format(
-          "surface: {}, {}, {} of the store\n", counted(outcome.surface->vertices, "vertex"),
-          counted(outcome.surface->triangles, "triangle"), readable_bytes(outcome.surface->bytes));
+                                 {"bytes", outcome.surface->bytes},
+                                 {"input_triangles", outcome.input_triangles}};
+      summary.text += fmt::format("surface: {}, {}{}, {} of the store\n",
+                                  counted(outcome.surface->vertices, "vertex"),
+                                  counted(outcome.surface->triangles, "triangle"),
+                                  outcome.input_triangles > 0 ? " of the input" : "",
+                                  readable_bytes(outcome.surface->bytes));
     }
     return summary;
   }
@@ -325,6 +338,7 @@ class BuildCommand final : public Command {
   std::optional<double> outlier_price_, facility_cost_;
   std::uint64_t block_ = 10000;
   bool dry_run_ = false, surface_ = false;
+  std::string surface_from_;
 };
 
 }  // namespace

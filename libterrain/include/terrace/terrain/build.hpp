@@ -17,8 +17,10 @@
 #include <terrace/stream/source.hpp>
 #include <terrace/stream/spatial_order.hpp>
 #include <terrace/stream/store.hpp>
+#include <terrace/stream/stored_surface.hpp>
 
 #include "terrace/terrain/context.hpp"
+#include "terrace/terrain/input_triangles.hpp"
 #include "terrace/terrain/metric_choice.hpp"
 
 namespace terrace::terrain {
@@ -89,8 +91,17 @@ struct BuildRequest {
   /// temporary file is next to the store.
   stream::Order order = stream::Order::automatic;
   /// Returns the surface through the points of the store, to be stored with it, such as
-  /// surface_to_store() of scan_surface.hpp. Called with the complete store before it is published.
-  stream::StoreWriter::MakeSurface surface{};
+  /// surface_to_store() of scan_surface.hpp. Called with the complete store before it is published,
+  /// and with the triangles of the input.
+  std::function<stream::StoredSurface(const stream::Store&, const stream::ClusterOrder&,
+                                      const InputTriangles&)>
+      surface{};
+  /// Whether the surface consists of the input's triangles. Files of meshes are then read twice.
+  SurfaceOrigin surface_origin = SurfaceOrigin::automatic;
+  /// With `open`: opens the triangles between its points as stream::Entities::triangles, in the
+  /// same stored coordinates; empty if there are none.
+  std::function<std::unique_ptr<stream::PointSource>(const stream::SourceOptions&)>
+      open_triangles{};
   /// Ends a trial run after about this many points, without a store. 0 builds the store from all
   /// points.
   std::uint64_t most_points = 0;
@@ -113,6 +124,8 @@ struct BuildOutcome {
   std::uint64_t store_bytes = 0;
   /// The surface that was stored with the points.
   std::optional<stream::SurfaceInfo> surface{};
+  /// Number of triangles of the input that were read for it; 0 if it was restored from the points.
+  std::uint64_t input_triangles = 0;
   stream::OrderedSource::Report order{};  ///< the order the points arrived in, and the work to sort
                                           ///< them
   unsigned top = 0;

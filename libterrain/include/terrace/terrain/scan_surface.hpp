@@ -16,6 +16,7 @@
 
 #include "terrace/terrain/context.hpp"
 #include "terrace/terrain/detail.hpp"
+#include "terrace/terrain/input_triangles.hpp"
 #include "terrace/terrain/triangle_mesh.hpp"
 
 /// Surfaces from the points of a scan.
@@ -101,11 +102,15 @@ struct ScanSurface {
                                        const ScanSurfaceOptions& options = {},
                                        const Context& context = {});
 
-/// Restores the surface through all points of a store, in metres on the ground, and sorts its
-/// vertices into a tree within the store's clusters: the surface to be stored with the points, see
-/// BuildRequest::surface. Throws: as scan_surface(); stream::Error for points that enclose nothing.
+/// Makes the surface to be stored with the points, see BuildRequest::surface, and sorts its
+/// vertices into a tree within the store's clusters. The surface consists of the input's triangles,
+/// whatever their topology. Their corners at one place become one vertex, and triangles with two
+/// equal corners are left out. Without triangles, the surface is restored through all points of the
+/// store. Throws: as scan_surface(); stream::Error for points that enclose nothing, or if required
+/// triangles are missing.
 [[nodiscard]] stream::StoredSurface surface_to_store(const stream::Store& store,
                                                      const stream::ClusterOrder& order,
-                                                     const Context& context = {});
+                                                     const Context& context = {},
+                                                     const InputTriangles& triangles = {});
 
 }  // namespace terrace::terrain
