@@ -5,22 +5,23 @@
 // used; without it, a synthetic raster of 8192 x 8192 cells.
 //
 // The first flight keeps 500,000 points on average in 600 pictures at 60 per second. It is flown twice if
-// TERRACE_BENCH_ERROR gives the pixel error that an earlier run found and printed. The second flight goes down from
-// the whole to full detail of 1 % of the area, at 30 frames per second if answers are delayed. The worker measures its
-// own times (the model's step, normals, slides, and copies of the changes). Seconds count from the last view to full
-// detail. Bytes are those of requests, start file included, compared with the stored bytes of all clusters read; the
-// columns for the start file, the index and clusters are shares of that ratio.
+// TERRACE_BENCH_ERROR gives the pixel error that an earlier run found and printed. The worker measures its own times (the
+// model's step, normals, slides, and copies of the changes). The second flight goes down from the whole to full detail of
+// 268,000 samples, at 30 frames per second. In node its time is simulated, so that requests do not depend on the machine.
+// Seconds count from the last view to full detail. Bytes are those of requests, start file included, compared with the
+// stored bytes of all clusters read; the columns for the start file, the index and clusters are shares of that ratio.
 import {existsSync, mkdtempSync, readFileSync, rmSync, statSync} from 'node:fs';
 import {tmpdir} from 'node:os';
 import {join, resolve} from 'node:path';
 import {spawnSync} from 'node:child_process';
 
-import {cruise, dive} from './flyer.mjs';
+import {cruise, dive, shareOf} from './flyer.mjs';
 import {serveSite} from './site_server.mjs';
+import {VirtualTime} from './virtual_time.mjs';
 import {folderFetch, Worker} from './worker_host.mjs';
 
 const small = process.env.TERRACE_BENCH_SMALL !== undefined;
-const FRAMES = small ? 60 : 600, POINTS = small ? 20_000 : 500_000;
+const FRAMES = small ? 60 : 600, POINTS = small ? 20_000 : 500_000, SAMPLES = small ? 20_000 : 268_000, PACE = 33;
 const folder = mkdtempSync(join(tmpdir(), 'terrace-flight-'));
 let site = join(folder, 'site');
 
@@ -81,15 +82,19 @@ try {
   } else {
     terrace('publish', store, '-o', site, '-q');
   }
-  const {name} = JSON.parse(readFileSync(join(site, 'stores.json'), 'utf8')).stores[0];
+  const {name, points: all} = JSON.parse(readFileSync(join(site, 'stores.json'), 'utf8')).stores[0];
 
   // Each flight has its own log, because the previous flight's worker may continue for a while.
   let files;
-  const inNodeAfter = latency => (fly, ...args) => {
-    files = folderFetch(site, undefined, latency);
-    return fly(receive => new Worker(join(site, 'worker.js'), files.fetch, receive), 'http://folder/', name, ...args);
+  const inNode = (latency, time) => (fly, ...args) => {
+    files = folderFetch(site, undefined, latency, time);
+    return fly(receive => new Worker(join(site, 'worker.js'), files.fetch, receive, 1, time), 'http://folder/', name, ...args);
   };
-  const hosts = [['node', inNodeAfter(1), () => files.log]];
+  const simulated = latency => {
+    const time = new VirtualTime();
+    return [`node, simulated, answers after ${latency} ms`, (...args) => inNode(latency, time)(...args, time), () => files.log];
+  };
+  const hosts = [['node', inNode(1), () => files.log]];
   if (process.env.CHROMIUM && process.argv[2]) {
     const {launch} = await import('../clients/globe.mjs');
     server = await serveSite(site);
@@ -102,12 +107,12 @@ try {
     console.log(`| ${host} | ${milliseconds.length} | ${quantile(milliseconds, 0.5).toFixed(1)} | ` +
                 `${quantile(milliseconds, 0.99).toFixed(1)} | ${Math.max(...milliseconds).toFixed(1)} | ${count(points)} | ${error.toFixed(2)} |`);
   }
-  hosts.push(['node, answers after 30 ms', inNodeAfter(30), () => files.log, 33]);
-  console.log('\n| down to 1 % of the area | points | requests | fetched | clusters read | ratio | start file | index | clusters | seconds |\n' +
+  hosts.splice(0, 1, ...[1, 30, 100].map(simulated));
+  console.log(`\n| down to ${count(SAMPLES)} samples | points | requests | fetched | clusters read | ratio | start file | index | clusters | seconds |\n` +
               '|---|---|---|---|---|---|---|---|---|---|');
-  for (const [host, fly, log, pace] of hosts) {
+  for (const [host, fly, log] of hosts) {
     if (server) server.log.length = 0;
-    const {state, stats, seconds} = pace ? await fly(dive, pace) : await fly(dive);
+    const {state, stats, seconds} = await fly(dive, shareOf(SAMPLES, all), PACE);
     const share = ending => (fetched(log(), ending) / state.storedBytes).toFixed(2);
     console.log(`| ${host} | ${count(state.points)} | ${stats.requests} | ${count(stats.bytes)} | ${count(state.storedBytes)} | ` +
                 `${(stats.bytes / state.storedBytes).toFixed(2)} | ${share('.start')} | ${share('.index')} | ${share('.clusters')} | ${seconds.toFixed(1)} |`);

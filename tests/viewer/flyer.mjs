@@ -110,21 +110,28 @@ export async function cruise(connect, base, name, points, frames, error) {
   return {milliseconds, points: Math.round(mean), error};
 }
 
-/// Flies from above the whole store down to full detail of 1 % of the area in 60 frames of at least
-/// `pace` milliseconds each. Returns the state and statistics of the last frame, and the seconds
-/// from the last view to it.
-export async function dive(connect, base, name, pace = 0) {
+/// Flies from above the whole store down to full detail of a part in 60 frames of at least `pace` milliseconds each. The last
+/// picture is `share` of the box high. `time`: a VirtualTime, in which the flight then takes place. Returns the state and
+/// statistics of the last frame, and the seconds from the last view to it.
+export async function dive(connect, base, name, share, pace = 0, time = null) {
   const flyer = new Flyer(connect, base, name);
   const {scene: {box}} = await flyer.opened();
-  const middle = middleOf(box), from = 1.2 * sizeOf(box), to = 0.1 * (box[4] - box[1]) / (2 * HALF);
+  const middle = middleOf(box), from = 1.2 * sizeOf(box), to = share * (box[4] - box[1]) / (2 * HALF);
+  const now = () => time ? time.time : performance.now();
   let begin = 0;
-  for (let i = 0; i <= 60; ++i) {
-    const above = from * (to / from) ** (i / 60), paced = new Promise(resume => setTimeout(resume, pace));
-    begin = performance.now();
-    await flyer.view(
-        {...picture, eye: [...middle, box[5] + above], direction: [0, 0, -1], error: i < 60 ? 4 : 0.01}, i === 60);
-    if (i < 60) await paced;
-  }
+  const fly = async () => {
+    for (let i = 0; i <= 60; ++i) {
+      const above = from * (to / from) ** (i / 60), paced = new Promise(resume => (time ?? globalThis).setTimeout(resume, pace));
+      begin = now();
+      await flyer.view(
+          {...picture, eye: [...middle, box[5] + above], direction: [0, 0, -1], error: i < 60 ? 4 : 0.01}, i === 60);
+      if (i < 60) await paced;
+    }
+  };
+  await (time ? time.run(fly()) : fly());
   const {state, stats} = flyer.last;
-  return {state, stats, seconds: (performance.now() - begin) / 1000};
+  return {state, stats, seconds: (now() - begin) / 1000};
 }
+
+/// The `share` of dive() at which about this many points of a square raster are in the last picture.
+export const shareOf = (points, all) => Math.min(1, Math.sqrt(points / all / picture.aspect));

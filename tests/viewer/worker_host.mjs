@@ -8,8 +8,8 @@ import vm from 'node:vm';
 /// response)` may change the response (undefined: never answers; null: the request fails; a null
 /// body: the response breaks off). Responses come `latency` milliseconds after the request. `log`
 /// lists all requests. Its `unanswered` counts the earlier requests that were still open, except
-/// those made at the same time.
-export function folderFetch(folder, fault = (_, response) => response, latency = 1) {
+/// those made at the same time. `time`: a VirtualTime.
+export function folderFetch(folder, fault = (_, response) => response, latency = 1, time = globalThis) {
   const log = [];
   let batch = 0;
   const waiting = new Map();  // batches by request
@@ -34,7 +34,7 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
     log.push(request);
     waiting.set(request, batch);
     queueMicrotask(() => ++batch);
-    await new Promise(resume => setTimeout(resume, latency));
+    await new Promise(resume => time.setTimeout(resume, latency));
     waiting.delete(request);
     if (options.signal?.aborted) throw new DOMException('aborted', 'AbortError');
     const response = answer(url, request);
@@ -56,9 +56,9 @@ export function folderFetch(folder, fault = (_, response) => response, latency =
   return {fetch, log};
 }
 
-/// Starts `script` (worker.js) with timeouts `haste` times as fast. Its messages go to `said`.
+/// Starts `script` (worker.js) with timeouts `haste` times as fast. Its messages go to `said`. `time`: a VirtualTime.
 export class Worker {
-  constructor(script, fetch, said, haste = 1) {
+  constructor(script, fetch, said, haste = 1, time = globalThis) {
     this.self = {
       postMessage: message => {
         if (message.type === 'frame') queueMicrotask(() => this.send({type: 'drawn', buffer: message.changes.buffer}));
@@ -75,14 +75,14 @@ export class Worker {
       Blob,
       DecompressionStream,
       Response,
-      performance,
+      performance: time.performance,
       // A MessageChannel of node would keep the process alive.
       MessageChannel: class {
         port1 = {};
-        port2 = {postMessage: () => setImmediate(() => this.port1.onmessage())};
+        port2 = {postMessage: () => (time === globalThis ? setImmediate : time.setTimeout)(() => this.port1.onmessage())};
       },
-      setTimeout: (work, time) => setTimeout(work, (time ?? 0) / haste),
-      clearTimeout,
+      setTimeout: (work, delay) => time.setTimeout(work, (delay ?? 0) / haste),
+      clearTimeout: time.clearTimeout,
       ArrayBuffer,
       Uint8Array,
       Uint32Array,

@@ -181,8 +181,9 @@ export class Core {
       colours: {rgb: n[8] === 1, intensity: n[10] === 1, classes: this.numbers(12 + n[11]).slice(12)}
     };
   }
-  /// Works for about `seconds`; `time` is the time of the picture.
-  frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[]} {
+  /// Works for about `seconds`; `time` is the time of the picture. `same`: the missing
+  /// bytes are those of the last frame.
+  frame(camera: Camera, seconds: number, time: number): {state: State, missing: ByteRange[], same: boolean} {
     this.writeNumbers([
       ...camera.eye, ...camera.direction, ...camera.up, camera.fov, camera.aspect, camera.height, camera.error, seconds,
       time, camera.level ?? 255, camera.region?.level ?? 255, ...(camera.region?.box ?? [])
@@ -203,7 +204,8 @@ export class Core {
         storedBytes: n[8],
         waiting: n[9] === 1
       },
-      missing: this.lacking
+      missing: this.lacking,
+      same: n[10] === 1
     };
   }
   /// Returns copies of the changes since the last call.

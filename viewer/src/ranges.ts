@@ -4,17 +4,19 @@
 import type {ByteRange} from './core';
 
 /// Fetching a gap smaller than this is cheaper than another request.
-const GAP = 1200;
+const GAP = 600;
 /// The same if part of the gap has been requested already.
 const SMALL_GAP = 200;
 const MOST_BYTES = 256 * 1024;
-/// An index is fetched in aligned blocks of this many bytes: its pages are smaller than a request header, and neighbouring
-/// pages are usually needed next.
-const INDEX_BLOCK = 1024;
-/// Smaller ranges wait for the requests in progress, and for PAUSE milliseconds after the last request started. By then more
-/// nearby ranges are known and can share a request.
-const SMALL = 4096, PAUSE = 20;
-const MOST_REQUESTS = 4;
+/// A camera at rest that lacks more parts of an index than this will need most of it, so larger gaps are fetched.
+const MANY_PARTS = 64, PARTS_GAP = 8192;
+/// Smaller ranges of a view wait for the requests in progress, and for PAUSE milliseconds after the last request started. By
+/// then more nearby ranges are known and can share a request. While more ranges become known in every frame, they wait up to
+/// MORE milliseconds longer. A vertex slides for 450 ms, so this is hardly visible.
+const SMALL = 16384, PAUSE = 120, MORE = 150;
+/// The same without a view: nothing else is known that could share the request.
+const SMALL_ALONE = 4096, PAUSE_ALONE = 20;
+const MOST_REQUESTS = 3;
 const TRIES = 4;
 const FORBIDDEN = 'access denied (HTTP 403). Open the full address that "terrace view" printed, with its token.';
 /// Milliseconds a server may be silent, before its answer starts and until the bytes arrive; tried twice.
@@ -104,13 +106,6 @@ export class Requested {
     const list = this.extents.get(file) ?? [], at = Requested.after(list, from + 1);
     return at < list.length && list[at][0] < to;
   }
-  /// Returns the widest range around this one without requested bytes.
-  around(file: string, from: number, to: number): [number, number] {
-    const list = this.extents.get(file) ?? [];
-    return [
-      Math.min(from, list[Requested.after(list, from, 0) - 1]?.[1] ?? 0), Math.max(to, list[Requested.after(list, to + 1)]?.[0] ?? Infinity)
-    ];
-  }
   /// Returns the first extent that ends (1) or begins (0) at or after `place`.
   private static after(list: Array<[number, number]>, place: number, side = 1): number {
     let low = 0, high = list.length;
@@ -123,18 +118,23 @@ export class Requested {
   }
 }
 
+function isIndex({file}: ByteRange): boolean {
+  return file.endsWith('.index');
+}
+
 /// Joins nearby ranges, in the order of their first parts. Across more than a small gap, joins only if none of it has been
-/// requested.
-export function joined(ranges: ByteRange[], requested = new Requested(), gap = GAP, most = MOST_BYTES): ByteRange[] {
+/// requested. `rests`: the view is not new.
+export function joined(ranges: ByteRange[], requested = new Requested(), rests = false): ByteRange[] {
+  const many = rests && ranges.filter(isIndex).length > MANY_PARTS;
   const rank = new Map(ranges.map((range, i) => [range, i]));
   const sorted =
       [...ranges].sort((a, b) => a.file < b.file ? -1 : a.file > b.file ? 1 : a.offset - b.offset);
   const result: Array<ByteRange&{rank: number}> = [];
   for (const range of sorted) {
-    const last = result[result.length - 1];
+    const last = result[result.length - 1], gap = many && isIndex(range) ? PARTS_GAP : GAP;
     const end = range.offset + range.bytes;
     if (last && last.file === range.file && range.offset <= last.offset + last.bytes + gap &&
-        Math.max(end, last.offset + last.bytes) - last.offset <= most &&
+        Math.max(end, last.offset + last.bytes) - last.offset <= MOST_BYTES &&
         (range.offset <= last.offset + last.bytes + SMALL_GAP || !requested.meets(range.file, last.offset + last.bytes, range.offset))) {
       last.bytes = Math.max(last.bytes, end - last.offset);
       last.rank = Math.min(last.rank, rank.get(range)!);
@@ -145,12 +145,30 @@ export function joined(ranges: ByteRange[], requested = new Requested(), gap = G
   return result.sort((a, b) => a.rank - b.rank).map(({file, offset, bytes}) => ({file, offset, bytes}));
 }
 
+/// Orders joined ranges for the next requests: the first, then by size, because small ones may grow until their turn comes.
+/// Parts of an index come after the others, in their order, because less of it is needed as the view comes closer.
+function chosen([first, ...others]: ByteRange[]): ByteRange[] {
+  const weight = (range: ByteRange) => isIndex(range) && range.bytes < PARTS_GAP ? 0 : range.bytes;
+  return first ? [first, ...others.sort((a, b) => weight(b) - weight(a))] : [];
+}
+
+function contains(outer: ByteRange, inner: ByteRange): boolean {
+  return outer.file === inner.file && outer.offset <= inner.offset && inner.offset + inner.bytes <= outer.offset + outer.bytes;
+}
+
+/// For ranges that no view asks for.
+export const NO_VIEW = 0;
+
 export class Ranges {
   readonly stats: Stats = {requests: 0, bytes: 0};
   private flights: Flight[] = [];
   private readonly tags = new Map<string, string>();
   private readonly requested = new Requested();
   private fresh = false;
+  /// What frames of `view` have lacked and no request has covered. A frame may lack time to list everything.
+  private readonly listed = new Map<string, ByteRange>();
+  private view = NO_VIEW;
+  private viewed = -PAUSE;  ///< since when it is this view
   private begun = -PAUSE;  ///< start of the last request
   private pause: ReturnType<typeof setTimeout>|undefined;
 
@@ -170,24 +188,26 @@ export class Ranges {
     this.tags.clear();
   }
   /// Sets the ranges that a view lacks, most important first. Others requested for an earlier view are cancelled after a
-  /// while.
-  want(ranges: ByteRange[], view: number, now: number): void {
+  /// while. `view`: its number, or NO_VIEW. `stable`: the list is as long as it will get before more bytes arrive.
+  want(ranges: ByteRange[], view: number, now: number, stable = true): void {
     const left: ByteRange[] = [];
-    for (const range of ranges) {
-      const flight = this.flights.find(
-          f => f.file === range.file && f.offset <= range.offset && range.offset + range.bytes <= f.offset + f.bytes);
+    if (view !== this.view) this.viewed = now;
+    for (const range of this.extended(ranges, view)) {
+      const flight = this.flights.find(f => contains(f, range));
       if (flight) {
         flight.wanted = now;
         flight.view = view;
       } else {
-        left.push(range.file.endsWith('.index') ? this.widened(range) : range);
+        left.push(range);
       }
     }
     for (const flight of this.flights) {
       if (flight.view !== view && now - flight.wanted > PATIENCE) flight.abort.abort();
     }
-    const alone = this.flights.length === 0;
-    const ready = joined(left, this.requested).filter(({bytes}) => bytes >= SMALL || (alone && now >= this.begun + PAUSE));
+    const [small, pause] = view === NO_VIEW ? [SMALL_ALONE, PAUSE_ALONE] : [SMALL, PAUSE];
+    const due = Math.min(this.begun, this.viewed) + pause;
+    const all = this.flights.length === 0 && now >= (stable ? due : this.begun + pause + MORE);
+    const ready = chosen(joined(left, this.requested, now >= this.viewed + PAUSE).filter(({bytes}) => bytes >= small || all));
     for (const range of ready.slice(0, Math.max(0, MOST_REQUESTS - this.flights.length))) {
       this.begun = now;
       void this.start({...range, abort: new AbortController(), wanted: now, view});
@@ -196,7 +216,7 @@ export class Ranges {
       this.pause ??= setTimeout(() => {
         this.pause = undefined;
         this.ended();
-      }, this.begun + PAUSE - now);
+      }, Math.max(0, due - now));
     }
   }
   stop(): void {
@@ -206,15 +226,26 @@ export class Ranges {
     this.pause = undefined;
   }
 
-  private widened({file, offset, bytes}: ByteRange): ByteRange {
-    const [low, high] = this.requested.around(file, offset, offset + bytes);
-    const begin = Math.max(low, offset - offset % INDEX_BLOCK);
-    const end = Math.min(high, Math.ceil((offset + bytes) / INDEX_BLOCK) * INDEX_BLOCK, this.sizes.get(file) ?? 0);
-    return {file, offset: begin, bytes: end - begin};
+  /// Appends to the ranges what earlier frames of the view have listed, unless it has been requested since.
+  private extended(ranges: ByteRange[], view: number): ByteRange[] {
+    if (view === NO_VIEW || view !== this.view) this.listed.clear();
+    this.view = view;
+    const all = new Map(ranges.map(range => [`${range.file} ${range.offset}`, range]));
+    for (const [place, range] of this.listed) {
+      if (!all.has(place)) all.set(place, range);
+    }
+    this.listed.clear();
+    for (const [place, range] of all) {
+      if (!this.flights.some(flight => contains(flight, range))) this.listed.set(place, range);
+    }
+    return [...all.values()];
   }
   private async start(flight: Flight): Promise<void> {
     this.flights.push(flight);
     this.requested.add(flight);
+    for (const [place, range] of this.listed) {
+      if (contains(flight, range)) this.listed.delete(place);
+    }
     let bytes: Uint8Array|null = null, fault: FetchFault|null = null;
     try {
       bytes = await this.patiently(flight, flight.abort.signal);

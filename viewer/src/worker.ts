@@ -3,7 +3,7 @@
 
 import {type Answer, type ByteRange, type Camera, type Changes, Core, CoreError, type Kind, VERTEX_BYTES} from './core';
 import type {FromWorker, ToWorker} from './messages';
-import {FetchFault, fetchAll, Ranges} from './ranges';
+import {FetchFault, fetchAll, NO_VIEW, Ranges} from './ranges';
 import {type Listed, type Manifest, parseManifest, parseStart} from './store';
 
 /// Milliseconds that a frame may take in the worker, and the part reserved for the unpredictable: garbage collection,
@@ -223,7 +223,7 @@ class Session {
     }
   }
   private fetchLacking(): void {
-    if (!this.failed) this.probing.want(this.lacking, 0, performance.now());
+    if (!this.failed) this.probing.want(this.lacking, NO_VIEW, performance.now());
   }
   private distrust(): void {
     this.ranges.distrust();
@@ -285,7 +285,7 @@ class Session {
     const result = this.core.open(ground, maxPoints);
     if ('missing' in result) {
       post({type: 'progress', bytes: this.ranges.stats.bytes});
-      this.ranges.want(result.missing, 0, performance.now());
+      this.ranges.want(result.missing, NO_VIEW, performance.now());
       return;
     }
     if (!this.terrain) this.scan ||= result.scan;
@@ -363,16 +363,16 @@ class Session {
   private frame(): void {
     if (!this.camera) return;
     const begin = performance.now();
-    const {state, missing} = this.core.frame(this.camera, (FRAME - IN_HAND) / 1000, begin / 1000);
+    const {state, missing, same} = this.core.frame(this.camera, (FRAME - IN_HAND) / 1000, begin / 1000);
     const changes = this.core.changes();
     this.noteClasses(changes);
-    this.ranges.want(missing, this.serial, begin);
-    const milliseconds = performance.now() - begin;
     const changed = changes.vertexBlocks.length > 0 || changes.triangleBlocks.length > 0;
+    this.ranges.want(missing, this.serial, begin, same);
+    const milliseconds = performance.now() - begin;
     if (this.showsSurface) this.settle(state.settled, changed && !this.restored);
     this.restored = false;
     // Missing bytes wake it again when they arrive.
-    this.idle = state.settled || (!changed && this.ranges.waiting && missing.length > 0);
+    this.idle = state.settled || (!changed && same && this.ranges.waiting && missing.length > 0);
     clearTimeout(this.exchange);
     if (this.idle && state.waiting) this.exchange = setTimeout(() => this.wake(), EXCHANGE);
     ++this.undrawn;

@@ -13,7 +13,7 @@ namespace {
 /// Share of a frame's time that the calling thread may spend looking for missing bytes.
 constexpr double kMissingShare = 0.25;
 /// A frame stops looking after this many missing ranges; requesting them takes longer than a frame.
-constexpr std::size_t kMaxMissing = 512;
+constexpr std::size_t kMaxMissing = 1024;
 
 class FrameReader final : public ClusterReader {
  public:
@@ -41,9 +41,14 @@ class FrameReader final : public ClusterReader {
       auto lacking = lacking_.find(request.cluster);
       if (lacking == lacking_.end() || has_come(lacking->second.front())) {
         try {
-          give(source_.load(request));
-          meter_.spend(members, kind);
-          continue;
+          const std::optional<stream::ByteRange> bytes =
+              has_arrived_ ? source_.bytes_of(request.cluster) : std::nullopt;
+          if (!bytes || has_arrived_(*bytes)) {
+            give(source_.load(request));
+            meter_.spend(members, kind);
+            continue;
+          }
+          lacking = lacking_.insert_or_assign(request.cluster, std::vector{*bytes}).first;
         } catch (const stream::MissingBytes& missing) {
           lacking = lacking_.insert_or_assign(request.cluster, missing.ranges()).first;
         }
@@ -136,7 +141,18 @@ tri::ClusterRecord FramedSource::record(tri::ClusterId id) {
 
 tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
   const stream::ClusterRecord record = store_.record(id);
-  tri::ClusterMembers members = inner_.read(id);
+  const auto read_members = [&] {
+    try {
+      return inner_.read(id);
+    } catch (const stream::MissingBytes& missing) {
+      const stream::ByteRange& first = missing.ranges().front();
+      if (tri::level_of(id) == 0 && first.offset == record.offset && first.bytes == record.bytes) {
+        members_file_ = first.file;
+      }
+      throw;
+    }
+  };
+  tri::ClusterMembers members = read_members();
   if (lattice_ != nullptr) {
     nodes_.clear();
     for (const stream::Point3& p : members.positions) nodes_.push_back(lattice_->node(frame_(p)));
@@ -146,6 +162,12 @@ tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
   points_ += record.points;
   bytes_ += record.bytes;
   return members;
+}
+
+std::optional<stream::ByteRange> FramedSource::bytes_of(tri::ClusterId id) const {
+  if (tri::level_of(id) > 0 || members_file_.empty()) return {};
+  const stream::ClusterRecord record = store_.record(id);
+  return stream::ByteRange{members_file_, record.offset, record.bytes};
 }
 
 tri::LoadedCluster FramedSource::retry(const std::function<tri::LoadedCluster()>& load) {

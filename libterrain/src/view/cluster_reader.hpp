@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <terrace/stream/given_bytes.hpp>
@@ -48,6 +50,10 @@ class FramedSource final : public tri::ClusterSource {
   tri::LoadedCluster load_root();
   /// Reads the record itself. Throws: stream::MissingBytes.
   tri::ClusterRecord exact_record(tri::ClusterId id);
+  /// Returns the bytes of the members of a cluster of level 0. Empty for other levels, and until
+  /// load() has lacked such bytes for the first time, which names their file. Throws:
+  /// stream::MissingBytes.
+  [[nodiscard]] std::optional<stream::ByteRange> bytes_of(tri::ClusterId id) const;
   /// Returns a number that clusters share if their records are in the same bytes.
   [[nodiscard]] static tri::ClusterId page_of(tri::ClusterId id) {
     constexpr std::uint64_t kClusters = 64;  // older stores have larger pages
@@ -72,6 +78,7 @@ class FramedSource final : public tri::ClusterSource {
   /// The index pages and bytes that the cluster being loaded still lacks.
   std::vector<tri::ClusterId> missing_pages_;
   std::vector<stream::ByteRange> missing_;
+  std::string members_file_;  ///< of level 0, see bytes_of()
   std::atomic<std::uint64_t> clusters_ = 0, points_ = 0, bytes_ = 0;
 };
 
