@@ -165,7 +165,7 @@ tri::ClusterMembers FramedSource::read(tri::ClusterId id) {
 }
 
 std::optional<stream::ByteRange> FramedSource::bytes_of(tri::ClusterId id) const {
-  if (tri::level_of(id) > 0 || members_file_.empty()) return {};
+  if (tri::level_of(id) > 0 || members_file_.empty() || store_.levels()[0].segments > 1) return {};
   const stream::ClusterRecord record = store_.record(id);
   return stream::ByteRange{members_file_, record.offset, record.bytes};
 }
