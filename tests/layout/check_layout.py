@@ -26,7 +26,7 @@ VERSIONED = ['CITATION.cff', 'python/terrace/__init__.py', 'python/qgis/terrace_
 TERRAIN_ROOMS = {'base': 0, 'earth': 1, 'build': 2, 'surface': 2, 'view': 2, 'sample': 3, 'contour': 3,
                  'mesh': 3, 'tile': 3}
 # The rooms of libstream by rank. A room within a room (`store/read`) has its rank.
-STREAM_ROOMS = {'io': 0, 'laz': 0, 'order': 1, 'raster': 1, 'store': 1, 'format': 2}
+STREAM_ROOMS = {'io': 0, 'laz': 0, 'net': 1, 'order': 1, 'raster': 1, 'store': 2, 'format': 3}
 # The largest number of sources in a folder that a newcomer can grasp at a glance.
 MOST_SOURCES = 40
 # The value of the option in meson.build.
@@ -41,6 +41,7 @@ INSTANTIATED = 'instantiates a template for one set of targets'
 OPTION = 'an option of several public headers'
 EXPANSION = 'names of folders, lists and patterns become names of files'
 SHORT_FILES = {
+    'libstream/src/net/byte_parts.hpp': 'plans requests; apart from the network',
     'libcluster/include/terrace/cluster/point.hpp': 'the type that all public headers share',
     'libcluster/src/cuda/probe.cu': 'compiled alone, when Meson looks for a CUDA compiler',
     'libcluster/src/cuda/rounds.hpp': NVCC,
@@ -96,6 +97,12 @@ SINGLE_USER_HEADERS = {
     'libcluster/src/cuda/device_complete.hpp': ON_CPU,
     'libcluster/src/cuda/device_dendrogram.hpp': ON_CPU,
     'libcluster/src/cuda/device_single.hpp': ON_CPU,
+    'libstream/src/net/aws_account.hpp': 'finds settings and credentials',
+    'libstream/src/net/aws_signature.hpp': 'signs requests; has its own test',
+    'libstream/src/net/byte_parts.hpp': 'plans requests; apart from the network',
+    'libstream/src/net/origin.hpp': 'URLs and signatures, apart from bytes',
+    'libstream/src/net/remote_folder.hpp': 'files by ranges, apart from the store',
+    'libstream/src/net/url.hpp': 'the parts of a URL',
     'libstream/src/format/copc/octree_builder.hpp': 'sorts points into an octree; has its own tests',
     'libstream/src/format/geojson/properties.hpp': 'the properties of features as columns',
     'libstream/src/format/geojson/items.hpp': 'cuts a stream of JSON into features',
@@ -206,6 +213,7 @@ RESTRICTED = [
      ['libcluster/src', 'libcluster/tests', 'libcluster/bench']),
     (r'glpk\.h', [RESEARCH]),
     (r'CLI/', ['tools']),
+    (r'curl/|openssl/', ['libstream/src/net']),
     (r'fmt/', ['libstream/src', 'libterrain/src', 'tools/src']),
     (r'pybind11/|Python\.h', ['python']),
     (r'nlohmann/', ['libterrain/src', 'libterrain/tests', 'libterrain/fuzz', 'tools', 'tests'] + IN_STREAM),

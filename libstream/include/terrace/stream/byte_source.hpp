@@ -12,7 +12,12 @@
 
 namespace terrace::stream {
 
-/// Bytes with random access, from a file, memory or elsewhere.
+/// A part of one file.
+struct BytePart {
+  std::uint64_t offset = 0, bytes = 0;
+};
+
+/// Bytes with random access, from a file, memory, a server or elsewhere.
 class ByteSource {
  public:
   virtual ~ByteSource() = default;
@@ -23,6 +28,14 @@ class ByteSource {
   /// Fills `out` with the bytes from `offset` on. Requires offset + out.size() <= size(). May be
   /// called by several threads at once. Throws: Error if the bytes cannot be read.
   virtual void read(std::uint64_t offset, std::span<std::byte> out) const = 0;
+
+  /// Number of bytes that prefetch() should be given at a time; 0 if it does nothing, because reads
+  /// are fast without it.
+  [[nodiscard]] virtual std::uint64_t prefetch_bytes() const { return 0; }
+  /// Requests the parts, which must exist, together, so that reads of them that follow soon do not
+  /// wait one after the other. May be called by several threads at once. Throws: Error if the bytes
+  /// cannot be read.
+  virtual void prefetch(std::span<const BytePart> parts) const { static_cast<void>(parts); }
 };
 
 /// Opens a regular file, to be read with pread(2). Throws: Error if it is not a regular file or
