@@ -213,6 +213,8 @@ def merge(stores: Iterable[Path], store: Path, *, replace: bool = False, progres
 class Store:
     """A store opened for reading: ``Store('alps.store')``. ``terrace.open`` and ``Store.open`` do the same.
 
+    ``path`` is a folder, or a URL of http, https or s3, of which only the bytes that are used are requested.
+
     Any number of threads may use it at once, and so may a fork of the process. Close it, or use it as a context
     manager; a closed store raises ValueError.
 
@@ -227,14 +229,14 @@ class Store:
             try:
                 self._core = _core.OpenStore(os.fsencode(path))
             except Error as error:
-                if not os.path.lexists(path):
+                if not os.path.lexists(path) and '://' not in os.fsdecode(path):
                     raise FileNotFoundError(errno.ENOENT, 'there is no store here', path) from error
                 raise
         self._info = self._core.info()
 
     @classmethod
     def open(cls, path: Path) -> Store:
-        """Opens the store in a folder, like ``Store(path)``."""
+        """Opens the store in a folder or at a URL, like ``Store(path)``."""
         return cls(path)
 
     def close(self) -> None:

@@ -17,6 +17,7 @@
 #include "io/text.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/input.hpp"
+#include "terrace/stream/network.hpp"
 
 namespace terrace::stream {
 namespace {
@@ -165,6 +166,9 @@ class Names {
       } else {
         files_.push_back(name);
       }
+    } else if (is_url(name)) {
+      throw Error(shown_url(name), "files of points or cells are not read over the network")
+          .remedy("download it first");
     } else if (name.size() > 1 && name.front() == '@') {
       add_list(name.substr(1));
     } else if (name.find_first_of("*?[") != name.npos) {

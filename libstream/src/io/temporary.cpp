@@ -18,6 +18,7 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/error.hpp"
 #include "terrace/stream/file_lock.hpp"
+#include "terrace/stream/network.hpp"
 
 namespace terrace::stream {
 namespace fs = std::filesystem;
@@ -114,6 +115,10 @@ void remove_tree(const fs::path& path) {
 }  // namespace
 
 fs::path follow_links(fs::path path) {
+  if (is_url(path.string())) {
+    throw Error(shown_url(path.string()), "files are not written over the network")
+        .remedy("write to this machine and copy the result");
+  }
   constexpr int kMaxLinks = 40;  // the same as Linux
   for (int links = 0; links <= kMaxLinks; ++links) {
     std::error_code error;

@@ -66,6 +66,8 @@ namespace {
 
 /// Number of points that are processed at once.
 constexpr std::uint64_t kPointsAtOnce = 16384;
+/// Number of clusters whose records are requested together from a server.
+constexpr std::size_t kRecordsAtOnce = 65536;
 
 /// Descends the levels and collects the clusters headed by the points it meets. Unlike
 /// stream::StoreQuery it reads whole records, and wanted levels in file order.
@@ -204,7 +206,33 @@ class Descent {
   }
 
   void run_heads(unsigned level) {
-    const std::vector<std::uint64_t> ordinals = take_heads(level);
+    const std::vector<std::uint64_t> all = take_heads(level);
+    for (std::span<const std::uint64_t> rest = all; !rest.empty();) {
+      const std::size_t count = store_.is_remote() ? prefetch(level, rest) : rest.size();
+      run_heads(level, rest.first(count));
+      rest = rest.subspan(count);
+    }
+  }
+
+  /// Requests from a server what the first of these clusters need. Returns their number.
+  [[nodiscard]] std::size_t prefetch(unsigned level, std::span<const std::uint64_t> ordinals) {
+    const std::size_t count =
+        store_.prefetch(stream::Store::Part::page_box, level,
+                        ordinals.first(std::min(kRecordsAtOnce, ordinals.size())));
+    ordinals =
+        ordinals.first(store_.prefetch(stream::Store::Part::record, level, ordinals.first(count)));
+    std::vector<std::uint64_t> chosen;
+    std::vector<std::size_t> places;
+    for (std::size_t i = 0; i < ordinals.size(); ++i) {
+      if (!wanted(stream::cluster_id(level, ordinals[i]))) continue;
+      chosen.push_back(ordinals[i]);
+      places.push_back(i);
+    }
+    const std::size_t taken = store_.prefetch(stream::Store::Part::cluster, level, chosen);
+    return taken < chosen.size() ? places[taken] : ordinals.size();
+  }
+
+  void run_heads(unsigned level, std::span<const std::uint64_t> ordinals) {
     const std::size_t each = static_cast<std::size_t>(clusters_per_part(level));
     base::in_order((ordinals.size() + each - 1) / each, threads_,
                    [&](unsigned worker, std::size_t i) {

@@ -182,14 +182,17 @@ struct Problem {
 /// Copies are cheap; they share the files and the indices read so far.
 class Store {
  public:
-  /// Throws: Error if `path` is not a store, or has a newer version or a damaged manifest.
+  /// Opens a store in a folder, or at a URL of http, https or s3 (see network.hpp; its path() has
+  /// neither password nor query). Throws: Error if `path` is not a store, or has a newer version or
+  /// a damaged manifest.
   static Store open(const std::filesystem::path& path);
   /// Opens a store whose files are not in a folder but in memory, in an archive or on a server.
   /// `name` replaces the folder in messages and in path(). `files` is kept if the store has a
   /// surface or several segments. Throws as above, and what `files` throws.
   static Store open(const std::string& name, const OpenByName& files);
   /// Whether `path` is a store. If a writer moved the store aside in order to replace it and then
-  /// died, this gives the store its name back. open() calls this.
+  /// died, this gives the store its name back. open() calls this. True for every URL, without
+  /// asking the server.
   static bool exists(const std::filesystem::path& path);
   /// Whether a folder is a store, of any version, and contains only overlays and the files that its
   /// manifest lists. Reads the manifest and the names in the folder.
@@ -256,6 +259,15 @@ class Store {
   /// from the index. It may be wider than that by a 32nd of the range over the neighbouring
   /// clusters. Throws: Error for a damaged page or an ordinal that does not exist.
   [[nodiscard]] std::vector<ValueRange> attribute_ranges(ClusterId id) const;
+  /// What calls for a cluster read: page_box(), record(), or read().
+  enum class Part : std::uint8_t { page_box, record, cluster };
+  /// Whether reads wait for a server, so that prefetch() saves time.
+  [[nodiscard]] bool is_remote() const;
+  /// Requests, together, what later calls for these clusters of a level read, if the store is on a
+  /// server. Of many clusters, it requests those of the first ones only, as many as are in one file
+  /// and are kept until they are read; returns their number, at least 1. Clusters of level 0 for
+  /// which may_match() is false are left out. Requires that the clusters exist. Throws: Error.
+  std::size_t prefetch(Part part, unsigned level, std::span<const std::uint64_t> ordinals) const;
   /// Decodes a cluster. Throws: Error for damage (checksum, counts); never returns a wrong point.
   void read(ClusterId id, ClusterPoints& out) const;
   using VisitCluster = std::function<void(ClusterId, const ClusterRecord&, const ClusterPoints&)>;

@@ -171,6 +171,11 @@ class StoreQuery {
   };
 
   void fill(Node& node, ClusterId id);
+  /// Requests from a server the index entries of the clusters below some of a level that
+  /// wants(below, box) selects, down to `level`. wants: see descend().
+  template <class Wants>
+  void prefetch_below(unsigned at, std::span<const std::uint64_t> ordinals, unsigned level,
+                      const Wants& wants);
   /// Throws Error if a traversal has opened more clusters than exist. Each cluster has one head, so
   /// that only happens in a damaged store, where the traversal could otherwise run almost forever.
   void check_traversal(std::uint64_t clusters) const;
@@ -181,9 +186,34 @@ class StoreQuery {
   Cache leaves_, inner_;
   ClusterPoints points_;
   std::vector<std::vector<std::uint64_t>> wanted_;  ///< per level, ordinals on the way down
+  std::vector<std::vector<std::uint64_t>> ahead_;   ///< as wanted_, of prefetch_below()
   std::vector<Open> open_;                          ///< a heap with the smallest on top
   std::vector<ClusterId> crossing_;
 };
+
+template <class Wants>
+void StoreQuery::prefetch_below(unsigned at, std::span<const std::uint64_t> ordinals,
+                                unsigned level, const Wants& wants) {
+  for (const Store::Part part : {Store::Part::page_box, Store::Part::record}) {
+    ahead_.assign(at, {});
+    for (const std::uint64_t ordinal : ordinals) {
+      const Node& node = this->node(cluster_id(at, ordinal));
+      for (std::size_t i = 0; i < node.heads(); ++i) {
+        for (unsigned below = at; below-- > level;) {
+          const Branch& branch = node.known_branch(i, below);
+          if (!wants(below, branch.box)) break;
+          if (branch.descendants > 0) continue;
+          if (part == Store::Part::record && !wants(below, node.near_branch(i, below).box)) break;
+          ahead_[below].push_back(branch.ordinal);
+        }
+      }
+    }
+    for (unsigned below = level; below < at; ++below) {
+      std::sort(ahead_[below].begin(), ahead_[below].end());
+      store_.prefetch(part, below, ahead_[below]);
+    }
+  }
+}
 
 template <class Wants, class Visit>
 void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit) {
@@ -206,13 +236,30 @@ void StoreQuery::descend(unsigned level, const Wants& wants, const Visit& visit)
     }
   };
   if (level > store_.top()) return;
+  const bool remote = store_.is_remote();
+  // Number of nodes whose index entries are requested together; their nodes stay in the cache.
+  constexpr std::size_t kNodesAtOnce = 128;
+  const auto wants_box = [&](unsigned below, const Box3& box) {
+    return wants(below, Branch{.box = box, .ordinal = 0, .descendants = 0});
+  };
+  constexpr std::uint64_t kRoot = 0;
+  if (remote) prefetch_below(store_.top(), {&kRoot, 1}, level, wants_box);
   deliver(root_);
   for (unsigned at = store_.top(); at-- > level;) {
     // By ordinal, which is the order of the bytes in the file.
     std::sort(wanted_[at].begin(), wanted_[at].end());
     // Duplicates exist only in a damaged store.
     wanted_[at].erase(std::unique(wanted_[at].begin(), wanted_[at].end()), wanted_[at].end());
-    for (const std::uint64_t ordinal : wanted_[at]) deliver(node(cluster_id(at, ordinal)));
+    for (std::span<const std::uint64_t> rest = wanted_[at]; !rest.empty();) {
+      std::size_t count = rest.size();
+      if (remote) {
+        if (at > level) count = std::min(count, kNodesAtOnce);
+        count = store_.prefetch(Store::Part::cluster, at, rest.first(count));
+        if (at > level) prefetch_below(at, rest.first(count), level, wants_box);
+      }
+      for (const std::uint64_t ordinal : rest.first(count)) deliver(node(cluster_id(at, ordinal)));
+      rest = rest.subspan(count);
+    }
   }
 }
 
@@ -221,8 +268,17 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
   const auto later = [](const Open& a, const Open& b) { return a.least > b.least; };
   open_.clear();
   double bound = 0;
-  const auto look_into = [&](const Node& node) {
-    bound = visit(node);
+  const bool remote = store_.is_remote();
+  const auto look_into = [&](const ClusterId id) {
+    const Node* read = &this->node(id);
+    bound = visit(*read);
+    if (remote && level_of(id) > level) {
+      const std::uint64_t ordinal = ordinal_of(id);
+      prefetch_below(level_of(id), {&ordinal, 1}, level,
+                     [&](unsigned below, const Box3& box) { return !(least(below, box) > bound); });
+      read = &this->node(id);
+    }
+    const Node& node = *read;
     const unsigned at = node.level();
     for (std::size_t i = 0; i < node.heads(); ++i) {
       for (unsigned below = level; below < at; ++below) {
@@ -240,14 +296,14 @@ void StoreQuery::best_first(unsigned level, const Least& least, const Visit& vis
     }
   };
   if (level > store_.top()) return;
-  look_into(root_);
+  look_into(root_.id);
   for (std::uint64_t opened = 0; !open_.empty(); ++opened) {
     check_traversal(opened);
     std::pop_heap(open_.begin(), open_.end(), later);
     const Open next = open_.back();
     open_.pop_back();
     if (next.least > bound) break;
-    look_into(node(next.id));
+    look_into(next.id);
   }
 }
 
@@ -260,11 +316,18 @@ void StoreQuery::cut(const Box3& box, const Take& take, const Opens& opens) {
     }
     return;
   }
+  const bool remote = store_.is_remote();
   crossing_.assign(1, root_.id);
   for (std::uint64_t opened = 0; !crossing_.empty(); ++opened) {
     check_traversal(opened);
-    const Node& at = node(crossing_.back());
+    const ClusterId id = crossing_.back();
     crossing_.pop_back();
+    if (remote) {
+      const std::uint64_t ordinal = ordinal_of(id);
+      prefetch_below(level_of(id), {&ordinal, 1}, 0,
+                     [&](unsigned, const Box3& other) { return box.intersects(other); });
+    }
+    const Node& at = node(id);
     for (std::size_t i = 0; i < at.heads(); ++i) {
       // The cluster that a point heads on a level is inside the one on the level above.
       for (unsigned below = at.level(); below-- > 0;) {

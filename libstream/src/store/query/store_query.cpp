@@ -287,7 +287,7 @@ std::uint64_t StoreQuery::count(const Box3& box, unsigned level) {
         });
     return sum;
   }
-  ClusterPoints border;
+  std::vector<std::uint64_t> border;
   cut(
       box,
       [&](const Point3* head, const Branch& branch) {
@@ -296,11 +296,20 @@ std::uint64_t StoreQuery::count(const Box3& box, unsigned level) {
           return true;
         }
         sum += box.contains(*head) ? 1 : 0;
-        store_.read(cluster_id(0, branch.ordinal), border);
-        for (const Point3& p : border.positions) sum += box.contains(p) ? 1 : 0;
+        border.push_back(branch.ordinal);
         return true;
       },
       [](const Branch&) { return true; });
+  std::sort(border.begin(), border.end());
+  ClusterPoints points;
+  for (std::span<const std::uint64_t> rest = border; !rest.empty();) {
+    const std::size_t count = store_.prefetch(Store::Part::cluster, 0, rest);
+    for (const std::uint64_t ordinal : rest.first(count)) {
+      store_.read(cluster_id(0, ordinal), points);
+      for (const Point3& p : points.positions) sum += box.contains(p) ? 1 : 0;
+    }
+    rest = rest.subspan(count);
+  }
   return sum;
 }
 

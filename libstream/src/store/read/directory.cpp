@@ -176,6 +176,14 @@ Box3 Directory::coarse_box(std::uint64_t page) const {
              : loaded->boxes[static_cast<std::size_t>(page % kChapterPages)].in(chapter);
 }
 
+BytePart Directory::contents_part(std::uint64_t page) const {
+  const auto number = static_cast<std::size_t>(page / kChapterPages);
+  const Chapter& chapter = chapters_[number];
+  const bool known = contents_[number].load(std::memory_order_acquire) != nullptr ||
+                     (chapter.contents_at >= cache_offset_ && !cache_.empty());
+  return {chapter.contents_at, known ? 0 : chapter.contents_bytes};
+}
+
 Bytes Directory::read_tables(const TablesPosition& at) const {
   Bytes bytes = read(at.offset, at.size + kChecksum);
   bytes.resize(checked(bytes, "the checksum of tables is wrong").size());

@@ -97,6 +97,8 @@ class Directory {
   /// Like page_box(), but without reading: the chapter's box until the chapter's contents have been
   /// read.
   [[nodiscard]] Box3 coarse_box(std::uint64_t page) const;
+  /// Returns what page_range() and page_box() read for a page; of no bytes if they do not read.
+  [[nodiscard]] BytePart contents_part(std::uint64_t page) const;
   /// Returns the sets of tables, in the order of clusters.
   [[nodiscard]] const std::vector<TablesPosition>& tables() const { return tables_; }
   /// Returns the bytes of a set. Throws: Damage, Error.

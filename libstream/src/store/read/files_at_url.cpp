@@ -39,9 +39,11 @@ void prepare(net::RemoteFolder& folder, const std::string& manifest) {
     if (json.has("surface")) expect(json.at("surface").at("data"));
     const std::vector<store::JsonValue>& levels = json.at("levels").items();
     for (const store::JsonValue& level : levels) {
-      for (const store::JsonValue& segment : level.at("segments").items()) {
+      const std::vector<store::JsonValue>& segments = level.at("segments").items();
+      for (const store::JsonValue& segment : segments) {
         const auto [data, data_bytes] = expect(segment.at("data"));
         const auto [index, index_bytes] = expect(segment.at("index"));
+        if (segments.size() > 1) continue;  // opened when they are first needed
         const std::uint64_t directory = segment.at("directory_bytes").count();
         const std::uint64_t end = index_bytes - std::min(index_bytes, directory) < kOpeningBytes
                                       ? index_bytes

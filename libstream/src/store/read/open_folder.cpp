@@ -15,10 +15,12 @@
 #include "terrace/stream/atomic_file.hpp"
 #include "terrace/stream/byte_source.hpp"
 #include "terrace/stream/error.hpp"
+#include "terrace/stream/network.hpp"
 #include "terrace/stream/overlay.hpp"
 #include "terrace/stream/store.hpp"
 
-/// Opens a store in a folder, where a writer that died may have left it under another name.
+/// Opens a store in a folder, where a writer that died may have left it under another name, or at a
+/// URL.
 
 namespace terrace::stream {
 
@@ -88,6 +90,9 @@ Ownership Store::ownership_of(const fs::path& folder) {
 }
 
 Store Store::open(const std::filesystem::path& path) {
+  if (const std::string url = path.string(); is_url(url)) {
+    return open(shown_url(url), files_at_url(url));
+  }
   if (!exists(path)) {
     throw Error(path.string(), "there is no store here")
         .remedy("give a folder written by terrace build");
@@ -96,6 +101,7 @@ Store Store::open(const std::filesystem::path& path) {
 }
 
 bool Store::exists(const std::filesystem::path& path) {
+  if (is_url(path.string())) return true;
   std::error_code error;
   return std::filesystem::is_regular_file(path / kManifestName, error) ||
          restore_replaced(follow_links(path));

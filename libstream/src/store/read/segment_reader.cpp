@@ -101,6 +101,23 @@ Box3 SegmentReader::page_box(std::uint64_t ordinal) const {
       from_directory([&] { return directory_->page_box(ordinal / layout_.page_clusters()); }));
 }
 
+BytePart SegmentReader::page_box_part(std::uint64_t ordinal) const {
+  return directory_->contents_part(ordinal / layout_.page_clusters());
+}
+
+BytePart SegmentReader::page_part(std::uint64_t ordinal) const {
+  const auto range =
+      from_directory([&] { return directory_->page_range(ordinal / layout_.page_clusters()); });
+  return {range.begin, range.end - range.begin};
+}
+
+BytePart SegmentReader::cluster_part(std::uint64_t ordinal) const {
+  std::uint64_t offset = 0;
+  const Entry entry = this->entry(ordinal, offset);
+  check_range(ordinal, offset, entry.bytes);
+  return {offset, entry.bytes};
+}
+
 std::shared_ptr<const IndexPage> SegmentReader::read_page(std::uint64_t number,
                                                           SequentialBytes* ahead) const {
   const Directory::Range range = from_directory([&] { return directory_->page_range(number); });

@@ -130,6 +130,11 @@ class SegmentReader {
   [[nodiscard]] Box3 page_box(std::uint64_t ordinal) const;
   /// Reads a page, or returns it from the cache. Throws: Error.
   [[nodiscard]] std::shared_ptr<const IndexPage> page(std::uint64_t number) const;
+  /// Return what page_box(), page() and read() read for a cluster, from the index, the index and
+  /// the data; of no bytes if they do not read. Throws: Error.
+  [[nodiscard]] BytePart page_box_part(std::uint64_t ordinal) const;
+  [[nodiscard]] BytePart page_part(std::uint64_t ordinal) const;
+  [[nodiscard]] BytePart cluster_part(std::uint64_t ordinal) const;
   /// Returns the entry of a cluster that exists, and where its bytes begin. Throws: Error.
   [[nodiscard]] Entry entry(std::uint64_t ordinal, std::uint64_t& offset) const;
   /// Returns the entry of a cluster in `page`, checked against the manifest. Throws: Error.

@@ -110,6 +110,37 @@ std::vector<ValueRange> Store::attribute_ranges(ClusterId id) const {
   return ranges;
 }
 
+bool Store::is_remote() const {
+  return impl_->levels.front()->segment(0)->data().prefetch_bytes() > 0;
+}
+
+std::size_t Store::prefetch(Part part, unsigned number,
+                            std::span<const std::uint64_t> ordinals) const {
+  if (!is_remote() || ordinals.empty()) return ordinals.size();
+  check_stop();
+  const LevelReader::Handle segment = impl_->level(number).find(ordinals.front()).segment;
+  const ByteSource& file = part == Part::cluster ? segment->data() : segment->index();
+  std::vector<BytePart> parts;
+  std::uint64_t bytes = 0;
+  std::size_t taken = 0;
+  for (; taken < ordinals.size(); ++taken) {
+    const std::uint64_t id = ordinals[taken];
+    if (id < segment->first() || id - segment->first() >= segment->clusters()) break;
+    const std::uint64_t ordinal = id - segment->first();
+    if (part == Part::cluster && number == 0 && !may_match(cluster_id(number, id))) continue;
+    const BytePart next = part == Part::cluster  ? segment->cluster_part(ordinal)
+                          : part == Part::record ? segment->page_part(ordinal)
+                                                 : segment->page_box_part(ordinal);
+    // Many clusters share a page.
+    if (!parts.empty() && parts.back().offset == next.offset) continue;
+    if (!parts.empty() && bytes + next.bytes > file.prefetch_bytes()) break;
+    bytes += next.bytes;
+    parts.push_back(next);
+  }
+  file.prefetch(parts);
+  return taken;
+}
+
 void Store::read(ClusterId id, ClusterPoints& out) const {
   check_stop();
   const auto [segment, ordinal] = impl_->level(level_of(id)).find(ordinal_of(id));
