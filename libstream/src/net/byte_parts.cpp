@@ -10,6 +10,8 @@ namespace terrace::stream::net {
 namespace {
 
 constexpr std::uint64_t kMaxGap = std::uint64_t{256} << 10;
+/// A gap that costs less than a request.
+constexpr std::uint64_t kSmallGap = std::uint64_t{4} << 10;
 constexpr std::uint64_t kFreeGaps = std::uint64_t{64} << 10;
 constexpr std::uint64_t kGapShare = 4;
 constexpr std::uint64_t kMaxPart = std::uint64_t{8} << 20;
@@ -47,8 +49,10 @@ std::vector<BytePart> joined_parts(std::vector<BytePart> parts) {
   std::vector<bool> joins(parts.size());
   std::uint64_t budget = std::max(kFreeGaps, needed / kGapShare);
   for (const auto& [gap, after] : gaps) {
-    if (gap > budget) break;
-    budget -= gap;
+    if (gap > kSmallGap) {
+      if (gap > budget) break;
+      budget -= gap;
+    }
     joins[after] = true;
   }
   std::vector<BytePart> out;
