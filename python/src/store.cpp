@@ -295,7 +295,7 @@ std::optional<terrain::Transformation> change_to(const stream::Store& store,
 
 void bind_store(py::module_& module) {
   py::class_<OpenStore>(module, "OpenStore")
-      .def(py::init<const std::string&>())
+      .def(py::init<const std::string&>(), py::call_guard<py::gil_scoped_release>())
       .def("close", &OpenStore::close)
       .def("closed", &OpenStore::closed)
       .def("where",
