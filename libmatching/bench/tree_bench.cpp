@@ -89,7 +89,7 @@ constexpr std::size_t kCluster = 10000;
 std::vector<TreeChildren> matching_tree(const std::vector<Point3>& places) {
   std::vector<std::uint32_t> labels(places.size());
   std::uint32_t label = 0;
-  std::vector<base::Box3> boxes;
+  std::vector<terrace::base::Box3> boxes;
   for (const Point3& p : places) boxes.push_back({p, p});
   std::vector<std::uint32_t> order(places.size());
   for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -112,7 +112,7 @@ std::vector<TreeChildren> matching_tree(const std::vector<Point3>& places) {
 constexpr std::array<const char*, 4> kBuilders{"matching", "rotated", "median", "binned"};
 
 std::vector<TreeChildren> build(std::size_t builder, const std::vector<Point3>& places,
-                                const std::vector<base::Box3>& boxes) {
+                                const std::vector<terrace::base::Box3>& boxes) {
   if (builder == 0) return matching_tree(places);
   if (builder == 1) return rotate_tree<3>(matching_tree(places), boxes);
   return builder == 2 ? peers::median_split(boxes) : peers::binned_sah(boxes);
@@ -222,7 +222,7 @@ class Scene {
   std::function<Mesh()> make_;
   Mesh mesh_;
   std::vector<Point3> places_;
-  std::vector<base::Box3> boxes_;
+  std::vector<terrace::base::Box3> boxes_;
   Queries queries_;
   std::array<std::optional<PointHierarchy<3>>, kBuilders.size()> point_trees_;
   std::array<std::optional<TriangleHierarchy>, kBuilders.size()> triangle_trees_;

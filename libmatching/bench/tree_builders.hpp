@@ -64,7 +64,7 @@ inline double centre(const base::Box3& box, std::size_t d) {
 inline base::Box3 box_of_centres(Boxes boxes, std::span<const std::uint32_t> range) {
   base::Box3 all;
   for (const std::uint32_t i : range) {
-    all.include({centre(boxes[i], 0), centre(boxes[i], 1), centre(boxes[i], 2)});
+    all.include(Point3{centre(boxes[i], 0), centre(boxes[i], 1), centre(boxes[i], 2)});
   }
   return all;
 }

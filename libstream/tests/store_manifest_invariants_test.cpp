@@ -66,7 +66,7 @@ TEST(StoreInvariants, RefusesManifestsWithInvalidCounts) {
              level(m, 0)["clusters"].template get<std::uint64_t>() + 1};
        }},
       // A number of clusters that is only possible if products wrap.
-      {"more points than possible",
+      {"more clusters than its index",
        [&](auto& m) {
          const std::uint64_t count = std::numeric_limits<std::uint64_t>::max();
          m["points"] = level(m, 0)["points"] = count;

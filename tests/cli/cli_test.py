@@ -25,7 +25,7 @@ import zlib
 TERRACE = os.environ.get('TERRACE', 'terrace')
 
 # All verbs, in the order of --help.
-VERBS = ['build', 'info', 'verify', 'points', 'mesh', 'surface', 'tile', 'sample', 'raster',
+VERBS = ['build', 'merge', 'info', 'verify', 'points', 'mesh', 'surface', 'tile', 'sample', 'raster',
          'profile', 'contour', 'cluster', 'match', 'render', 'view', 'publish', 'synth', 'convert']
 
 

@@ -451,11 +451,13 @@ class OptionTest(ProcessTest):
         points, store, dem = self.points_file(), self.store(), self.path('dem.tif')
         self.run_ok('synth', 'dem', '--size', '64x64', '-o', dem)
         self.run_ok('build', dem, '-o', self.path('raster'))
+        self.run_ok('build', self.points_file('others.xyz', 200), '-o', self.path('others'))
         places = self.path('places.csv')
         with open(places, 'w') as file:
             file.write('x,y\n5,5\n')
         out = lambda name: ['-o', self.path(name)]
-        return {'build': ['build', points, *out('built')], 'info': ['info', points],
+        return {'build': ['build', points, *out('built')],
+                'merge': ['merge', store, self.path('others'), *out('merged')], 'info': ['info', points],
                 'verify': ['verify', store], 'points': ['points', store, *out('out.xyz')],
                 'mesh': ['mesh', store, *out('out.ply')],
                 'surface': ['surface', store, *out('out.ply')],

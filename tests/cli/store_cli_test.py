@@ -66,7 +66,7 @@ class StoreTest(unittest.TestCase):
         store = self.path('keys.terrace')
         summary = json.loads(self.run_ok('build', self.dem, '-o', store, '--json', '--memory', '200M'))
         self.assertEqual(set(summary), {'points', 'nodata', 'excluded', 'lost', 'outliers', 'empty_values',
-                                        'withheld', 'seconds', 'points_per_second', 'peak_rss_bytes', 'store_bytes', 'levels', 'reordered',
+                                        'withheld', 'seconds', 'points_per_second', 'peak_rss_bytes', 'store_points', 'store_bytes', 'levels', 'reordered',
                                         'spread', 'temporary_bytes'})
         self.assertEqual(summary['points'], SIZE * SIZE)
         self.assertLessEqual(summary['peak_rss_bytes'], 200 << 20)

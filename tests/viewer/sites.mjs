@@ -36,6 +36,11 @@ export class Sites {
     }
     writeFileSync(join(this.folder, 'flat.asc'), `${flat.join('\n')}\n`);
     this.terrace('build', 'flat.asc', '-o', 'flat.store', '--block', '1000', '-q');
+    // The same joined from two halves.
+    for (const [half, region] of [['west', '0,0,3000,5400'], ['east', '3000,0,6000,5400']]) {
+      this.terrace('build', 'flat.asc', '--region', region, '-o', `${half}.store`, '--block', '1000', '-q');
+    }
+    this.terrace('merge', 'west.store', 'east.store', '-o', 'joined.store', '-q');
     this.terrace('synth', 'dem', '--size', '1000x1000', '-o', 'hills.tif', '-q');
     this.terrace('build', 'hills.tif', '-o', 'hills.store', '-q');
     // Land in the west with a bay 3 km wide and a lake of one cell.
@@ -97,7 +102,7 @@ export class Sites {
       writeFileSync(join(this.folder, name), text);
       this.terrace('build', name, '-o', `${name.split('.')[0]}.store`, '-q');
     }
-    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'cloud.store', 'rare.store', 'ball.store', 'bowl.store', 'high.store', 'kept.store', 'corners.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
+    const stores = ['alps.store', 'hills.store', 'coast.store', 'flat.store', 'joined.store', 'cloud.store', 'rare.store', 'ball.store', 'bowl.store', 'high.store', 'kept.store', 'corners.store', ...Object.keys(small).map(name => `${name.split('.')[0]}.store`)];
     for (const [name, file] of Object.entries(this.real)) {
       this.terrace('build', join(process.env.TERRACE_DATA, file), '-o', `${name}.store`, '-q');
       stores.push(`${name}.store`);

@@ -87,7 +87,7 @@ class Tested extends Flyer {
   }
 }
 
-const FLIGHTS = {alps: 'raster', flat: 'raster', cloud: 'points', ball: 'surface', bowl: 'surface', kept: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
+const FLIGHTS = {alps: 'raster', flat: 'raster', joined: 'raster', cloud: 'points', ball: 'surface', bowl: 'surface', kept: 'surface', ...(process.env.TERRACE_DATA ? {bunny: 'surface'} : {})};
 for (const [name, kind] of Object.entries(FLIGHTS)) {
   test(`a flight over ${name} gives the hashes of the native run`, {skip: name === 'bunny' && !sites.real.bunny}, async () => {
     // Close to the bunny this takes a minute, so only nightly runs continue.
@@ -113,7 +113,7 @@ for (const [name, kind] of Object.entries(FLIGHTS)) {
         assert.match(path, /^\/((core|body)\.wasm|stores\/\w+\.start)$/);
         continue;
       }
-      assert.match(path, /^\/stores\/\w+\/(level-\d+\.0\.(clusters|index)|surface\.0)$/);
+      assert.match(path, /^\/stores\/\w+\/(level-\d+\.[0-9a-f]+\.(clusters|index)|surface\.0)$/);
       assert.ok(!seen.has(path + range), `${path} ${range} twice`);
       seen.add(path + range);
     }
@@ -760,7 +760,8 @@ test('few requests: small ones wait for open ones', async () => {
   assert.ok(small > 0);
 });
 
-for (const latency of [1, 30, 100]) {
+// Far away more becomes known while answers travel, so that small ranges wait less.
+for (const [latency, most] of [[1, 75], [30, 75], [100, 90]]) {
   test(`a flight to full detail takes few requests and not twice the clusters read, answers after ${latency} ms`, async () => {
     const time = new VirtualTime(), {fetch, log} = folderFetch(made(), undefined, latency, time);
     const connect = receive => new Worker(join(made(), 'worker.js'), fetch, receive, 1, time);
@@ -774,7 +775,7 @@ for (const latency of [1, 30, 100]) {
     assert.equal(stats.requests, twice.size + 1);
     const figures = `${stats.requests} requests, ${stats.bytes} bytes, ${state.storedBytes} of clusters`;
     console.log(figures);
-    assert.ok(stats.requests <= 75, figures);
+    assert.ok(stats.requests <= most, figures);
     assert.ok(stats.bytes <= 2 * state.storedBytes, figures);  // a seventh of it is the start file
   });
 }

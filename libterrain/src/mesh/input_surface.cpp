@@ -19,7 +19,7 @@ namespace terrace::terrain {
 namespace {
 
 /// Peak memory in bytes per triangle beyond two for each point.
-constexpr std::uint64_t kBytesPerTriangle = 200;
+constexpr std::uint64_t kBytesPerMoreTriangle = 200;
 
 /// Finds the points of a store by their places.
 class PlaceNumbers {
@@ -98,7 +98,7 @@ std::vector<std::array<std::uint32_t, 3>> numbered_faces(const stream::Store& st
     }
     const std::uint64_t count = points.positions.size(), usual = 2 * count;
     if (faces.size() <= usual) continue;
-    const std::uint64_t more = (faces.size() - usual) * kBytesPerTriangle / count + 1;
+    const std::uint64_t more = (faces.size() - usual) * kBytesPerMoreTriangle / count + 1;
     need_memory_for_surface(store, count, kInputSurfaceBytesPerPoint + more, context.memory_or(0),
                             stream::message("raise {memory_bytes}, or leave the surface out"));
   }
