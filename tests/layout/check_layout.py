@@ -120,7 +120,6 @@ SINGLE_USER_HEADERS = {
     'libmatching/src/blossom/pricing.hpp': 'the search for violated edges, apart from the solver and its caller',
     'libmatching/src/windows/discs.hpp': 'the lower bound, apart from the matching',
     'libterrain/src/base/region_grid.hpp': SEARCH,
-    'libterrain/src/build/joined_longitudes.hpp': BUILD,
     'libterrain/src/build/mesh_input.hpp': BUILD,
     'libterrain/src/contour/lines.hpp': TESTED,
     'libterrain/src/contour/text.hpp': 'the output, apart from the lines',

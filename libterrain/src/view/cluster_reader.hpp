@@ -50,10 +50,9 @@ class FramedSource final : public tri::ClusterSource {
   tri::LoadedCluster load_root();
   /// Reads the record itself. Throws: stream::MissingBytes.
   tri::ClusterRecord exact_record(tri::ClusterId id);
-  /// Returns the bytes of the members of a cluster of level 0. Empty for other levels, for a level 0
-  /// in several files, and until load() has lacked such bytes for the first time, which names their
-  /// file. Throws:
-  /// stream::MissingBytes.
+  /// Returns the bytes of the members of a cluster of level 0. Empty for other levels, for a level
+  /// 0 in several files, and until load() has lacked such bytes for the first time, which names
+  /// their file. Throws: stream::MissingBytes.
   [[nodiscard]] std::optional<stream::ByteRange> bytes_of(tri::ClusterId id) const;
   /// Returns a number that clusters share if their records are in the same bytes.
   [[nodiscard]] static tri::ClusterId page_of(tri::ClusterId id) {
