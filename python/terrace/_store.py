@@ -281,7 +281,7 @@ class Store:
         points, bytes, top, checksum, parameters: of the whole store.
         bounds: six numbers in the CRS, minima first.
         crs, vertical, attributes: as recorded when it was built.
-        levels: level 0 first; ``points`` counts the points on that level and above.
+        levels: level 0 first; ``points`` counts the points on that level and above, ``segments`` the runs that wrote it.
         grid, columns, rows, transform: of a raster; the transform is to the centres of cells.
         nodata: the number of samples left out.
         surface: the numbers of vertices, triangles and bytes of the stored surface of a scan, or None.

@@ -185,7 +185,8 @@ std::optional<AwsAccount::Temporary> AwsAccount::find() {
   return from_machine();
 }
 
-HttpAnswer AwsAccount::ask(const HttpRequest& request, std::chrono::milliseconds deadline) {
+HttpAnswer AwsAccount::ask(HttpRequest request, std::chrono::milliseconds deadline) {
+  request.follow = false;  // tokens in headers must not reach another host
   HttpTask task{.make = [&] { return request; }, .max_bytes = kMaxAnswer};
   client_.send({&task, 1}, deadline);
   return std::move(task.answer);

@@ -43,7 +43,7 @@ class AwsAccount {
   [[nodiscard]] Temporary from_web_identity(const std::string& token_file, const std::string& role);
   [[nodiscard]] std::optional<Temporary> from_container();
   [[nodiscard]] std::optional<Temporary> from_machine();
-  HttpAnswer ask(const HttpRequest& request, std::chrono::milliseconds deadline);
+  HttpAnswer ask(HttpRequest request, std::chrono::milliseconds deadline);
 
   HttpClient& client_;
   std::string profile_name_;

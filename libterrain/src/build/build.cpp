@@ -491,12 +491,13 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
   }
 
   std::span<const stream::StorePart> parts;
+  std::optional<Ground> extended_ground;
   if (extension_ != nullptr) {
     extension_->set_source(info_, schema);
     schema = extension_->schema();
+    extended_ground.emplace(schema, request_.z_weight);
     parts = extension_->parts();
   }
-  const Ground ground_of_store(schema, request_.z_weight);
   stream::StoreWriter writer(request_.store, schema, parts, request_.replace, threads);
   const bool trial = request_.most_points > 0;
   MeshInput mesh(request_, info_, schema, middle_, context_);
@@ -507,7 +508,8 @@ std::variant<BuildOutcome, JoinedLongitudes::Joint> Build::run() {
     };
   }
   StoreSink sink(writer, !trial, context_.stop, make_surface);
-  cluster::HierarchyOptions options = clustering_of(request_, schema, ground_of_store);
+  cluster::HierarchyOptions options =
+      clustering_of(request_, schema, extended_ground ? *extended_ground : ground);
   if (extension_ != nullptr) options.existing_clusters = extension_->clusters();
   options.threads = threads;
   options.stop = context_.stop;

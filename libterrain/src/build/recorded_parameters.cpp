@@ -114,14 +114,14 @@ std::vector<std::pair<std::string, std::string>> recorded_parameters(const Build
 BuildRequest recorded_request(const stream::StoreSchema& schema, const std::string& file) {
   BuildRequest request;
   request.entities = entities_of(schema);
-  for (const auto& [name, value] : schema.parameters) {
+  for (const auto& parameter : schema.parameters) {
     const auto unknown = [&] {
       return stream::Error(file, fmt::format("the parameter \"{}\" is not one of this version: {}",
-                                             name, value))
+                                             parameter.first, parameter.second))
           .remedy("rebuild the store from its source");
     };
     try {
-      set_parameter(name, value, request);
+      set_parameter(parameter.first, parameter.second, request);
     } catch (const std::invalid_argument&) {
       throw unknown();
     } catch (const UsageError&) {
