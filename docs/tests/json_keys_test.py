@@ -72,7 +72,8 @@ class JsonKeysTest(unittest.TestCase):
     @classmethod
     def make_inputs(cls):
         for line in ('synth dem --size 129x129 -o dem.tif', 'build dem.tif -o dem.st', 'synth surface --points 2k -o scan.ply',
-                     'build scan.ply -o scan.st', 'build scan.ply -o body.st --surface', 'build scan.ply --crs EPSG:2225 -o feet.st', 'tile dem.st --vertical ignore --zoom 0-11 -o tiles',
+                     'build scan.ply -o scan.st', 'synth surface --points 1k --seed 2 -o other.ply', 'build other.ply -o other.st',
+                     'build scan.ply -o body.st --surface', 'build scan.ply --crs EPSG:2225 -o feet.st', 'tile dem.st --vertical ignore --zoom 0-11 -o tiles',
                      'mesh dem.st --smooth laplacian -o smooth.ply --save-overlay heights.overlay',
                      'convert scan.ply -o scan.copc.laz', 'surface scan.st -o body.ply',
                      'cluster scan.ply --method single --dendrogram tree.csv', 'match scan.ply -o pairs.csv'):
@@ -98,7 +99,7 @@ class JsonKeysTest(unittest.TestCase):
     @classmethod
     def run_all(cls):
         for line, exit_code in (
-                ('build dem.tif -o a.st', 0), ('build scan.ply -o b.st --surface', 0), ('info body.st', 0), ('info dem.tif', 0), ('info dem.st', 0), ('info scan.copc.laz', 0),
+                ('build dem.tif -o a.st', 0), ('build dem.tif -o a.st --append', 0), ('merge scan.st other.st -o c.st', 0), ('build scan.ply -o b.st --surface', 0), ('info body.st', 0), ('info dem.tif', 0), ('info dem.st', 0), ('info scan.copc.laz', 0),
                 ('info gaps.csv', 0), ('info withheld.las', 0), ('verify dem.st', 0), ('verify damaged.st', 1),
                 ('verify tiles --store dem.st --vertical ignore', 0), ('points dem.st --level 1 -o a.csv', 0),
                 ('points dem.st --near 400100,5199900 -k 3 -o b.csv', 0), ('points dem.st --overlay heights.overlay -o c.csv', 0),
