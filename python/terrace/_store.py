@@ -196,7 +196,7 @@ def merge(stores: Iterable[Path], store: Path, *, replace: bool = False, progres
     ...         build(np.random.default_rng(1).random((2000, 3)) + [x, 0, 0], part).close()
     ...     with merge(parts, folder + '/all') as store:
     ...         print(store)
-    <terrace.Store 'all': 4000 points, 1 level>
+    <terrace.Store 'all': 4000 points, 1 level, points>
     """
     paths = [os.fspath(path) for path in stores]
     for path in paths:
