@@ -371,6 +371,7 @@ TEST_F(Merge, AppendsWindowsOfARaster) {
       kept.push_back(clusters_of(before, l, before.levels()[l].clusters));
     }
     const std::vector<Point> points = points_of(before);
+    const stream::Store late = open("store");  // which opens its segments later
     window(name, box, append);
     const stream::Store after = open("store");
     expect_sound(after);
@@ -378,7 +379,9 @@ TEST_F(Merge, AppendsWindowsOfARaster) {
     for (unsigned l = 0; l < before.top(); ++l) {
       EXPECT_EQ(clusters_of(after, l, before.levels()[l].clusters), kept[l]);
     }
-    EXPECT_EQ(points_of(before), points);  // a reader keeps the store that it has opened
+    // Readers keep the store that they have opened.
+    EXPECT_EQ(points_of(before), points);
+    EXPECT_EQ(points_of(late), points);
   }
   const stream::Store after = open("store");
   EXPECT_EQ(points_of(after), points_of(whole));

@@ -7,6 +7,7 @@
 
 #include <terrace/base/thread_team.hpp>
 
+#include "io/output_placement.hpp"
 #include "spares.hpp"
 #include "store/read/store_impl.hpp"
 #include "store/write/block_encoder.hpp"
@@ -104,6 +105,10 @@ struct StoreWriter::Impl {
   /// Creates a file of the new store with the contents of one of the part's.
   void adopt_file(const Store& store, const ByteSource& from, const FileEntry& entry,
                   const std::string& name) const;
+  /// Renames the files of a new segment, so that its names are not those of another run's. A store
+  /// that extends this one has the same files under the same names, for readers that open them
+  /// late.
+  void name_by_contents(unsigned level, SegmentEntry& segment) const;
   [[nodiscard]] std::uint64_t adopted_clusters(std::size_t level) const {
     return level < adopted.size() ? adopted[level].clusters : 0;
   }
@@ -247,6 +252,20 @@ void StoreWriter::Impl::adopt_file(const Store& store, const ByteSource& from,
   }
 }
 
+void StoreWriter::Impl::name_by_contents(unsigned level, SegmentEntry& segment) const {
+  for (auto [file, kind] :
+       {std::pair(&segment.data, "clusters"), std::pair(&segment.index, "index")}) {
+    const std::string name = segment_file_name(level, segment, kind);
+    std::error_code error;
+    std::filesystem::rename(staging.folder() / file->name, staging.folder() / name, error);
+    if (error) {
+      throw system_error(staging.target().string(), "cannot be renamed", error.value(),
+                         remedy_for(error.value()));
+    }
+    file->name = name;
+  }
+}
+
 SurfaceEntry StoreWriter::Impl::write_surface(const std::string& manifest,
                                               const MakeSurface& make) {
   const auto files = [&](const std::string& name) {
@@ -341,6 +360,7 @@ std::uint64_t StoreWriter::finish(const ClusteredBlock& root, bool publish,
     LevelEntry level = l < w.adopted.size() ? w.adopted[l] : LevelEntry();
     if (w.levels[l] != nullptr) {
       LevelWriter::Written written = w.levels[l]->finish(top, w.bounds);
+      if (!w.adopted.empty()) w.name_by_contents(static_cast<unsigned>(l), written.segment);
       level.members += written.members;
       level.clusters += written.segment.clusters;
       level.segments.push_back(std::move(written.segment));
