@@ -452,7 +452,7 @@ next), and the position of the representative (None in the root)."""
         self.representative = None if root else count // 2 + unzigzag(place)
 
     def move(self, base, shift):
-        self.points = [tuple(c + by for c, by in zip(p, shift)) for p in self.points]
+        self.points = [tuple(c + by if by else c for c, by in zip(p, shift)) for p in self.points]
         self.children = [[below + by for below in level] for level, by in zip(self.children, reversed(base))]
 
     def members(self):

@@ -214,6 +214,28 @@ TEST_F(Merge, HasAllPointsOfClouds) {
   }
 }
 
+TEST_F(Merge, KeepsTheSignOfZero) {
+  std::vector<fs::path> paths;
+  for (const char* name : {"a", "b"}) {
+    std::vector<stream::Point3> points;
+    for (int i = 0; i < 400; ++i) points.push_back({-0.0, -0.0, *name - 95.0 + i});
+    paths.push_back(cloud(name, points).path());
+  }
+  merge(paths, "merged");
+  cloud("merged", {{-0.0, -0.0, -0.0}}, [](BuildRequest& request) { request.append = true; });
+  const stream::Store merged = open("merged");
+  expect_sound(merged);
+  std::size_t negative = 0;
+  for (unsigned level = 0; level <= merged.top(); ++level) {
+    merged.for_each(level, [&](stream::ClusterId, const auto&, const stream::ClusterPoints& p) {
+      for (const stream::Point3& at : p.positions) {
+        negative += std::signbit(at[0]) && std::signbit(at[1]);
+      }
+    });
+  }
+  EXPECT_EQ(negative, 801u);
+}
+
 TEST_F(Merge, ShiftsIntegersOfDifferentOffsets) {
   // Laser points whose headers count from different corners.
   const auto las = [&](const std::string& name, double offset, std::uint64_t seed) {

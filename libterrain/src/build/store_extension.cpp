@@ -18,7 +18,10 @@ namespace terrace::terrain {
 namespace {
 
 void move(stream::Point3& p, const std::array<std::int64_t, 3>& shift) {
-  for (std::size_t axis = 0; axis < 3; ++axis) p[axis] += static_cast<double>(shift[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // A sum would lose the sign of zero.
+    if (shift[axis] != 0) p[axis] += static_cast<double>(shift[axis]);
+  }
 }
 
 stream::Store open_without_overlays(const BuildRequest& request) {

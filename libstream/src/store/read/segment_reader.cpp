@@ -281,7 +281,9 @@ void SegmentReader::check_points(const Entry& entry, const ClusterPoints& points
 /// Converts checked points from the segment's coordinates and ordinals to the store's.
 void SegmentReader::move_into_store(ClusterPoints& points) const {
   const auto move = [this](Point3& p) {
-    for (std::size_t axis = 0; axis < 3; ++axis) p[axis] += shift_[axis];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (shift_[axis] != 0.0) p[axis] += shift_[axis];  // a sum would lose the sign of zero
+    }
   };
   for (Point3& p : points.positions) move(p);
   if (points.has_representative) move(points.representative);
