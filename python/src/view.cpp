@@ -50,7 +50,7 @@ class AnyView {
   /// Pins a cluster, or unpins it if `pin` is empty.
   virtual void pin(tri::ClusterId cluster, std::optional<tri::ViewPin> pin) = 0;
   /// Returns records of the store's schema. Throws: std::invalid_argument for a vertex that does
-  /// not exist or whose attributes are no longer kept.
+  /// not exist or whose attributes were dropped.
   virtual std::vector<std::byte> attributes(std::span<const std::int32_t> vertices) = 0;
   /// Converts points from stored coordinates to metres east, north and up.
   virtual void to_metres(std::span<stream::Point3> points) = 0;
@@ -69,7 +69,7 @@ std::vector<std::byte> records_of(const View& view, const Shown& shown,
     const auto record = view.attributes(vertex);
     if (record.empty()) {
       throw std::invalid_argument("the attributes of vertex " + std::to_string(number) +
-                                  " are no longer kept: read them after the frame that adds it");
+                                  " were dropped: read them right after the frame that adds it");
     }
     records.insert(records.end(), record.begin(), record.end());
   }

@@ -191,7 +191,7 @@ class View:
 
         The attributes of vertices that a frame added are available until the next frame.
 
-        Raises: ValueError for a vertex that does not exist or whose attributes are no longer kept.
+        Raises: ValueError for a vertex that does not exist or whose attributes were dropped.
         """
         return self._core.attributes(as_numbered(vertices, 'vertices', most=2 ** 31 - 1))
 

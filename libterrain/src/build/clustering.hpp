@@ -50,9 +50,10 @@ cluster::HierarchyOptions clustering_of(const BuildRequest& request, const strea
 /// in the order of the manifest.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> recorded_parameters(
     const BuildRequest& request);
-/// Returns a request with the options that recorded_parameters() gave, and otherwise defaults.
-/// file: the store, for messages. Throws: stream::Error for a name or value that it does not write.
+/// Returns the request with the options of clustering that recorded_parameters() gave; all others
+/// stay as they are. file: the store, for messages. Throws: stream::Error for a name or value that
+/// recorded_parameters() does not write.
 [[nodiscard]] BuildRequest recorded_request(const stream::StoreSchema& schema,
-                                            const std::string& file);
+                                            const std::string& file, BuildRequest request = {});
 
 }  // namespace terrace::terrain

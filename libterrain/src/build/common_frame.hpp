@@ -26,7 +26,7 @@ struct CommonFrame {
   /// The first one's, with the columns and rows of all rasters, the cells without data of all, and
   /// the formats of all.
   stream::StoreSchema schema;
-  /// Of each, to be added to its stored coordinates.
+  /// What to add to the stored coordinates of each, in their order.
   std::vector<std::array<std::int64_t, 3>> shifts;
 };
 

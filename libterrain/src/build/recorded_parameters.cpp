@@ -111,9 +111,10 @@ std::vector<std::pair<std::string, std::string>> recorded_parameters(const Build
   return parameters;
 }
 
-BuildRequest recorded_request(const stream::StoreSchema& schema, const std::string& file) {
-  BuildRequest request;
+BuildRequest recorded_request(const stream::StoreSchema& schema, const std::string& file,
+                              BuildRequest request) {
   request.entities = entities_of(schema);
+  request.channels.clear();
   for (const auto& parameter : schema.parameters) {
     const auto unknown = [&] {
       return stream::Error(file, fmt::format("the parameter \"{}\" is not one of this version: {}",

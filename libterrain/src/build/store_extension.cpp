@@ -83,18 +83,9 @@ BuildRequest StoreExtension::clustering_as_before(const BuildRequest& request) c
         "{append} clusters as the store: {} is {}, not {}", parameter.first,
         found == of_store.end() ? std::string("not set") : found->second, parameter.second));
   }
-  BuildRequest result = request;
-  result.entities = recorded.entities;
-  result.block_points = recorded.block_points;
-  result.facility_cost = recorded.facility_cost;
-  result.k = recorded.k;
-  result.effort = recorded.effort;
-  result.z_weight = recorded.z_weight;
-  result.metric = recorded.metric;
-  result.channels = recorded.channels;
-  result.outlier_price = recorded.outlier_price;
-  result.strategy = recorded.strategy;
-  result.batch = recorded.batch;
+  BuildRequest result =
+      recorded_request(part_.store.schema(), part_.store.path().string(), request);
+  result.seed = request.seed;
   return result;
 }
 
